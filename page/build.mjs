@@ -1,10 +1,11 @@
-// Makes what runs out of what is written: `node build.mjs page` makes dist/, `node build.mjs tests` makes build/tests/. Both
-// make build/lockstep.mjs, the page's virtual Uno for another program.
+// Builds the page: `node build.mjs page` makes dist/, and `node build.mjs tests` makes build/tests/. Both make
+// build/lockstep.mjs, the page's virtual Uno for another program.
 //
-// The page is three files that a browser opens from anywhere, the disk included, and three more by which it can be installed where it
-// comes from a server. The firmware is inside, and so is the project's own Rust, as a browser gives no page a file of the disk. Both are
-// packed, as they would be more than half of the page. The firmware comes from `cargo firmware`, which has to be run first; the
-// command `weeder`, the one that WEEDER names or else this repository's, proves its bounds. The Rust is built here.
+// The page has three files that a browser opens from any source, also from the disk. Three more files make it
+// installable from a server. The firmware and the project's Rust are inside the page, because a page opened from the
+// disk may read no file. Both are compressed, as they would be more than half of the page. The firmware comes from
+// `cargo firmware`, which must run first. The command `weeder` proves its bounds: the one that WEEDER names, else this
+// repository's. The Rust is built here.
 
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
@@ -19,7 +20,7 @@ process.chdir(here);
 
 const target = process.env.CARGO_TARGET_DIR ?? "../target";
 
-/** The firmware as a HEX file: `weeder hex` writes none whose bounds are not proved. */
+/** The firmware as a HEX file. `weeder hex` refuses a firmware with unproved bounds. */
 function firmware() {
     const elf = join(target, "avr-none/firmware/weeder-firmware.elf");
     if (!existsSync(elf)) {
@@ -41,21 +42,24 @@ function rust() {
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
-/** A file packed, as a file: src/unpack.ts unpacks it. */
+/** Compresses a file into a file; src/unpack.ts decompresses it. */
 function packed(/** @type {string} */ path) {
     const to = join("build", `${basename(path)}.deflated`);
     writeFileSync(to, deflateRawSync(readFileSync(path), { level: 9 }));
     return resolve(to);
 }
 
-/** The worker that reads logs, as a file: a page from the disk has no worker but one whose code is inside. */
+/**
+ * The worker that reads logs, as a file. A page opened from the disk can only start a worker whose code is inside the
+ * page.
+ */
 async function logWorker() {
     const outfile = resolve("build/log-worker.txt");
     await build({ entryPoints: ["src/record/worker.ts"], bundle: true, minify: true, target: "es2022", outfile });
     return outfile;
 }
 
-/** What the manual says of alarms and warnings, as a file: what to do in its table, and the causes in its lists. */
+/** The manual's alarms and warnings, as a file: the advice from its table, and the causes from its lists. */
 function faults() {
     const manual = readFileSync("../docs/faults.md", "utf8");
     const causes = new Map(
@@ -73,7 +77,7 @@ function faults() {
     return "build/faults.json";
 }
 
-/** Puts the page's texts in English into its HTML, which has their names behind `$`. */
+/** Replaces the names behind `$` in the page's HTML by the English texts. */
 async function english() {
     const { outputFiles } = await build({ entryPoints: ["src/words/en.ts"], format: "esm", write: false });
     const { en } = await import(`data:text/javascript,${encodeURIComponent(outputFiles[0]?.text ?? "")}`);
@@ -100,7 +104,8 @@ const common = {
     bundle: true,
     charset: "utf8",
     target: "es2022",
-    // avr8js as modules also for node: its other form looks each function up anew at every call, and takes twice the time.
+    // avr8js as modules, also for node. Its other form resolves each function again at every call, and takes twice the
+    // time.
     mainFields: ["module", "main"],
     alias: {
         "weeder.hex": resolve(hex),

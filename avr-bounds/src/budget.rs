@@ -1,5 +1,6 @@
-//! What a program may need at most, as a file says it, and whether it keeps to that. The file tells what the ELF does not say as well:
-//! how often loops turn, where calls lead, how deep recursion goes.
+//! The budgets file: the limits that a program must keep, and the check that it keeps them.
+//!
+//! The file also holds facts that the ELF does not: loop bounds, targets of indirect calls, and the depth of recursion.
 
 use crate::error::BoundsError;
 use crate::loops::LoopBounds;
@@ -9,11 +10,11 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What a program may need at most, and facts about it. Every key is optional.
+/// The limits of a program, and facts about it. Every key is optional.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Budgets {
-    /// The chip, where the ELF does not name it.
+    /// The chip, if the ELF does not name it.
     pub chip: Option<String>,
     /// The deepest stack, in bytes.
     pub stack_bytes: Option<u64>,
@@ -25,21 +26,21 @@ pub struct Budgets {
     pub loops_without_bound: Option<u64>,
     /// The longest turn of that loop, without the handlers that come in.
     pub turn_cycles: Option<u64>,
-    /// Edges of the input in a second of which none is lost: at least so many.
+    /// The lowest rate of edges, in edges a second, at which no edge may be lost.
     pub never_lost_per_s: Option<u64>,
-    /// What is to be proved of values in registers.
+    /// The rule for values in registers.
     pub registers: RegisterRule,
-    /// The input whose edges are watched.
+    /// The input with a required rate.
     pub input: Option<Input>,
     /// How often the loops of some functions turn.
     pub loops: LoopBounds,
-    /// Where functions that call by an address can lead: by the caller's name, the functions called.
+    /// Targets of indirect calls: for each calling function, the functions that it may call.
     pub calls: BTreeMap<String, Vec<String>>,
     /// How often functions may be active at once.
     pub recursion: BTreeMap<String, Depth>,
 }
 
-/// How deep a recursion goes.
+/// The depth of a recursion.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Depth {
@@ -49,14 +50,16 @@ pub struct Depth {
     pub because: String,
 }
 
-/// What is to be proved of values in registers.
+/// The rule for values in registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RegisterRule {
-    /// Functions preserve r2 to r17, r28 and r29 and leave zero in r1, as the calling convention has it, and handlers all registers and flags.
+    /// Functions preserve r2 to r17, r28 and r29 and leave zero in r1, as in the calling convention. Handlers preserve
+    /// all registers and flags.
     #[default]
     Convention,
-    /// Whatever a caller needs behind a call is preserved, and handlers preserve all: for compilers that drop the convention.
+    /// Every value that a caller needs after a call is preserved, and handlers preserve all registers. For compilers
+    /// that drop the calling convention.
     Followed,
     /// Nothing.
     Unchecked,
@@ -68,17 +71,17 @@ pub enum RegisterRule {
 pub struct BudgetsError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The problem.
     pub problem: BudgetsProblem,
 }
 
-/// What is wrong with a file of budgets.
+/// The problem of a file of budgets.
 #[derive(Debug, thiserror::Error)]
 pub enum BudgetsProblem {
-    /// The system does not give it.
+    /// The system cannot read it.
     #[error(transparent)]
     File(#[from] io::Error),
-    /// It is no TOML, or has a key that is not known; with line and column.
+    /// It is no TOML, or has an unknown key; with line and column.
     #[error(transparent)]
     Content(#[from] toml::de::Error),
 }
@@ -92,7 +95,7 @@ pub struct Held {
     pub proved: u64,
     /// What is allowed.
     pub budget: u64,
-    /// Whether the one keeps to the other.
+    /// Whether the bound keeps to the budget.
     pub keeps: bool,
 }
 
@@ -100,7 +103,7 @@ impl Budgets {
     /// Reads them from a TOML file.
     ///
     /// # Errors
-    /// Where it cannot be read, or says what is not known.
+    /// If it cannot be read, or says what is not known.
     pub fn read(path: &Path) -> Result<Budgets, BudgetsError> {
         let read = || Ok(toml::from_str(&std::fs::read_to_string(path)?)?);
         read().map_err(|problem| BudgetsError { path: path.into(), problem })
@@ -109,7 +112,7 @@ impl Budgets {
     /// Holds bounds against the budgets that there are.
     ///
     /// # Errors
-    /// Where there is a budget for a time that has no bound.
+    /// If there is a budget for a time that has no bound.
     pub fn hold(&self, bounds: &Bounds) -> Result<Vec<Held>, BoundsError> {
         let mut held = Vec::new();
         let mut at_most = |name, proved, budget: Option<u64>| {
@@ -127,7 +130,7 @@ impl Budgets {
             let longest = bounds.critical_section.or_refuse("a stretch without interrupts")?;
             at_most("critical_section_cycles", longest.unwrap_or_default(), self.critical_section_cycles);
         }
-        // A main program whose turn is not found has bounded nothing.
+        // A main program without a known turn counts as unbounded.
         let loops = bounds.turn.as_ref().map_or(u64::MAX, |turn| turn.without_bound.len() as u64);
         at_most("loops_without_bound", loops, self.loops_without_bound);
         let turn = bounds.turn.as_ref().and_then(|turn| turn.cycles).unwrap_or(u64::MAX);
@@ -144,7 +147,7 @@ impl Budgets {
 }
 
 impl Longest {
-    /// The cycles of a time that has to have a bound; `what` it is the time of. `None` where it never ends.
+    /// The cycles of a time that must have a bound; `what` names it in the error. `None` if it never ends.
     pub(crate) fn or_refuse(&self, what: &str) -> Result<Option<u64>, BoundsError> {
         match self.without_bound.first() {
             None => Ok(self.cycles),

@@ -1,29 +1,30 @@
-//! The chips that are known: memories, vectors and the few registers that matter to the analysis.
+//! The supported chips: memories, vectors, and the few registers that the analysis uses.
 //!
-//! One row a chip. Memories, vectors and register addresses are those of the device's header in avr-libc (`FLASHEND`, `RAMEND`,
-//! `_VECTORS_SIZE`, `EECR`, `GPIOR0`), which a test compares with this table. Cycles of calls and of the interrupt response are those of
-//! the data sheets' instruction set summary and section "Interrupt Response Time".
+//! Each chip has one row. Memories, vectors and register addresses come from the device's header in avr-libc
+//! (`FLASHEND`, `RAMEND`, `_VECTORS_SIZE`, `EECR`, `GPIOR0`). A test compares them with this table. The cycles of calls
+//! and of the interrupt response come from the data sheets: the instruction set summary, and section "Interrupt
+//! Response Time".
 
 use crate::decode::Operation;
 
 /// A chip of the AVR family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chip {
-    /// Its name, as `avr-gcc -mmcu` takes it.
+    /// Its name, as in `avr-gcc -mmcu`.
     pub name: &'static str,
     /// Flash in bytes.
     pub flash_bytes: u32,
-    /// The last address of SRAM, where the stack pointer stands after a reset.
+    /// The last address of SRAM: the stack pointer's value after a reset.
     pub ram_last: u16,
     /// Interrupt vectors, the reset's included.
     pub vectors: u8,
-    /// Bytes of a vector: 4 where there is room for `jmp`, else 2.
+    /// Bytes of a vector: 4 on chips with `jmp`, else 2.
     pub vector_bytes: u32,
     /// The EEPROM's control register, by its address in the data space.
     pub(crate) eecr: u16,
     /// The general purpose I/O registers, by their addresses in the data space.
     pub(crate) gpior: &'static [u16],
-    /// Whether it has `mul` and its like.
+    /// Whether it has `mul` and similar instructions.
     has_mul: bool,
 }
 
@@ -57,17 +58,18 @@ impl Chip {
         CHIPS.into_iter().find(|chip| chip.name == name.to_ascii_lowercase())
     }
 
-    /// Bytes of a return address on the stack: 3 where the program counter does not fit into 2.
+    /// Bytes of a return address on the stack: 3 if the program counter does not fit into 2.
     pub fn return_address_bytes(&self) -> usize {
         if self.flash_bytes > 0x2_0000 { 3 } else { 2 }
     }
 
-    /// Cycles from the end of an instruction to the first one of the vector. Each byte of the return address takes one.
+    /// Cycles from the end of an instruction to the first one of the vector. Each byte of the return address takes one
+    /// cycle.
     pub(crate) fn response_cycles(&self) -> u64 {
         2 + self.return_address_bytes() as u64
     }
 
-    /// Cycles that calls and returns take here beyond what they take with a return address of two bytes.
+    /// Additional cycles of calls and returns, compared with a return address of two bytes.
     pub(crate) fn more_cycles(&self, operation: Operation) -> u32 {
         use Operation::*;
 

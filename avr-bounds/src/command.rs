@@ -1,4 +1,4 @@
-//! The command: what it is asked, and what it prints.
+//! The command line: its arguments, and its output.
 
 use crate::{Bounds, BoundsError, Budgets, Frame, FunctionBounds, Held, Longest, Program, order, prove};
 use anyhow::{Context, Result, ensure};
@@ -23,7 +23,7 @@ pub struct Arguments {
     pub options: Options,
 }
 
-/// What the statuses mean, for the help.
+/// The exit statuses, for the help.
 pub const AFTER_HELP: &str = "\
 Examples:
   avr-bounds blink.elf
@@ -63,7 +63,7 @@ pub struct Options {
     pub diff: Option<PathBuf>,
 }
 
-/// What is printed, and whether every bound keeps to its budget.
+/// The printed text, and whether every bound keeps to its budget.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {
     /// The text.
@@ -80,7 +80,7 @@ struct Command {
     arguments: Arguments,
 }
 
-/// Runs the command as it was typed; its status.
+/// Runs the command with its arguments. Returns its exit status.
 pub fn main() -> ExitCode {
     // Cargo hands its own name for the command on.
     let is_cargo = |(place, argument): &(usize, String)| *place == 1 && argument == "avr-bounds";
@@ -95,10 +95,10 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Proves and prints; whether every bound keeps to its budget.
+/// Proves the bounds and prints them. Returns whether every bound keeps to its budget.
 ///
 /// # Errors
-/// If the program cannot be read or followed, or the budgets not be read.
+/// If the program cannot be read or followed, or the budgets cannot be read.
 pub fn run(arguments: &Arguments) -> Result<bool> {
     let Report { text, keeps } = report(&arguments.elf, &arguments.options)?;
     let mut output = io::stdout().lock();
@@ -110,10 +110,10 @@ pub fn run(arguments: &Arguments) -> Result<bool> {
     Ok(keeps)
 }
 
-/// Proves the bounds of the program at `elf` and says what they are.
+/// Proves the bounds of the program at `elf` and returns the report.
 ///
 /// # Errors
-/// If the program cannot be read or followed, or the budgets not be read.
+/// If the program cannot be read or followed, or the budgets cannot be read.
 pub fn report(elf: &Path, options: &Options) -> Result<Report> {
     let budgets = options.budgets.as_deref().map_or(Ok(Budgets::default()), Budgets::read)?;
     let chip = options.chip.as_deref().or(budgets.chip.as_deref());
@@ -204,7 +204,7 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
             )),
         }
     }
-    // Addresses stand behind `--loops` alone: the rest of the report is the same for programs that are laid out differently.
+    // Only `--loops` prints addresses. So the rest of the report is the same for programs with another layout.
     let named_or_where = if all { ":" } else { ", which --loops names." };
     let loops = &bounds.loops_without_bound;
     if !loops.is_empty() {
@@ -270,7 +270,7 @@ fn graph(bounds: &Bounds) -> String {
     text + "}\n"
 }
 
-/// What changed between two programs, as a table.
+/// The differences of two programs, as a table.
 fn differences(old: &Bounds, new: &Bounds) -> String {
     let (old, new) = (figures(old), figures(new));
     let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
@@ -304,7 +304,7 @@ fn figures(bounds: &Bounds) -> BTreeMap<String, String> {
     all
 }
 
-/// A table whose first column is text, and whose others are numbers as far as they are.
+/// A table. Its first column is text. The others are numbers, if their cells are.
 fn table(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header(head);

@@ -1,6 +1,6 @@
-//! What arithmetic instructions make of registers and flags that are known, as the AVR instruction set manual gives it.
+//! The results of arithmetic instructions on known registers and flags, from the AVR instruction set manual.
 //!
-//! A test compares each of them with the simulator.
+//! A test compares each instruction with the simulator.
 
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
@@ -42,7 +42,7 @@ impl Concrete {
         sum
     }
 
-    /// A difference; with a carry, Z stays clear where it was.
+    /// Subtracts. With a carry, Z can only be cleared, not set.
     fn subtract(&mut self, from: u8, what: u8, carry: Option<u8>) -> u8 {
         let borrowed = carry.unwrap_or_default();
         let difference = from.wrapping_sub(what).wrapping_sub(borrowed);
@@ -65,7 +65,7 @@ impl Concrete {
         value
     }
 
-    /// Carries an instruction out; `false` for one that does more than arithmetic, or goes to memory.
+    /// Executes an instruction. Returns `false` for one that does more than arithmetic, or accesses memory.
     pub(crate) fn carry_out(&mut self, instruction: &Instruction) -> bool {
         let (d, r) = (instruction.destination(), instruction.source());
         let (to, from, constant) = (self.registers[d], self.registers[r], instruction.constant());

@@ -1,8 +1,9 @@
-//! How often a loop turns that counts by itself.
+//! Loop bounds of loops that count by themselves.
 //!
-//! A loop is counted where a branch that leaves it goes by registers which only arithmetic in the loop changes, each of these instructions runs
-//! exactly once a turn, and the registers hold constants wherever the loop is entered. Then those instructions are carried out,
-//! turn after turn, until the branch leaves. Another way out makes the loop shorter, never longer. Everything else is not counted.
+//! A loop is counted under three conditions. A branch leaves the loop, and it depends on registers that only arithmetic
+//! in the loop changes. Each of these instructions runs exactly once a turn. The registers hold constants at every
+//! entry to the loop. The analysis then executes those instructions, turn after turn, until the branch leaves. Another
+//! exit can only make the loop shorter. All other loops are not counted.
 
 use crate::concrete::Concrete;
 use crate::decode::Operation::*;
@@ -13,10 +14,10 @@ use crate::paths::{circles, is_circle};
 use crate::values::Constants;
 use std::collections::BTreeSet;
 
-/// Turns that are tried before a loop counts as endless.
+/// Turns after which a loop counts as endless.
 const MOST_TURNS: u64 = 1 << 22;
 
-/// How often `head` is come to again at most, each time that its loop is entered. `circle` is a strongly connected part of a routine.
+/// The most returns to `head` for each entry to its loop. `circle` is a strongly connected part of a routine.
 pub(crate) fn turns(code: &Code, nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
     let within = |set: &BTreeSet<usize>, node: usize| -> Vec<usize> {
         nodes[node].ways.iter().map(|way| way.to).filter(|to| set.contains(to)).collect()
@@ -30,7 +31,7 @@ pub(crate) fn turns(code: &Code, nodes: &[Node], circle: &BTreeSet<usize>, head:
     if circle.contains(&0) || entries.iter().any(|(to, _)| *to != first) {
         return None;
     }
-    // What runs exactly once a turn: it is in no loop within, and no turn goes round it.
+    // Instructions that run exactly once a turn: they are in no inner loop, and every turn passes them.
     let without_first: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != first).collect();
     let inner: BTreeSet<usize> = circles(&without_first, &|node| within(&without_first, node))
         .into_iter()
@@ -75,7 +76,7 @@ struct Loop<'a> {
     code: &'a Code<'a>,
     nodes: &'a [Node],
     circle: &'a BTreeSet<usize>,
-    /// Its places, each behind those that lead to it from the entry.
+    /// Its places, each after those that lead to it from the entry.
     ordered: &'a [usize],
 }
 
@@ -84,7 +85,7 @@ impl Loop<'_> {
         self.code.instruction(self.nodes[node].place.address).ok()
     }
 
-    /// How often the loop's beginning is come to again, as the branch at `exit` has it.
+    /// The number of returns to the loop's head, by the branch at `exit`.
     fn counted_by(
         &self,
         exit: usize,
@@ -98,7 +99,7 @@ impl Loop<'_> {
         }
         let mut needed = Registers::NONE;
         let mut slice = BTreeSet::new();
-        // Flags are made right in front of what reads them.
+        // Flags are set directly before the instruction that reads them.
         let mut flags_of = vec![(exit, branch.effects().reads & Registers::FLAGS)];
         needed |= branch.effects().reads - Registers::FLAGS;
         loop {
@@ -117,7 +118,7 @@ impl Loop<'_> {
                     }
                 }
             }
-            // Everything in the loop that changes what is needed.
+            // All instructions in the loop that change a needed register.
             let before = (needed, slice.len());
             for &node in self.circle {
                 let instruction = self.instruction(node)?;
@@ -155,7 +156,7 @@ impl Loop<'_> {
     }
 }
 
-/// Whether a call changes what is needed.
+/// Whether a call changes a needed register.
 fn clobbers(called: Option<&crate::flow::Routine>, needed: Registers) -> bool {
     called.is_some_and(|called| needed.iter().any(|register| !called.keeps[register]))
 }
@@ -164,7 +165,7 @@ fn clobbers(called: Option<&crate::flow::Routine>, needed: Registers) -> bool {
 fn run(steps: &[Instruction], exit: u32, stays_when_next: bool, mut held: Concrete, needed: Registers) -> Option<u64> {
     let mut before = held.clone();
     for turn in 0..MOST_TURNS {
-        // What holds the same once more never ends.
+        // If a state repeats, the loop never ends.
         if turn > 0 && needed.iter().all(|register| held.registers[register] == before.registers[register]) {
             return None;
         }
@@ -195,7 +196,7 @@ fn run(steps: &[Instruction], exit: u32, stays_when_next: bool, mut held: Concre
     None
 }
 
-/// Moves the pointer of a load or store, which does nothing else to what is needed.
+/// Moves the pointer of a load or store, which changes no other needed register.
 fn moves_pointer(step: &Instruction, held: &mut Concrete, needed: Registers) -> bool {
     let Some(pointer) = step.moved_pointer() else { return false };
     let is_load = matches!(step.operation, Ld | Lpm | Elpm);

@@ -1,11 +1,13 @@
-//! How long a program may take: the longest path through a routine, and the longest stretch in which no interrupt comes in.
+//! The longest time of a routine, and the longest stretch in which no interrupt is served.
 //!
-//! A path's length is the sum of its instructions' cycles, with what is called on it. Where paths form a loop, the longest is
-//! found for one turn first, from the loop's head back to it, and taken as often as the loop may turn. Loops within loops are
-//! taken from the inside out. How often a loop turns is said by its source or by a table ([`crate::loops`]), or counted
-//! (`counted`). Else the loop is taken once and its head is kept in the result, which then is no bound ([`Time::is_bound`]).
+//! A path's length is the sum of its instructions' cycles, with the called functions. For a loop, the longest path of
+//! one turn is found first, from the loop's head back to it. It is multiplied by the loop bound. Inner loops are
+//! calculated before outer loops. A loop bound comes from the source or a table ([`crate::loops`]), or is counted
+//! (`counted`). Without a bound the loop is taken once, and its head is kept in the result. Such a result is no bound
+//! ([`Time::is_bound`]).
 //!
-//! Paths that never come to an end are left out: a loop that waits for the watchdog's reset is not the longest time of anything.
+//! Paths that never end are left out. For example, a loop that waits for the watchdog's reset adds no time to a
+//! routine.
 
 use crate::counted;
 use crate::flow::{Code, Node, Routine, Way};
@@ -13,12 +15,12 @@ use crate::paths::{circles, is_circle, reaching};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The longest time of something.
+/// A longest time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Time {
-    /// Cycles, where every loop without a bound turns once.
+    /// Cycles. Every loop without a bound counts one turn.
     pub(crate) cycles: u64,
-    /// Addresses of the heads of the loops on the way that have no bound.
+    /// Addresses of the heads of unbounded loops in it.
     pub(crate) unbounded: BTreeSet<u32>,
 }
 
@@ -40,13 +42,13 @@ impl Time {
         self.and(&Time::of(cycles.into()))
     }
 
-    /// The longer of both; loops without a bound on either make the longer one unknown.
+    /// The longer of both. Unbounded loops in either make the result unknown.
     pub(crate) fn or(&self, other: &Time) -> Time {
         Time { cycles: self.cycles.max(other.cycles), unbounded: &self.unbounded | &other.unbounded }
     }
 }
 
-/// The longer of what there is.
+/// The longer of the known times.
 fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
     match (one, other) {
         (Some(one), Some(other)) => Some(one.or(&other)),
@@ -55,36 +57,38 @@ fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
     }
 }
 
-/// What has been said of how often loops are passed through.
+/// The stated loop bounds.
 #[derive(Clone, Default)]
 pub(crate) struct Passes {
-    /// By addresses in loops: how often the program comes by them at most, each time that the loop is come to.
+    /// By addresses in loops: the most executions of the address for each entry to the loop.
     pub(crate) stated: BTreeMap<u32, u64>,
-    /// By addresses at which loops may begin, for the outermost of a function and for each depth within it.
+    /// By addresses where loops may begin: the bounds for the outermost loop of a function and for each depth within
+    /// it.
     pub(crate) of_heads: BTreeMap<u32, Vec<u64>>,
-    /// Entries of functions whose only loop is passed once for each byte of a length, and once more.
+    /// Entries of functions with a single loop, which turns once for each byte of a length, and once more.
     pub(crate) by_length: BTreeSet<u32>,
 }
 
-/// What is meant by a stretch without interrupts.
+/// The two kinds of stretch without interrupts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Stretch {
-    /// From behind the instruction that clears the interrupt flag to behind the one that sets it.
+    /// From the end of the instruction that clears the interrupt flag to the end of the one that sets it.
     FlagClear,
-    /// From one moment at which an interrupt can come in to the next: an instruction in front of it and one behind it join in.
+    /// From one moment at which an interrupt can be served to the next. It includes one instruction before and one
+    /// after.
     Closed,
 }
 
 /// The stretches of a routine.
 #[derive(Clone, Debug, Default)]
 struct Stretches {
-    /// From the entry to a return, all of it without interrupts.
+    /// From the entry to a return, completely without interrupts.
     through: Option<Time>,
-    /// From the entry to where interrupts come in.
+    /// From the entry to the first moment with interrupts.
     first: Option<Time>,
-    /// From where none comes in any more to a return.
+    /// From the last moment with interrupts to a return.
     last: Option<Time>,
-    /// From where none comes in any more to where one does again.
+    /// From one moment with interrupts to the next.
     inner: Option<Time>,
 }
 
@@ -101,7 +105,7 @@ impl<'a> Timer<'a> {
         Timer { code, passes, longest: BTreeMap::new(), stretches: BTreeMap::new() }
     }
 
-    /// The longest path from a routine's entry to the end of a return; `None` where it never returns.
+    /// The longest path from a routine's entry to the end of a return; `None` if it never returns.
     pub(crate) fn longest(&mut self, routine: &Routine) -> Option<Time> {
         if let Some(known) = self.longest.get(&std::ptr::from_ref(routine)) {
             return known.clone();
@@ -113,7 +117,8 @@ impl<'a> Timer<'a> {
         time
     }
 
-    /// The longest paths from a routine's entry to the end of each of some places, and from there to the end of a return.
+    /// The longest paths from a routine's entry to the end of each of some places, and from there to the end of a
+    /// return.
     pub(crate) fn around(&mut self, routine: &Routine, is_place: impl Fn(&Node) -> bool) -> Option<(Time, Time)> {
         let returning = reaching(&routine.nodes, |node| routine.nodes[node].returns.is_some());
         let before = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], None);
@@ -127,7 +132,7 @@ impl<'a> Timer<'a> {
         }
         let after = self.times(&routine.nodes, &|node| returning[node], behind, None);
         let is_passed_again = places.iter().any(|&place| after[place].is_some());
-        // Every path has to come by one of the places.
+        // Every path must pass one of the places.
         let others = self.times(
             &routine.nodes,
             &|node| returning[node] && !places.contains(&node),
@@ -141,7 +146,7 @@ impl<'a> Timer<'a> {
         Some((to?, ends(&routine.nodes, &after)?))
     }
 
-    /// The longest stretch in a routine and in what it calls; `None` where there is none.
+    /// The longest stretch in a routine and in the functions that it calls; `None` if there is none.
     pub(crate) fn longest_stretch(&mut self, routine: &Routine, kind: Stretch) -> Option<Time> {
         self.stretches(routine, kind).inner
     }
@@ -157,7 +162,7 @@ impl<'a> Timer<'a> {
             Stretch::Closed => node.place.interrupts != Interrupts::On,
         };
         let mut found = Stretches::default();
-        // Where stretches begin: behind an instruction that is not in one, or in what was called.
+        // The beginnings of stretches: after an instruction outside of stretches, or in a called function.
         let mut begins = Vec::new();
         for node in nodes {
             for (_, called) in &node.ends_in {
@@ -187,7 +192,7 @@ impl<'a> Timer<'a> {
                 found.inner = longer(found.inner, Some(Time::of(cycles.into())));
             }
         }
-        // Those that begin in here, and the one that the routine is entered in.
+        // The stretches that begin here, and the one at the routine's entry.
         (found.last, found.inner) = self.run(routine, kind, &is_inside, begins, found.inner);
         if is_inside(&nodes[0]) {
             (found.through, found.first) = self.run(routine, kind, &is_inside, vec![(0, Time::default())], None);
@@ -196,7 +201,7 @@ impl<'a> Timer<'a> {
         found
     }
 
-    /// The longest of the stretches that begin so: to a return, and to where interrupts come in.
+    /// The longest of the stretches with these beginnings: to a return, and to a moment with interrupts.
     fn run(
         &mut self,
         routine: &Routine,
@@ -206,7 +211,7 @@ impl<'a> Timer<'a> {
         longest: Option<Time>,
     ) -> (Option<Time>, Option<Time>) {
         let nodes = &routine.nodes;
-        // Where a call's stretch goes on to in what is called: at once, where interrupts are on there.
+        // How a call's stretch continues in the called function: it ends at once if interrupts are on there.
         let opens = |timer: &mut Timer<'a>, called: &Routine| {
             if is_inside(&called.nodes[0]) { timer.stretches(called, kind).first } else { Some(Time::default()) }
         };
@@ -244,8 +249,8 @@ impl<'a> Timer<'a> {
         (to_return, to_open)
     }
 
-    /// The longest turn of the loop that never ends and in which the watchdog is fed: from one `is_fed` to the next. `None` where
-    /// the routine has none.
+    /// The longest turn of the endless loop that feeds the watchdog: from one `is_fed` to the next. `None` if the
+    /// routine has no such loop.
     pub(crate) fn turn(&mut self, routine: &Routine, is_fed: impl Fn(&Node) -> bool) -> Option<Time> {
         let nodes = &routine.nodes;
         let mut turn = None;
@@ -263,7 +268,7 @@ impl<'a> Timer<'a> {
         turn
     }
 
-    /// The time of a way, with what is called on it: all of it, or the part that is in one stretch.
+    /// The time of a way, with the called functions: the whole time, or the part in one stretch.
     fn time_of(&mut self, node: &Node, way: &Way, stretch: Option<Stretch>) -> Option<Time> {
         let called = match (&way.through, stretch) {
             (None, _) => Time::default(),
@@ -282,14 +287,14 @@ impl<'a> Timer<'a> {
         Some(time)
     }
 
-    /// The longest path through a function that goes over so many bytes.
+    /// The longest path through a function that processes this number of bytes.
     fn of_length(&self, routine: &Routine, length: u16) -> Option<Time> {
         let passes = vec![u64::from(length) + 1];
         let of_heads = routine.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
         Timer::new(self.code, Passes { of_heads, ..Passes::default() }).longest(routine)
     }
 
-    /// The beginnings of a routine's own loops that have no bound, but for loops that it never leaves.
+    /// The heads of a routine's own unbounded loops, except loops that it never leaves.
     pub(crate) fn loops_without_bound(&mut self, routine: &Routine) -> BTreeSet<u32> {
         let nodes = &routine.nodes;
         let mut found = BTreeSet::new();
@@ -321,7 +326,7 @@ impl<'a> Timer<'a> {
         found
     }
 
-    /// The same as `times`, where what is called takes no time.
+    /// The same as `times`, without the time of called functions.
     fn times_of_own(
         &self,
         nodes: &[Node],
@@ -335,8 +340,8 @@ impl<'a> Timer<'a> {
         self.fill(nodes, &ways.collect::<Vec<_>>(), within, begins)
     }
 
-    /// The longest time to the beginning of each place that can be come to from those where paths begin, over places that are
-    /// within.
+    /// The longest time to the beginning of each place that can be reached from the starting places, over places that
+    /// are `within`.
     fn times(
         &mut self,
         nodes: &[Node],
@@ -391,7 +396,7 @@ impl Paths<'_> {
         self.nodes[node].place.address
     }
 
-    /// Carries the times of the places where paths begin on to all others of a set, which lies in so many loops; ways back to `heads` are
+    /// Propagates the times of the starting places to all others of a set at this loop depth. Ways back to `heads` are
     /// left out.
     fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
         let ways = |node: usize| self.ways[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
@@ -409,10 +414,10 @@ impl Paths<'_> {
         }
     }
 
-    /// Carries the times at which a loop is entered on to all of its places.
+    /// Propagates the times at a loop's entries to all of its places.
     fn turn(&self, circle: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
-        // Of a loop that can be entered at several places, a turn is the way from one of them to the next, and it turns as often as the
-        // program comes by any of them; what one place in it says is no word for all of them.
+        // In a loop with several entries, a turn is the way from one entry to the next. The loop turns as often as the
+        // program passes any entry. A bound stated at one place is not valid for all of them.
         let heads: BTreeSet<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
         let mut passes = Some(0);
         let mut entered: Option<Time> = None;
@@ -448,7 +453,7 @@ impl Paths<'_> {
         }
     }
 
-    /// How often a loop turns at most, where a place that is in no loop within it says so, and no turn goes round that place.
+    /// The loop bound that a place states, if the place is in no inner loop and every turn passes it.
     fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
         let saying = |node: usize| self.passes.stated.get(&self.address(node)).map(|passes| (node, *passes));
         let within = |node: usize, set: &BTreeSet<usize>| -> Vec<usize> {

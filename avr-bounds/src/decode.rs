@@ -1,14 +1,14 @@
-//! The instructions of the family: what a word of flash means, and how many cycles it takes.
+//! The AVR instructions: the meaning of a word in flash, and its cycles.
 //!
-//! The table has a row for every form of every instruction, its bits written as the AVR instruction set manual writes them, and
-//! its cycles as the data sheet's instruction set summary gives them.
-//! It is the project's own because what would have been there is not dependable enough for a proof: the one crate that decodes AVR
-//! gives `jmp` and `call`, the two that this is about, a wrong length, and the text of avr-objdump is made for readers. A
-//! test holds the table against avr-objdump, over all 65,536 words.
+//! The table has a row for every form of every instruction. Its bits are written as in the AVR instruction set manual.
+//! Its cycles come from the instruction set summary in the data sheet. This project has its own table because no
+//! existing decoder is reliable enough for a proof. The only crate that decodes AVR gives `jmp` and `call` a wrong
+//! length, and this analysis depends on both. The text of avr-objdump is made for readers. A test compares the table
+//! with avr-objdump over all 65,536 words.
 
 use std::sync::LazyLock;
 
-/// What an instruction does. Forms that differ only in how they address memory have the same name.
+/// The operation of an instruction. Forms that differ only in addressing have the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[rustfmt::skip]
 pub(crate) enum Operation {
@@ -20,8 +20,8 @@ pub(crate) enum Operation {
 
 use Operation::*;
 
-/// A form of an instruction: its bits, from the highest on, where a letter is a bit of the operand of that name; what it does;
-/// its cycles, without the one of a branch that is taken and those of what is skipped.
+/// A form of an instruction: its bits, from the highest on (a letter is a bit of the operand with that name); its
+/// operation; its cycles, without the extra one of a taken branch and those of a skipped instruction.
 type Form = (&'static str, Operation, u32);
 
 /// Every form.
@@ -134,7 +134,7 @@ static FORM_OF_WORD: LazyLock<Vec<Option<&Form>>> = LazyLock::new(|| {
             fixed |= 1 << bit;
             value |= usize::from(letter == b'1') << bit;
         }
-        // Every way to fill the bits that are free, counted through them.
+        // Every combination of the free bits.
         let free = !fixed & 0xFFFF;
         let mut operand = 0_usize;
         loop {
@@ -148,26 +148,26 @@ static FORM_OF_WORD: LazyLock<Vec<Option<&Form>>> = LazyLock::new(|| {
     forms
 });
 
-/// An instruction at its place in flash.
+/// An instruction at its address in flash.
 #[derive(Clone, Copy)]
 pub(crate) struct Instruction {
     /// Its address, in bytes.
     pub(crate) address: u32,
     /// What it does.
     pub(crate) operation: Operation,
-    /// Its cycles, without those of a branch that is taken, of what is skipped, and of the EEPROM.
+    /// Its cycles, without those of a taken branch, of a skipped instruction, and of the EEPROM.
     pub(crate) cycles: u32,
     bits: &'static str,
     destination: u8,
     source: u8,
     constant: u8,
     word: u16,
-    /// The second word, of those that have one.
+    /// The second word, if it has one.
     second: u16,
 }
 
 impl Instruction {
-    /// The instruction at an address, in bytes; `None` where there is no flash or no instruction.
+    /// The instruction at an address, in bytes; `None` without flash or a valid instruction.
     pub(crate) fn at(flash: &[u8], address: u32) -> Option<Instruction> {
         let word = |address: u32| {
             let bytes = flash.get(address as usize..)?.first_chunk()?;
@@ -183,13 +183,13 @@ impl Instruction {
         Some(Instruction { destination, source, constant: found.operand('K') as u8, ..found })
     }
 
-    /// The operand of this letter, as a number: its bits, put together; 0 where the form has none.
+    /// The operand with this letter as a number, from its bits; 0 if the form has none.
     pub(crate) fn operand(&self, letter: char) -> u16 {
         let bits = self.bits.chars().zip((0..16).rev()).filter(|(bit, _)| *bit == letter);
         bits.fold(0, |operand, (_, bit)| operand << 1 | self.word >> bit & 1)
     }
 
-    /// The register that is read and written, or written: R0 to R31, of a pair the lower one.
+    /// The register that is written, or read and written: R0 to R31; of a pair the lower one.
     pub(crate) fn destination(&self) -> usize {
         self.destination.into()
     }
@@ -223,9 +223,10 @@ impl Instruction {
         self.constant
     }
 
-    /// The data address that is in the instruction itself: of `in`, `out` and those for a bit of a register as of `lds` and `sts`.
+    /// The data address in the instruction itself: of `in`, `out` and the instructions for a bit of a register, and of
+    /// `lds` and `sts`.
     pub(crate) fn data_address(&self) -> Option<u16> {
-        /// Where the registers for `in` and `out` begin in the data space (data sheet, register summary).
+        /// The address of the registers for `in` and `out` in the data space (data sheet, register summary).
         const IO_START: u16 = 0x20;
 
         match self.operation {
@@ -235,12 +236,12 @@ impl Instruction {
         }
     }
 
-    /// Whether it reads the register at an address in the data space that is in the instruction itself.
+    /// Whether it reads the register at this data address, which is in the instruction itself.
     pub(crate) fn reads(&self, address: u16) -> bool {
         matches!(self.operation, In | Lds | Sbic | Sbis) && self.data_address() == Some(address)
     }
 
-    /// The lower register of the pointer that a load or a store goes by.
+    /// The lower register of the pointer of a load or a store.
     pub(crate) fn pointer(&self) -> Option<usize> {
         match (self.operation, self.word & 0xF) {
             (Ld | St, 0xC..=0xE) => Some(X),
@@ -261,7 +262,7 @@ impl Instruction {
         }
     }
 
-    /// By how much a load or a store moves its pointer: on behind it, or back in front of it.
+    /// The change of the pointer by a load or a store: after it, or before it if negative.
     pub(crate) fn moves_by(&self) -> i8 {
         match (self.moved_pointer(), self.operation, self.word & 0xF) {
             (None, ..) => 0,
@@ -270,7 +271,7 @@ impl Instruction {
         }
     }
 
-    /// How far behind its pointer a load or a store goes.
+    /// The displacement of a load or a store from its pointer.
     pub(crate) fn displacement(&self) -> u8 {
         if matches!(self.operation, Ldd | Std) { self.operand('q') as u8 } else { 0 }
     }
@@ -285,7 +286,7 @@ impl Instruction {
         self.address + self.bytes()
     }
 
-    /// The address that a jump, a call or a branch leads to. Those relative to the program counter wrap at the flash's end.
+    /// The target of a jump, a call or a branch. Relative targets wrap at the flash's end.
     pub(crate) fn target(&self, flash_bytes: u32) -> Option<u32> {
         // The distance is in words, with its sign in the highest bit.
         let relative = |width: u32| {
@@ -321,8 +322,8 @@ mod tests {
     use super::*;
     use std::process::Command;
 
-    /// The instructions that avr-objdump finds in so many bytes of flash: address, length and name. What it takes for data
-    /// is called `.word`.
+    /// The instructions that avr-objdump finds in these bytes of flash: address, length and name. It calls data
+    /// `.word`.
     fn by_objdump(arguments: &[&str], file: &std::path::Path) -> Vec<(u32, u32, String)> {
         let output =
             Command::new("avr-objdump").args(arguments).arg(file).output().expect("./setup.sh brings avr-objdump");
@@ -337,7 +338,7 @@ mod tests {
         text.lines().filter_map(line).collect()
     }
 
-    /// What only the XMEGA have, and what is no instruction.
+    /// Instructions of the XMEGA only, and words that are no instruction.
     const LACKING: [&str; 6] = [".word", "des", "xch", "las", "lac", "lat"];
     const SPM_WITH_INCREMENT: u32 = 0x95F8;
 

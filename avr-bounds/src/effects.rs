@@ -1,7 +1,7 @@
-//! What an instruction reads and what it changes, of registers and of the flags in SREG.
+//! The registers and SREG flags that an instruction reads and changes.
 //!
-//! As the AVR instruction set manual gives it. The interrupt flag is not among the flags here ([`crate::flow`] follows it). A
-//! call, a jump and a return have no effects of their own; what a call does to registers is what the called function does.
+//! The source is the AVR instruction set manual. The interrupt flag is left out here: [`crate::flow`] follows it.
+//! Calls, jumps and returns have no effects of their own. The effects of a call are those of the called function.
 
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
@@ -10,11 +10,11 @@ use std::ops::{self, RangeInclusive};
 
 const SREG: u16 = 0x5F;
 
-/// A set of registers and flags: registers by their number, flags behind them by their bit in SREG.
+/// A set of registers and flags: registers by their number, then flags by their bit in SREG.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Registers(u64);
 
-/// How many registers there are; the flags come behind them.
+/// The number of registers; the flags follow them.
 const REGISTERS: usize = 32;
 
 impl Registers {
@@ -44,7 +44,7 @@ impl Registers {
         self.0 == 0
     }
 
-    /// Those of it that are registers or flags, one after the other.
+    /// Its registers and flags, one after the other.
     pub(crate) fn iter(self) -> impl Iterator<Item = usize> {
         (0..REGISTERS + 7).filter(move |&register| self.contains(register))
     }
@@ -134,7 +134,8 @@ impl Instruction {
         let flag = flags(1 << self.operand('s')) & R::FLAGS;
         let pointer = self.pointer().map_or(R::NONE, R::pair);
         let moved = self.moved_pointer().map_or(R::NONE, R::pair);
-        // A register less itself, or with itself by exclusive or, is 0 or made of the carry, whatever it held.
+        // Subtracting a register from itself, or XOR with itself, gives 0 or a value made from the carry. The old value
+        // does not matter.
         let is_same = d == r;
         let (reads, changes, acts) = match self.operation {
             Sub | Eor if is_same => (R::NONE, to | if self.operation == Sub { HSVNZC } else { SVNZ }, false),
@@ -237,7 +238,8 @@ mod tests {
         }
     }
 
-    /// Whatever registers and flags can hold, with pointers into SRAM, and away from its ends by more than a displacement.
+    /// Random registers and flags. Pointers lead into SRAM, and stay further from its ends than the largest
+    /// displacement.
     fn any_contents(random: &mut ChaCha8Rng) -> Contents {
         std::array::from_fn(|register| match register {
             27 | 29 | 31 => random.random_range(2..6),

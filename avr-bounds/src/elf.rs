@@ -1,5 +1,5 @@
-//! What the analysis takes from an ELF: the bytes in flash and of initialised variables, the functions, the chip, and what the program says
-//! of its loops.
+//! Reads an ELF: the bytes in flash and of initialised variables, the functions, the chip, and the program's records of
+//! loop bounds.
 
 use crate::chip::Chip;
 use crate::lines::Lines;
@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Where AVR ELF files place SRAM and EEPROM in their single address space.
+/// Addresses of SRAM and EEPROM in the single address space of AVR ELF files.
 const SRAM_ORIGIN: u32 = 0x80_0000;
 const EEPROM_ORIGIN: u32 = 0x81_0000;
 
@@ -31,12 +31,12 @@ pub enum ElfError {
         /// The operating system's answer.
         source: std::io::Error,
     },
-    /// The file is no ELF, or a broken one.
+    /// The file is no ELF, or damaged.
     #[error("{path} is not a readable ELF file ({reason})")]
     NotElf {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         reason: object::Error,
     },
     /// The file was made for another processor.
@@ -44,7 +44,7 @@ pub enum ElfError {
     NotAvr {
         /// The file.
         path: PathBuf,
-        /// What it was made for.
+        /// Its target.
         architecture: Architecture,
     },
     /// The file does not name its chip, and neither did the caller.
@@ -62,7 +62,7 @@ pub enum ElfError {
         /// Its name.
         name: String,
     },
-    /// The file holds more than the chip does.
+    /// The file has more bytes than the chip's flash.
     #[error("{path} has {end} bytes for the flash: the {chip} holds {limit}; --chip names another chip")]
     TooLarge {
         /// The file.
@@ -84,37 +84,38 @@ fn names() -> String {
 /// A function's symbol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Symbol {
-    /// Its name as its source has it: a Rust or C++ path, without the compiler's numbers.
+    /// Its name in its source: a Rust or C++ path, without the compiler's numbers.
     pub name: String,
-    /// Its size in bytes; 0 where the file does not say it.
+    /// Its size in bytes; 0 if the file does not have it.
     pub bytes: u32,
 }
 
 /// An ELF, taken apart.
 #[derive(Debug)]
 pub struct Program {
-    /// The chip it is for.
+    /// Its chip.
     pub chip: Chip,
     /// Flash from address 0 to the last byte used.
     pub flash: Vec<u8>,
-    /// Where a reset starts it, in bytes of flash.
+    /// Its start address, in bytes of flash.
     pub start: u32,
-    /// Whether interrupt vectors stand at its start.
+    /// Whether it begins with interrupt vectors.
     pub has_vectors: bool,
-    /// Its functions by their addresses. Of two names for one address the first in the alphabet is kept.
+    /// Its functions by address. Of two names for one address the alphabetically first is kept.
     pub functions: BTreeMap<u32, Symbol>,
     /// Every symbol in flash by its raw name.
     pub(crate) labels: BTreeMap<String, u32>,
-    /// Where code can begin, behind the vectors, and where flash ends but for the initial values of variables.
+    /// The first address of code after the vectors, and the end of flash without the initial values of variables.
     pub(crate) code_start: u32,
     code_end: u32,
     /// Initial values of variables.
     pub(crate) data: Vec<u8>,
     /// Which of these bytes are virtual tables.
     pub(crate) virtual_tables: Vec<Range<usize>>,
-    /// Functions whose address is taken outside virtual tables and the tables of constructors, where the relocations are kept.
+    /// Functions whose address is taken outside virtual tables and the tables of constructors, if the ELF has
+    /// relocations.
     pub(crate) taken: Option<BTreeSet<u32>>,
-    /// What loops say of themselves.
+    /// The records of loops.
     pub(crate) records: BTreeMap<u32, u64>,
     lines: Lines,
 }
@@ -123,7 +124,7 @@ impl Program {
     /// Reads the ELF at `path`, for the chip named, or the one that the file names.
     ///
     /// # Errors
-    /// Where the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
+    /// If the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
     pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, ElfError> {
         let bytes = std::fs::read(path).map_err(|source| ElfError::Read { path: path.into(), source })?;
         let not_elf = |reason| ElfError::NotElf { path: path.into(), reason };
@@ -172,7 +173,7 @@ impl Program {
                 data.get(table.clone()).map(|_| table)
             })
             .collect();
-        // A program that lies behind address 0 is a bootloader; some have no vectors.
+        // A program at a higher address than 0 is a bootloader; some have no vectors.
         let start = if start == u32::MAX { 0 } else { start };
         let has_vectors = start == 0 || labels.get("__vectors") == Some(&start);
         let records = loops::records_of(&file).map_err(not_elf)?;
@@ -196,7 +197,7 @@ impl Program {
         })
     }
 
-    /// What loops say of themselves: by an address in the loop, how often the program comes by it.
+    /// The records of loops: an address in the loop, and the most executions of that address.
     pub fn records(&self) -> &BTreeMap<u32, u64> {
         &self.records
     }
@@ -219,7 +220,7 @@ impl Program {
         [self.code_start].into_iter().chain(ends).zip(begins).map(|(end, begin)| end..begin)
     }
 
-    /// Where the function ends that an address lies in, and where it begins.
+    /// The function that contains an address: its beginning and end.
     pub(crate) fn extent(&self, address: u32) -> Option<(u32, u32)> {
         let (&first, symbol) = self.functions.range(..=address).next_back()?;
         let next = self.functions.range(address + 1..).next().map_or(self.flash.len() as u32, |(&next, _)| next);
@@ -227,9 +228,9 @@ impl Program {
     }
 }
 
-/// The chip that an ELF was made for, if it says so.
+/// The ELF's chip, if it names one.
 fn device(file: &ElfFile32<LittleEndian>) -> Option<String> {
-    /// Where the names begin: behind the note's head, six sizes, and the table of one name.
+    /// The offset of the names: after the note's head, six sizes, and the table of one name.
     const NAMES: usize = 0x31;
 
     let note = file.section_by_name(DEVICE_INFO)?.data().ok()?;
@@ -238,7 +239,7 @@ fn device(file: &ElfFile32<LittleEndian>) -> Option<String> {
 }
 
 fn functions(file: &ElfFile32<LittleEndian>) -> BTreeMap<u32, Symbol> {
-    // Those of libgcc have a size and no type.
+    // Symbols of libgcc have a size and no type.
     let is_code = |symbol: &ElfSymbol32<LittleEndian>| {
         let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
         section.is_some_and(|section| section.kind() == SectionKind::Text)
@@ -269,8 +270,8 @@ fn functions(file: &ElfFile32<LittleEndian>) -> BTreeMap<u32, Symbol> {
     functions
 }
 
-/// The functions whose address is taken, by the relocations that `--emit-relocs` keeps; `None` where there are none. Left out are virtual
-/// tables and the tables of constructors.
+/// The functions whose address is taken, by the relocations that `--emit-relocs` keeps; `None` without relocations.
+/// Virtual tables and the tables of constructors are left out.
 fn taken(
     file: &ElfFile32<LittleEndian>,
     functions: &BTreeMap<u32, Symbol>,
@@ -306,9 +307,9 @@ fn taken(
     is_kept.then_some(taken)
 }
 
-/// A symbol's name as its source has it: a Rust path without the types that it is made for, or a C++ name without its parameters.
+/// A symbol's name in its source: a Rust path without type parameters, or a C++ name without parameters.
 fn demangled(name: &str) -> String {
-    // A local symbol may carry a number behind its mangled name.
+    // A local symbol may have a number behind its mangled name.
     let (mangled, suffix) = name.split_once('.').unwrap_or((name, ""));
     if let Ok(rust) = rustc_demangle::try_demangle(mangled) {
         return without_types(&format!("{rust:#}"));
@@ -319,7 +320,7 @@ fn demangled(name: &str) -> String {
     cpp.unwrap_or_else(|| if suffix.is_empty() { mangled.to_owned() } else { name.to_owned() })
 }
 
-/// A function's path without the types that it is made for: of `<a::B<c::D> as e::F>::g::<h>` remains `a::B::g`.
+/// A function's path without type parameters: `<a::B<c::D> as e::F>::g::<h>` becomes `a::B::g`.
 fn without_types(name: &str) -> String {
     let Some(inner) = name.strip_prefix('<') else {
         let mut depth = 0;

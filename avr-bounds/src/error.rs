@@ -1,16 +1,16 @@
-//! Why nothing could be proved of a program, where, and what to write.
+//! The errors of the analysis: the reason why no proof was possible, the address, and what to write in the budgets.
 
 use crate::elf::ElfError;
 use crate::proved::Place;
 use std::fmt;
 
-/// Why nothing could be proved.
+/// Why no proof was possible.
 #[derive(Debug, thiserror::Error)]
 pub enum BoundsError {
     /// The ELF cannot be read.
     #[error(transparent)]
     Elf(#[from] ElfError),
-    /// The budgets tell of functions that the program does not have.
+    /// The budgets name functions that the program does not have.
     #[error(
         "no function of the program is called {}, which the budgets name in [{table}]: take the names that `avr-objdump -dC` shows",
         names.join(" or ")
@@ -18,10 +18,10 @@ pub enum BoundsError {
     NoSuchFunction {
         /// The table in the budgets.
         table: &'static str,
-        /// What they are said to be called.
+        /// Their names in the budgets.
         names: Vec<String>,
     },
-    /// The program does something at a place that cannot be followed.
+    /// The program has an instruction that cannot be followed.
     #[error("{} {problem}, at {:#06x}{}{}", place.function, place.address, Line(place), problem.advice(place))]
     At {
         /// Where.
@@ -38,10 +38,10 @@ pub enum BoundsError {
         circle.first().map_or("", String::as_str)
     )]
     Recursion {
-        /// The functions, the first once more at the end.
+        /// The functions, with the first one repeated at the end.
         circle: Vec<String>,
     },
-    /// A handler that lets others come in.
+    /// A handler turns interrupts on.
     #[error(
         "the handler of vector {vector} turns interrupts on at {:#06x}{}, in {}: handlers could nest without an end",
         place.address, Line(place), place.function
@@ -52,7 +52,7 @@ pub enum BoundsError {
         /// Where.
         place: Place,
     },
-    /// A loop where time has to have a bound.
+    /// A loop without a bound, where the time must have one.
     #[error(
         "{what} has a loop without a bound, at {:#06x}{} in {}: say how often it turns, by a record in .loop_bounds or for the function, \
          as in [loops] {:?} = {{ passes = 9, because = \"..\" }}",
@@ -64,7 +64,7 @@ pub enum BoundsError {
         /// Where the loop begins.
         place: Place,
     },
-    /// Functions change registers that are needed behind their calls.
+    /// Functions clobber live registers.
     #[error("a value is needed behind a call that clobbers it:{}", all.iter().map(Clobbered::to_string).collect::<String>())]
     Clobbered {
         /// Every call that does.
@@ -81,7 +81,7 @@ pub enum BoundsError {
         /// The registers.
         registers: String,
     },
-    /// A handler leaves something else in registers or flags than it found there.
+    /// A handler changes registers or flags.
     #[error("the handler of vector {vector}, {function}, does not put back what it found in {registers}")]
     HandlerSpoils {
         /// The vector.
@@ -91,7 +91,7 @@ pub enum BoundsError {
         /// The registers and flags.
         registers: String,
     },
-    /// The watched vectors do not come before all others.
+    /// The input's vectors do not rank before all others.
     #[error(
         "vector {other} goes before vector {vector} and is not among those whose edges are watched, so their longest wait is not bounded"
     )]
@@ -101,7 +101,7 @@ pub enum BoundsError {
         /// The one before it.
         other: u8,
     },
-    /// A watched vector has no handler, or one that does not look once.
+    /// A vector of the input has no handler, or its handler does not read the port exactly once.
     #[error(
         "the handler of vector {vector} does not read the port at {port:#04x} exactly once on every path, or there is none"
     )]
@@ -113,7 +113,7 @@ pub enum BoundsError {
     },
 }
 
-/// A place's line, in brackets.
+/// A place's source line, in brackets.
 struct Line<'a>(&'a Place);
 
 impl fmt::Display for Line<'_> {
@@ -125,9 +125,9 @@ impl fmt::Display for Line<'_> {
 /// What cannot be followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Problem {
-    /// A word that is no instruction, or none of this chip.
+    /// A word that is no instruction of this chip.
     NoInstruction,
-    /// A call or a jump to an address that is worked out.
+    /// A call or a jump to a computed address.
     Indirect,
     /// The status register gets a value that is not known.
     UnknownStatus,
@@ -137,9 +137,9 @@ pub enum Problem {
     HalfAStackPointer,
     /// A stack that grows without an end.
     GrowsForEver,
-    /// A function that takes what is not its own from the stack.
+    /// A function that pops more than it has pushed.
     TakesTooMuch,
-    /// A return to an address that the function has put onto the stack.
+    /// A return to an address that the function has pushed.
     ReturnsElsewhere,
     /// `ret` in a handler, or `reti` elsewhere.
     WrongReturn,
@@ -165,7 +165,7 @@ impl fmt::Display for Problem {
 }
 
 impl Problem {
-    /// What to write, behind a colon.
+    /// What to write, after a colon.
     fn advice(self, place: &Place) -> String {
         match self {
             Problem::Indirect => {
@@ -180,7 +180,7 @@ impl Problem {
     }
 }
 
-/// A call behind which registers are needed that the function changes.
+/// A call to a function that clobbers live registers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Clobbered {
     /// The call's address.

@@ -1,17 +1,20 @@
-//! Where a program goes: its calls, its paths, how deep the stack is on each of them and whether interrupts are on.
+//! The control flow of a program: its calls and paths, the depth of the stack on each path, and whether interrupts are
+//! on.
 //!
-//! A [`Routine`] is what is entered at one place, with interrupts on or off: a function, a handler, or the program after a
-//! reset. From its entry every path is followed to its ends. A place on a path is an address together with the bytes that lie on
-//! the stack there and the state of the interrupts; so a stack that differs between two paths to one address is two places,
-//! and one that grows in a loop never ends, which is found. For every place it is known what the registers hold, as far as it
-//! matters (`values`). What a call leaves of them is worked out from the function that is called, not from a convention.
+//! A [`Routine`] has one entry, with interrupts on or off: a function, a handler, or the program after a reset. From
+//! its entry every path is followed to its ends. A place on a path consists of an address, the bytes on the stack, and
+//! the state of the interrupts. Two paths that reach an address with different stacks therefore make two places. A
+//! stack that grows in a loop makes places without end, and the analysis detects this. For every place the analysis
+//! knows the register contents that matter (`values`). It derives the registers that a call preserves from the called
+//! function, not from a convention.
 //!
-//! A jump into another function, as compilers make of a call at the end, is followed like any jump. The reset vector's address
-//! is where a program starts again, so a path ends there. Calls and jumps to addresses that are worked out lead to all their
+//! A jump into another function is followed like any jump: compilers make it from a call at the end (tail call). The
+//! program starts again at the reset vector's address, so a path ends there. Computed calls and jumps lead to all their
 //! targets (`targets`).
 //!
-//! What cannot be followed is refused: indirect calls without targets, recursion that the budgets do not bound, a stack pointer or a
-//! handler's interrupt flag made of what is not known. It is assumed that no store by a pointer hits a return address or a saved register.
+//! The analysis refuses what it cannot follow: indirect calls without targets, recursion without a bound in the
+//! budgets, and a stack pointer or a handler's interrupt flag with an unknown value. It assumes that no store through a
+//! pointer hits a return address or a saved register.
 
 use crate::budget::Budgets;
 use crate::decode::Instruction;
@@ -24,8 +27,8 @@ use crate::values::{Constants, DEEPEST, Doubt, INTERRUPT_FLAG, Interrupts, Known
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
-/// The EEPROM control register's bits that start to read and to write, and for how many cycles the core then stands still (data sheets,
-/// EEPROM data memory).
+/// The EEPROM control register's bits that start a read and a write, and for how many cycles they halt the core (data
+/// sheets, EEPROM data memory).
 const EERE: u16 = 0;
 const EEPE: u16 = 1;
 const READ_HALT_CYCLES: u32 = 4;
@@ -34,7 +37,7 @@ const WRITE_HALT_CYCLES: u32 = 2;
 /// SREG's bit of the last result being zero.
 const ZERO_FLAG: u16 = 1;
 
-/// How a routine is entered, and so how it has to end.
+/// The kind of a routine's entry, which decides how it must end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Kind {
     /// From the reset vector.
@@ -69,44 +72,45 @@ pub(crate) struct Place {
 pub(crate) struct Way {
     /// The place's number in its routine.
     pub(crate) to: usize,
-    /// Cycles of the instruction on this way, those of a call's own included.
+    /// Cycles of the instruction on this way, including those of a call itself.
     pub(crate) cycles: u32,
-    /// The routine that is run through on this way.
+    /// The routine that is called on this way.
     pub(crate) through: Option<Rc<Routine>>,
-    /// The number in R21 and R20 where the way begins, if it is known: how many bytes a call of `memcpy` and its like is about.
+    /// The number in R21 and R20 at the beginning of the way, if it is known: the length argument of `memcpy` and
+    /// similar functions.
     pub(crate) length: Option<u16>,
-    /// Registers that hold known constants behind the instruction.
+    /// Registers with known constants after the instruction.
     pub(crate) constants: Constants,
 }
 
-/// An instruction at a place, and where it leads.
+/// An instruction at a place, and its ways.
 #[derive(Clone)]
 pub(crate) struct Node {
     pub(crate) place: Place,
     pub(crate) ways: Vec<Way>,
-    /// The routine returns here, after so many cycles.
+    /// If the routine returns here, the cycles of the return.
     pub(crate) returns: Option<u32>,
     /// Functions that are called from here and never return, and the cycles of the call.
     pub(crate) ends_in: Vec<(u32, Rc<Routine>)>,
-    /// Whether the instruction waits for something that has no time of its own.
+    /// Whether the instruction waits for an unknown time.
     pub(crate) waits: bool,
 }
 
-/// A routine whose every path is known.
+/// A routine with all its paths.
 pub(crate) struct Routine {
     pub(crate) entry: Entry,
-    /// The places that can be come to; the first is the entry.
+    /// The reachable places; the first is the entry.
     pub(crate) nodes: Vec<Node>,
-    /// States of the interrupts behind its returns: off, on.
+    /// States of the interrupts after its returns: off, on.
     pub(crate) returns: BTreeSet<Interrupts>,
-    /// Registers that hold at every return what they held at the entry.
+    /// Registers with the same value at every return as at the entry.
     pub(crate) keeps: [bool; 32],
     /// Whether R1 is zero at every return.
     pub(crate) leaves_zero: bool,
-    /// The deepest stack, and the deepest where an interrupt can come in: who holds how much of it, from the entry on.
+    /// The deepest stack, and the deepest stack with interrupts on: the bytes of each function, from the entry on.
     pub(crate) deepest: Vec<Frame>,
     pub(crate) deepest_interrupted: Option<Vec<Frame>>,
-    /// Where interrupts that were off at the entry are turned on, in it or in what it calls.
+    /// The address where interrupts that were off at the entry are turned on, in it or in a called function.
     pub(crate) enables: Option<u32>,
 }
 
@@ -115,17 +119,17 @@ pub(crate) fn bytes(frames: &[Frame]) -> usize {
     frames.iter().map(|frame| frame.bytes).sum()
 }
 
-/// A program in flash, and what is known of its routines.
+/// A program in flash, and the known facts about its routines.
 pub(crate) struct Code<'a> {
     pub(crate) elf: &'a elf::Program,
     budgets: &'a Budgets,
     targets: Targets,
     /// Which calls of functions with bounded recursion can be active at once: each by its function's address.
     active: Vec<Vec<u32>>,
-    /// Indirect calls, with what they lead to.
+    /// Indirect calls, with their targets.
     pub(crate) indirect: BTreeMap<u32, Where>,
     routines: BTreeMap<Entry, Rc<Routine>>,
-    /// Those that are being followed, the outermost first.
+    /// The routines that are being followed, the outermost first.
     open: Vec<Entry>,
 }
 
@@ -148,7 +152,7 @@ impl<'a> Code<'a> {
         found.ok_or_else(|| self.refuse(address, Problem::NoInstruction))
     }
 
-    /// A refusal of what is done at an address.
+    /// The error for an instruction at an address.
     fn refuse(&self, address: u32, problem: Problem) -> BoundsError {
         BoundsError::At { place: self.place(address), problem }
     }
@@ -158,7 +162,7 @@ impl<'a> Code<'a> {
         proved::Place { address, function: self.name(address), source: self.elf.line(address) }
     }
 
-    /// What is active in a function that is called from where so much is active; `None` where it is as deep as it goes.
+    /// The number of active calls in a called function; `None` if the recursion is at its limit.
     fn enter(&mut self, function: u32, active: usize) -> Option<usize> {
         let symbol = self.elf.functions.get(&function);
         let Some(bound) = symbol.and_then(|symbol| self.budgets.recursion.get(&symbol.name)) else {
@@ -187,7 +191,7 @@ impl<'a> Code<'a> {
         before.map_or_else(|| format!("{address:#06x}"), |(_, symbol)| symbol.name.clone())
     }
 
-    /// What a routine is called: a handler after the function that its vector leads to.
+    /// A routine's name. A handler has the name of the function that its vector leads to.
     pub(crate) fn name_of(&self, entry: Entry) -> String {
         let leads_to = || self.instruction(entry.address).ok()?.target(self.flash_bytes());
         match entry.kind {
@@ -197,7 +201,7 @@ impl<'a> Code<'a> {
         }
     }
 
-    /// Follows a routine through all its paths, and those that it calls.
+    /// Follows a routine through all its paths, and the routines that it calls.
     pub(crate) fn follow(&mut self, entry: Entry) -> Result<Rc<Routine>, BoundsError> {
         if let Some(routine) = self.routines.get(&entry) {
             return Ok(Rc::clone(routine));
@@ -221,7 +225,7 @@ impl<'a> Code<'a> {
     }
 }
 
-/// Where an instruction leads from a place.
+/// The next address of an instruction at a place.
 struct Next {
     place: Place,
     known: Known,
@@ -229,7 +233,7 @@ struct Next {
     through: Option<Rc<Routine>>,
 }
 
-/// All that an instruction does at a place.
+/// The effects of an instruction at a place.
 #[derive(Default)]
 struct Step {
     next: Vec<Next>,
@@ -323,7 +327,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         })
     }
 
-    /// The deepest stack over the places that count, and those of the routines called.
+    /// The deepest stack over the selected places, and over the called routines.
     fn deepest(
         &self,
         nodes: &[Node],
@@ -352,7 +356,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         Some([vec![Frame { function, bytes: depth }], below].concat())
     }
 
-    /// Carries the instruction at a place out.
+    /// Executes the instruction at a place.
     fn step(&mut self, place: Place) -> Result<Step, BoundsError> {
         let mut known = self.known[&place].clone();
         let instruction = self.program.instruction(place.address)?;
@@ -364,7 +368,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         if known.upper_half.is_some() && place.interrupts == Interrupts::On {
             return Err(self.program.refuse(at, Problem::HalfAStackPointer));
         }
-        // What lies in these can be changed by any handler that comes in.
+        // Any handler can change these registers.
         if place.interrupts == Interrupts::On {
             known.kept = [Value::Unknown; 3];
         }
@@ -426,7 +430,7 @@ impl<'p, 'a> Follower<'p, 'a> {
             Rcall | Call => {
                 let target = target.unwrap_or_default();
                 if target == instruction.next() {
-                    // A compiler's shortest way to put bytes onto the stack.
+                    // A compiler's shortest code for pushing bytes.
                     known.stack.extend(vec![Value::Unknown; chip.return_address_bytes()]);
                     self.go(&mut step, target, known, interrupts, cycles, None);
                 } else {
@@ -454,7 +458,7 @@ impl<'p, 'a> Follower<'p, 'a> {
                 let is_start_up = self.entry.kind == Kind::Reset;
                 let done = known.carry_out(&instruction, &chip, place.interrupts, &mut interrupts, is_start_up);
                 let problem = match done {
-                    // Whatever is put there: both can be.
+                    // The value is unknown, so interrupts can be on or off.
                     Err(Doubt::Status) if self.entry.kind != Kind::Handler => {
                         self.go(&mut step, instruction.next(), known.clone(), Interrupts::Off, cycles, None);
                         turn(&mut interrupts, true);
@@ -475,7 +479,7 @@ impl<'p, 'a> Follower<'p, 'a> {
                 {
                     self.enables.get_or_insert(at);
                 }
-                // What sleeps with interrupts off sleeps on, and how long flash takes to be written is not in the instruction.
+                // A sleep with interrupts off does not end, and the time of a write to flash is unknown.
                 step.waits = match instruction.operation {
                     Sleep => place.interrupts == Interrupts::Off,
                     operation => operation == Spm,
@@ -486,7 +490,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         Ok(step)
     }
 
-    /// Goes on at an address.
+    /// Continues at an address.
     fn go(
         &self,
         step: &mut Step,
@@ -503,7 +507,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         }
     }
 
-    /// Goes on at every target of an indirect call or jump.
+    /// Continues at every target of an indirect call or jump.
     fn lead(
         &mut self,
         step: &mut Step,
@@ -526,7 +530,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         Ok(())
     }
 
-    /// Calls a function and goes on behind it.
+    /// Calls a function and continues after it.
     fn call(
         &mut self,
         step: &mut Step,
@@ -545,7 +549,7 @@ impl<'p, 'a> Follower<'p, 'a> {
             self.enables = called.enables.filter(|_| interrupts == Interrupts::Off);
         }
         known.after_call(&called.keeps);
-        // The convention, which is checked where the function returns.
+        // The calling convention, which is checked at the function's return.
         if called.leaves_zero && !called.keeps[1] {
             known.registers[1] = Value::Constant(0);
         }
@@ -560,8 +564,8 @@ impl<'p, 'a> Follower<'p, 'a> {
     }
 }
 
-/// Cycles for which the core stands still behind an instruction, because of the EEPROM. A write of the whole register may order either;
-/// it is taken for the longer.
+/// Cycles that the EEPROM halts the core after an instruction. A write of the whole register may start either; it
+/// counts as the longer one.
 fn halt_cycles(instruction: &Instruction, eecr: u16) -> u32 {
     match (instruction.operation, instruction.data_address()) {
         (Sbi, Some(address)) if address == eecr => match instruction.operand('b') {

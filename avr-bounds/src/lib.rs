@@ -1,8 +1,9 @@
-//! What an AVR program can need at most, proved from its ELF: stack, handlers, stretches without interrupts, and how fast the edges of
-//! an input may follow each other.
+//! Upper bounds for an AVR program, proved from its ELF: stack, handlers, stretches without interrupts, and the rate of
+//! an input's edges.
 //!
-//! [`prove`] follows every path of the program in flash, from the reset vector and from every interrupt's, and takes the deepest and the
-//! longest. The program is not run, and nothing is sampled. So the bounds hold for every input and every phase.
+//! [`prove`] follows every path of the program in flash, from the reset vector and from every interrupt vector. It
+//! takes the deepest and the longest path. The program is not run, and nothing is sampled. So the bounds hold for every
+//! input and every phase.
 //!
 //! ```no_run
 //! use avr_bounds::{Budgets, Program, prove};
@@ -13,24 +14,31 @@
 //! # Ok::<(), avr_bounds::BoundsError>(())
 //! ```
 //!
-//! What it takes for granted: handlers do not turn interrupts on (this is checked, and refused), stores through pointers keep off return
-//! addresses and saved registers, and the program gets the address of a function from one of the places where the README says that
-//! such addresses are found. A path that the program never takes is followed like any other. So a bound can be larger than what ever
-//! happens, never smaller.
+//! The proof makes three assumptions. Handlers do not turn interrupts on; the analysis checks this and refuses a
+//! program that does. Stores through pointers do not touch return addresses and saved registers. The program takes
+//! function addresses only from the places that the README lists. The analysis also follows paths that the program
+//! never takes. So a bound can be larger than any real value, but never smaller.
 //!
 //! # The response of a handler
 //!
-//! A request waits for the longest other handler of lower rank, or for its own; for each handler of higher rank once; and in front of each of
-//! them for the longest stretch of the main program in which no interrupt comes in. After each handler the program is given one
-//! instruction, and that one may turn interrupts off. Handlers that ask more often than once in this time make the wait longer.
+//! A request waits for the longest other handler of lower rank, or for its own handler. It also waits once for each
+//! handler of higher rank. In front of each handler it waits for the longest stretch of the main program in which no
+//! interrupt is served. After each handler the main program executes one instruction, and that instruction may turn
+//! interrupts off. A handler that is requested more than once in this time makes the wait longer.
 //!
 //! # The rate that is never lost
 //!
-//! An edge asks for a handler, and the handler looks at the pins. From an edge that comes right behind one look to the next look
-//! pass, at most: the chip's synchroniser; the longest other handler, or what is left of this one behind its look; the longest
-//! stretch of the main program in which no interrupt comes in; the interrupt's response; the handler up to its look. While no more
-//! edges come in that time than the decoder can tell apart, none is ever lost, however long it goes on. It holds for the
-//! vectors that go before all others that the program uses, which is checked.
+//! An edge requests a handler, and the handler reads the pins. The worst edge comes directly after one read. The time
+//! to the next read is at most the sum of:
+//!
+//! - the chip's synchroniser;
+//! - the longest other handler, or the rest of this handler after its read;
+//! - the longest stretch of the main program in which no interrupt is served;
+//! - the interrupt response;
+//! - the handler up to its read.
+//!
+//! While no more edges come in that time than the decoder can tell apart, no edge is lost, for any duration. This holds
+//! for the vectors that rank before all others that the program uses. The analysis checks their rank.
 
 mod budget;
 mod chip;
@@ -69,15 +77,16 @@ use self::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-/// Cycles more that a response takes out of sleep (data sheets, interrupt response time), without the time that the oscillator needs.
+/// Additional cycles of a response in sleep (data sheets, interrupt response time), without the oscillator's start-up
+/// time.
 const WAKE_UP_CYCLES: u64 = 4;
 
-/// Cycles from an edge at a pin until it asks for its interrupt, at most, and by which it may come before a look and not be seen
-/// (data sheet, pin change interrupt timing, and reading the pin value).
+/// The most cycles from an edge at a pin to its interrupt request. An edge that comes up to this time before a read may
+/// also be missed by that read (data sheet, pin change interrupt timing, and reading the pin value).
 const SYNCHRONISER_CYCLES: u64 = 3;
 
-/// The instruction at an address of flash, as the proof takes it: its length in bytes and what a disassembler calls it. None where
-/// no instruction stands.
+/// The instruction at an address of flash, as the proof decodes it: its length in bytes and its disassembled name.
+/// `None` without an instruction.
 pub fn instruction_at(flash: &[u8], address: u32) -> Option<(u32, String)> {
     Instruction::at(flash, address).map(|found| (found.bytes(), found.mnemonic()))
 }
@@ -86,7 +95,7 @@ pub fn instruction_at(flash: &[u8], address: u32) -> Option<(u32, String)> {
 /// used: how often loops turn, where calls lead, how deep recursion goes. Their limits are not ([`Budgets::hold`]).
 ///
 /// # Errors
-/// Where the program cannot be followed.
+/// If the program cannot be followed.
 pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     let known: BTreeSet<&str> = elf.functions.values().map(|symbol| symbol.name.as_str()).collect();
     let tables: [(_, Vec<&String>); 2] =
@@ -153,7 +162,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     })
 }
 
-/// What is said of loops.
+/// The stated loop bounds.
 fn passes(code: &Code, budgets: &Budgets) -> Passes {
     let loops = &budgets.loops;
     let functions = code.elf.functions.iter();
@@ -188,7 +197,7 @@ fn time_handlers(
             }
         })
         .collect();
-    // One that never returns lets no other wait: the program ends in it.
+    // A handler that never returns delays no other: the program ends in it.
     let time = |handler: &Handler| {
         if handler.without_bound.is_empty() { Some(handler.cycles.unwrap_or_default()) } else { None }
     };
@@ -208,7 +217,8 @@ fn time_handlers(
     timed
 }
 
-/// How long an edge of an input waits for a look, and how fast its edges may come. `of_handlers` are all handlers with their times.
+/// The longest wait of an input's edge for a read, and the highest rate of its edges. `of_handlers` are all handlers
+/// with their times.
 fn watch(
     input: &Input,
     code: &Code,
@@ -242,7 +252,8 @@ fn watch(
     Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * input.clock_hz / wait_cycles })
 }
 
-/// The deepest stack: the main program where a handler comes in, and that handler, or with interrupts off the main program alone.
+/// The deepest stack: the main program plus a handler with interrupts on, or the main program alone with interrupts
+/// off.
 fn deepest<'a>(
     main: &Routine,
     handlers: impl Iterator<Item = &'a Rc<Routine>>,
@@ -260,7 +271,7 @@ fn deepest<'a>(
     interrupted.into_iter().chain([main.deepest.clone()]).max_by_key(|frames| bytes(frames)).unwrap_or_default()
 }
 
-/// Every function that is come to, in whatever state of the interrupts.
+/// Every function that the program reaches, with interrupts on or off.
 fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
     let mut found: BTreeMap<u32, (FunctionBounds, Option<Time>)> = BTreeMap::new();
     for routine in code.routines() {
@@ -303,15 +314,15 @@ fn indirect(code: &Code) -> Vec<Indirect> {
 }
 
 impl Time {
-    /// The time with the places that have no bound.
+    /// The time with its unbounded places.
     fn longest(&self, code: &Code) -> Longest {
         let without_bound = self.unbounded.iter().map(|&address| code.place(address)).collect();
         Longest { cycles: self.is_bound().then_some(self.cycles), without_bound }
     }
 }
 
-/// Where the handler of a vector is entered: at the vector itself. `None` where the vector's jumps lead to the reset, as
-/// they do for a vector that is not used.
+/// The entry of a vector's handler: the vector itself. `None` if the vector's jumps lead to the reset, as for unused
+/// vectors.
 fn handler_of(code: &Code, vector: u8) -> Result<Option<u32>, BoundsError> {
     let start = code.elf.start + u32::from(vector) * code.elf.chip.vector_bytes;
     let mut address = start;

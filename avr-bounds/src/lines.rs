@@ -1,4 +1,4 @@
-//! Which line of a source an address comes from, as the ELF's debug information has it.
+//! Maps addresses to lines of source, by the ELF's debug information.
 
 use addr2line::Loader;
 use std::cell::OnceCell;

@@ -1,8 +1,8 @@
-//! How often loops turn, as their sources say it.
+//! Loop bounds that the source or a table states.
 //!
-//! A loop says it by a record in the ELF's section `.loop_bounds`, which takes no flash: an address inside the loop, and how
-//! often the program comes by it at most each time that the loop is come to, 4 bytes each. Assembly inside the loop writes it, in C
-//! and in Rust alike:
+//! A loop states its bound in a record in the ELF's section `.loop_bounds`, which takes no flash. A record has two
+//! values of 4 bytes: an address inside the loop, and the most executions of this address for each entry to the loop.
+//! Assembly inside the loop writes the record, in C and in Rust alike:
 //!
 //! ```text
 //! 1: .pushsection .loop_bounds, "", @progbits
@@ -10,17 +10,17 @@
 //!    .popsection
 //! ```
 //!
-//! The compiler keeps such a record in its loop, and writes it twice where it makes two loops of one. The record is taken for
-//! the innermost loop around its address, and only where no turn can go round it; so a record that has come to lie elsewhere
-//! bounds nothing.
+//! The compiler keeps such a record in its loop. If it splits the loop into two, it writes the record twice. The record
+//! applies to the innermost loop around its address, and only if every turn passes the address. So a record that was
+//! moved elsewhere bounds nothing.
 //!
-//! Where a source cannot write assembly, or is a library's, a table names the function, by its path without types, and says how often the
-//! program comes by the beginning of a loop in it at most ([`LoopBound`]), or by each of its beginnings where it can be entered at
-//! several places: of the outermost loops, of those within them, and so on. Of several loops side by side it is the one that turns most
-//! that counts, since the order in which a compiler lays them out is nobody's business. A record at a loop goes before the table. A function
-//! that goes over as many bytes as its third argument says is taken to do so wherever a caller gives a constant.
+//! A source that cannot write assembly, such as a library's, needs a row in a table ([`LoopBound`]). The row names the
+//! function by its path without types. It states the most executions of a loop's head, or of each head if the loop has
+//! several entries. It has one number for the outermost loops, one for the loops within them, and so on. For loops side
+//! by side it states the largest number, because the compiler chooses their order. A record at a loop takes precedence
+//! over the table. For a function whose third argument is a number of bytes, a constant argument is used as its bound.
 //!
-//! That a number is right is the source's word, or the table's, which a run in the simulator can refute.
+//! The analysis does not prove that a stated number is right. A run in the simulator can disprove it.
 
 use object::read::elf::ElfFile32;
 use object::{LittleEndian, Object, ObjectSection};
@@ -34,18 +34,19 @@ const SECTION: &str = ".loop_bounds";
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoopBound {
-    /// How often the program comes by the beginning of a loop at most, each time that the loop is come to: of the outermost, of those
-    /// within them, and so on; the last number is that of all that are deeper.
+    /// The most executions of a loop's head for each entry to the loop: of the outermost, of those within them, and so
+    /// on. The last number is valid for all deeper loops.
     #[serde(deserialize_with = "one_or_several")]
     pub passes: Vec<u64>,
-    /// Whether it is once for each byte of the length that the caller gives, and once more: where that is a constant, it stands for `passes`.
+    /// Whether the loop turns once for each byte of the caller's length, and once more. A constant length then replaces
+    /// `passes`.
     #[serde(default)]
     pub by_length: bool,
-    /// Why it does not do so more often.
+    /// The reason for the bound.
     pub because: String,
 }
 
-/// A number that holds at every depth may stand alone.
+/// A number that is valid at every depth may be written without a list.
 fn one_or_several<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u64>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "a number, or one for each depth, the outermost loop's first")]
@@ -59,17 +60,17 @@ fn one_or_several<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<V
     }
 }
 
-/// Those of functions, by their paths without types.
+/// The bounds of functions, by their paths without types.
 pub type LoopBounds = BTreeMap<String, LoopBound>;
 
-/// The records of an ELF: an address, and how often the program comes by it at most each time that it comes to the loop around it.
+/// The records of an ELF: an address, and its most executions for each entry to the loop around it.
 pub(crate) fn records_of(file: &ElfFile32<LittleEndian>) -> Result<BTreeMap<u32, u64>, object::Error> {
     let Some(section) = file.section_by_name(SECTION) else { return Ok(BTreeMap::new()) };
     let mut turns = BTreeMap::new();
     for record in section.data()?.chunks_exact(8) {
         let word = |at: usize| record[at..].first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let (address, stated) = (word(0), u64::from(word(4)));
-        // Of two for the same place the larger one holds for both.
+        // Of two records for the same place the larger one is valid for both.
         turns.entry(address).and_modify(|turns| *turns = stated.max(*turns)).or_insert(stated);
     }
     Ok(turns)

@@ -1,28 +1,29 @@
-//! The order of functions in flash in which most calls are short.
+//! An order of functions in flash that makes most calls short.
 //!
-//! `rcall` and `rjmp` take a word, `call` and `jmp` two. A linker that relaxes (`--relax`) takes the short form where it reaches, 4 KiB either
-//! way, but leaves the functions in the order in which the compiler happened to write them. [`order`] begins with that order and moves
-//! functions towards their callers and callees, at first also where that costs something (simulated annealing). Its numbers come from a
-//! fixed seed, so the same program gives the same order.
+//! `rcall` and `rjmp` take one word, `call` and `jmp` two. A linker that relaxes (`--relax`) uses the short form within
+//! its reach of 4 KiB either way. It leaves the functions in the compiler's order. [`order`] starts with that order and
+//! moves functions towards their callers and callees. At first it also accepts moves that cost something (simulated
+//! annealing). Its random numbers come from a fixed seed, so the same program gives the same order.
 //!
-//! A linker script takes the order as patterns of section names, which is why the compiler has to give each function a section of its own.
-//! A pattern that no section has costs nothing, and functions without a pattern follow behind. Assembly and libraries stay where they are.
+//! A linker script takes the order as patterns of section names. So the compiler must give each function its own
+//! section. A pattern without a section costs nothing, and functions without a pattern follow at the end. Assembly and
+//! libraries are not moved.
 
 use crate::decode::Instruction;
 use crate::elf::Program;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// How far the short forms reach from their own end (instruction set manual, RCALL and RJMP).
+/// Reach of the short forms from their own end (instruction set manual, RCALL and RJMP).
 const REACH: std::ops::RangeInclusive<i64> = -4096..=4094;
 
 /// Moves that are tried for each function.
 const TRIES: u32 = 2000;
 
-/// Long calls that a move may cost in the beginning, about.
+/// Long calls that an early move may cost, about.
 const HEAT: f64 = 3.0;
 
-/// A place in the program: which function, or none of those that can be moved, and the offset in it or the address.
+/// A place in the program: the function and the offset in it, or no movable function and the address.
 type Spot = (Option<usize>, i64);
 
 /// The functions that can be moved, and the calls and jumps between functions.
@@ -83,7 +84,7 @@ impl Graph {
     }
 }
 
-/// Numbers that look random (xorshift).
+/// Pseudo-random numbers (xorshift).
 struct Dice(u64);
 
 impl Dice {
@@ -95,10 +96,10 @@ impl Dice {
     }
 }
 
-/// The lines of a linker script that put the functions into an order with few long calls, and how many long calls there are before
-/// and behind.
+/// The lines of a linker script for an order of functions with few long calls, and the number of long calls before and
+/// after.
 ///
-/// The crates' numbers are left out of the names, since they differ from one compiler to the next.
+/// The crates' numbers are left out of the names, since they differ between compilers.
 pub fn order(elf: &Program) -> (String, usize, usize) {
     let graph = Graph::of(elf);
     let functions = graph.names.len();
@@ -120,7 +121,7 @@ pub fn order(elf: &Program) -> (String, usize, usize) {
         let mut next = now.clone();
         let moved = next.remove(dice.below(functions));
         let to = match partners[moved].as_slice() {
-            // Beside a function that calls it or that it calls, more often than anywhere.
+            // Most often a function moves next to a caller or a callee.
             [_, ..] if dice.below(5) < 3 => {
                 let partner = partners[moved][dice.below(partners[moved].len())];
                 next.iter().position(|&function| function == partner).map_or(0, |place| place + dice.below(2))

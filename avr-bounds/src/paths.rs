@@ -1,9 +1,9 @@
-//! Ways over the places of a routine: which parts of it are loops, and what can be come to from where.
+//! The graph of a routine's places: its loops, and which places can be reached from which.
 
 use crate::flow::Node;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// From which nodes one of those can be come to, itself included.
+/// The nodes from which a node with `is_end` can be reached, itself included.
 pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (number, node) in nodes.iter().enumerate() {
@@ -21,12 +21,13 @@ pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bo
     reaches
 }
 
-/// Whether a strongly connected part is a loop: more than a place, or one that leads to itself.
+/// Whether a strongly connected part is a loop: several places, or one that leads to itself.
 pub(crate) fn is_circle(part: &BTreeSet<usize>, ways: &dyn Fn(usize) -> Vec<usize>) -> bool {
     part.len() > 1 || part.iter().any(|&node| ways(node).contains(&node))
 }
 
-/// The strongly connected parts of a set, each before those that it leads to (Tarjan's algorithm, without recursion).
+/// The strongly connected parts of a set, each before the parts that it leads to (Tarjan's algorithm, without
+/// recursion).
 pub(crate) fn circles(set: &BTreeSet<usize>, ways: &dyn Fn(usize) -> Vec<usize>) -> Vec<BTreeSet<usize>> {
     #[derive(Clone, Copy)]
     struct Mark {
@@ -75,7 +76,7 @@ pub(crate) fn circles(set: &BTreeSet<usize>, ways: &dyn Fn(usize) -> Vec<usize>)
             }
         }
     }
-    // Tarjan finds a part behind those that it leads to.
+    // Tarjan's algorithm finds a part after those that it leads to.
     found.reverse();
     found
 }

@@ -1,4 +1,4 @@
-//! What was proved of a program, and of which input.
+//! The result of a proof: the bounds, and the program that they hold for.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -9,9 +9,9 @@ use std::fmt;
 pub struct Place {
     /// Its address in bytes of flash.
     pub address: u32,
-    /// The function it lies in.
+    /// Its function.
     pub function: String,
-    /// File and line, where the ELF says it.
+    /// File and line, if the ELF has them.
     pub source: Option<String>,
 }
 
@@ -23,22 +23,22 @@ impl fmt::Display for Place {
     }
 }
 
-/// The longest time of something.
+/// A longest time.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Longest {
-    /// Cycles; `None` where something on the way has no bound.
+    /// Cycles; `None` if a part of it has no bound.
     pub cycles: Option<u64>,
-    /// What has none: loops, and instructions that wait.
+    /// The unbounded parts: loops, and instructions that wait.
     pub without_bound: Vec<Place>,
 }
 
-/// Bytes of the stack that a function holds at its deepest.
+/// The greatest number of bytes of the stack that a function uses.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Frame {
-    /// The function, as in its source, without the types that it is made for.
+    /// The function's name in its source, without type parameters.
     pub function: String,
-    /// What it has put onto the stack when it calls the next of them, the address that it is returned to from there included; the
-    /// last one, at its deepest.
+    /// Its bytes on the stack when it calls the next function, including the return address of that call. For the last
+    /// function: its deepest stack.
     pub bytes: usize,
 }
 
@@ -49,27 +49,28 @@ pub struct Handler {
     pub vector: u8,
     /// Its name.
     pub function: String,
-    /// The longest time from the interrupt's response to the end of its return; `None` for one that never returns, and where a loop
-    /// has no bound.
+    /// The longest time from the interrupt's response to the end of its return; `None` if it never returns, or if a
+    /// loop has no bound.
     pub cycles: Option<u64>,
-    /// What in it has no bound.
+    /// Its unbounded parts.
     pub without_bound: Vec<Place>,
-    /// The longest time from the request to the first instruction of the handler, if every handler that goes before it comes in once.
-    /// `None` where something on the way has no bound.
+    /// The longest time from the request to the first instruction of the handler, if every handler of higher rank runs
+    /// once. `None` if a part of it has no bound.
     pub response_cycles: Option<u64>,
-    /// The most that it puts onto the stack, the address it returns to included, and where it does not return as well.
+    /// The most bytes that it uses on the stack, including its return address, also on paths without a return.
     pub stack_bytes: usize,
 }
 
-/// An input whose edges ask for interrupts.
+/// An input whose edges request interrupts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
     /// The vectors that its edges ask for.
     pub vectors: BTreeSet<u8>,
-    /// The register that their handlers look at, by its address in the data space: on an ATmega328P PINB 0x23, PINC 0x26, PIND 0x29.
+    /// The register that their handlers read, by its address in the data space: on an ATmega328P PINB 0x23, PINC 0x26,
+    /// PIND 0x29.
     pub port: u16,
-    /// Edges between two looks that the handlers can still tell apart.
+    /// Edges between two reads that the handlers can still distinguish.
     pub edges_between_looks: u64,
     /// The chip's clock.
     #[serde(default = "clock_hz")]
@@ -81,34 +82,34 @@ fn clock_hz() -> u64 {
     16_000_000
 }
 
-/// How fast an input's edges may come.
+/// The highest rate of an input's edges.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct EdgeBounds {
-    /// The longest time from an edge until a handler looks, in cycles.
+    /// The longest time from an edge to a read, in cycles.
     pub wait_cycles: u64,
-    /// Evenly spaced edges in a second of which none is ever lost.
+    /// The highest rate of evenly spaced edges, in edges a second, at which no edge is lost.
     pub never_lost_per_s: u64,
 }
 
-/// Values in registers that last over calls, each of which was found to be left alone or put back.
+/// Values that are live over a call. Each register was found to be untouched, or saved and restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Lasting {
     /// Places that call a function.
     pub calls: usize,
-    /// Bytes in registers that are needed behind them, of all calls together.
+    /// Bytes in live registers over all these calls.
     pub bytes: usize,
 }
 
-/// A function, with all that it calls.
+/// A function, with all functions that it calls.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FunctionBounds {
     /// Its name.
     pub function: String,
     /// Where it begins.
     pub address: u32,
-    /// Its deepest stack, without the address it returns to.
+    /// Its deepest stack, without its return address.
     pub stack_bytes: usize,
-    /// Its longest time, from its first instruction to the end of its return; `None` where it never returns.
+    /// Its longest time, from its first instruction to the end of its return; `None` if it never returns.
     pub longest: Option<Longest>,
     /// The functions that it calls.
     pub calls: BTreeSet<String>,
@@ -135,7 +136,7 @@ pub enum Found {
     Table,
     /// The budgets list them.
     Listed,
-    /// By slot, from the virtual tables, with all functions whose address the program takes.
+    /// By slot, from the virtual tables, and all functions whose address the program takes.
     Slot,
     /// All functions whose address the program takes.
     Taken,
@@ -146,29 +147,30 @@ pub enum Found {
 pub struct Bounds {
     /// The chip.
     pub chip: &'static str,
-    /// The deepest stack in bytes: the main program, and the deepest handler where it comes in.
+    /// The deepest stack in bytes: the main program, and the deepest handler that can interrupt it there.
     pub stack_bytes: usize,
-    /// Whose frames those are, from the reset on.
+    /// Its frames, from the reset on.
     pub stack: Vec<Frame>,
     /// Every handler, by its vector.
     pub handlers: Vec<Handler>,
-    /// The longest stretch of the main program with the interrupt flag clear: from behind the instruction that clears it to behind
-    /// the one that sets it; 0 where it never clears it. Before interrupts are first turned on does not count.
+    /// The longest stretch of the main program with the interrupt flag clear: from the end of the instruction that
+    /// clears it to the end of the one that sets it; 0 if it is never cleared. The time before interrupts are first
+    /// turned on does not count.
     pub critical_section: Longest,
-    /// The longest time from one moment at which the main program lets interrupts in to the next.
+    /// The longest time between two moments at which the main program lets interrupts in.
     pub closed: Longest,
     /// The watched input.
     pub edges: Option<EdgeBounds>,
-    /// The longest turn of the main program's loop, from one `wdr` to the next, without the handlers that come in; `None` where no
-    /// loop feeds the watchdog.
+    /// The longest turn of the main program's loop, from one `wdr` to the next, without handlers; `None` if no loop
+    /// feeds the watchdog.
     pub turn: Option<Longest>,
-    /// What lasts in registers, where that is followed.
+    /// The live values over calls, if the rule `followed` is used.
     pub lasting: Option<Lasting>,
-    /// Every loop without a bound, but for those that the program never leaves.
+    /// Every loop without a bound, except those that the program never leaves.
     pub loops_without_bound: Vec<Place>,
-    /// Calls and jumps to addresses that are worked out.
+    /// Calls and jumps to computed addresses.
     pub indirect: Vec<Indirect>,
-    /// Every function that is come to.
+    /// Every function that the program reaches.
     pub functions: Vec<FunctionBounds>,
 }
 

@@ -1,43 +1,46 @@
-//! Whether every value in a register lasts as long as it is needed: over calls, and over interrupts.
+//! Checks that every live register is preserved over calls and interrupts.
 //!
-//! By default every function is held to the calling convention: it preserves R2 to R17, R28 and R29, and leaves zero in R1. That finds a
-//! push or a pop that is missing, in assembly as well. The rest of this page is about the rule `followed`, for programs whose compiler drops the
-//! convention or goes beyond it. With GCC's `-fipa-ra`, which `-Os` turns on, a caller keeps values in registers that the function which it
-//! calls leaves alone. With LLVM's `--enable-ipra` a function need not save what none of its callers needs. Which registers those are
-//! stands nowhere in the ELF. It can be worked out there, though:
+//! By default every function must keep the calling convention: it preserves R2 to R17, R28 and R29, and leaves zero in
+//! R1. This also finds a missing push or pop in assembly. The rest of this page describes the rule `followed`, for
+//! programs whose compiler drops the convention or goes beyond it. With GCC's `-fipa-ra`, part of `-Os`, a caller keeps
+//! values in registers that the called function does not change. With LLVM's `--enable-ipra` a function need not save a
+//! register that none of its callers needs. The ELF does not list those registers, but the analysis can derive them:
 //!
-//! - **what a function keeps**: the registers that hold at each of its returns what they held at its entry, because nothing has
-//!   changed them or because they were saved and put back ([`Preserved`]);
-//! - **what is needed** behind a call: the registers that are read later on before anything changes them, in the caller, in what it
-//!   calls, or behind its own return in one of its callers ([`LiveIn`]). To save a register and to put it back is no use of it;
-//! - **what a function gives back**: see below.
+//! - **preserved**: at each return of the function the register holds its value at the entry. It was not changed, or it
+//!   was saved and restored ([`Preserved`]);
+//! - **live** after a call: the register is read later before it is changed. The reader is the caller, a function that
+//!   the caller calls, or code behind the caller's own return ([`LiveIn`]). Saving and restoring a register does not
+//!   count as a read;
+//! - **results** of a function: see below.
 //!
-//! A register that is needed behind a call has to be one that the function keeps, or one in which it gives something back. All else
-//! has been clobbered: whoever called the function reads what happened to be left in the register.
+//! A register that is live after a call must be preserved by the function, or hold its result. All other registers are
+//! clobbered: after the call they hold values that the caller must not use.
 //!
-//! # What a function gives back
+//! # Results of a function
 //!
-//! Results are in R18 to R25 and nowhere else, and end in R25 or R24 (AVR calling conventions of GCC and LLVM, libgcc's division
-//! included). Of those a register counts as a result where an instruction puts something there that the function itself does not
-//! need, and that reaches a return. What is read only to work out what nobody needs is not needed, so a result that is worked
-//! out in a loop counts. A counter, a pointer or a temporary value is needed until the function has done with it, so it does not.
-//! The division routines go by what they have worked out so far; for them it is written down ([`LIBRARY`]). All between a result
-//! and R25 goes with it, and R25 with R24, since a value of several bytes lies in neighbours.
+//! Results are in R18 to R25 only, and end in R25 or R24 (AVR calling conventions of GCC and LLVM, libgcc's division
+//! included). One of these registers holds a result if an instruction writes a value that reaches a return and that the
+//! function itself does not need. A value that serves only to calculate unneeded values is itself unneeded. So a result
+//! that is calculated in a loop counts. A counter, a pointer or a temporary value is needed until its last use in the
+//! function, so it does not count. The division routines branch on their partial results; a list names those results
+//! ([`LIBRARY`]). All registers between a result and R25 also count, and R25 counts with R24, because a value of
+//! several bytes uses neighbouring registers.
 //!
-//! # What is found, and what is not
+//! # What the check finds, and what it does not
 //!
-//! Found is an instruction that reads what a call has clobbered, whichever way the program came to it; and a call that clobbers a register
-//! other than a result's, which was set before it, has not been read since, and is needed behind it.
+//! It finds an instruction that reads a clobbered register, on any path. It also finds a call that clobbers a live
+//! register which holds no result, if that register was set before the call and not read since.
 //!
-//! A read that clobbered and proper values can both reach, of a register that was read before the call too, is let pass. Compilers make such
-//! reads of the payload of an empty `Option`, which nobody has set and which they copy with the rest: an analysis of registers
-//! cannot tell the two apart. A test takes from functions of the firmware the saving of a register, and counts how often it is found.
+//! It accepts one kind of read. The register was also read before the call, and both a clobbered and a valid value can
+//! reach the read. Compilers make such reads when they copy an empty `Option`: its payload was never set and is copied
+//! with the rest. An analysis of registers cannot tell this from an error. A test removes the saving of a register from
+//! functions of the firmware, and counts how often the check finds it.
 //!
-//! # What else is held
+//! # Other checks
 //!
-//! R1 is zero at every call of a function that reads it or lets its caller read it, and at every return. A handler leaves every register
-//! and every flag as it found them. That handlers and main program share no memory by accident is Rust's to say, not this
-//! proof's.
+//! R1 is zero at every return, and at every call of a function that reads it or lets its caller read it. A handler
+//! leaves every register and every flag as it found them. This proof does not check that handlers and main program
+//! share memory correctly. Rust ensures that.
 
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
@@ -50,14 +53,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::rc::Rc;
 
-/// The register that is zero between instructions that change it (AVR calling convention).
+/// The register that is zero except between instructions that change it (AVR calling convention).
 const ZERO: usize = 1;
 
 /// Registers that results are in: R18 to R25 (AVR calling conventions).
 const RESULTS: Registers = Registers::range(18..=25);
 
-/// Division, which uses what it gives back, and in which registers it gives it: quotient and remainder (GCC's AVR calling convention,
-/// exceptions).
+/// The division routines, which use their own results, and the registers of quotient and remainder (GCC's AVR calling
+/// convention, exceptions).
 const LIBRARY: [(&str, RangeInclusive<usize>); 3] =
     [("__udivmodqi4", 24..=25), ("__udivmodhi4", 22..=25), ("__udivmodsi4", 18..=25)];
 
@@ -65,24 +68,24 @@ const LIBRARY: [(&str, RangeInclusive<usize>); 3] =
 const GPIOR: [u16; 3] = [0x3E, 0x4A, 0x4B];
 const SPL: u16 = 0x5D;
 
-/// What a register holds, as far as it matters here.
+/// A register's content, as far as it matters here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Content {
     Unknown,
     Zero,
-    /// What this register held at the entry.
+    /// The value of this register at the entry.
     Register(usize),
     /// The flags as they were at the entry.
     Flags,
 }
 
-/// What is held where at a place.
+/// The contents of registers and stack at a place.
 #[derive(Clone, Debug, PartialEq)]
 struct Preserved {
     registers: [Content; 32],
-    /// The flags, of which these are as they were at the entry.
+    /// The flags that still have their values from the entry.
     flags: Registers,
-    /// The register that has just been counted down, while the flag says whether it has come to zero.
+    /// The register that was just decremented, while the flag shows whether it is zero.
     counted: Option<usize>,
     /// The general purpose I/O registers, in which some handlers keep the flags.
     gpior: [Content; 3],
@@ -98,7 +101,7 @@ impl Preserved {
         Preserved { registers, flags: Registers::FLAGS, counted: None, gpior: [Content::Unknown; 3], stack: Vec::new() }
     }
 
-    /// Leaves what both know; whether that is less than before.
+    /// Keeps the facts that both have. Returns whether this has removed any.
     fn meet(&mut self, other: &Preserved) -> bool {
         let mut is_less =
             self.flags & other.flags != self.flags || self.counted.is_some() && self.counted != other.counted;
@@ -116,7 +119,7 @@ impl Preserved {
         is_less
     }
 
-    /// Carries an instruction out that calls nothing.
+    /// Executes an instruction that is no call.
     fn carry_out(&mut self, instruction: &Instruction) {
         let (d, r) = (instruction.destination(), instruction.source());
         let gpior = instruction.data_address().and_then(|address| GPIOR.iter().position(|gpior| *gpior == address));
@@ -166,7 +169,7 @@ impl Preserved {
         }
     }
 
-    /// Something else is in these now.
+    /// Marks these registers as changed.
     fn clobber(&mut self, changed: Registers) {
         for (register, held) in self.registers.iter_mut().enumerate() {
             if changed.contains(register) {
@@ -179,16 +182,16 @@ impl Preserved {
     }
 }
 
-/// What is needed at a place.
+/// The live registers at a place.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 struct LiveIn {
     registers: Registers,
-    /// Bytes of the stack, by how many lie below, that are put back into a register which is needed.
+    /// Bytes of the stack that are restored into a live register, by the number of bytes below them.
     stack: BTreeSet<usize>,
 }
 
 impl LiveIn {
-    /// Takes what else is needed; whether it is more than before.
+    /// Adds live registers. Returns whether there are new ones.
     fn join(&mut self, other: &LiveIn) -> bool {
         let before = (self.registers, self.stack.len());
         self.registers |= other.registers;
@@ -197,15 +200,15 @@ impl LiveIn {
     }
 }
 
-/// What is known of a routine whichever way it is called.
+/// The facts about a routine that are valid for all its callers.
 struct Summary {
-    /// Registers, and flags, that hold at every return what they held at the entry.
+    /// Registers and flags with the same value at every return as at the entry.
     keeps: Registers,
-    /// Registers in which something is given back.
+    /// Registers with a result.
     gives: Registers,
-    /// Those whose value at the entry is read.
+    /// Registers whose value at the entry is read.
     reads: Registers,
-    /// Those whose value at the entry is read on every path.
+    /// Registers whose value at the entry is read on every path.
     surely_reads: Registers,
     /// Whether R1 is zero at each place.
     zero: Vec<bool>,
@@ -214,13 +217,14 @@ struct Summary {
 /// Which needs are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum What {
-    /// What is needed behind the return, and lasts until there. Nothing that is read on the way.
+    /// Registers that are live after the return and preserved until there. Registers that are read on the way do not
+    /// count.
     Lasting,
-    /// What is read before it changes.
+    /// Registers that are read before they change.
     Needed,
 }
 
-/// Proves that in this program every value lasts. `main` and the handlers are where it is entered.
+/// Proves that every live value is preserved in this program. `main` and the handlers are its entries.
 pub(crate) fn prove<'a>(
     program: &Code,
     main: &Rc<Routine>,
@@ -242,7 +246,8 @@ fn is_preserved(register: usize) -> bool {
     matches!(register, 2..=17 | 28 | 29)
 }
 
-/// Proves that every function of this program keeps to the calling convention, and that handlers put back all registers and flags.
+/// Proves that every function of this program keeps the calling convention, and that handlers restore all registers and
+/// flags.
 pub(crate) fn prove_convention<'a>(
     program: &Code,
     handlers: impl Iterator<Item = (u8, &'a Rc<Routine>)>,
@@ -254,7 +259,7 @@ pub(crate) fn prove_convention<'a>(
                 is_preserved(register) && !routine.keeps[register] || register == ZERO && !routine.leaves_zero
             })
         };
-        // What it calls is named for itself.
+        // An error names the function itself, not its caller.
         let called = routine.nodes.iter().flat_map(called).filter(|called| !called.returns.is_empty());
         let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
         if !broken.is_empty() {
@@ -270,11 +275,11 @@ pub(crate) fn prove_convention<'a>(
     Ok(())
 }
 
-/// What is known of the routines of a program.
+/// The facts about the routines of a program.
 struct Survey<'a> {
     program: &'a Code<'a>,
     summaries: BTreeMap<*const Routine, Summary>,
-    /// Each routine behind those that it calls.
+    /// All routines, each after those that it calls.
     order: Vec<Rc<Routine>>,
 }
 
@@ -283,7 +288,7 @@ impl Survey<'_> {
         &self.summaries[&Rc::as_ptr(routine)]
     }
 
-    /// Works out what a routine keeps, and nothing else of it.
+    /// Finds the registers that a routine preserves, and no other facts.
     fn look_at(&mut self, routine: &Rc<Routine>) -> Result<(), BoundsError> {
         if self.summaries.contains_key(&Rc::as_ptr(routine)) {
             return Ok(());
@@ -300,10 +305,10 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// Holds that a handler leaves everything as it found it.
+    /// Checks that a handler changes no register and no flag.
     fn put_back(&self, vector: u8, handler: &Rc<Routine>) -> Result<(), BoundsError> {
         let clobbered = Registers::ALL - self.of(handler).keeps;
-        // What one leaves that never returns is read by none.
+        // A handler that never returns may change registers.
         if !clobbered.is_empty() && handler.nodes.iter().any(|node| node.returns.is_some()) {
             let function = self.program.name_of(handler.entry);
             return Err(BoundsError::HandlerSpoils { vector, function, registers: clobbered.to_string() });
@@ -322,7 +327,7 @@ impl Survey<'_> {
         let gives = self.gives(routine, keeps)?;
         let needs = self.needs(routine, gives, What::Needed)?;
         let reads = needs[0].registers;
-        // On a path that never ends, nothing is left that would not be read on it.
+        // On an endless path every register counts as read, so such paths restrict nothing.
         let surely_reads = self.sure_needs(routine, &needs)?[0] & reads;
         let summary = Summary { keeps, gives, reads, surely_reads, zero };
         self.summaries.insert(Rc::as_ptr(routine), summary);
@@ -330,7 +335,7 @@ impl Survey<'_> {
         Ok(())
     }
 
-    /// What holds at every return what it held at the entry, and where R1 is zero.
+    /// The registers that are preserved at every return, and the places where R1 is zero.
     fn keeps(&self, routine: &Routine) -> Result<(Registers, Vec<bool>), BoundsError> {
         let nodes = &routine.nodes;
         let mut known: Vec<Option<Preserved>> = vec![None; nodes.len()];
@@ -383,7 +388,7 @@ impl Survey<'_> {
         Ok((keeps, known.iter().map(is_zero).collect()))
     }
 
-    /// What is needed at each place, where so much is needed behind the return.
+    /// The live registers at each place, for these live registers after the return.
     fn needs(&self, routine: &Routine, behind: Registers, what: What) -> Result<Vec<LiveIn>, BoundsError> {
         let nodes = &routine.nodes;
         let from = leading_to(nodes);
@@ -400,7 +405,7 @@ impl Survey<'_> {
                     before.registers = before.registers - Registers::one(instruction.destination());
                     before.stack.extend(depth.checked_sub(1));
                 }
-                // What the stack pointer passes over has been put there to be read through a pointer.
+                // Bytes that the stack pointer moves past were written to be read through a pointer.
                 Out if what != What::Lasting && instruction.data_address() == Some(SPL) => {
                     let least = node.ways.iter().map(|way| nodes[way.to].place.depth).min();
                     before.stack.extend(least.unwrap_or(depth)..depth);
@@ -423,7 +428,7 @@ impl Survey<'_> {
         Ok(needs)
     }
 
-    /// What is needed in front of what is called at a place, behind the instruction itself.
+    /// The live registers before a call at a place, after the instruction itself.
     fn in_front(&self, node: &Node, needs: &[LiveIn], what: What) -> LiveIn {
         let mut all = LiveIn::default();
         for way in &node.ways {
@@ -439,7 +444,7 @@ impl Survey<'_> {
         all
     }
 
-    /// In which registers a routine that keeps so many gives something back.
+    /// The result registers of a routine that preserves these registers.
     fn gives(&self, routine: &Routine, keeps: Registers) -> Result<Registers, BoundsError> {
         let name = self.program.name_of(routine.entry);
         if let Some((_, gives)) = LIBRARY.iter().find(|(library, _)| *library == name) {
@@ -469,7 +474,7 @@ impl Survey<'_> {
         Ok(gives - keeps)
     }
 
-    /// What is read on every path from a place on, before it changes and in this routine.
+    /// Registers that are read on every path from a place, before they change and in this routine.
     fn sure_needs(&self, routine: &Routine, needs: &[LiveIn]) -> Result<Vec<Registers>, BoundsError> {
         let nodes = &routine.nodes;
         let from = leading_to(nodes);
@@ -494,7 +499,7 @@ impl Survey<'_> {
         Ok(sure)
     }
 
-    /// In which registers something has been put on every path to a place, and has not been read yet.
+    /// Registers that were written on every path to a place, and not read since.
     fn unread(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
         let nodes = &routine.nodes;
         let mut unread = vec![Registers::ALL; nodes.len()];
@@ -521,7 +526,7 @@ impl Survey<'_> {
         Ok(unread)
     }
 
-    /// What has been clobbered by a call on every path to a place, and not been set since.
+    /// Registers that a call has clobbered on every path to a place, and that were not written since.
     fn clobbered(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
         let nodes = &routine.nodes;
         let mut clobbered = vec![Registers::ALL; nodes.len()];
@@ -546,13 +551,13 @@ impl Survey<'_> {
         Ok(clobbered)
     }
 
-    /// Registers in which a routine gives nothing back and leaves something else than it found. R1 is looked at by itself.
+    /// Registers that a routine changes and that hold no result. R1 is checked separately.
     fn clobbers(&self, routine: &Rc<Routine>) -> Registers {
         let Summary { keeps, gives, .. } = *self.of(routine);
         Registers::ALL - keeps - gives - Registers::one(ZERO)
     }
 
-    /// Holds every call against what is needed behind it.
+    /// Checks every call against the registers that are live after it.
     fn hold(&self) -> Result<Lasting, BoundsError> {
         let mut needed_behind: BTreeMap<*const Routine, Registers> = BTreeMap::new();
         let mut found: BTreeMap<(u32, u32), Registers> = BTreeMap::new();
@@ -600,7 +605,7 @@ impl Survey<'_> {
         Err(BoundsError::Clobbered { all: found.into_iter().map(clobbered).collect() })
     }
 
-    /// The calls that have left in a register what is found there at a place: where they are, and what they call.
+    /// The calls that have clobbered a register at a place: their addresses, and the called functions.
     fn clobberers(
         &self,
         routine: &Routine,
@@ -626,19 +631,20 @@ impl Survey<'_> {
     }
 }
 
-/// What an instruction reads, where so much is needed behind it. What does nothing that is needed reads for nothing.
+/// The registers that an instruction reads, for these live registers after it. An instruction without a live effect
+/// reads nothing.
 fn reads(instruction: &Instruction, needed: Registers) -> Registers {
     let effects = instruction.effects();
     let has_purpose = effects.acts || !(effects.changes & needed).is_empty();
     if has_purpose { effects.reads } else { Registers::NONE }
 }
 
-/// The registers that are needed behind an instruction, and behind what it calls.
+/// The registers that are live after an instruction, and after its called function.
 fn behind(node: &Node, needs: &[LiveIn]) -> Registers {
     node.ways.iter().fold(Registers::NONE, |all, way| all | needs[way.to].registers)
 }
 
-/// The places in front of each place.
+/// The predecessors of each place.
 fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
     let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (number, node) in nodes.iter().enumerate() {
@@ -649,7 +655,7 @@ fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
     from
 }
 
-/// Whether a branch leads there where the last result was zero.
+/// Whether a branch leads there if the last result was zero.
 fn is_way_of_zero(branch: &Instruction, to: u32) -> bool {
     let is_of_zero = Registers::ZERO_FLAG == branch.effects().reads;
     match branch.operation {
@@ -659,7 +665,7 @@ fn is_way_of_zero(branch: &Instruction, to: u32) -> bool {
     }
 }
 
-/// The routines that are called from a place.
+/// The routines that a place calls.
 fn called(node: &Node) -> impl Iterator<Item = &Rc<Routine>> {
     node.ways.iter().filter_map(|way| way.through.as_ref()).chain(node.ends_in.iter().map(|(_, called)| called))
 }

@@ -1,20 +1,22 @@
-//! Where calls and jumps lead whose address is worked out.
+//! Targets of computed calls and jumps.
 //!
-//! - **A constant** in the pointer: there (`-mcall-prologues`, pointers that the compiler knows).
-//! - **A compiler's jump table** (libgcc's `__tablejump2__`): to every entry of the table that lies in the same function. The table's length
-//!   is not needed: what stands behind it belongs to another function, or is another place of this one.
-//! - **Constructors and destructors** of global objects: to every entry of their tables.
-//! - **Listed** in the budgets' `[calls]`: there, and nowhere else.
-//! - **Any other call**: to every function whose address the program takes. The relocations tell these, if the program was linked with
-//!   `-Wl,--emit-relocs`. Else they are the functions whose word address stands somewhere in the initial values of variables, in
-//!   flash where no function is, or in a pair of registers that a function loads with constants; that can be too many. A virtual call, which loads its pointer from a slot behind a pointer that it loaded as well, leads to this slot of every virtual
-//!   table and to functions whose address is taken elsewhere.
+//! - **A constant** in the pointer: this address (`-mcall-prologues`, pointers that the compiler knows).
+//! - **A compiler's jump table** (libgcc's `__tablejump2__`): every entry of the table that lies in the same function.
+//!   The table's length is not needed: the words after it belong to another function, or lead to another place in this
+//!   one.
+//! - **Constructors and destructors** of global objects: every entry of their tables.
+//! - **Listed** in the budgets' `[calls]`: these functions, and no others.
+//! - **Any other call**: every function whose address the program takes. The relocations list these functions, if the
+//!   program was linked with `-Wl,--emit-relocs`. Else the analysis searches for word addresses of functions, which can
+//!   give too many. It searches the initial values of variables, flash outside functions, and pairs of registers that a
+//!   function loads with constants. A virtual call loads its pointer from a slot behind another loaded pointer. It
+//!   leads to this slot of every virtual table, and to functions whose address is taken elsewhere.
 //!
-//! A jump through a pointer that is none of a virtual table's and no variable at a fixed address could be a computed `goto`, and is
-//! refused. So is a call for which no function is found.
+//! A jump could be a computed `goto` if its pointer comes from no virtual table and no variable at a fixed address.
+//! Such a jump is refused. So is a call without any target.
 //!
-//! What this takes for granted: that a program has a function's address from one of these places. One that works it out by arithmetic has to list
-//! its calls.
+//! Assumption: a program gets a function's address only from one of these places. A program that calculates an address
+//! must list its calls.
 
 use crate::budget::Budgets;
 use crate::decode::Instruction;
@@ -25,21 +27,21 @@ use crate::proved::Found;
 use crate::values::{Deep, Known, Value};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Where an indirect call or jump leads.
+/// The targets of an indirect call or jump.
 #[derive(Clone, Debug)]
 pub(crate) struct Where {
     pub(crate) found: Found,
     pub(crate) addresses: BTreeSet<u32>,
 }
 
-/// What of a program tells where indirect calls lead.
+/// The data of a program that give the targets of indirect calls.
 pub(crate) struct Targets {
     /// Entries of libgcc's routines that jump through a table.
     table_jumps: BTreeSet<u32>,
-    /// Functions whose address is taken outside virtual tables, and whether these are all for sure.
+    /// Functions whose address is taken outside virtual tables, and whether this set is certain.
     taken: BTreeSet<u32>,
     is_exact: bool,
-    /// Virtual tables: in each, the words as functions, as far as they are some.
+    /// Virtual tables: for each, its words as functions, if they are some.
     virtual_tables: Vec<Vec<Option<u32>>>,
     /// By the caller's name.
     listed: BTreeMap<String, BTreeSet<u32>>,
@@ -77,12 +79,12 @@ impl Targets {
         })
     }
 
-    /// Whether a routine stands there that jumps through a table.
+    /// Whether a routine at this address jumps through a table.
     pub(crate) fn is_table_jump(&self, address: u32) -> bool {
         self.table_jumps.contains(&address)
     }
 
-    /// Where a call or jump at `at` of such a routine leads, and the cycles of the routine itself.
+    /// The targets of a call or jump at `at` to such a routine, and the cycles of the routine itself.
     pub(crate) fn of_table(&self, elf: &Program, at: u32, known: &Known) -> Option<(Where, u32)> {
         let label = |name: &str| elf.labels.get(name).copied();
         let call = Instruction::at(&elf.flash, at)?;
@@ -102,7 +104,7 @@ impl Targets {
             Some(u32::from(u16::from_le_bytes([bytes[0], bytes[1]])) * 2)
         };
         for of in ["ctors", "dtors"] {
-            // It is called in a loop from the start-up code, right in front of which its label stands.
+            // The start-up code calls it in a loop. Its label stands directly in front of that loop.
             let caller = label(&format!("__do_global_{of}"));
             let in_loop = caller.is_some_and(|caller| (caller..caller + 32).contains(&at));
             if in_loop && matches!(call.operation, Call | Rcall) {
@@ -123,7 +125,7 @@ impl Targets {
         (!addresses.is_empty()).then_some((Where { found: Found::Table, addresses }, cycles))
     }
 
-    /// Where a call or jump by the pointer leads.
+    /// The targets of a call or jump by the pointer.
     pub(crate) fn of_pointer(
         &self,
         elf: &Program,
@@ -153,7 +155,7 @@ impl Targets {
         let mut addresses = self.taken.clone();
         for table in self.virtual_tables.iter().filter(|_| !is_variable) {
             match slot {
-                // A pointer to a table points behind two words that are no functions.
+                // A pointer to a table points after two words that are no functions.
                 Some(slot) => {
                     let is_start = |&start: &usize| table[start - 1].is_none() && table[start].is_some();
                     let starts = (1..table.len()).filter(is_start);
@@ -168,14 +170,14 @@ impl Targets {
     }
 }
 
-/// The function that begins at a word address, if one does.
+/// The function that begins at a word address, if there is one.
 fn function_at(elf: &Program, word: u16) -> Option<u32> {
     let address = beyond_trampoline(elf, u32::from(word) * 2);
     let is_function = elf.functions.contains_key(&address) && address >= elf.code_start;
     (is_function && word != 0).then_some(address)
 }
 
-/// Where a jump among the trampolines leads, which stand in for functions that a word cannot reach.
+/// The target of a jump in the trampolines, which stand for functions that a word address cannot reach.
 fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
     let label = |name: &str| elf.labels.get(name).copied();
     let is_trampoline = label("__trampolines_start")
@@ -185,8 +187,8 @@ fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
     if is_trampoline { target().unwrap_or(address) } else { address }
 }
 
-/// The functions whose address the program seems to take outside virtual tables: all that it does, and others whose address is by chance a
-/// number that it uses.
+/// The functions whose address the program seems to take outside virtual tables. This includes all real ones, and
+/// others whose address equals a number in the program.
 fn found_taken(elf: &Program) -> BTreeSet<u32> {
     let mut taken = BTreeSet::new();
     let word = |bytes: &[u8]| function_at(elf, u16::from_le_bytes([bytes[0], bytes[1]]));
@@ -196,7 +198,7 @@ fn found_taken(elf: &Program) -> BTreeSet<u32> {
             taken.extend(word(bytes));
         }
     }
-    // Constants in flash, in front of the code and between functions; the tables of constructors are called from start-up code alone.
+    // Constants in flash, before the code and between functions. Only start-up code calls the tables of constructors.
     let label = |name: &str| elf.labels.get(name).copied().unwrap_or_default();
     let constructors = label("__ctors_start")..label("__dtors_end").max(label("__ctors_end"));
     for address in elf.gaps().flatten() {
@@ -206,7 +208,7 @@ fn found_taken(elf: &Program) -> BTreeSet<u32> {
             taken.extend(word(bytes));
         }
     }
-    // Pairs of registers that a function loads with constants, in whatever order.
+    // Pairs of registers that a function loads with constants, in either order.
     for &first in elf.functions.keys() {
         let Some((_, end)) = elf.extent(first) else { continue };
         let mut loaded: BTreeMap<usize, BTreeSet<u8>> = BTreeMap::new();

@@ -1,8 +1,8 @@
-//! What is known of the registers and the stack at a place of the program, and what an instruction makes of it.
+//! Known values of registers and stack at a place, and how an instruction changes them.
 //!
-//! Only what decides where a program goes is followed: bytes of a stack pointer, a saved status register, constants, what the caller
-//! left, and from where a pointer to a function was loaded. All else is unknown, and so is what two paths that meet disagree on. Where
-//! it goes from there is worked out in `flow`.
+//! Only values that decide the control flow are followed: bytes of a stack pointer, a saved status register, constants,
+//! values from the caller, and the source of a function pointer. All other values are unknown. A value is also unknown
+//! where two paths meet with different values. The module `flow` follows the paths.
 
 use crate::chip::Chip;
 use crate::concrete::Concrete;
@@ -10,7 +10,7 @@ use crate::decode::Instruction;
 use crate::decode::Operation::*;
 use crate::effects::Registers;
 
-/// More than there is SRAM for: a stack so deep grows without an end.
+/// More than any SRAM: a stack this deep grows without an end.
 pub(crate) const DEEPEST: usize = 0x4000;
 
 // Registers by their address in the data space (data sheets, register summary).
@@ -22,10 +22,10 @@ const SREG: u16 = 0x5F;
 /// SREG's bit of the interrupts.
 pub(crate) const INTERRUPT_FLAG: u16 = 7;
 
-/// Where the flags stand in a set of registers and flags.
+/// The index of the flags in a set of registers and flags.
 const FLAGS: usize = 32;
 
-/// Whether an interrupt can come in before an instruction.
+/// Whether an interrupt can be served before an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Interrupts {
     /// The flag is clear.
@@ -41,17 +41,18 @@ pub(crate) enum Interrupts {
 pub(crate) enum Value {
     Unknown,
     Constant(u8),
-    /// What this register held at the routine's entry.
+    /// The value of this register at the routine's entry.
     AtEntry(usize),
-    /// The lower byte of the stack pointer at the entry less so many, modulo 256.
+    /// The lower byte of the stack pointer at the entry, less this number, modulo 256.
     StackLow(u8),
-    /// The upper byte of the stack pointer at the entry less so many.
+    /// The upper byte of the stack pointer at the entry, less this number.
     StackHigh(i32),
     /// The status register, with interrupts on or off.
     Status(bool),
-    /// From memory: so far behind a pointer, which came from memory itself where it is deep; `None` from a fixed address.
+    /// From memory, at this displacement from a pointer; the pointer itself came from memory if it is deep. `None` is a
+    /// fixed address.
     Loaded(Option<u8>, Deep),
-    /// Something unknown, less a constant.
+    /// An unknown value, less a constant.
     Less(u8),
 }
 
@@ -62,32 +63,32 @@ pub(crate) enum Deep {
     Yes,
 }
 
-/// What is known at a place.
+/// The known facts at a place.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Known {
     pub(crate) registers: [Value; 32],
-    /// Flags that are known, and what they are.
+    /// Known flags and their values.
     flags: (u8, u8),
-    /// R1 is zero at the entry, as the calling convention has it of functions.
+    /// Whether R1 is zero at the entry, as the calling convention requires for functions.
     is_zero_at_entry: bool,
     /// The general purpose I/O registers, which some handlers keep the status register in.
     pub(crate) kept: [Value; 3],
-    /// What lies on the stack, from the entry on.
+    /// The stack's content, from the entry on.
     pub(crate) stack: Vec<Value>,
-    /// A constant has just been taken from the lower byte of a stack pointer, or added: what that was, and the constant. The carry is
-    /// still that operation's.
+    /// A constant was just subtracted from the lower byte of a stack pointer, or added: the byte before, and the
+    /// constant. The carry is still that of this operation.
     borrow: Option<(u8, u8, bool)>,
-    /// The stack pointer's upper byte has been written, and the lower one not yet.
+    /// The stack pointer's upper byte was written, and the lower one not yet.
     pub(crate) upper_half: Option<Value>,
-    /// The register that has just been counted down, while the zero flag tells of it.
+    /// The register that was just decremented, while the zero flag still belongs to it.
     counted: Option<usize>,
 }
 
-/// The registers whose content is a known constant.
+/// The registers with known constants.
 pub(crate) type Constants = [Option<u8>; 32];
 
 impl Known {
-    /// What is known at a routine's entry.
+    /// The known facts at a routine's entry.
     pub(crate) fn at_entry(is_function: bool) -> Known {
         Known {
             registers: std::array::from_fn(Value::AtEntry),
@@ -101,7 +102,7 @@ impl Known {
         }
     }
 
-    /// Takes the way of a branch on which the last result was zero.
+    /// Takes the branch on which the last result was zero.
     pub(crate) fn is_zero(&mut self) {
         if let Some(register) = self.counted {
             self.registers[register] = Value::Constant(0);
@@ -117,7 +118,7 @@ impl Known {
         }
     }
 
-    /// All registers that hold known constants.
+    /// All registers with known constants.
     pub(crate) fn constants(&self) -> Constants {
         std::array::from_fn(|register| self.constant(register))
     }
@@ -127,15 +128,15 @@ impl Known {
         Some(u16::from_le_bytes([self.constant(lower)?, self.constant(lower + 1)?]))
     }
 
-    /// The number in R21 and R20, a function's third argument where each has 16 bits.
+    /// The number in R21 and R20: a function's third argument, if each has 16 bits.
     pub(crate) fn length(&self) -> Option<u16> {
         self.pair(20)
     }
 
-    /// Leaves what both know; whether that is less than before.
+    /// Keeps the facts that both have. Returns whether this has removed any.
     pub(crate) fn meet(&mut self, other: &Known) -> bool {
         let before = self.clone();
-        // What the caller left in R1 is zero.
+        // The caller's value in R1 is zero.
         if self.registers[1] != other.registers[1]
             && self.constant(1).is_some()
             && self.constant(1) == other.constant(1)
@@ -167,7 +168,7 @@ impl Known {
         *self != before
     }
 
-    /// What a call leaves: registers that it does not keep are unknown, and flags.
+    /// The effect of a call: registers that it does not preserve are unknown, and so are the flags.
     pub(crate) fn after_call(&mut self, keeps: &[bool; 32]) {
         for (register, _) in keeps.iter().enumerate().filter(|(_, keeps)| !**keeps) {
             self.registers[register] = Value::Unknown;
@@ -178,7 +179,7 @@ impl Known {
         self.kept = [Value::Unknown; 3];
     }
 
-    /// How far below the stack pointer at the entry a pair points, if it does.
+    /// The distance of a pair's address below the stack pointer at the entry, if it is known.
     fn below(&self, lower: usize) -> Option<i32> {
         match (self.registers[lower], self.registers[lower + 1]) {
             (Value::StackLow(low), Value::StackHigh(high)) if low == high as u8 => Some(high),
@@ -191,7 +192,7 @@ impl Known {
         self.registers[lower + 1] = Value::StackHigh(below);
     }
 
-    /// The place on the stack that a load or a store goes to, by a pointer whose way is known.
+    /// The stack position that a load or a store accesses, by a pointer with a known target.
     fn on_stack(&self, instruction: &Instruction, pointer: usize) -> Option<usize> {
         let below = self.below(pointer)?;
         let place = match instruction.moves_by() {
@@ -201,7 +202,7 @@ impl Known {
         usize::try_from(place).ok().filter(|place| *place < self.stack.len())
     }
 
-    /// Arithmetic on the bytes of a stack pointer; whether it was that.
+    /// Applies arithmetic on the bytes of a stack pointer. Returns whether it was that.
     fn moves_stack_pointer(&mut self, instruction: &Instruction) -> bool {
         use Value::{StackHigh, StackLow, Unknown};
 
@@ -238,7 +239,7 @@ impl Known {
         }
     }
 
-    /// Arithmetic on constants; whether it was that.
+    /// Applies arithmetic on constants. Returns whether it was that.
     fn computes(&mut self, instruction: &Instruction) -> bool {
         let effects = instruction.effects();
         let known = |place: usize| match place.checked_sub(FLAGS) {
@@ -265,7 +266,8 @@ impl Known {
         true
     }
 
-    /// Carries an instruction out that leads to the one behind it. Only start-up code may set the stack pointer to a constant.
+    /// Executes an instruction that continues at the next one. Only start-up code may set the stack pointer to a
+    /// constant.
     pub(crate) fn carry_out(
         &mut self,
         instruction: &Instruction,
@@ -287,7 +289,7 @@ impl Known {
             self.borrow = None;
         }
         if !moves && self.computes(instruction) {
-            // Registers that only move may hold more than constants.
+            // Registers that are only moved may hold more than constants.
             return Ok(());
         }
         let changed_flags = (0..8).filter(|&flag| changes.contains(FLAGS + flag)).fold(0, |all, flag| all | 1 << flag);
@@ -340,7 +342,7 @@ impl Known {
                         let upper = self.upper_half.take();
                         let depth = match (upper, value) {
                             (Some(StackHigh(high)), StackLow(low)) if low == high as u8 => usize::try_from(high).ok(),
-                            // The start-up code says what the reset has done already.
+                            // The start-up code repeats the reset's value.
                             (Some(Constant(high)), Constant(low)) if is_start_up => {
                                 chip.ram_last.checked_sub(u16::from_be_bytes([high, low])).map(usize::from)
                             }
@@ -379,11 +381,11 @@ impl Known {
                         };
                         let loaded = Loaded(Some(instruction.displacement()), deep);
                         let value = place.map_or(loaded, |place| lasting(self.stack[place]));
-                        // Of a pointer that loads over itself the second byte goes by what was there before.
+                        // If a pointer loads over itself, the second byte uses the pointer's old value.
                         self.registers[d] = value;
                     }
                 }
-                // The pointer goes on, or back, with what it was loaded from.
+                // The pointer moves, and so does the address that its content came from.
                 if instruction.moves_by() != 0 && !(pointer..pointer + 2).contains(&d) {
                     match (self.below(pointer), self.pair(pointer)) {
                         (Some(below), _) => self.point_below(pointer, below - i32::from(instruction.moves_by())),
@@ -406,7 +408,8 @@ impl Known {
     }
 }
 
-/// What a byte of a frame is taken to hold for good. Variables can be changed through pointers, so only what compilers save there is.
+/// The value of a byte in a frame that stays valid. Variables can be changed through pointers, so only values that
+/// compilers save count.
 fn lasting(value: Value) -> Value {
     match value {
         Value::AtEntry(2..=17 | 28 | 29) | Value::Status(_) | Value::StackLow(_) | Value::StackHigh(_) => value,
@@ -414,16 +417,16 @@ fn lasting(value: Value) -> Value {
     }
 }
 
-/// What was to be known of an instruction's operands, and is not.
+/// A required fact about an instruction's operands is unknown.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Doubt {
-    /// It takes more from the stack than the routine has put there.
+    /// It pops more than the routine has pushed.
     TakesTooMuch,
-    /// It sets the stack pointer to what is not known.
+    /// It sets the stack pointer to an unknown value.
     Stack,
-    /// It sets the status register to what is not known.
+    /// It sets the status register to an unknown value.
     Status,
-    /// It sets EIND to something else than 0.
+    /// It sets EIND to another value than 0.
     LongIndirect,
 }
 

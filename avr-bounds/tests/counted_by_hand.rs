@@ -1,22 +1,22 @@
-//! What is proved of small programs in assembly, whose stack and cycles can be counted by hand.
+//! Proofs of small assembly programs. Their stack and cycles can be counted by hand.
 
 use avr_bounds::{Bounds, BoundsError, Budgets, Input, LoopBound, LoopBounds, Program, RegisterRule, prove};
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-/// Assembles a program for the ATmega328P and proves its bounds. It begins at `start`; `handler` is INT0's, where there is one,
-/// and `other` Timer0's. A vector that is not used leads to the reset, as avr-libc has it.
+/// Assembles a program for the ATmega328P and proves its bounds. It begins at `start`. `handler` is INT0's, if there is
+/// one, and `other` is Timer0's. An unused vector leads to the reset, as in avr-libc.
 fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsError> {
     try_to_prove_with(program, input, &LoopBounds::new())
 }
 
-/// The same with what is said of the loops of its functions.
+/// The same with loop bounds of its functions.
 fn try_to_prove_with(program: &str, input: Option<&Input>, loops: &LoopBounds) -> Result<Bounds, BoundsError> {
     let (input, loops, registers) = (input.cloned(), loops.clone(), RegisterRule::Followed);
     try_to_prove_by(program, &Budgets { input, loops, registers, ..Budgets::default() })
 }
 
-/// The same by facts of any kind; every time that a budget could be for has to have a bound.
+/// The same with facts of any kind. Every time that a budget can limit must have a bound.
 fn try_to_prove_by(program: &str, facts: &Budgets) -> Result<Bounds, BoundsError> {
     let elf = assembled(program);
     let bounds = prove(&Program::read(elf.path(), Some("atmega328p"))?, facts)?;
@@ -30,7 +30,7 @@ fn assembled(program: &str) -> tempfile::NamedTempFile {
     assembled_for(program, false)
 }
 
-/// The same, with the vectors of an ATmega2560 where it is large.
+/// The same, with the vectors of an ATmega2560 if `is_large` is set.
 fn assembled_for(program: &str, is_large: bool) -> tempfile::NamedTempFile {
     let used = |label: &str| if program.contains(&format!("{label}:")) { label.to_owned() } else { "0".to_owned() };
     let vectors: String = (0..57)
@@ -66,7 +66,7 @@ fn proved(program: &str) -> Bounds {
     try_to_prove(program, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The refusal of a program, which has to say this.
+/// Asserts that a program is refused with this message.
 #[track_caller]
 fn assert_refused(program: &str, words: &str) {
     let error = try_to_prove(program, None).expect_err("it has no bounds").to_string();
@@ -144,7 +144,7 @@ fn a_frame_is_made_by_arithmetic_on_the_stack_pointer() {
         "start:\n sei\n1: rcall one\n rjmp 1b\none:\n push r28\n push r29\n {large} pop r29\n pop r28\n ret\nleaf:\n ret"
     ));
     assert_eq!(bounds.stack_bytes, 2 + 2 + 300 + 2);
-    // `out SPH` and `out SREG` behind `cli`; the instruction in front of them and the one behind join in.
+    // `out SPH` and `out SREG` after `cli`. The stretch includes one instruction before and one after.
     assert_eq!((bounds.critical_section.cycles, bounds.closed.cycles), (Some(2), Some(4)));
 }
 
@@ -161,7 +161,7 @@ fn a_handler_comes_in_where_the_stack_is_deepest_with_interrupts_on() {
     let handler = "handler:\n push r2\n pop r2\n reti";
     let on = proved(&format!("start:\n sei\n1: push r2\n push r3\n pop r3\n pop r2\n rjmp 1b\n{handler}"));
     assert_eq!(on.stack_bytes, 2 + 2 + 1);
-    // The deepest place has them off: none comes in there, but one does right before.
+    // The deepest place has interrupts off. But an interrupt can be served directly before it.
     let off =
         proved(&format!("start:\n sei\n1: push r2\n cli\n push r3\n pop r3\n sei\n nop\n pop r2\n rjmp 1b\n{handler}"));
     assert_eq!(off.stack_bytes, 1 + 2 + 1);
@@ -234,7 +234,7 @@ fn a_nested_critical_section_ends_with_the_outer_one() {
 fn an_instruction_between_two_critical_sections_lets_nothing_in() {
     let apart = proved("start:\n sei\n1: cli\n nop\n sei\n nop\n cli\n nop\n sei\n rjmp 1b");
     assert_eq!((apart.critical_section.cycles, apart.closed.cycles), (Some(2), Some(1 + 2 + 2)));
-    // The instruction behind the first `sei` is the second `cli`: both sections are one to whoever waits.
+    // The instruction after the first `sei` is the second `cli`. So a waiting interrupt sees both sections as one.
     let joined = proved("start:\n sei\n1: nop\n cli\n nop\n sei\n cli\n nop\n sei\n rjmp 1b");
     assert_eq!((joined.critical_section.cycles, joined.closed.cycles), (Some(2), Some(1 + 2 + 1 + 2 + 2)));
 }
@@ -342,18 +342,18 @@ fn a_loop_in_a_handler_or_in_a_critical_section_has_to_have_a_bound() {
         &format!("start:\n sei\n2: cli\n {looping} sei\n rjmp 2b"),
         "a stretch without interrupts has a loop without a bound",
     );
-    // The start-up code may take its time before it turns interrupts on.
+    // The start-up code may take any time before it turns interrupts on.
     proved(&format!("start:\n {looping} sei\n2: rjmp 2b"));
 }
 
-/// A handler's body with what it changes put back.
+/// A handler's body that saves and restores the registers that it changes.
 fn saving(body: &str) -> String {
     format!(
         "push r24\n push r25\n in r24, 0x3f\n push r24\n lds r24, 0x0100\n{body} pop r24\n out 0x3f, r24\n pop r25\n pop r24\n"
     )
 }
 
-/// A record that says how often the program comes by the place right behind it.
+/// A record with the most executions of the next instruction.
 fn at_most(turns: u32) -> String {
     format!("7: .pushsection .loop_bounds, \"\", @progbits\n .long 7b, {turns}\n .popsection\n")
 }
@@ -382,7 +382,7 @@ fn a_record_that_a_turn_can_go_round_bounds_nothing() {
         &format!("{main}handler:\n {} reti", saving(&round)),
         "the handler of vector 1 has a loop without a bound",
     );
-    // The inner loop's record says nothing of the outer one.
+    // The inner loop's record does not bound the outer loop.
     let outer = format!("1: ldi r25, 8\n3:\n {} dec r25\n brne 3b\n dec r24\n brne 1b\n", at_most(8));
     assert_refused(
         &format!("{main}handler:\n {} reti", saving(&outer)),
@@ -471,7 +471,7 @@ fn a_value_lasts_over_a_call_where_the_function_leaves_it_alone_or_puts_it_back(
     ] {
         assert_eq!(lasts(keep, saved).bytes, 1, "{saved}");
     }
-    // What is saved and put back is not used by that.
+    // Saving and restoring is no use.
     assert_eq!(lasts("push r2\n rcall called\n pop r2", "clr r2\n inc r2\n sts 0x0100, r2").bytes, 0);
 }
 
@@ -480,7 +480,7 @@ fn a_register_that_only_a_convention_would_keep_is_found_where_it_is_clobbered()
     let clobbers = "lds r16, 0x0101\n inc r16\n sts 0x0101, r16";
     let program = calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", clobbers);
     assert_refused(&program, "caller calls called, which clobbers r16");
-    // On one of two paths is enough; and so is a function further down.
+    // One of two paths suffices, and so does a function further down.
     assert_refused(
         &calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "sbrc r24, 0\n ldi r16, 1\n sts 0x0101, r16"),
         "caller calls called, which clobbers r16",
@@ -490,45 +490,45 @@ fn a_register_that_only_a_convention_would_keep_is_found_where_it_is_clobbered()
         calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "rcall deeper")
     );
     assert_refused(&deeper, "caller calls called, which clobbers r16");
-    // Only where it is needed.
+    // Only if it is live.
     proved(&calling("ldi r16, 5\n sts 0x0100, r16\n rcall called\n ldi r16, 6\n sts 0x0100, r16", clobbers));
-    // What the caller's caller keeps there.
+    // A value of the caller's caller.
     let above = format!(
         "start:\n clr r1\n ldi r16, 5\n1: rcall caller\n sts 0x0100, r16\n rjmp 1b\ncaller:\n rcall called\n ret\ncalled:\n {clobbers}\n ret"
     );
     assert_refused(&above, "start calls caller, which clobbers r16");
-    // Set for what comes behind the call, where another way there has a value of its own.
+    // Set before the call, and used after it, where another path has its own value.
     let joined = "sbrs r24, 0\n rjmp 3f\n ldi r16, 5\n rcall called\n rjmp 4f\n3: ldi r16, 6\n4: sts 0x0100, r16";
     assert_refused(&calling(joined, clobbers), "caller calls called, which clobbers r16");
 }
 
 #[test]
 fn a_result_is_no_clobbered_value_and_what_a_function_uses_itself_is_no_result() {
-    // Given back, alone and in several bytes.
+    // A result, in one byte and in several.
     proved(&calling("ldi r24, 5\n rcall called\n sts 0x0100, r24", "lds r24, 0x0101\n inc r24"));
     proved(&calling(
         "rcall called\n sts 0x0100, r22\n sts 0x0101, r25",
         "lds r22, 0x0101\n lds r23, 0x0102\n clr r24\n clr r25",
     ));
-    // Worked out in a loop, in which it is read again.
+    // Calculated in a loop that also reads it.
     let shifts = "ldi r18, 3\n2: lsl r24\n rol r25\n dec r18\n brne 2b";
     proved(&calling("ldi r24, 1\n clr r25\n rcall called\n sts 0x0100, r24\n sts 0x0101, r25", shifts));
-    // Given back by what it calls.
+    // The result of a called function.
     let deeper =
         format!("{}\ndeeper:\n lds r24, 0x0101\n ret", calling("rcall called\n sts 0x0100, r24", "rcall deeper"));
     proved(&deeper);
-    // The loop's counter is what the function counts with.
+    // The loop's counter belongs to the function.
     let counts = "ldi r18, 3\n2: sts 0x0101, r18\n dec r18\n brne 2b";
     assert_refused(
         &calling("ldi r18, 5\n rcall called\n sts 0x0100, r18", counts),
         "caller calls called, which clobbers r18",
     );
-    // So it is where the caller counts with it, too.
+    // The same if the caller counts with it, too.
     assert_refused(
         &calling("ldi r18, 5\n3: sts 0x0100, r18\n rcall called\n dec r18\n brne 3b", counts),
         "caller calls called, which clobbers r18",
     );
-    // A pointer, and a flag, are never given back.
+    // A pointer and a flag are never results.
     assert_refused(&calling("rcall called\n st X, r1", "lds r26, 0x0101\n lds r27, 0x0102"), "which clobbers r26, r27");
     assert_refused(&calling("rcall called\n brts 3f\n sts 0x0100, r1\n3:", "bst r24, 0"), "which clobbers flag T");
 }
@@ -606,7 +606,7 @@ fn a_program_sleeps_with_interrupts_on_and_its_handlers_take_longer_to_answer() 
     let bounds = proved(&format!("start:\n sei\n1: sleep\n rjmp 1b\n{handler}"));
     // Response 4, out of sleep 4 more, jmp 3, reti 4.
     assert_eq!(bounds.handlers[0].cycles, Some(15));
-    // What sleeps with interrupts off has no time.
+    // A sleep with interrupts off has no bound.
     assert_refused(&format!("start:\n sei\n1: cli\n sleep\n sei\n rjmp 1b\n{handler}"), "a stretch without interrupts");
 }
 
@@ -671,7 +671,7 @@ fn a_call_by_a_constant_address_is_followed_and_one_by_an_unknown_address_leads_
     let call = "lds r30, 0x0100\n lds r31, 0x0101\n icall";
     assert_eq!(proved(&main(&format!("{}{call}", take("one")))).stack_bytes, 2 + 1);
     assert_eq!(proved(&main(&format!("{}{}{call}", take("one"), take("two")))).stack_bytes, 2 + 2);
-    // A jump by what a table in memory has could be a computed goto.
+    // A jump through a table in memory could be a computed goto.
     assert_refused(&main("ld r30, X+\n ld r31, X\n ijmp"), "start calls or jumps to an address that it works out");
 }
 

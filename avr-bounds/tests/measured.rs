@@ -1,8 +1,9 @@
-//! Programs that this project did not write, proved and measured: examples of the Arduino core and its libraries on three boards, its
-//! bootloaders, and the programs of simavr's own tests and of avr-libc's manual.
+//! Programs from outside this project, proved and measured: examples of the Arduino core and its libraries on three
+//! boards, its bootloaders, and the programs of simavr's own tests and of avr-libc's manual.
 //!
-//! Each runs in simavr while its pins, its serial line and its converter get random input. What is measured never exceeds what is proved:
-//! stack, handlers, stretches without interrupts. README.md has the table that this test makes; `UPDATE_EXPECT=1` writes it.
+//! Each program runs in simavr while its pins, its serial line and its converter get random input. No measured value
+//! may exceed its proved bound: stack, handlers, stretches without interrupts. This test writes the table in README.md
+//! when `UPDATE_EXPECT=1` is set.
 
 mod programs;
 
@@ -27,11 +28,11 @@ const INTERRUPT_FLAG: usize = 7;
 const ERASED: u16 = 0xFFFF;
 
 unsafe extern "C" {
-    /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
+    /// Runs the next instruction. It is declared in sim_core.h, which simavr-ffi leaves out of its bindings.
     fn avr_run_one(avr: *mut simavr_ffi::avr_t) -> simavr_ffi::avr_flashaddr_t;
 }
 
-/// What a run was measured to need.
+/// The measured values of a run.
 #[derive(Clone, Debug, Default)]
 struct Measured {
     stack_bytes: usize,
@@ -52,8 +53,8 @@ fn measure(program: &Program, seed: u64) -> Measured {
     let chip = program.chip;
     let response = 2 + chip.return_address_bytes() as u64;
     let name = CString::new(chip.name).expect("a name has no zero");
-    // SAFETY: simavr knows the chip by its name, or gives null, which is checked; flash has room for what the chip's ELF holds, and data
-    // for every register; `avr` is used by this function alone.
+    // SAFETY: simavr knows the chip by its name, or returns null, which is checked. Flash has room for the contents of
+    // the chip's ELF, and data for every register. Only this function uses `avr`.
     unsafe {
         let avr = simavr_ffi::avr_make_mcu_by_name(name.as_ptr());
         assert!(!avr.is_null(), "simavr has no {}", chip.name);
@@ -79,7 +80,7 @@ fn measure(program: &Program, seed: u64) -> Measured {
                 drive(avr, &mut random);
             }
             let word = word_at(avr, (*avr).pc);
-            // A bootloader has gone on to the firmware, and there is none.
+            // A bootloader has jumped to the firmware, and there is none.
             if word == ERASED {
                 break;
             }
@@ -131,7 +132,7 @@ fn measure(program: &Program, seed: u64) -> Measured {
     measured
 }
 
-/// Puts something random onto a pin or a serial line.
+/// Drives a random level or byte on a pin or a serial line.
 ///
 /// # Safety
 /// `avr` is a chip that was initialised.
@@ -145,7 +146,7 @@ unsafe fn drive(avr: *mut simavr_ffi::avr_t, random: &mut impl Rng) {
             random.random_range(0..2),
         ),
     };
-    // SAFETY: a part that the chip does not have gives null, and every part has more lines than are asked for.
+    // SAFETY: a part that the chip lacks gives null, and every part has more lines than are requested.
     unsafe {
         let line = simavr_ffi::avr_io_getirq(avr, part, line);
         if !line.is_null() {
@@ -154,14 +155,14 @@ unsafe fn drive(avr: *mut simavr_ffi::avr_t, random: &mut impl Rng) {
     }
 }
 
-/// Holds what was measured against what was proved.
+/// Compares the measured values with the proved ones.
 #[track_caller]
 fn assert_within(name: &str, measured: &Measured, bounds: &Bounds) {
     assert!(measured.stack_bytes <= bounds.stack_bytes, "{name}: {measured:?}, {} proved", bounds.stack_bytes);
     for (&vector, &cycles) in &measured.handlers {
         let proved = bounds.handlers.iter().find(|handler| handler.vector == vector);
         let proved = proved.unwrap_or_else(|| panic!("{name}: the handler of vector {vector} is not known"));
-        // What has no bound says nothing, and what never returns was not measured.
+        // A handler without a bound has no limit, and one that never returns was not measured.
         assert!(proved.cycles.is_none_or(|proved| cycles <= proved), "{name}, vector {vector}: {cycles} of {proved:?}");
     }
     if let Some(proved) = bounds.critical_section.cycles {
@@ -237,7 +238,7 @@ fn what_is_measured_never_exceeds_what_is_proved() {
     programs::expect_in_readme("measured", &table);
 }
 
-/// What becomes of a program in which an instruction was made to do nothing.
+/// The results for a program in which an instruction was replaced by `nop`.
 #[derive(Default)]
 struct Tally {
     refused: usize,
@@ -288,7 +289,7 @@ fn faults_that_are_put_in_are_found() {
     programs::expect_in_readme("faults", &table);
 }
 
-/// Faults of every kind that a program has room for: up to four of each in every program, by the addresses of what is left out.
+/// Faults of every kind in a program, up to four of each, by the addresses of the removed instructions.
 fn faults(program: &Program, bounds: &Bounds) -> Vec<(&'static str, Vec<usize>)> {
     const PER_KIND: usize = 4;
 
@@ -306,7 +307,7 @@ fn faults(program: &Program, bounds: &Bounds) -> Vec<(&'static str, Vec<usize>)>
         let register = |word: u16| word >> 4 & 0x1F;
         let (is_push, is_pop) = (|word: u16| word & 0xFE0F == 0x920F, |word: u16| word & 0xFE0F == 0x900F);
         let mut add = |kind, places: Vec<usize>| found.entry(kind).or_default().push(places);
-        // Pushes and pops of call-saved registers, as every function has them that saves some.
+        // Pushes and pops of call-saved registers.
         let is_saved = |word: u16| matches!(register(word), 2..=17 | 28 | 29);
         for (place, &(at, word)) in words.iter().enumerate().filter(|(_, (_, word))| is_saved(*word)) {
             if is_push(word) {

@@ -551,7 +551,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_is_seen_anew_after_rolling_back_farther_than_it_is_remembered() {
+    fn ground_is_seen_again_as_new_after_rolling_back_farther_than_the_memory() {
         let (mut ground, _) = ground();
         for position in (-40_000..1400).rev().step_by(100) {
             assert_eq!(ground.roll_to(Position::new(position)), None);
@@ -568,7 +568,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_of_another_grain_begins_anew_and_closes_what_was_seen() {
+    fn a_wheel_of_another_length_scale_forgets_and_closes_the_ground() {
         let (mut ground, mut settings) = ground();
         settings.set(Setting::TicksPerM, 15_000).expect("within its range");
         ground.follow(&settings, Position::new(1400), SPEED);
@@ -653,7 +653,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_is_due_whatever_is_set_but_another_spacing() {
+    fn a_plant_stays_expected_after_every_setting_except_another_spacing() {
         for (setting, value, is_due) in [(Setting::MarginMm, 60, true), (Setting::GuardSpacingMm, 510, false)] {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::GuardSpacingMm, 500).expect("within its range");

@@ -1,7 +1,7 @@
-//! Gives `weeder` its version: the package's, and the commit that it is built from.
+//! Sets the version of `weeder`: the package's version and the commit of the build.
 //!
-//! The commit is that of the environment variable `WEEDER_COMMIT`, or else of the clone that this folder stands in, with a `+` if
-//! something in the clone has been changed since. Where there is neither, the version has no commit.
+//! The commit comes from the environment variable `WEEDER_COMMIT`, or else from the clone that contains this folder,
+//! with a `+` if files of the clone have changed since. Without both, the version has no commit.
 
 use std::env;
 use std::path::Path;
@@ -19,10 +19,10 @@ fn main() {
 }
 
 fn commit_of_the_clone() -> Option<String> {
-    // What git tracks, and where it notes that a commit is another one: Cargo looks at their times.
+    // The files that git tracks, and the files that change with each commit: Cargo checks their times.
     let root = git(&["rev-parse", "--show-toplevel"])?;
-    // Another project's clone may have this one's files in it.
-    // It is asked now: two folders that share their target folder share what this file is compiled to.
+    // Another project's clone may contain these files. The variable is read at run time: two folders that share a
+    // target folder share this compiled program.
     let package = env::var("CARGO_MANIFEST_DIR").ok()?;
     let workspace = Path::new(&package).ancestors().nth(2)?;
     if Path::new(&root).canonicalize().ok()? != workspace.canonicalize().ok()? {
@@ -37,7 +37,7 @@ fn commit_of_the_clone() -> Option<String> {
     Some(if changed.is_empty() { commit } else { commit + "+" })
 }
 
-/// What git answers, if it knows.
+/// git's output, if it succeeds.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let answer = String::from_utf8(output.stdout).ok()?;

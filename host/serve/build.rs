@@ -1,9 +1,10 @@
-//! Puts the page into the program where `WEEDER_PAGE` names the folder that has it, as release.sh does. Without that there is none in it.
+//! Includes the page in the program, if `WEEDER_PAGE` names the page's folder. release.sh sets it. Other builds contain
+//! no page.
 
 use std::path::Path;
 use std::{env, fs};
 
-/// The page's files, in the order in which `page.rs` takes them.
+/// The page's files, in the order that `page.rs` expects.
 const FILES: [&str; 3] = ["index.html", "page.css", "page.js"];
 
 fn main() {

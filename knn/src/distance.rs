@@ -1,7 +1,7 @@
 //! The squared Euclidean distance between two quantised feature vectors.
 //!
-//! The square of a difference of two bytes is one 8 x 8 bit multiplication, and fits 16 bits. The squares are summed in 32 bits, of
-//! which 24 suffice. There is no square root: it would not change which example is nearer.
+//! The square of a difference of two bytes is one 8 x 8 bit multiplication, and fits 16 bits. The squares are summed in 32 bits;
+//! 24 suffice. There is no square root: it would not change which example is nearer.
 
 /// The most features of an example: 258 differences of 255, squared, still add up within 24 bits.
 pub const MAX_FEATURES: usize = 258;

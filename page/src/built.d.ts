@@ -1,4 +1,5 @@
-// What build.mjs puts in: the firmware, as it is and packed, the project's Rust, packed, the worker that reads logs, and what the manual says of alarms and warnings.
+// The files that build.mjs includes: the firmware, plain and compressed, the project's Rust, compressed, the worker
+// that reads logs, and the manual's alarms and warnings.
 declare module "weeder.hex" {
     const hex: string;
     export default hex;

@@ -1,21 +1,22 @@
-// The project's own Rust in the page. It is inside of it, packed: start.ts has it unpacked before anything is asked.
+// The project's own Rust in the page. It is compressed inside the page, and start.ts decompresses it before the first
+// question.
 
 import packed from "page.wasm";
 import { Rust } from "./rust.ts";
 import { unpack } from "./unpack.ts";
 
-/** The module, for those who ask it in a worker. */
+/** The module, for workers. */
 export let module: WebAssembly.Module;
 let rust: Rust;
 
-/** When it can be asked. */
+/** Resolves when questions can be asked. */
 export const ready: Promise<void> = unpack(packed).then((bytes) => {
     module = new WebAssembly.Module(bytes);
     rust = new Rust(module);
 });
 
-/** One of its own, for what it is to remember. */
+/** Another instance, with its own state. */
 export const another = (): Rust => new Rust(module);
 
-/** Asks a question. Throws where it is none: this page and its Rust are not of one version then. */
+/** Asks a question. Throws if it is invalid: the page and its Rust are then of different versions. */
 export const ask = <Answer>(question: unknown): Answer => rust.ask(question);

@@ -1,4 +1,4 @@
-// The page's elements, by the names that index.html gives them in `data-part`, each with the kind that it has to be.
+// The page's elements, by their names in `data-part` in index.html, each checked for its type.
 
 import { show } from "./words/words.ts";
 
@@ -25,14 +25,14 @@ export class Parts {
         return button;
     }
 
-    /** Puts a text where another was. */
+    /** Replaces an element's text. */
     write(name: string, text: string): void {
         const element = this.html(name);
         show(element);
         if (element.textContent !== text) element.textContent = text;
     }
 
-    /** Puts a text where another was, and writes it again where the language is another one. */
+    /** Sets an element's text, and sets it again after a change of language. */
     say(name: string, text: () => string): void {
         show(this.html(name), text);
     }
@@ -56,6 +56,6 @@ export function download(name: string, text: string, type: string): void {
     link.href = URL.createObjectURL(new Blob([text], { type }));
     link.download = name;
     link.click();
-    // The browser has begun by the time that anything else happens.
+    // The download has begun by then.
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }

@@ -1,5 +1,5 @@
-// The keyboard's focus stays near where it was: what is hidden, disabled or taken away while it has the focus leaves it to the
-// nearest thing that can take it, in the same group if there is one. A browser would begin at the page's top again.
+// Keeps the keyboard's focus near its place. If a focused element is hidden, disabled or removed, the nearest element
+// that can take the focus gets it, in the same group if possible. A browser would restart at the page's top.
 
 const CAN_TAKE = "a[href], button, input, select, textarea, [tabindex]";
 
@@ -8,7 +8,7 @@ const canTake = (element: HTMLElement): boolean =>
 
 /** Follows the focus from now on. */
 export function keepFocus(): void {
-    /** What had the focus by the keyboard, and all around it, from the inside out. */
+    /** The last element with keyboard focus and its ancestors, from the inside out. */
     let last: HTMLElement[] = [];
     document.addEventListener("focusin", ({ target }) => {
         last = [];
@@ -26,12 +26,12 @@ export function keepFocus(): void {
     keep();
 }
 
-/** What follows it in the innermost of its groups that has something, or else stands there last. */
+/** The next focusable element in its innermost group that has one, or else the last one there. */
 function nearest(lost: HTMLElement, groups: readonly HTMLElement[]): HTMLElement | undefined {
     for (const group of groups) {
         const all = [...group.querySelectorAll<HTMLElement>(CAN_TAKE)].filter(canTake);
         if (all.length === 0) continue;
-        // What was taken out of the page stands nowhere.
+        // An element that was removed has no position.
         if (!lost.isConnected) return all[0];
         const follows = (other: HTMLElement) => lost.compareDocumentPosition(other) & Node.DOCUMENT_POSITION_FOLLOWING;
         return all.find(follows) ?? all.at(-1);

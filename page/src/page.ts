@@ -1,5 +1,5 @@
-// The page: three things to do, and what they share. The panel that stands beside the row in "Try it" is the one that works
-// with a real Uno; it is only connected to another.
+// The page: its views, and their shared parts. The panel beside the row in "Try it" is the same as the panel for a real
+// Uno; only its connection differs.
 
 import { makeInstallable } from "./app/install.ts";
 import { Parts } from "./dom.ts";
@@ -33,15 +33,15 @@ import {
     translate,
 } from "./words/words.ts";
 
-/** Share of a frame's time that the chip may take: the rest is for the picture, and for the operator's clicks. */
+/** Share of a frame's time for the chip. The rest is for the picture and the operator's clicks. */
 const CHIP_SHARE = 0.75;
 /** Longest time that passes in a frame: a page that was hidden does not catch up. */
 const LONGEST_FRAME_S = 0.1;
-/** Time between two pictures of the row where little motion is asked for: it does not glide. */
+/** Time between two pictures of the row under reduced motion. */
 const STILL_MS = 1000;
 /** Time over which the pace is measured. */
 const PACE_S = 1;
-/** The things to do, by their sections and the address behind #. */
+/** The views, by their sections and the address behind #. */
 const VIEWS = ["try", "work", "flash", "record"] as const;
 
 function find<Kind extends Element>(id: string, kind: new () => Kind): Kind {
@@ -50,7 +50,7 @@ function find<Kind extends Element>(id: string, kind: new () => Kind): Kind {
     return element;
 }
 
-/** Puts a text where another was. */
+/** Replaces an element's text. */
 function write(id: string, text: string): void {
     const element = find(id, HTMLElement);
     if (element.textContent !== text) element.textContent = text;
@@ -82,18 +82,18 @@ const wire: Wire = {
     close: async () => {},
 };
 trial.onText = (text) => wire.onText(text);
-/** The chip's time: a trial that is slow, or stands still, keeps nobody waiting in vain. */
+/** The chip's time. Timeouts use it, so that a slow or paused trial causes no timeout. */
 const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
 trialPanel.connect(wire, trialMs(), true);
 trialPanel.onHappening = (happening) => {
     trial.take(happening);
-    // A board without settings says so: it is told those of this machine, which is set up.
+    // A board without saved settings raises an alarm. Then this machine's settings are sent and saved.
     if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
     if (happening.is !== settleAt) return;
     settleAt = undefined;
     for (const command of [...commandsSetUp(), "save", "clear"]) trialPanel.ask(command).catch(() => {});
 };
-/** What is waited for before the settings are saved. */
+/** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
 new RecordView(find("view-record", HTMLElement));
@@ -134,7 +134,7 @@ async function workServed(): Promise<void> {
     }
 }
 
-/** Shows what is chosen. */
+/** Shows the chosen view. */
 function choose(): void {
     const shown = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
     const focused = document.activeElement;
@@ -155,14 +155,14 @@ void makeInstallable((load) => {
     button("load-newer", load);
 });
 
-/** HOLD on a key, for every machine that is shown. */
+/** The key for HOLD, for every shown machine. */
 globalThis.addEventListener("keydown", ({ key }) => {
     if (key !== "Escape") return;
     if (!find("view-try", HTMLElement).hidden) trialPanel.hold();
     else for (const panel of workPanels) panel.hold();
 });
 
-/** Light or dark as the system has it, or light where the sun shines on it. */
+/** Light or dark as in the system, or always light, for sunlight. */
 const light = find("light", HTMLButtonElement);
 function lighten(on: boolean): void {
     light.ariaPressed = String(on);
@@ -189,7 +189,7 @@ sound.addEventListener("click", () => {
     showSound();
 });
 
-/** Shows a slider's value beside it, and does with it what it is for, now and whenever it is moved. */
+/** Shows a slider's value beside it and applies it, now and after each move. */
 function slider(id: string, shown: (value: number) => string, use: (value: number) => void): void {
     const [input, output] = [find(id, HTMLInputElement), find(`${id}-is`, HTMLOutputElement)];
     const apply = () => {
@@ -203,7 +203,7 @@ function slider(id: string, shown: (value: number) => string, use: (value: numbe
 
 function toggle(id: string, use: (on: boolean) => void): void {
     const input = find(id, HTMLInputElement);
-    // A browser may remember how it was left.
+    // A browser may remember the earlier state.
     input.checked = false;
     input.addEventListener("change", () => use(input.checked));
 }
@@ -213,7 +213,7 @@ function button(id: string, use: () => void): void {
 }
 
 for (const form of ["drive", "bench"]) find(form, HTMLFormElement).reset();
-// Where little motion is asked for, the machine stands until the operator drives it.
+// Under reduced motion the machine stands until the operator drives it.
 if (isStill()) find("speed", HTMLInputElement).value = "0";
 slider(
     "speed",
@@ -264,14 +264,14 @@ function showTrial(): void {
 }
 let drawnMs = Number.NEGATIVE_INFINITY;
 
-/** How much time passed, on the chip and outside, since the pace was last shown. */
+/** Time on the chip and outside since the pace was last shown. */
 const passed = { chipS: 0, outsideS: 0 };
 let lastMs = performance.now();
 
 function frame(nowMs: number): void {
     const outsideS = Math.min(Math.max((nowMs - lastMs) / 1000, 0), LONGEST_FRAME_S);
     lastMs = nowMs;
-    // A trial that nobody looks at stands still.
+    // A hidden trial is paused.
     if (!find("view-try", HTMLElement).hidden) {
         passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
         passed.outsideS += outsideS;
@@ -287,5 +287,5 @@ function frame(nowMs: number): void {
 
 requestAnimationFrame(frame);
 
-// For tests, and for who opens the browser's own console.
+// For tests, and for the browser's console.
 Object.assign(globalThis, { trial });

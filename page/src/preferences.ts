@@ -1,11 +1,11 @@
-// What the operator has chosen, kept by the browser from one visit to the next: by name, as text.
+// The operator's choices, stored by the browser between visits: by name, as text.
 //
-// A browser that keeps nothing, as a private window may be, forgets it when the page is closed.
+// A browser that stores nothing, such as a private window, forgets them when the page is closed.
 
 const PREFIX = "weeder.";
 const now = new Map<string, string>();
 
-/** What was chosen; nothing where nothing was. */
+/** A choice; undefined if there is none. */
 export function chosen(name: string): string | undefined {
     const inPage = now.get(name);
     if (inPage !== undefined) return inPage;
@@ -16,7 +16,7 @@ export function chosen(name: string): string | undefined {
     }
 }
 
-/** Keeps what was chosen. */
+/** Stores a choice. */
 export function keep(name: string, value: string): void {
     now.set(name, value);
     try {

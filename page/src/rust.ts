@@ -1,7 +1,7 @@
-// The project's own Rust (host/page, as WebAssembly): a question goes in as JSON, and its answer comes out. It remembers nothing from
-// one question to the next, but for the log that is read and the machine that rolls.
+// The project's own Rust (host/page, as WebAssembly): it takes a question as JSON, and returns its answer. Its only
+// state between questions is the log that is being read, and the rolling machine.
 
-/** What the module gives: host/page/src/exports.rs says what each is for. */
+/** The module's exports: see host/page/src/exports.rs. */
 interface Exports {
     readonly memory: WebAssembly.Memory;
     readonly room: (length: number) => number;
@@ -27,7 +27,7 @@ export class Rust {
         this.#exports = exports as unknown as Exports;
     }
 
-    /** Asks a question. Throws where it is none: this page and its Rust are not of one version then. */
+    /** Asks a question. Throws if it is invalid: the page and its Rust are then of different versions. */
     ask<Answer>(question: unknown): Answer {
         this.#put(encoder.encode(JSON.stringify(question)));
         const { memory, answer, length } = this.#exports;
@@ -38,13 +38,13 @@ export class Rust {
         return said.answer;
     }
 
-    /** Has it read the next bytes of a log. */
+    /** Passes the next bytes of a log. */
     read(bytes: Uint8Array): void {
         this.#put(bytes);
         this.#exports.read();
     }
 
-    /** A copy of a table of what the log shows. */
+    /** A copy of a table of the log's picture. */
     table(number: number): Float64Array<ArrayBuffer> {
         const { memory, table, table_length } = this.#exports;
         return new Float64Array(
@@ -59,12 +59,12 @@ export class Rust {
         this.#exports.roll(cycle);
     }
 
-    /** Has the machine's servo hear a pulse, by the cycles of its edges. */
+    /** Passes a pulse to the machine's servo, by the cycles of its edges. */
     hear(rise: number, fall: number): void {
         this.#exports.hear(rise, fall);
     }
 
-    /** A table of the machine that rolls, until it is asked something else. */
+    /** A table of the rolling machine, valid until the next call. */
     trialTable(number: number): Float64Array {
         const { memory, trial_table, trial_table_length } = this.#exports;
         const at = trial_table(number);
@@ -73,7 +73,7 @@ export class Rust {
 
     #put(bytes: Uint8Array): void {
         const room = this.#exports.room(bytes.length);
-        // The memory may move as it grows.
+        // The memory may move when it grows.
         new Uint8Array(this.#exports.memory.buffer, room, bytes.length).set(bytes);
     }
 }

@@ -1,5 +1,5 @@
-// Sounds, and where the device can, vibrations: an alarm, a machine that was lost, and a HOLD that was obeyed. The driver looks at
-// the row, and not at the screen.
+// Sounds, and vibrations if the device can: an alarm, a lost machine, and an obeyed HOLD. The driver watches the row,
+// not the screen.
 //
 // A browser lets a page sound only after the operator has touched it. Until then `isWaiting` is true.
 
@@ -7,7 +7,7 @@ import { chosen, keep } from "./preferences.ts";
 
 export type Signal = "alarm" | "lost" | "held";
 
-/** Tones one after the other, in Hz and ms, with the same pause behind each; and the vibration, on and off in ms. */
+/** Tones one after the other, in Hz and ms, with the same pause after each; and the vibration, on and off in ms. */
 interface Sound {
     readonly tones: readonly (readonly [hz: number, ms: number])[];
     readonly pauseMs: number;
@@ -38,48 +38,48 @@ const SOUNDS: Readonly<Record<Signal, Sound>> = {
         vibration: [80, 60, 80],
     },
 };
-/** Time in which the same signal is given once: several machines may obey together. */
+/** Time in which the same signal is given only once: several machines may obey together. */
 const ONCE_MS = 300;
-/** How loud, of 1. A square wave is louder than it looks. */
+/** Gain, from 0 to 1. A square wave sounds louder than its value. */
 const GAIN = 0.4;
 
 let context: AudioContext | undefined;
-/** When the last tone ends, by the context's clock. */
+/** End of the last tone, by the context's clock. */
 let busyUntilS = 0;
 const lastMs: Partial<Record<Signal, number>> = {};
 
-/** Whether signals are given. */
+/** Whether signals are on. */
 export const isOn = (): boolean => chosen("sound") !== "off";
 
-/** Whether signals are on, and the browser gives none before the page is touched. */
+/** Whether signals are on, but the browser plays none before the page is touched. */
 export const isWaiting = (): boolean => isOn() && context?.state !== "running";
 
-/** Turns signals on or off. Turned on, one is given, to hear. */
+/** Turns signals on or off. Turning on plays one as a test. */
 export function turn(on: boolean): void {
     keep("sound", on ? "on" : "off");
     if (on) signal("held");
     else navigator.vibrate?.(0);
 }
 
-/** Calls back when that may have changed what `isWaiting` says. */
+/** Calls `changed` when `isWaiting` may have changed. */
 export function wakeOnTouch(changed: () => void): void {
     const wake = async () => {
         context ??= new AudioContext();
         if (context.state !== "running") await context.resume();
         changed();
     };
-    // What comes first of these is a touch to the browser.
+    // The first of these events is a touch for the browser.
     for (const touch of ["pointerup", "keydown"])
         document.addEventListener(touch, () => void wake(), { capture: true });
 }
 
-/** Gives a signal, behind those that are still heard. */
+/** Plays a signal, after those that are still playing. */
 export function signal(which: Signal): void {
     const nowMs = performance.now();
     if (!isOn() || nowMs - (lastMs[which] ?? Number.NEGATIVE_INFINITY) < ONCE_MS) return;
     lastMs[which] = nowMs;
     const { tones, pauseMs, vibration } = SOUNDS[which];
-    // A page that was not touched may not, and the browser complains of it.
+    // An untouched page may not vibrate, and the browser logs an error.
     if (navigator.userActivation?.hasBeenActive !== false) navigator.vibrate?.([...vibration]);
     if (!context) return;
     let atS = Math.max(context.currentTime, busyUntilS);

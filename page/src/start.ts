@@ -1,4 +1,4 @@
-// Starts the page when what is packed in it is unpacked.
+// Starts the page after its compressed parts are decompressed.
 
 import { ready as rust } from "./core.ts";
 import { ready as firmware } from "./firmware.ts";

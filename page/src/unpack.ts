@@ -1,4 +1,5 @@
-// What build.mjs has packed: the page is smaller so, as Base64 of what is packed is shorter than the thing itself.
+// Decompresses the parts that build.mjs has compressed. The page is smaller this way: the Base64 of compressed data is
+// shorter than the data.
 
 export async function unpack(packed: Uint8Array<ArrayBuffer>): Promise<ArrayBuffer> {
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));

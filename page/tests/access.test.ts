@@ -1,5 +1,5 @@
-// The page without eyes, without a mouse, and in the sun: what a screen reader says and leaves out, the whole of "Work with it" and
-// "Flash it" by the keyboard, and the contrast of what the operator has to read.
+// The page without sight, without a mouse, and in sunlight: the output of a screen reader, all of "Work with it" and
+// "Flash it" by the keyboard, and the contrast of the parts that the operator must read.
 
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
@@ -20,7 +20,7 @@ declare global {
     var saidAloud: string[];
 }
 
-/** Keeps all that a screen reader says from now on: the texts of live regions, each as it changes. */
+/** Records the output of a screen reader from now on: the texts of live regions, each after its change. */
 const listen = (page: Page) =>
     page.evaluate(() => {
         globalThis.saidAloud = [];
@@ -35,7 +35,7 @@ const listen = (page: Page) =>
             }).observe(region, { subtree: true, childList: true, characterData: true, attributeFilter: ["hidden"] });
     });
 
-/** What was said since this was last asked. */
+/** The output since the last call. */
 const heard = (page: Page) => page.evaluate(() => globalThis.saidAloud.splice(0));
 
 test("a screen reader says a state, a reason that lasts and an alarm, and no number that changes often", async () => {
@@ -73,7 +73,7 @@ test("a screen reader says a state, a reason that lasts and an alarm, and no num
         alarm.join(" / "),
     );
 
-    // Of the console, the answers to what is typed there.
+    // From the console only answers to typed lines are read out.
     await part(page, "typed").fill("get k");
     await part(page, "typed").press("Enter");
     await part(page, "answered").filter({ hasText: /^k=3 / }).waitFor({ state: "attached" });
@@ -90,9 +90,9 @@ async function tabTo(page: Page, name: string | RegExp): Promise<void> {
     assert.fail(`the Tab key does not come to ${name}`);
 }
 
-/** The name of what has the focus, which is seen to have it; nothing where the browser has it. */
+/** The name of the focused element, whose focus must be visible; empty if the browser itself has the focus. */
 async function focused(page: Page): Promise<string> {
-    // What was scrolled to is there in the next frame.
+    // Scrolling ends in the next frame.
     const { name, problem } = await page.evaluate(async () => {
         await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
         const element = document.activeElement;
@@ -118,7 +118,7 @@ async function focused(page: Page): Promise<string> {
     return name?.trim() ?? "";
 }
 
-/** Goes to something by Tab, and presses a key there. */
+/** Moves to an element by Tab, and presses a key there. */
 async function press(page: Page, name: string | RegExp, key: string): Promise<void> {
     await tabTo(page, name);
     await page.keyboard.press(key);
@@ -173,7 +173,7 @@ test("an Uno is flashed, connected, set, started and held by Tab, Enter, Space a
     await close(opened);
 });
 
-/** The contrast of these parts of a panel with what they stand on, by the formula of WCAG 2. */
+/** The contrast of these parts of a panel with their background, by the formula of WCAG 2. */
 const contrasts = (page: Page, panel: string, names: readonly string[]) =>
     page.evaluate(
         ([panel, names]) => {
@@ -185,7 +185,7 @@ const contrasts = (page: Page, panel: string, names: readonly string[]) =>
                 });
                 return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
             };
-            /** The first colour below it that lets nothing through. */
+            /** The first opaque colour below it. */
             const below = (element: Element | null): string => {
                 if (!element) throw new Error("there is no ground");
                 const { backgroundColor } = getComputedStyle(element);
@@ -205,7 +205,7 @@ const contrasts = (page: Page, panel: string, names: readonly string[]) =>
         [panel, names] as const,
     );
 
-/** Holds that these can be read in the sun, in the dark, and wherever the operator has made the page light. */
+/** Asserts that these parts are readable in sunlight, in the dark, and if the operator has chosen the light page. */
 async function assertReadable(page: Page, panel: string, names: readonly string[]): Promise<void> {
     const light = page.getByRole("button", { name: "Light" });
     for (const [colorScheme, isMadeLight] of [

@@ -1,4 +1,4 @@
-// The check of a board, with avr8js in the weeder's place: a third program compares the two simulators at the pins.
+// The check of a board, with avr8js instead of the weeder: a third program compares the two simulators at the pins.
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
@@ -20,10 +20,10 @@ test("the board check passes the firmware on avr8js too", () => {
     const { wires, lines }: { wires: string[]; lines: Line[] } = JSON.parse(stdout);
     for (const { id, measured, simulated } of lines.filter(({ verdict }) => verdict === "differs"))
         console.log(`${id} is ${measured} on avr8js, and ${simulated} on simavr`);
-    // The time of a typed `hold` has the computer in it, which may have much else to do.
+    // The time of a typed `hold` includes the computer, which may be busy.
     const failed = lines.filter(({ id, verdict }) => verdict === "fail" && id !== "hold_out");
     assert.deepEqual([wires, failed], [[], []]);
-    // The range of each of these is so narrow that a simulator that does nothing is outside of it.
+    // The limits of each of these exclude a simulator without any output.
     const ids = lines.map(({ id }) => id);
     for (const id of ["pulse_out_us", "highest_forward_busy", "beam_flickers_code", "row_2.5_damaged"])
         assert(ids.includes(id), `${id} is not in the report`);

@@ -1,4 +1,4 @@
-// What has to be on the screen without scrolling, by its boxes.
+// Checks of parts that must be on the screen without scrolling, by their boxes.
 
 import assert from "node:assert/strict";
 import type { Page } from "playwright-core";
@@ -10,7 +10,10 @@ const SCREENS = [
     { width: 1280, height: 800 },
 ];
 
-/** Holds in each tab, on each screen, at the page's top and at its end, that these parts of a panel are whole, and under nothing else. */
+/**
+ * Asserts in each tab, on each screen, at the page's top and at its end, that these parts of a panel are completely
+ * visible.
+ */
 export async function assertOnScreen(
     page: Page,
     panel: string,

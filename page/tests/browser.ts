@@ -1,7 +1,7 @@
-// What the tests in a browser share: headless Chromium, the page opened from the disk as somebody without a network does, and
-// what is held against every page: no error, no request, nothing wider than the screen, nothing that axe-core finds.
+// Shared code of the browser tests: starts headless Chromium, opens the page from the disk as without a network, and
+// checks every page. A page must have no error, no request, nothing wider than the screen, and no finding of axe-core.
 //
-// CHROMIUM and FIREFOX name the browsers where they are not Debian's. Screenshots go to build/screenshots.
+// CHROMIUM and FIREFOX name the browsers if they are not Debian's. Screenshots go to build/screenshots.
 
 import assert from "node:assert/strict";
 import { existsSync, readFileSync } from "node:fs";
@@ -16,15 +16,15 @@ import { type Browser, chromium, firefox, type Page } from "playwright-core";
 import type { Trial } from "../src/try/trial.ts";
 import { type Device, offerPorts } from "./ports.ts";
 
-/** What the page leaves for tests. */
+/** The page's objects for tests. */
 declare global {
     var trial: Trial;
 }
 
-/** The longest that anything on the page may take: CI's machines are slow, and share their cores. */
+/** The longest wait for anything on the page: CI's machines are slow, and share their cores. */
 export const PATIENCE_MS = 60_000;
 
-/** What a page is shown on, and the browser's language where that is another one than American English. */
+/** The screen of a page, and the browser's language if it is not American English. */
 export interface Screen {
     readonly width: number;
     readonly height: number;
@@ -41,7 +41,7 @@ export function launch(): Promise<Browser> {
         executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
         args: [
             "--headless",
-            // A name that is not this computer's own, as another one in the network has it.
+            // A host name other than this computer's own, as on another computer in the network.
             "--host-resolver-rules=MAP weeder.test 127.0.0.1",
             "--no-sandbox",
             "--disable-gpu",
@@ -53,7 +53,7 @@ export function launch(): Promise<Browser> {
     });
 }
 
-/** Firefox, by WebDriver BiDi: the browser as Debian has it, and not a build of Playwright's own. */
+/** Firefox, by WebDriver BiDi: Debian's browser, not Playwright's own build. */
 export function launchFirefox(): Promise<Browser> {
     return firefox.launch({ channel: "moz-firefox", executablePath: process.env.FIREFOX ?? "/usr/bin/firefox-esr" });
 }
@@ -66,7 +66,7 @@ const MEDIA: Readonly<Record<string, string>> = {
     ".webmanifest": "application/manifest+json",
 };
 
-/** A web server that knows nothing of the page gives away what lies in a folder. */
+/** A plain web server that serves the files of a folder. */
 export async function served(test: TestContext, folder: string): Promise<{ port: number; close(): Promise<void> }> {
     const server = createServer((request, response) => {
         const name = basename(new URL(request.url ?? "", "http://any").pathname) || "index.html";
@@ -83,22 +83,22 @@ export async function served(test: TestContext, folder: string): Promise<{ port:
     return { port: (server.address() as AddressInfo).port, close };
 }
 
-/** A page, and what went wrong in it. */
+/** A page, and its errors. */
 export interface Opened {
     readonly page: Page;
     readonly errors: string[];
 }
 
-/** Opens an address, to which all requests go. */
+/** Opens an address, to which all requests must go. */
 export async function openAt(browser: Browser, address: string, viewport = DESK): Promise<Opened> {
     const opened = await blank(browser, viewport, new URL(address).origin);
     await opened.page.goto(address);
-    // The page is unpacked first. Where a phone is to be paired, another page comes instead.
+    // The page is decompressed first. For an unpaired phone another page comes instead.
     await opened.page.waitForFunction(() => "trial" in globalThis || !document.getElementById("view-try"));
     return opened;
 }
 
-/** Opens the page at a view. `ports` are the serial ports from which the operator chooses one after the other; none: no Web Serial. */
+/** Opens the page at a view. The operator chooses `ports` one after the other; without them there is no Web Serial. */
 export async function open(browser: Browser, view: string, viewport = DESK, ports?: Device[]): Promise<Opened> {
     const opened = await blank(browser, viewport, "file:");
     if (ports) await offerPorts(opened.page, ports);
@@ -107,7 +107,7 @@ export async function open(browser: Browser, view: string, viewport = DESK, port
     return opened;
 }
 
-/** A page that has opened nothing yet, and is to ask for nothing that does not begin like this. */
+/** A new page. Requests that do not begin with `own` are errors. */
 async function blank(browser: Browser, { locale, ...viewport }: Screen, own: string): Promise<Opened> {
     const page = await browser.newPage({ viewport, ...(locale && { locale }) });
     page.setDefaultTimeout(PATIENCE_MS);
@@ -123,13 +123,16 @@ async function blank(browser: Browser, { locale, ...viewport }: Screen, own: str
     return { page, errors };
 }
 
-/** Closes a page in which nothing went wrong. */
+/** Closes a page and asserts that it had no errors. */
 export async function close({ page, errors }: Opened): Promise<void> {
     assert.deepEqual(errors, []);
     await page.close();
 }
 
-/** Holds against the page that axe-core finds nothing in it and it is not wider than the screen, light and dark; keeps its pictures. */
+/**
+ * Asserts that axe-core finds nothing in the page and that it is not wider than the screen, light and dark. Saves its
+ * pictures.
+ */
 export async function inspect(page: Page, name: string): Promise<void> {
     const { width = 0 } = page.viewportSize() ?? {};
     for (const colorScheme of ["light", "dark"] as const) {

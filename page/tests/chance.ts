@@ -1,4 +1,4 @@
-/** A source of chance: the same seed gives the same numbers, from 0 to 1, everywhere (Mulberry32). */
+/** A random generator: the same seed gives the same numbers, from 0 to 1, everywhere (Mulberry32). */
 export function chance(seed: number): () => number {
     let state = seed >>> 0;
     return () => {

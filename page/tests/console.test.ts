@@ -1,4 +1,4 @@
-// The firmware's console on avr8js: every kind of answer, and what is said without being asked.
+// The firmware's console on avr8js: every kind of answer, and its events.
 
 import assert from "node:assert/strict";
 import test from "node:test";

@@ -6,15 +6,15 @@ import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
 import { chance } from "./chance.ts";
 import { wokenUp } from "./operator.ts";
 
-/** Half a second or more, so that a loop that gets no time any more would be reset. */
+/** Half a second or more, so that the watchdog would reset a starved loop. */
 const COUNTS = 100_000;
 /** Time between two changes of the beam, whose sensor takes 1 ms. */
 const FLICKER_CYCLES = CYCLES_PER_SECOND / 1000;
 
-/** Questions on their way at any time, so that the line is busy while one of them is being read. */
+/** Pending questions at any time, so that the line stays busy while one of them is being read. */
 const QUESTIONS_AHEAD = 2;
 
-/** Turns the encoder past COUNTS counts, each early or late by up to a share of the time between two. */
+/** Turns the encoder past COUNTS counts. Each is early or late by up to a share of the time between two. */
 function assertNoCountIsLost(countsPerS: number, forward: boolean, jitter: number): void {
     const operator = wokenUp();
     const { uno } = operator;
@@ -33,7 +33,7 @@ function assertNoCountIsLost(countsPerS: number, forward: boolean, jitter: numbe
         for (; unanswered < QUESTIONS_AHEAD; unanswered++) uno.send("status\n");
         uno.runUntil(due);
         uno.set(count % 2 === 0 ? first : second, count % 4 < 2);
-        // A character takes longer than the steps, so that one at most has come.
+        // A character takes longer than the steps, so at most one has come.
         const said = operator.take();
         heard += said;
         if (said && heard.endsWith("\nok\r")) unanswered -= 1;

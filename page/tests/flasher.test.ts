@@ -1,5 +1,5 @@
-// The flasher in a real browser: it puts the HEX on a virtual Uno through that one's own bootloader, and says what is wrong where
-// it cannot.
+// The flasher in a real browser: it flashes the HEX to a virtual Uno through the Uno's own bootloader, and reports
+// errors.
 
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
@@ -22,7 +22,7 @@ before(async () => {
 
 after(() => browser?.close());
 
-/** Presses the button and waits until it can be pressed again; what is said then. */
+/** Presses the button and waits until it is enabled again. Returns the message. */
 async function flash(page: Page): Promise<string> {
     const button = page.getByRole("button", { name: "Flash it" });
     await button.click();
@@ -30,7 +30,7 @@ async function flash(page: Page): Promise<string> {
     return (await page.locator("[data-part=flash-said]").textContent()) ?? "";
 }
 
-/** What is said where these devices are flashed, one after the other. */
+/** The message after flashing this device. */
 async function said(device: Device): Promise<string> {
     const opened = await open(browser, "flash", undefined, [device]);
     const text = await flash(opened.page);

@@ -1,9 +1,9 @@
-// What the tests share: an Uno that has woken up, and a patient operator at its console.
+// Shared code of the tests: a started Uno, and a patient operator at its console.
 
 import hex from "weeder.hex";
 import { CYCLES_PER_SECOND, Uno } from "../src/uno/uno.ts";
 
-/** Longest time that an answer may take, and that the firmware may take to its first line. */
+/** Timeout of an answer, and of the firmware's first line. */
 const TIMEOUT_MS = 1000;
 
 const CYCLES_PER_MS = CYCLES_PER_SECOND / 1000;
@@ -23,7 +23,7 @@ const AT_REST: [number, boolean][] = [
 
 export class Operator {
     readonly uno: Uno;
-    /** All that the firmware has sent and nobody has taken. */
+    /** The firmware's output that was not read yet. */
     #heard = "";
 
     constructor(uno: Uno) {
@@ -33,7 +33,7 @@ export class Operator {
         };
     }
 
-    /** What was sent since this was last asked. */
+    /** The output since the last call. */
     take(): string {
         const heard = this.#heard;
         this.#heard = "";
@@ -44,7 +44,7 @@ export class Operator {
         this.uno.runUntil(this.uno.cycle + ms * CYCLES_PER_MS);
     }
 
-    /** Lets the firmware run until what it has sent matches, and takes that. */
+    /** Lets the firmware run until its output matches, and returns that. */
     waitFor(pattern: RegExp): string {
         for (let waited = 0; !pattern.test(this.#heard); waited++) {
             if (waited === TIMEOUT_MS)
@@ -54,18 +54,18 @@ export class Operator {
         return this.take();
     }
 
-    /** Types a line and gives back all lines of its answer, the last of which is `ok` or begins with `error:`. */
+    /** Types a line and returns all lines of its answer. The last line is `ok` or begins with `error:`. */
     exchange(line: string): string[] {
         this.take();
         this.uno.send(`${line}\n`);
         const heard = this.waitFor(END_OF_ANSWER);
         const end = heard.search(END_OF_ANSWER) + (heard.match(END_OF_ANSWER)?.[0].length ?? 0);
-        // What happens meanwhile may be told right behind the answer.
+        // An event may come directly after the answer.
         this.#heard = heard.slice(end);
         return heard.slice(0, end).trimEnd().split("\r\n");
     }
 
-    /** Types a command that is to be carried out, and gives back the lines of its answer, the `ok` left out. */
+    /** Types a command that must succeed, and returns the lines of its answer without the `ok`. */
     ask(command: string): string[] {
         const answer = this.exchange(command);
         const last = answer.pop();
@@ -82,14 +82,14 @@ export class Operator {
     }
 }
 
-/** An Uno with its inputs at rest whose firmware has said its first line. */
+/** An Uno with its inputs at rest, after its firmware's first line. */
 export function poweredUp(eeprom?: Uint8Array): { operator: Operator; greeting: string } {
     const operator = new Operator(new Uno(hex, eeprom));
     for (const [pin, high] of AT_REST) operator.uno.set(pin, high);
     return { operator, greeting: operator.waitFor(/\n/) };
 }
 
-/** As `poweredUp`, and told that its settings are right although none are saved. */
+/** As `poweredUp`, with the alarm for missing saved settings cleared. */
 export function wokenUp(): Operator {
     const { operator } = poweredUp();
     operator.ask("clear");

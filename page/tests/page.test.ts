@@ -1,4 +1,4 @@
-// "Try it" in a real browser: the real firmware weeds a row in the page, and shows faults that are made on the same panel that
+// "Try it" in a real browser: the real firmware weeds a row in the page. Simulated faults appear on the same panel that
 // works with a real Uno.
 
 import assert from "node:assert/strict";
@@ -119,7 +119,7 @@ test("what is moved or broken on the page is moved or broken on the machine", as
         const { speedMmS, groundMmATick, ticks } = machine;
         return { pins: [...pins], ticks: ticks - wasTicks, speedMmS, groundMmATick };
     });
-    // It rolls, and past plants, but no pin says so.
+    // It rolls past plants, but no pin changes.
     assert(found.ticks < -1000 && found.pins.length === 0, JSON.stringify(found));
     assert(Math.abs(found.speedMmS + 500 / 3.6) < 1e-6, JSON.stringify(found));
     assert(Math.abs(found.groundMmATick / tickMm - 0.88) < 1e-6, JSON.stringify(found));
@@ -145,7 +145,7 @@ test("a setting that is saved is there after the supply has sagged", async () =>
     await close(opened);
 });
 
-test("HOLD takes the tool out at once, whatever else waits for its answer", async () => {
+test("HOLD takes the tool out at once, even while other commands wait for their answers", async () => {
     const opened = await tryIt(browser);
     const { page } = opened;
     await page.getByLabel("Work switch").check();

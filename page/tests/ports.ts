@@ -1,8 +1,8 @@
-// Serial ports for the page: what stands in `navigator.serial`'s place, and the devices at their other ends.
+// Serial ports for the page: a replacement of `navigator.serial`, and the devices at their other ends.
 //
-// The page's side behaves as Chromium's: one opening at a time, streams that fail when the device is lost, `readable` null from
-// then on. Its bytes go through the browser's driver to a device in this process: the virtual Uno's pseudo terminal, or something
-// that is no Uno.
+// The page's side behaves as Chromium's: one opening at a time, streams that fail when the device is lost, and
+// `readable` null from then on. Its bytes go through the browser's driver to a device in this process: the virtual
+// Uno's pseudo terminal, or a device that is no Uno.
 
 import { type ChildProcess, spawn } from "node:child_process";
 import { closeSync, constants, existsSync, mkdtempSync, openSync, readSync, rmSync, writeSync } from "node:fs";
@@ -13,28 +13,28 @@ import { setTimeout as wait } from "node:timers/promises";
 import type { Page } from "playwright-core";
 import { WEEDER } from "./weeder.ts";
 
-/** What is at the other end of a port. */
+/** The device at the other end of a port. */
 export interface Device {
     /** Why it cannot be opened: the browser's error, by name and message. */
     readonly refuses?: { name: string; message: string };
     open(): void;
-    /** The modem lines were let go of and taken again: an Uno is reset by that. */
+    /** The modem lines were released and set again: this resets an Uno. */
     reset(): void;
     write(bytes: Uint8Array): void;
-    /** What has come since the last time; nothing where the device is gone. */
+    /** The input since the last call; undefined if the device is gone. */
     read(): Uint8Array | undefined;
     close(): void;
 }
 
-/** Time between two looks at a device. */
+/** Time between two reads of a device. */
 const LOOK_MS = 2;
 
 /** The virtual Uno, `weeder virtual-uno`, at its pseudo terminal. */
 export class VirtualUno implements Device {
     readonly path: string;
-    /** Bytes that the page has written to it, after which the cable is pulled. */
+    /** Number of bytes from the page after which the cable is unplugged. */
     pullAfterBytes = Number.POSITIVE_INFINITY;
-    /** Bytes, counted from the first, that are lost on their way to it. */
+    /** Indices of bytes that are lost on their way to it. */
     loseBytes: number[] = [];
     #written = 0;
     readonly #folder: string;
@@ -48,7 +48,7 @@ export class VirtualUno implements Device {
         this.path = join(folder, "uno");
     }
 
-    /** Starts one for a test, at whose end it stops, with further options. */
+    /** Starts one for a test, with further options. It stops at the test's end. */
     static async start(test: TestContext, ...options: string[]): Promise<VirtualUno> {
         const folder = mkdtempSync(join(tmpdir(), "weeder-page-"));
         const child = spawn(WEEDER, ["virtual-uno", "--link", join(folder, "uno"), ...options], {
@@ -72,7 +72,7 @@ export class VirtualUno implements Device {
     }
 
     reset(): void {
-        // A pseudo terminal has no modem lines: opening it is what resets.
+        // A pseudo terminal has no modem lines: opening it resets the Uno.
         this.close();
         this.open();
     }
@@ -126,7 +126,7 @@ export class VirtualUno implements Device {
     }
 }
 
-/** Something that is no Uno: answers what it is sent by bytes of its own, and pours out others by itself. */
+/** A device that is no Uno: it answers with its own bytes, and sends others by itself. */
 export class Foreign implements Device {
     readonly refuses?: { name: string; message: string };
     readonly #answer: (bytes: Uint8Array) => number[];
@@ -152,7 +152,7 @@ export class Foreign implements Device {
     }
 }
 
-/** Puts ports with these devices in `navigator.serial`'s place, from which the operator chooses one after the other. */
+/** Replaces `navigator.serial` by ports with these devices, which the operator chooses one after the other. */
 export async function offerPorts(page: Page, devices: Device[]): Promise<void> {
     const device = (index: number) => {
         const device = devices[index];
@@ -169,7 +169,7 @@ export async function offerPorts(page: Page, devices: Device[]): Promise<void> {
     await page.exposeFunction("deviceWrite", (index: number, bytes: number[]) =>
         device(index).write(Uint8Array.from(bytes)),
     );
-    // Waits a while for something to come; nothing where the device is gone.
+    // Waits some time for input; undefined if the device is gone.
     await page.exposeFunction("deviceRead", async (index: number) => {
         for (let looks = 0; ; looks++) {
             const bytes = device(index).read();
@@ -181,7 +181,7 @@ export async function offerPorts(page: Page, devices: Device[]): Promise<void> {
     await page.addInitScript(putPorts, devices.length);
 }
 
-/** What `exposeFunction` puts into the page. */
+/** The functions that `exposeFunction` adds to the page. */
 interface Bridge {
     deviceOpen(index: number): Promise<{ name: string; message: string } | undefined>;
     deviceReset(index: number): Promise<void>;
@@ -190,7 +190,7 @@ interface Bridge {
     deviceRead(index: number): Promise<number[] | null>;
 }
 
-/** Runs in the page, before its own code, and is sent there as text: it uses nothing from outside. */
+/** Runs in the page before its own code. It is sent there as text, so it uses nothing from outside. */
 function putPorts(count: number): void {
     const bridge = globalThis as unknown as Bridge;
 

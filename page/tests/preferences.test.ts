@@ -1,4 +1,4 @@
-// What the operator has chosen, and what his system asks for: kept, honoured, and what he hears by it.
+// The operator's choices, and the system's preferences: the page stores and follows them, and plays its signals.
 
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
@@ -14,7 +14,7 @@ before(async () => {
 
 after(() => browser?.close());
 
-/** What the page has let the operator hear and feel since this was last asked: tones in Hz, and vibrations. */
+/** Signals since the last call: tones in Hz, and vibrations. */
 const heard = (page: Page) => page.evaluate(() => globalThis.signals.splice(0).join(" "));
 
 declare global {
@@ -100,7 +100,7 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
     await page.waitForFunction(() => !document.querySelector("#sound.waiting"));
     await part(page, "start").click();
     await part(page, "state").filter({ hasText: "work" }).waitFor();
-    // The answer to HOLD and the state that it brings, as far from each other as on a slow line.
+    // The answer to HOLD and the following state, with the delay of a slow line.
     await page.evaluate(() => {
         const { now } = performance;
         let lateMs = 0;

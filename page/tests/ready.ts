@@ -1,4 +1,4 @@
-// build.mjs puts this in front of every test: the project's Rust is unpacked before a test asks it.
+// build.mjs puts this before every test: it decompresses the project's Rust before a test uses it.
 
 import { ready } from "../src/core.ts";
 

@@ -1,4 +1,4 @@
-// Looking at a log in the page: one that the page itself has written, drawn, moved, zoomed and replayed; and one of a long day.
+// Viewing a log in the page: the page's own log, drawn, moved, zoomed and replayed; and the log of a long day.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -54,7 +54,7 @@ test("a log of the page is drawn with what was seen, kept free and worked, led t
     assert.equal(Number(alarms), lines(/,event,(alarm|warning) /), told);
     assert(Number(detections) >= 6 && Number(alarms) >= 1, told);
     const drawn = async (selector: string) => {
-        // It is drawn in the next picture.
+        // It is drawn in the next frame.
         await page.evaluate(() => new Promise(requestAnimationFrame));
         return inView(page, "log-drawing").locator(selector).count();
     };
@@ -102,8 +102,8 @@ test("a file that is no log is told, and so is one without a machine", async () 
 });
 
 /**
- * A log of so many hours as `weeder record` writes it: at 2.5 km/h, with a status ten times a second, a plant each 0.3 m, its swings, and
- * an alarm an hour.
+ * A log of this many hours as `weeder record` writes it: at 2.5 km/h, with a status ten times a second, a plant each
+ * 0.3 m, its swings, and an alarm an hour.
  */
 function longLog(hours: number): string {
     const lines = ["time_ms,kind,line", "0,connected,0.2.0", "0,setting,ticks_per_m=2000"];
@@ -129,7 +129,10 @@ function sentence(text: string): string {
     return `$${text}*${sum.toString(16).toUpperCase().padStart(2, "0")}`;
 }
 
-/** The log of a row of 30 m to the north, with a receiver, and a plant each half metre; so many metres east of the first row. */
+/**
+ * The log of a row of 30 m to the north, with a receiver, and a plant each half metre; `eastM` metres east of the first
+ * row.
+ */
 function placedLog(eastM: number): string {
     const lines = ["time_ms,kind,line", "0,antenna,beam_ahead_mm=0 beam_right_mm=0 delay_ms=0", "0,connected,0.2.0"];
     lines.push("0,setting,ticks_per_m=2000", "0,setting,beam_to_tool_mm=400", "0,setting,margin_mm=50");
@@ -167,7 +170,7 @@ test("logs of several rows are moved together, and their map is that of weeder",
     assert.equal(await rows.count(), 2);
     await inView(page, "log-place").fill("20000");
     await inView(page, "log-closer").click();
-    // Three statuses of a second are read, and the nearest is told.
+    // Three statuses of a second are read, and the nearest is shown.
     await page
         .locator(".log-at")
         .filter({ hasText: /^At 20\.0 m, after (39\.[89]|40\.[0-2]) / })
@@ -235,7 +238,7 @@ test("a log of a day opens, is moved through with only what is in the window, an
         for (let move = 1; move <= moves; move++) {
             place.value = String((move / moves) * Number(place.max));
             place.dispatchEvent(new Event("input"));
-            // It is drawn in the next picture, before this is called.
+            // It is drawn in the next frame, before this is called.
             await new Promise((done) => requestAnimationFrame(done));
             most = Math.max(most, drawing.childElementCount);
             texts.add(document.querySelector(".log-at")?.textContent ?? "");
@@ -245,7 +248,7 @@ test("a log of a day opens, is moved through with only what is in the window, an
     test.diagnostic(
         `${hours} h opened in ${openMs.toFixed(0)} ms, and moves at ${(1000 / perFrameMs).toFixed(0)} pictures a second`,
     );
-    // 200 m have 667 plants with canopy, zone and ground behind each.
+    // 200 m have 667 plants, each with canopy, zone and ground behind it.
     assert(most > 1000 && most < 2500, `${most} elements are drawn`);
     assert.equal(texts, 60, "each move is drawn");
     await inView(page, "log-replay").click();

@@ -1,11 +1,11 @@
-// Save and restart on avr8js: what the EEPROM keeps over a reset, a brown-out and a loss of power.
+// Save and restart on avr8js: the EEPROM's content after a reset, a brown-out and a power failure.
 
 import assert from "node:assert/strict";
 import test from "node:test";
 import type { ResetCause } from "../src/uno/uno.ts";
 import { type Operator, poweredUp, wokenUp } from "./operator.ts";
 
-/** Starts the machine anew and gives back its first line. */
+/** Restarts the machine and returns its first line. */
 function restart(operator: Operator, cause: Exclude<ResetCause, "watchdog">): string {
     operator.take();
     operator.uno.reset(cause);
@@ -67,7 +67,7 @@ test("the servo has no signal during a restart, and comes back with the tool out
     operator.ask("servo in");
     operator.run(100);
     operator.uno.reset("brown-out");
-    // The pulse that the reset may have cut off.
+    // The reset may have cut off this pulse.
     widthsUs.length = 0;
     operator.run(200);
     assert(widthsUs.length >= 8, `${widthsUs.length} pulses`);

@@ -1,4 +1,4 @@
-// Rows at the paper's speeds on avr8js: every plant has a swing of its own, and the tool is never over a canopy.
+// Rows at the paper's speeds on avr8js: every plant has its own swing, and the tool is never over a canopy.
 
 import assert from "node:assert/strict";
 import test from "node:test";
@@ -11,17 +11,17 @@ import { type Operator, wokenUp } from "./operator.ts";
 const PLANTS = 8;
 const FIRST_MM = 900;
 const SECOND_BEAM_PIN = 10;
-/** Cycles between two looks at the tool. */
+/** Cycles between two checks of the tool. */
 const LOOK_CYCLES = CYCLES_PER_SECOND / 1000;
 
-/** What came of a row. */
+/** The result of a row. */
 interface Outcome {
     operator: Operator;
     machine: Machine;
-    /** Plants over whose canopies the tool was not fully out, and those over which it was. */
+    /** Plants over whose canopies the tool was not fully out, and the other plants. */
     touched: number;
     clear: number;
-    /** Tall weeds, and those that the tool worked. */
+    /** Tall weeds, and those that the tool cut. */
     weeds: number;
     weeded: number;
     /** Share of the ground between the plants that the tool worked. */
@@ -43,7 +43,7 @@ function irregularRow(seed: number): Thing[] {
     return row;
 }
 
-/** Weeds a row from standstill until the tool is behind it, the firmware set up by these commands. */
+/** Weeds a row from standstill until the tool is behind it. `commands` set up the firmware. */
 function weed(speedKmH: number, seed: number, commands: readonly string[] = []): Outcome {
     const operator = wokenUp();
     for (const command of commands) operator.ask(command);
@@ -139,6 +139,6 @@ test("the second beam sees the row as far behind the first as it stands, and the
 
     assert.deepEqual(seen.filter((high) => !high).length, things.length);
     const measured = Number(operator.status().slip_permille);
-    // A share of the wheel's way, or that of the ground: 50 or 53.
+    // A share of the wheel's distance, or of the ground: 50 or 53.
     assert(Math.abs(measured - 1000 * SLIP) <= 6, `slip_permille=${measured}`);
 });

@@ -1,5 +1,5 @@
-// What has to be on the screen without scrolling: state, its reason, the alarm and HOLD, in every tab of "Try it" and "Work with it",
-// on the screens that the manual names, in Chromium and in Firefox ESR.
+// Parts that must be on the screen without scrolling: state, its reason, the alarm and HOLD, in every tab of "Try it"
+// and "Work with it", on the screens that the manual names, in Chromium and in Firefox ESR.
 
 import { join } from "node:path";
 import test from "node:test";
@@ -31,7 +31,7 @@ for (const [name, launched] of BROWSERS) {
         await tryPart(opened.page, "state").filter({ hasText: "hold" }).waitFor();
         await tryPart(opened.page, "start").click();
         await tryPart(opened.page, "state").filter({ hasText: "work" }).waitFor();
-        // What a row at work says grows, and moves what is to be clicked.
+        // The texts of a row at work grow, and would move the buttons.
         await time.selectOption("0");
         await opened.page.getByLabel("Kill the encoder").check();
         await pass(opened.page, 5);
@@ -58,7 +58,7 @@ for (const [name, launched] of BROWSERS) {
         await part("state").filter({ hasText: "work" }).waitFor();
         await work.page.keyboard.press("Escape");
         await part("state").filter({ hasText: "hold" }).waitFor();
-        // What the page was asking as HOLD came was dropped, which the browser itself writes down.
+        // HOLD drops the page's pending questions, and the browser logs them as errors.
         await close({ page: work.page, errors: work.errors.filter((error) => !error.includes("status of 409")) });
     });
 }

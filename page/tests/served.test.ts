@@ -1,4 +1,4 @@
-// The page as `weeder serve` gives it to a phone: the real process at a virtual Uno, in a real browser.
+// The page from `weeder serve` on a phone: the real process with a virtual Uno, in a real browser.
 
 import assert from "node:assert/strict";
 import { join } from "node:path";
@@ -47,10 +47,10 @@ test("a phone is paired by the code, sees the machine, and holds it", async (tes
     await part(page, "uno", "why").filter({ hasText: "The port is gone: plug the Uno in again." }).waitFor();
     assert(await part(page, "uno", "hold").isDisabled());
     await plugIn(test, port);
-    // It has forgotten its settings.
+    // It has lost its settings.
     await part(page, "uno", "alarm-name").filter({ hasText: "settings_lost" }).waitFor();
 
-    // The computer falls silent, as one that the phone's network no longer reaches.
+    // The computer stops answering, as if out of the phone's network.
     served.process.kill("SIGSTOP");
     await part(page, "uno", "why")
         .filter({ hasText: "The computer that has the machine's port does not answer" })
@@ -78,7 +78,7 @@ test("the address with the code pairs by itself, and machines side by side are s
     await part(page, "right", "state").filter({ hasText: "work" }).waitFor();
     assert.equal(await part(page, "left", "state").textContent(), "hold");
     await inspect(page, "phone-served-two");
-    // At the computer itself nobody needs a code, and all of the panel is there.
+    // The computer itself needs no code, and shows the whole panel.
     const here = await openAt(browser, served.here);
     await part(here.page, "right", "state").filter({ hasText: "work" }).waitFor();
     assert(await part(here.page, "right", "tab-calibrate").isVisible());
@@ -86,7 +86,7 @@ test("the address with the code pairs by itself, and machines side by side are s
     await part(page, "right", "hold").click();
     await part(here.page, "right", "state").filter({ hasText: "hold" }).waitFor();
 
-    // All of them at once, at a glance.
+    // The overview of all machines.
     const all = page.getByRole("region", { name: "all rows" });
     for (const name of ["left", "right"]) await part(page, name, "start").click();
     await all
@@ -104,7 +104,7 @@ test("the address with the code pairs by itself, and machines side by side are s
         .filter({ hasText: /right\s*hold/ })
         .waitFor();
     assert.equal(await part(page, "left", "state").textContent(), "hold");
-    // What a page was asking as HOLD came was dropped, which the browser itself writes down.
+    // HOLD drops the page's pending questions, and the browser logs them as errors.
     for (const { page, errors } of [here, opened])
         await close({ page, errors: errors.filter((error) => !error.includes("status of 409")) });
 });

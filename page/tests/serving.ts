@@ -1,5 +1,5 @@
-// What the tests share that have `weeder serve` at virtual Unos. 127.0.0.2 stands for the computer's address in the network, where a
-// code is needed.
+// Shared code of tests with `weeder serve` and virtual Unos. 127.0.0.2 stands for the computer's address in the
+// network, which needs a code.
 
 import assert from "node:assert/strict";
 import { type ChildProcess, spawn } from "node:child_process";
@@ -18,7 +18,7 @@ const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
 export const part = (page: Page, machine: string, name: string): Locator =>
     page.getByRole("region", { name: machine, exact: true }).locator(`[data-part="${name}"]`);
 
-/** Ends a process as Ctrl-C does. */
+/** Ends a process by Ctrl-C. */
 export async function end(child: ChildProcess): Promise<void> {
     if (child.exitCode !== null || child.signalCode !== null) return;
     const ended = new Promise((done) => child.once("exit", done));
@@ -26,7 +26,7 @@ export async function end(child: ChildProcess): Promise<void> {
     await ended;
 }
 
-/** A virtual Uno whose port has this path, until the test ends. */
+/** Starts a virtual Uno whose port has this path, until the test ends. */
 export async function plugIn(test: TestContext, path: string): Promise<ChildProcess> {
     const uno = spawn(WEEDER, ["virtual-uno", "--elf", FIRMWARE, "--link", path], { stdio: "ignore" });
     test.after(() => end(uno));
@@ -76,7 +76,7 @@ export async function serve(test: TestContext, ports: string[], ...options: stri
     };
 }
 
-/** A folder that is gone at the test's end. */
+/** A folder that is deleted at the test's end. */
 export function folder(test: TestContext): string {
     const folder = mkdtempSync(join(tmpdir(), "weeder-served-"));
     test.after(() => rmSync(folder, { recursive: true }));

@@ -1,4 +1,4 @@
-// A session with the real firmware, without a page: what the operator does at any moment of it.
+// A session with the real firmware, without a page: the operator's actions at any moment.
 
 import assert from "node:assert/strict";
 import test from "node:test";
@@ -8,22 +8,22 @@ import { wokenUp } from "./operator.ts";
 
 /** Time between two turns of the session. */
 const TURN_MS = 10;
-/** Turns in which a session is sure to have asked all that it asks. */
+/** Turns in which a session has asked all its questions. */
 const TURNS = 300;
 
-/** A session with a firmware that was told to work, which turns as often as a page's. */
+/** A session with a firmware at work, which turns as often as a page's. */
 class Connected {
     readonly happened: Happening[] = [];
     readonly session: Session;
     /** Time in which the page slept, and the machine's answers lay unread. */
     sleptMs = 0;
     readonly #operator = wokenUp();
-    /** What had happened when it was reset. */
+    /** Number of events before its reset. */
     #resetAt = Number.POSITIVE_INFINITY;
 
     /**
-     * `dropped` says which of the lines, counted from 0, others have dropped on their way, where they share the machine; `lost`
-     * which of them noise on the wire takes.
+     * `dropped` has the indices of lines that other clients of the machine have dropped on their way. `lost` has those
+     * that noise on the wire takes.
      */
     constructor(dropped?: (line: number) => boolean, lost: (line: number) => boolean = () => false) {
         const { uno } = this.#operator;
@@ -57,7 +57,7 @@ class Connected {
     async turn(): Promise<void> {
         this.#operator.run(TURN_MS);
         this.session.turn(this.nowMs);
-        // Whoever waits for an answer goes on.
+        // Lets the code that waits for an answer continue.
         await new Promise((done) => setImmediate(done));
     }
 
@@ -74,14 +74,14 @@ class Connected {
         return this.happened.slice(this.#resetAt).some((happening) => happening.is === is);
     }
 
-    /** The machine's state as it was last told. */
+    /** The machine's last reported state. */
     get mode(): string | undefined {
         return this.happened.flatMap((happening) => (happening.is === "status" ? [happening.status.mode] : [])).at(-1);
     }
 }
 
 test("HOLD at any moment of a session holds the machine, and the session goes on", async () => {
-    // Ten a second, and one alone at moments that lie all over the questions that a session begins with.
+    // Ten a second, and single ones at moments all over a session's first questions.
     const moments = [
         (turn: number) => turn % 10 === 0,
         ...[1, 3, 8, 21, 55].map((at) => (turn: number) => turn === at),
@@ -130,7 +130,7 @@ test("a HOLD of others, who share the machine, drops no question of the page's o
 });
 
 test("a question that noise takes, whichever it is, loses no machine for good", async () => {
-    // Those that a session begins with, and the help and the status behind them.
+    // A session's first questions, and the help and the status after them.
     for (const taken of [0, 1, 2, 3, 40]) {
         const machine = new Connected(undefined, (line) => line === taken);
         for (let turn = 0; turn < 2 * TURNS; turn++) await machine.turn();

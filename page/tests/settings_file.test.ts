@@ -1,4 +1,4 @@
-// Settings files, read as the panel reads them.
+// Settings files, as the panel reads them.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";

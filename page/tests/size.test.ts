@@ -1,10 +1,10 @@
-// How large the page is: it is opened on phones in the field, and stands in a release and in `weeder`.
+// The page's size: it is opened on phones in the field, and is part of a release and of `weeder`.
 
 import assert from "node:assert/strict";
 import { readdirSync, statSync } from "node:fs";
 import test from "node:test";
 
-/** All of it: the firmware and the Rust inside, and four languages. Raise it with what is measured, and a reason. */
+/** Greatest size with the firmware, the Rust, and four languages. Raise it to the measured size, with a reason. */
 const MOST_KIB = 640;
 
 test("the page is not larger than it is meant to be", (test) => {

@@ -1,5 +1,5 @@
-// A trial without a page: the real firmware weeds a row, and what became of each plant is judged; and each thing that can be
-// broken in "Try it" does what it does in a field.
+// A trial without a page: the real firmware weeds a row, and each plant gets its verdict. Each fault of "Try it" has
+// the effect that it has in a field.
 
 import assert from "node:assert/strict";
 import test from "node:test";
@@ -9,7 +9,10 @@ import { LineReader } from "../src/link/lines.ts";
 import { inWords } from "../src/try/outcome.ts";
 import { Trial } from "../src/try/trial.ts";
 
-/** A trial whose firmware has woken up, been told that its settings are right, and some more. It hears what the firmware says, as the page's does. */
+/**
+ * A trial after the firmware's start, with its missing settings confirmed, and some commands. It reads the firmware's
+ * output, as the page's does.
+ */
 class Tried {
     readonly trial = new Trial(hex, 7);
     heard = "";
@@ -40,7 +43,7 @@ class Tried {
         assert.match(this.heard, /^ok\r$/m, command);
     }
 
-    /** Rolls at a speed until the tool has come to a place. */
+    /** Rolls at a speed until the tool has reached a position. */
     roll(speedKmH: number, toolMm: number): void {
         this.trial.machine.change({ speedKmH });
         while (this.trial.machine.toolMm < toolMm) {
@@ -49,7 +52,7 @@ class Tried {
         }
     }
 
-    /** Why each plant that was not kept was not, without those that are the same. */
+    /** The distinct reasons why plants were not kept. */
     get notKept(): string[] {
         return [...new Set(this.trial.outcome.notKept.values())];
     }
@@ -67,7 +70,7 @@ test("a row that the real firmware weeds has no plant damaged and no margin cut,
     const { plants, weeds } = tried.trial.outcome.totals;
     assert(plants.kept >= 8, `${plants.kept} plants were passed`);
     assert.deepEqual([plants["margin cut"], plants.damaged], [0, 0]);
-    // The others stand on ground that the plants' margins and the servo's way take.
+    // The others stand on ground that the plants' margins and the servo's time take.
     assert(weeds.passed >= 6 && weeds.cut >= 2, `${weeds.cut} of ${weeds.passed} weeds`);
     assert.match(
         inWords(tried.trial.outcome.totals),
@@ -97,12 +100,12 @@ test("without the servo's leads plants are damaged, and that is said", () => {
     assert.match(tried.trial.why, /^Why plants were not kept: \d+ the swing was late or early for this speed\./);
 });
 
-test("a plant over which the tool is taken by hand is damaged, and stays so when the machine rolls back and passes it anew", () => {
+test("a plant is damaged if the tool is driven over it directly, and stays damaged when the machine rolls back and passes it again", () => {
     const tried = new Tried();
     const [first] = tried.trial.machine.things;
     assert(first?.kind === "plant");
     const [beforeMm, behindMm] = [first.placeMm - 200, first.placeMm + 200];
-    // Out in hold; in by hand, as the tool stands beside the first plant.
+    // Out in hold; driven in directly when the tool is beside the first plant.
     tried.roll(1, first.placeMm - 50);
     tried.trial.machine.change({ speedKmH: 0 });
     tried.pass(2);
@@ -122,7 +125,7 @@ test("a wheel that slips has each window come late, until the margin is cut", ()
     tried.trial.work(true);
     tried.roll(2, 4000);
     const { plants } = tried.trial.outcome.totals;
-    // A fifth of the way from beam to tool is 80 mm, which no margin of 50 mm holds.
+    // A fifth of the distance from beam to tool is 80 mm, more than a margin of 50 mm.
     assert(plants["margin cut"] + plants.damaged >= 4, inWords(tried.trial.outcome.totals));
     assert.deepEqual(tried.notKept, ["off"]);
 });

@@ -1,11 +1,11 @@
-// What the tests of "Try it" share: the page when its machine is set up, and time that passes on its chip.
+// Shared code of the tests of "Try it": the page after its machine is set up, and time on its chip.
 
 import type { Browser, Locator, Page } from "playwright-core";
 import { DESK, type Opened, open } from "./browser.ts";
 
 export const part = (page: Page, name: string): Locator => page.locator(`#try-panel [data-part="${name}"]`);
 
-/** Opens "Try it", and waits until its settings are saved and it holds: a switch that is thrown before that does nothing. */
+/** Opens "Try it", and waits until its settings are saved and it holds. Before that the work switch has no effect. */
 export async function tryIt(browser: Browser, viewport = DESK): Promise<Opened> {
     const opened = await open(browser, "try", viewport);
     await pass(opened.page, 0.5);
@@ -17,17 +17,17 @@ export async function tryIt(browser: Browser, viewport = DESK): Promise<Opened> 
     return opened;
 }
 
-/** Lets time pass in the page until the tool has come to a place along the row, as fast as this machine can. */
+/** Lets time pass in the page until the tool has reached a position along the row, as fast as this machine can. */
 export async function rollTo(page: Page, toolMm: number): Promise<void> {
     while (await page.evaluate((mm) => globalThis.trial.machine.toolMm < mm, toolMm)) await pass(page, 0.5);
 }
 
-/** Lets so much time pass on the chip. */
+/** Lets time pass on the chip. */
 export async function pass(page: Page, seconds: number): Promise<void> {
     await page.evaluate((seconds) => globalThis.trial.advance(seconds, Number.POSITIVE_INFINITY), seconds);
 }
 
-/** Types a command and waits for what the machine says to it: an answer like this behind the command itself, which is shown anew. */
+/** Types a command, and waits until the console shows the command again and an answer like this. */
 export async function type(page: Page, command: string, answer: RegExp): Promise<void> {
     const typed = part(page, "said").locator("div", { hasText: new RegExp(`^> ${command}$`) });
     const before = await typed.count();

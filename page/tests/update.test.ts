@@ -1,4 +1,4 @@
-// The page as an app that works without a network, a newer page, and a firmware that is not the page's.
+// The page as an app without a network, a newer page, and a firmware that differs from the page's.
 
 import assert from "node:assert/strict";
 import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -29,7 +29,7 @@ test("from localhost the page can be installed, opens without a network, and say
     await page.evaluate(() => navigator.serviceWorker.ready);
     const devtools = await page.context().newCDPSession(page);
     const { installabilityErrors } = await devtools.send("Page.getInstallabilityErrors");
-    // The browser of the tests has no window in which anything is installed.
+    // The test browser has no window for installing apps.
     assert.deepEqual(
         installabilityErrors.filter(({ errorId }) => errorId !== "in-incognito"),
         [],
@@ -44,7 +44,7 @@ test("from localhost the page can be installed, opens without a network, and say
             name === "worker.js" ? `${text}\n` : text.replace("<h1>weeder", "<h1>weeder 2"),
         );
     }
-    // In "Work with it": where a row is simulated, a slow computer's browser puts the look off.
+    // In "Work with it": with a simulated row, a slow computer's browser delays the check.
     await page.reload();
     await newer.waitFor();
     await inspect(page, "desk-newer");
@@ -62,7 +62,7 @@ test("from localhost the page can be installed, opens without a network, and say
     );
 });
 
-/** A device whose lines are changed on their way to the page, and the page's on their way to it. */
+/** A device with changed lines in both directions. */
 function changed(device: Device, change: (line: string) => string, sent: (line: string) => string): Device {
     let rest = "";
     return {
@@ -87,7 +87,7 @@ test("an Uno with another firmware is told with what changes, and gets its setti
         (line) => line.replace(/weeder \d+\.\d+\.\d+/, "weeder 0.0.9").replace(/^no_plant_m\b/, "no_crop_m"),
         (line) => line.replace("no_crop_m", "no_plant_m"),
     );
-    // The same board with the new firmware: as its table is another one, it has lost its settings.
+    // The same board with the new firmware: its table is another one, so it has lost its settings.
     const flashed = await VirtualUno.start(test, "--bootloader", "optiboot", "--stand");
     const opened = await open(browser, "work", PHONE, [old, flashed]);
     const { page } = opened;

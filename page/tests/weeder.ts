@@ -1,4 +1,4 @@
-// The command `weeder` that the tests run: the one that WEEDER names, or else this repository's.
+// The command `weeder` for the tests: the one that WEEDER names, or else this repository's.
 
 import { existsSync } from "node:fs";
 import { resolve } from "node:path";

@@ -1,5 +1,5 @@
-// The page in the operator's language: no text is missing, left in English or too long for its place, and the language is chosen, kept
-// and changed while a machine is connected.
+// The page in the operator's language. No text is missing, left in English or too long for its place. The language can
+// be chosen, is stored, and can change while a machine is connected.
 
 import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
@@ -37,10 +37,10 @@ after(() => browser?.close());
 
 const found = (text: string, pattern: RegExp) => [...new Set(text.match(pattern))].sort();
 const holes = (text: string) => found(text, /\{\w+\}/g);
-/** What is typed, which is the same in every language. */
+/** Typed text, which is the same in every language. */
 const typed = (text: string) => found(text, /`[^`]*`/g);
 
-/** The settings, each with what the machine says that it is. */
+/** The settings, each with the machine's description. */
 const helps = [
     ...readFileSync("../control/src/settings.rs", "utf8").matchAll(
         /^ +\w+ "(\w+)"(?: in "[^"]*")?: \d[^;]*,\s+"([^;]*(?:;[^;"]*)?)";$/gm,
@@ -196,7 +196,7 @@ test("what the machine refuses, and settings that contradict each other, are kno
     speak("en");
 });
 
-/** What is cut off, wider than the screen, or out of its box, of all that is shown. */
+/** Visible parts that are cut off, wider than the screen, or outside their box. */
 const cut = (page: Page) =>
     page.evaluate(() => {
         const width = document.documentElement.clientWidth;
@@ -237,7 +237,7 @@ const cut = (page: Page) =>
         return problems;
     });
 
-/** Holds that nothing is cut, in all tabs of the shown view. */
+/** Asserts that nothing is cut, in all tabs of the shown view. */
 async function assertNothingCut(page: Page, view: string): Promise<void> {
     const tabs = page.locator(`#view-${view} [role=tab]`);
     for (let tab = 0; tab < Math.max(await tabs.count(), 1); tab++) {
@@ -256,7 +256,7 @@ for (const code of Object.keys(LANGUAGES) as Code[])
         assert.equal(await page.locator("#unchecked").textContent(), table.words.unchecked);
         await part(page, "state").filter({ hasText: table.words.stateHold }).waitFor();
         await assertNothingCut(page, "try");
-        // With something to tell: plants, weeds, and what the tool did.
+        // With output: plants, weeds, and the tool's swings.
         await page.locator("#switch").check();
         await part(page, "state").filter({ hasText: table.words.stateWork }).waitFor();
         await page.locator("#slip").fill("15");

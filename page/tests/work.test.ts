@@ -1,4 +1,4 @@
-// The panel of a real Uno in a real browser: a virtual Uno behind a serial port, with a machine that rolls along a row.
+// The panel of a real Uno in a real browser: a virtual Uno at a serial port, with a machine that rolls along a row.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -30,7 +30,7 @@ async function connect(device: Device, viewport = DESK): Promise<Opened> {
     return opened;
 }
 
-/** The panel of a virtual Uno whose settings are saved, and whose machine rolls. */
+/** The panel of a virtual Uno with saved settings, whose machine rolls. */
 async function atHold(test: TestContext, viewport = DESK, ...row: string[]): Promise<Opened & { uno: VirtualUno }> {
     const uno = await VirtualUno.start(test, "--elf", FIRMWARE, ...row);
     const opened = await connect(uno, viewport);
@@ -123,7 +123,7 @@ test("the log of a row at work is replayed by weeder without a difference", asyn
     await close({ page, errors });
 });
 
-/** Holds that these parts are on the screen as it is, and that what can be pressed is as large as a thumb. */
+/** Asserts that these parts are visible without scrolling, and that buttons are as large as a thumb. */
 async function assertOnOneScreen(page: Page, names: string[]): Promise<void> {
     for (const name of names) {
         const box = await part(page, name).boundingBox();
@@ -160,17 +160,17 @@ test("a value that cannot be is refused beside its field, in the machine's words
     await close({ page, errors });
 });
 
-test("settings go to a file that weeder reads, and come from one, whatever the order", async (test) => {
+test("settings go to a file that weeder reads, and come from one, in any order", async (test) => {
     const { page, errors } = await atHold(test);
     await page.getByRole("tab", { name: "Settings" }).click();
-    // What the settings are comes behind the settings.
+    // The settings' descriptions come after the settings.
     await page.getByText(/X, from the tool to the beam/).waitFor();
     const download = page.waitForEvent("download");
     await page.getByRole("button", { name: "To a file" }).click();
     await (await download).saveAs("build/files/machine.toml");
     const text = readFileSync("build/files/machine.toml", "utf8");
     assert.match(text, /\n# wheel diameter\n# 200 to 800 mm, default 400\nwheel_mm = 400\n/);
-    // A lead that only a beam farther ahead allows stands before it.
+    // A lead that needs a longer distance from beam to tool comes before it.
     writeFileSync(
         "build/files/other.toml",
         "# mine\nlead_out_ms = 400\nbeam_to_tool_mm = 900 # far\nend_switch = false\n",
@@ -236,7 +236,7 @@ test("the wheel is calibrated over a measured stretch", async (test) => {
     await part(page, "wheel-begin").click();
     const rolled = part(page, "wheel-rolled").filter({ hasText: /^[3-9]\.\d\d m/ });
     await rolled.waitFor();
-    // Twice what the wheel says: no wheel is as wrong as that.
+    // Twice the wheel's value: no wheel has such a large error.
     const measuredMm = 2000 * Number.parseFloat((await rolled.textContent()) ?? "");
     await part(page, "wheel-mm").fill(measuredMm.toFixed(0));
     await part(page, "wheel-end").click();
@@ -262,7 +262,7 @@ test("the servo is calibrated by eye, and timed, while the machine stands", asyn
     await part(page, "lead_out_ms").fill("150");
     await part(page, "servo-leads").click();
     await part(page, "servo-said").filter({ hasText: "Both leads are set" }).waitFor();
-    // The steps are the manual's, and so is what comes next.
+    // The steps and the next step are the manual's.
     await part(page, "set-up-steps").filter({ hasText: "Time the servo" }).waitFor();
     await part(page, "margin-said")
         .filter({ hasText: "Next, time the servo: `calibrate servo` (1 of 2 done)" })

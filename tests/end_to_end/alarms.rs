@@ -1,4 +1,4 @@
-//! Alarms: a fault puts the tool out, is named and blinked, and is latched until it is cleared.
+//! Alarms: a fault puts the tool out. The firmware names it, blinks its code, and latches it until it is cleared.
 
 use crate::common::{
     Run, ask, bare_ground, is_out_at_the_pin, named, number, refusal, run_for_ms, status, steady, throw_switch, trial,
@@ -12,7 +12,7 @@ use field::wiring;
 use uno::Uno;
 use uno::{CYCLES_PER_SECOND, PinChange};
 
-/// A flash and the dark behind it, within a digit.
+/// A flash and the dark time after it, within a digit.
 const FLASH_CYCLES: u64 = CYCLES_PER_SECOND * 524 / 1000;
 
 /// From a digit's last flash to the next digit's first, and to the next code's.
@@ -25,7 +25,7 @@ fn with_a_blocked_beam(start: Start) -> Run {
     let machine = Machine { beam_to_tool_mm: 900.0, ..Machine::default() };
     let motion = steady(mm_s(2.0), 1800.0);
     let mut run = Run::begin(Trial { machine, start, ..trial(row, motion) }, &[]);
-    // 400 mm behind the beginning of what breaks the beam.
+    // 400 mm after the beginning of the blocked stretch.
     run.roll_to(1390.0);
     assert!(!is_out_at_the_pin(&run.uno));
     run.roll_to(1450.0);
@@ -44,8 +44,8 @@ fn assert_alarm(run: &mut Run, alarm: &str) {
     assert_eq!(said, ("alarm", alarm, "out"), "{status}");
 }
 
-/// The codes that the LED blinks during some seconds, as their digits; the first and the last code, which may be cut, left
-/// out.
+/// The codes that the LED blinks during some seconds, as digits. The first and the last code may be cut, so they are
+/// left out.
 fn blinked_codes(uno: &mut Uno) -> Vec<Vec<usize>> {
     let begin = uno.cycle();
     run_for_ms(uno, 16_000);
@@ -166,7 +166,7 @@ fn the_switch_clears_an_alarm_by_going_off_and_on() {
     throw_switch(&mut run.uno, true);
     let after = status(&mut run.uno);
     assert_eq!(value(&after, "state"), "work");
-    // The ground behind the beam is unknown after a fault: the tool waits for what the beam sees from there on.
+    // The ground behind the beam is unknown after a fault: the tool waits for ground that the beam sees from there on.
     assert!(number(&after, "unseen_mm") > 400, "{after}");
     assert!(is_out_at_the_pin(&run.uno));
 }

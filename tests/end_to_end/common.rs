@@ -1,6 +1,6 @@
-//! What the tests share: an Uno that has woken up, an operator at its console, and a run along a row.
+//! Shared code of the tests: a started Uno, an operator at its console, and a run along a row.
 //!
-//! A [`Run`] is a trial that can be looked at and talked to on the way. Nothing in here judges: that is for the tests.
+//! A [`Run`] is a trial that a test can inspect and operate on the way. This file makes no verdicts: the tests do.
 
 use field::machine::{Machine, cycle_at};
 use field::motion::Motion;
@@ -17,7 +17,7 @@ use trial::firmware;
 use uno::PinChange;
 use uno::Uno;
 
-/// Greatest distance between a swing's command at the pin and its ideal place.
+/// Greatest distance between a swing's command at the pin and its ideal position.
 pub const SWING_TOLERANCE_TICKS: f64 = 12.0;
 
 /// The firmware.
@@ -25,19 +25,19 @@ pub fn elf() -> PathBuf {
     firmware::build().expect("the firmware builds")
 }
 
-/// An Uno that has woken up with its inputs at rest, the switch off and the beam clear, and was told that its settings are
-/// right although none are saved.
+/// An Uno after its start, with inputs at rest, the switch off and the beam clear. The alarm for missing saved settings
+/// is cleared.
 pub fn woken_up() -> Uno {
     trial::boot(&elf(), &[]).expect("the firmware wakes up")
 }
 
-/// Types a command and returns the lines of its answer, the `ok` left out.
+/// Types a command and returns the lines of its answer, without the `ok`.
 #[track_caller]
 pub fn ask(uno: &mut Uno, command: &str) -> Vec<String> {
     console::ask(uno, command).expect("the firmware knows the command")
 }
 
-/// Types a command that the firmware is to refuse, and returns the refusal.
+/// Types a command that the firmware must refuse. Returns the error.
 #[track_caller]
 pub fn refusal(uno: &mut Uno, command: &str) -> String {
     match console::ask(uno, command) {
@@ -46,11 +46,11 @@ pub fn refusal(uno: &mut Uno, command: &str) -> String {
     }
 }
 
-/// The status, its lines joined to one.
+/// The status, with its lines joined.
 #[track_caller]
 pub fn status(uno: &mut Uno) -> String {
     let lines = ask(uno, "status");
-    // The end of an event's line may come before it.
+    // The end of an event's line may come first.
     let start = lines.iter().position(|line| line.starts_with("state=")).expect("a status line");
     lines[start..].join(" ")
 }
@@ -80,7 +80,7 @@ pub fn run_for_ms(uno: &mut Uno, time_ms: u64) {
     uno.run_for_ms(time_ms).expect("the firmware runs");
 }
 
-/// Throws the work switch and waits until it has stopped bouncing.
+/// Switches the work switch and waits until it has stopped bouncing.
 #[track_caller]
 pub fn throw_switch(uno: &mut Uno, work: bool) {
     uno.set(wiring::WORK_SWITCH, !work);
@@ -93,12 +93,12 @@ pub fn is_out_at_the_pin(uno: &Uno) -> bool {
     (pulse.width_us() - 2000.0).abs() < 1.0
 }
 
-/// The machine rolls at a steady speed from 0 to `end_mm`; it has its speed after a few centimetres, and brakes as fast.
+/// The machine rolls at a steady speed from 0 to `end_mm`. It accelerates and brakes within a few centimetres.
 pub fn steady(speed_mm_s: f64, end_mm: f64) -> Motion {
     Motion::steady(0.0, 3000.0, speed_mm_s, end_mm).change_speed(0.0, 3000.0)
 }
 
-/// A row that begins far beyond where the machine ever comes.
+/// A row that begins beyond the end of every motion.
 pub fn bare_ground() -> Row {
     Row::new(vec![Thing::plant(100_000.0, 100.0)]).expect("a plant is a row")
 }
@@ -122,14 +122,14 @@ pub fn outcome(trial: &Trial) -> Outcome {
     trial::run(trial, &elf(), |_| {}).expect("the firmware runs")
 }
 
-/// Every plant was kept, the margin less its tolerance on both sides included.
+/// Asserts that every plant was kept, with the margin less its tolerance on both sides.
 #[track_caller]
 pub fn assert_all_kept(judgement: &Judgement) {
     let harmed: Vec<&PlantOutcome> = judgement.plants.iter().filter(|plant| plant.verdict != Verdict::Kept).collect();
     assert!(harmed.is_empty(), "{harmed:#?}");
 }
 
-/// Each plant has one swing out and one in, for itself alone, and there is no other swing.
+/// Asserts that each plant has its own swing out and swing in, and that there are no other swings.
 #[track_caller]
 pub fn assert_a_swing_each(judgement: &Judgement, commands: &[Command]) {
     for plant in &judgement.plants {
@@ -137,11 +137,11 @@ pub fn assert_a_swing_each(judgement: &Judgement, commands: &[Command]) {
         assert!(plant.out_error_ticks.is_some() && plant.in_error_ticks.is_some(), "{plant:?}");
     }
     assert_eq!(judgement.idle_swings, 0);
-    // Two a plant; before them the tool that is out at power-up, and its way into the row.
+    // Two for each plant. Before them are the tool out at power-up, and its first swing in.
     assert_eq!(commands.len(), 2 + 2 * judgement.plants.len(), "{commands:?}");
 }
 
-/// Each command was at the pin close to its ideal place.
+/// Asserts that each command at the pin was close to its ideal position.
 #[track_caller]
 pub fn assert_commands_in_place(judgement: &Judgement) {
     for plant in &judgement.plants {
@@ -151,14 +151,14 @@ pub fn assert_commands_in_place(judgement: &Judgement) {
     }
 }
 
-/// No count was lost and none was made up.
+/// Asserts that the count is exact.
 #[track_caller]
 pub fn assert_position_exact(outcome: &Outcome) {
     assert_eq!(outcome.status.position_ticks, outcome.true_ticks);
     assert_eq!(outcome.status.lost_ticks, 0);
 }
 
-/// Types bytes and returns every line that comes until the firmware has had time to answer all of them.
+/// Types bytes. Returns every line that comes in the time for answering all of them.
 #[track_caller]
 pub fn exchange(uno: &mut Uno, bytes: &[u8]) -> Vec<String> {
     uno.received();
@@ -168,7 +168,7 @@ pub fn exchange(uno: &mut Uno, bytes: &[u8]) -> Vec<String> {
     uno.received().lines().map(str::to_owned).collect()
 }
 
-/// A machine on its way along a row, with the firmware telling its events.
+/// A machine that rolls along a row, with events on.
 pub struct Run {
     /// The Uno.
     pub uno: Uno,
@@ -178,14 +178,14 @@ pub struct Run {
 }
 
 impl Run {
-    /// Wakes the firmware up, gives it these commands and those of the trial's start, and sets the machine in motion.
+    /// Starts the firmware, types these commands and those of the trial's start, and sets the machine in motion.
     #[track_caller]
     pub fn begin(trial: Trial, commands: &[&str]) -> Self {
         Self::begin_altered(trial, commands, |_, changes| changes)
     }
 
-    /// As [`Run::begin`], with other levels on the pins than the motion gives: `alter` gets the cycle at which the motion
-    /// begins, and what a sound machine would show.
+    /// As [`Run::begin`], with changed levels on the pins: `alter` gets the cycle at which the motion begins, and the
+    /// changes of a machine without faults.
     #[track_caller]
     pub fn begin_altered(
         trial: Trial,
@@ -222,14 +222,14 @@ impl Run {
         Self { uno, trial, start_cycle, heard: String::new() }
     }
 
-    /// Rolls on until the machine first comes to a place.
+    /// Rolls on until the machine first reaches a position.
     #[track_caller]
     pub fn roll_to(&mut self, place_mm: f64) {
         let passing = self.trial.motion.passings(place_mm).next().expect("the machine comes to the place");
         self.uno.run_until(cycle_at(self.start_cycle, passing.time_s)).expect("the firmware runs");
     }
 
-    /// Types a line every so many milliseconds of the way, to the motion's end.
+    /// Types a line at an interval in milliseconds, until the motion's end.
     #[track_caller]
     pub fn roll_on_asking(&mut self, line: &str, every_ms: u64) {
         let end = self.end_cycle();
@@ -256,12 +256,12 @@ impl Run {
         self.start_cycle..self.end_cycle()
     }
 
-    /// The machine's place at a cycle.
+    /// The machine's position at a cycle.
     pub fn place_mm(&self, cycle: u64) -> f64 {
         self.trial.motion.position_mm(field::machine::time_at_s(self.start_cycle, cycle))
     }
 
-    /// Every line that the firmware has sent on the way.
+    /// Every line that the firmware has sent so far.
     pub fn lines(&mut self) -> Vec<String> {
         self.heard += &self.uno.received();
         self.heard.lines().map(str::to_owned).collect()
@@ -274,7 +274,7 @@ impl Run {
         lines
     }
 
-    /// What happened to the row.
+    /// The result for the row.
     pub fn judgement(&self) -> Judgement {
         let Trial { row, machine, motion, timing, .. } = &self.trial;
         judge(row, machine, motion, *timing, &self.uno.pulses(wiring::SERVO), self.start_cycle)

@@ -1,4 +1,4 @@
-//! The console's grammar, as it comes over the serial line.
+//! The console's grammar over the serial line.
 
 use crate::common::{exchange, refusal, run_for_ms, status, value, woken_up};
 use control::say::command::Word;
@@ -6,12 +6,12 @@ use control::settings::Setting;
 use field::wiring;
 use uno::Uno;
 
-/// The lines of an answer that are its end.
+/// The number of lines that end an answer.
 fn ends(lines: &[String]) -> usize {
     lines.iter().filter(|line| *line == "ok" || line.starts_with("error: ")).count()
 }
 
-/// The answer is so many lines, then `ok`, and nothing else.
+/// Asserts that the answer is this number of lines and `ok`, and nothing else.
 #[track_caller]
 fn assert_answer(uno: &mut Uno, command: &str, lines: u8) {
     let answer = exchange(uno, format!("{command}\n").as_bytes());

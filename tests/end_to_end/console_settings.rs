@@ -1,4 +1,4 @@
-//! Every setting over the console: its range, what is beyond it, and what may be changed while the machine works.
+//! Every setting over the console: its range, values out of range, and changes while the machine works.
 
 use crate::common::{ask, refusal, run_for_ms, woken_up};
 use control::settings::{Description, Setting};
@@ -21,7 +21,7 @@ fn written(setting: Setting, value: u16) -> String {
     }
 }
 
-/// The value that the firmware says.
+/// The firmware's value.
 #[track_caller]
 fn get(uno: &mut Uno, name: &str) -> String {
     let lines = ask(uno, &format!("get {name}"));
@@ -135,7 +135,7 @@ fn settings_that_change_where_the_tool_is_are_refused_while_the_machine_works() 
     ask(&mut uno, "hold");
     for name in refused {
         let (setting, _) = settings().find(|(_, other)| *other == name).expect("a setting");
-        // One more than the least: the two servo pulses may not be equal.
+        // One above the least: the two servo pulses must differ.
         let value = setting.description().least + u16::from(name == "servo_out_us");
         ask(&mut uno, &format!("set {name} {value}"));
     }

@@ -7,12 +7,12 @@ use trial::bench::BenchError;
 use trial::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
 use uno::{CYCLES_PER_SECOND, PinChange};
 
-/// Counts in a second that the firmware follows while its status streams at 115200 baud and the beam flickers, whatever the
-/// moments at which the edges come: evenly, and early and late by 30 % of the time between two.
+/// Counts a second that the firmware follows while its status streams at 115200 baud and the beam flickers. This holds
+/// for any timing of the edges: even, and early and late by 30 % of the time between two.
 const EVEN_PER_S: f64 = 255_000.0;
 const JITTERED_PER_S: f64 = 235_000.0;
 
-/// Turns the encoder forward and backward beside all the rest, by chance and at the worst moments.
+/// Turns the encoder forward and backward under full load, with random edges and with edges at the worst moments.
 #[track_caller]
 fn assert_no_count_is_lost(counts_per_s: f64, jitter: f64) {
     for direction in [Direction::Forward, Direction::Backward] {

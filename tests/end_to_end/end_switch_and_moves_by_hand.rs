@@ -1,4 +1,4 @@
-//! A tool that was moved by hand is not taken for stuck when the machine moves it back: it has its time again.
+//! A tool that was driven directly must not count as stuck when the machine moves it back: its time limit restarts.
 
 use crate::common::{ask, run_for_ms, status, throw_switch, value, woken_up};
 use field::wiring;
@@ -7,7 +7,7 @@ use uno::Uno;
 /// The tool follows a command by this.
 const FOLLOWS_MS: u64 = 120;
 
-/// Types a line that moves the tool, and waits until it is there.
+/// Types a line that moves the tool, and waits until it has moved.
 fn moved(uno: &mut Uno, line: &str, out: bool) {
     ask(uno, line);
     run_for_ms(uno, FOLLOWS_MS);

@@ -1,4 +1,4 @@
-//! Examples taught in the field: they change what the next object is taken for, and outlive the power.
+//! Examples taught in the field: they change the class of later detections, and survive a power failure.
 
 use crate::common::{ask, elf, refusal, run_for_ms, woken_up};
 use control::ground::field_examples::{self, FieldExamples};
@@ -11,13 +11,13 @@ use knn::Example;
 use uno::CYCLES_PER_SECOND;
 use uno::Uno;
 
-/// Where the firmware keeps the slots in EEPROM.
+/// The address of the example slots in the EEPROM.
 const SLOTS_BEGIN: usize = SIZE;
 
 /// A width that is neither a plant's nor a weed's to the built-in examples.
 const ODD_WIDTH_MM: f64 = 55.0;
 
-/// Rolls past `count` odd objects, in hold.
+/// Rolls past `count` unusual objects, in hold.
 fn roll_past_odd_objects(uno: &mut Uno, count: usize) {
     let things = (0..count).map(|index| Thing::weed(300.0 + 300.0 * index as f64, ODD_WIDTH_MM)).collect();
     let row = Row::new(things).expect("the objects stand apart");
@@ -81,7 +81,7 @@ fn an_object_that_was_labelled_is_known_when_it_comes_again() {
     );
     assert_eq!(field_examples(&mut uno).len(), 1);
 
-    // One neighbour decides: the next one is like the one that was taught.
+    // One neighbour decides: the next detection is like the taught one.
     uno.power_cycle();
     greeted(&mut uno);
     ask(&mut uno, "set k 1");

@@ -4,8 +4,8 @@ use experiments::experiment::{Engine, Experiment, Treatment};
 use field::conditions::Conditions;
 use trial::firmware;
 
-/// Over all plots, in-row weeding may fall short of what the servo allows by this share of the ground. A single plot may
-/// by more: a weed as wide as a plant is kept as one, and one such in these 7 m costs 3 %.
+/// Over all plots, in-row weeding may fall short of the servo's bound by this share of the ground. A single plot may
+/// fall short by more: a weed as wide as a plant is kept, and one of them in these 7 m costs 3 %.
 const SHORT_OF_BOUND: f64 = 0.05;
 
 #[test]
@@ -13,7 +13,7 @@ fn the_firmware_damages_no_plant_at_any_of_the_papers_speeds_and_spacings_and_we
     let mut conditions = Conditions::default();
     conditions.set("plot.rows", 1.0).unwrap();
     conditions.set("plot.row_m", 7.0).unwrap();
-    // As long as this servo takes mostly: the bound asks for no more.
+    // The usual time of this servo: the bound assumes no more.
     conditions.set("lead_out_ms", 180.0).unwrap();
     let experiment = Experiment {
         replications: 1,

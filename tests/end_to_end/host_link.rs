@@ -1,4 +1,4 @@
-//! The host's link to the console: what it asks, sets and hears, of the real firmware.
+//! The PC's link with the real firmware: its questions, settings and events.
 
 use crate::common::{elf, number};
 use control::settings::{Setting, Settings};
@@ -37,10 +37,10 @@ fn all_settings_are_read_and_are_the_table_s_defaults() {
 }
 
 #[test]
-fn settings_are_pushed_whatever_stands_in_each_other_s_way() {
+fn settings_are_pushed_even_if_their_ranges_block_each_other() {
     let mut link = link();
     link.ask("clear").expect("the firmware knows the command");
-    // The pulses change places, and only the beam's new place makes room for the margin.
+    // The pulses are exchanged, and only the beam's new position makes room for the margin.
     let wanted = [
         (Setting::MarginMm, 200),
         (Setting::LeadOutMs, 400),

@@ -1,8 +1,8 @@
-//! What each interrupt and each critical section may take, and the encoder at the rate that follows from it.
+//! The budgets of interrupts and critical sections, and the encoder at the rate that follows from them.
 //!
-//! No more than two of the encoder's counts may come between two looks at it. What keeps it waiting is the longest of the
-//! other handlers, and the critical section that the loop may open right behind it. So each has a budget in cycles, entry
-//! and return included.
+//! At most two counts of the encoder may come between two reads. A read waits for the longest of the other handlers,
+//! and for the critical section that the loop may enter directly after it. So each has a budget in cycles, including
+//! entry and return.
 
 use crate::common::{ask, encoder_steps, number, run_for_ms, status, woken_up};
 use field::wiring;
@@ -22,8 +22,8 @@ const BUDGETS: [(u8, &str, u64); 6] = [
 /// Budget of a stretch with interrupts off outside the handlers, in cycles.
 const CRITICAL_SECTION: u64 = 25;
 
-/// Rolls for two seconds at so many counts a second, forward and then back, with the console asked without end and a beam
-/// that flickers.
+/// Rolls for two seconds at a rate of counts, forward and then back, with continuous console questions and a flickering
+/// beam.
 pub fn roll(uno: &mut Uno, counts_per_second: u64) -> String {
     const MILLISECONDS: u64 = 2000;
     ask(uno, "events on");
@@ -81,6 +81,6 @@ fn no_interrupt_and_no_critical_section_exceeds_its_budget() {
 fn no_count_is_lost_at_250_000_a_second() {
     let mut uno = woken_up();
     let status = roll(&mut uno, 250_000);
-    // Were every look in time, the jumps that are resolved would go untested.
+    // If every read were in time, the resolved jumps would not be tested.
     assert!(number(&status, "jumps") > 0, "{status}");
 }

@@ -1,4 +1,4 @@
-//! `hold` and the work switch put the tool out at once, wherever it is.
+//! `hold` and the work switch put the tool out at once, at every position.
 
 use crate::common::{Run, bare_ground, is_out_at_the_pin, run_for_ms, status, steady, trial, value};
 use field::motion::mm_s;
@@ -7,7 +7,7 @@ use field::wiring;
 use uno::CYCLES_PER_SECOND;
 use uno::SENT_BYTE_CYCLES;
 
-/// A running pulse, the gap behind it, and turns of the loop.
+/// A running pulse, the gap after it, and turns of the loop.
 const AT_ONCE_MS: f64 = 6.0;
 
 /// Contacts are believed after 20 ms.
@@ -21,7 +21,7 @@ fn weeding(start: Start) -> Run {
     run
 }
 
-/// Time from a cycle to the next command at the pin, which is to be one out of the row.
+/// Time from a cycle to the next command at the pin, which must be a swing out.
 #[track_caller]
 fn time_to_swing_out_ms(run: &mut Run, cycle: u64) -> f64 {
     run.roll_to(1500.0);

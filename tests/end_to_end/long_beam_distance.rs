@@ -1,4 +1,4 @@
-//! Beams far ahead of the tool, with more than one plant between them, and one that is too near for the speed.
+//! Beams far ahead of the tool, with several plants between them, and a beam that is too near for the speed.
 
 use crate::common::{Run, assert_a_swing_each, assert_all_kept, assert_commands_in_place, number};
 use field::machine::Machine;
@@ -7,7 +7,7 @@ use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
 
-/// Rolls along plants every 500 mm, asking for the status on the way.
+/// Rolls along plants every 500 mm, and asks for the status on the way.
 fn run_with_beam_at(beam_to_tool_mm: f64, speed_km_h: f64) -> Run {
     let planting = Planting { plants: 8, spacing_scatter_mm: 20.0, ..Planting::default() };
     let row = planting.grow(1).expect("the plants have room");
@@ -51,7 +51,7 @@ fn with_the_beam_2000_mm_ahead_four_plants_wait_in_the_schedule() {
 
 #[test]
 fn a_beam_too_near_for_the_speed_keeps_the_tool_out() {
-    // 180 ms are 125 mm at 2.5 km/h: a plant just behind the beam could not be left in time.
+    // 180 ms are 125 mm at 2.5 km/h: the tool could not swing out in time for a plant directly behind the beam.
     let mut run = run_with_beam_at(120.0, 2.5);
     assert_all_kept(&run.judgement());
     assert!(run.events("alarm")[0].starts_with("alarm code=3-1 name=too_fast "), "{:?}", run.lines());

@@ -1,8 +1,8 @@
-//! End to end: the real ELF in the virtual Uno, judged by its pins and its serial line.
+//! End-to-end tests: the real ELF in the virtual Uno, observed at its pins and its serial line.
 //!
-//! One file a behaviour. They are modules of one test program, so that the firmware is built once and the simulations
-//! share the processor's cores. What is asserted here can be seen from outside the chip; the decisions themselves are
-//! tested in `control`, the simulator in `field`.
+//! Each file has one behaviour. All are modules of one test program, so that the firmware is built once and the
+//! simulations share the cores. The assertions concern behaviour outside the chip. The decisions are tested in
+//! `control`, and the simulator in `field`.
 
 mod alarms;
 mod common;

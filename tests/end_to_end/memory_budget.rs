@@ -1,4 +1,4 @@
-//! The memory that the firmware may take on an ATmega328P.
+//! The firmware's memory budget on an ATmega328P.
 
 use crate::common::{Run, ask, elf};
 use field::machine::Machine;
@@ -12,10 +12,10 @@ use uno::elf::{Image, Size};
 /// The flash below the Uno's bootloader, less a reserve of 356 bytes.
 const FLASH_BYTES: u64 = 32_256 - 356;
 
-/// What the stack that is proved (budgets.toml) leaves of the 2 KiB of SRAM, less a reserve of 400 bytes.
+/// The 2 KiB of SRAM, less the proved stack (budgets.toml) and a reserve of 400 bytes.
 const SRAM_BYTES: u64 = 1248;
 
-/// What memory.x leaves the stack at link time.
+/// The stack's room at link time, by memory.x.
 const STACK_BYTES: usize = 768;
 
 #[test]
@@ -51,6 +51,6 @@ fn the_flash_that_the_tools_tell_is_what_avr_size_counts_and_what_is_flashed() {
     let counted = bytes(".text") + bytes(".data");
     assert_eq!(Size::read(&elf()).expect("the ELF can be read").flash, counted);
     assert_eq!(Image::read(&elf()).expect("the ELF can be read").flash.len() as u64, counted);
-    // Its mark outlives a reset in SRAM, and has nothing in flash.
+    // Its mark survives a reset in SRAM, and has no initial value in flash.
     assert!(bytes(".noinit") > 0);
 }

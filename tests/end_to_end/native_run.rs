@@ -1,7 +1,8 @@
-//! The native run and the firmware on the virtual Uno swing at the same places.
+//! The native run and the firmware on the virtual Uno swing at the same positions.
 //!
-//! The rows have everything that the presets have but stops: a machine that brakes may come to stand at the very edge of a
-//! window, where the last reading of the speed decides whether the tool swings once more, and both read it at different moments.
+//! The rows have all conditions of the presets except stops. A braking machine may stop exactly at the edge of a zone.
+//! There the last reading of the speed decides whether the tool swings once more, and the two runs read it at different
+//! moments.
 
 use field::conditions::{Conditions, presets};
 use field::driving::drive;
@@ -16,10 +17,10 @@ use rayon::prelude::*;
 use trial::firmware;
 use uno::Pulse;
 
-/// A servo's frame: what a swing may differ by.
+/// Greatest difference of a swing: a servo's frame.
 const FRAME_S: f64 = 0.020;
 
-/// A short row under the conditions of some preset, with a speed and a spacing of its own.
+/// A short row under the conditions of a preset, with its own speed and spacing.
 fn random_row(seed: u64) -> Trial {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let presets: Vec<&str> = presets().collect();
@@ -50,7 +51,7 @@ fn the_native_run_swings_as_the_firmware_does_on_random_rows() {
             let servo = trial.machine.servo;
             let on_the_uno = trial::run(&trial, &elf, |_| ()).unwrap();
             let by_the_native_run = native::weed(&trial, &Sensors::new(&trial, native::TURN_S)).unwrap();
-            // The tool is out from the beginning, and on the Uno before it is told how far that is.
+            // The tool is out from the beginning. On the Uno this is before the command with the setting of the width.
             let swings = |pulses: &[Pulse]| {
                 servo.commands(pulses).into_iter().skip_while(|command| command.is_out()).collect::<Vec<_>>()
             };

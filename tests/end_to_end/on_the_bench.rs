@@ -1,4 +1,4 @@
-//! What is tried on the bench, on the real ELF: the servo by hand and timed, and a row without sensors.
+//! Bench commands on the real ELF: the servo driven directly and timed, and a row without sensors.
 
 use crate::common::{Run, ask, assert_all_kept, exchange, refusal, run_for_ms, status, trial, value, woken_up};
 use field::machine::Machine;
@@ -41,7 +41,7 @@ fn what_moves_the_tool_in_hold_waits_until_the_machine_stands_and_ends_when_it_r
     }
 }
 
-/// Has the end switch follow the servo's commands, as a tool does that takes `out_ms` and begins to leave after `in_ms`.
+/// Simulates the end switch of a tool that is out after `out_ms`, and begins to swing in after `in_ms`.
 fn swing(uno: &mut Uno, duration_ms: u64, out_ms: u64, in_ms: u64) {
     let (mut told_out, mut told_at) = (true, 0);
     for now in 0..duration_ms {
@@ -67,7 +67,7 @@ fn the_end_switch_times_the_servo() {
     let told = uno.received();
     let line = told.lines().find(|line| line.starts_with("calibrated ")).expect("how it ended");
     let number = |key| value(line, key).parse::<f64>().expect("a number");
-    // A pulse has to end before it can be seen, and the firmware adds 11 ms to the way out.
+    // A pulse is known only at its end, and the firmware adds 11 ms to the swing out.
     assert!((159.0..=168.0).contains(&number("lead_out_ms")), "{line}");
     assert!((58.0..=66.0).contains(&number("lead_in_ms")), "{line}");
     assert_eq!(value(line, "set"), "yes");
@@ -86,7 +86,7 @@ fn a_row_without_sensors_swings_the_servo_for_each_plant() {
     assert!(told.lines().skip(1).all(|line| line.starts_with("swing ")), "{told}");
     assert_eq!(told.lines().count(), 14, "{told}");
     let commands = Servo::default().commands(&uno.pulses(wiring::SERVO)[before..]);
-    // Into the row, and out and in for each plant; out for good at the end.
+    // One swing in, a swing out and in for each plant, and the final swing out.
     assert_eq!(commands.len(), 1 + 2 * 6 + 1, "{commands:?}");
     let said = status(&mut uno);
     assert_eq!((value(&said, "state"), value(&said, "pos")), ("hold", "0"), "{said}");
@@ -95,7 +95,7 @@ fn a_row_without_sensors_swings_the_servo_for_each_plant() {
 
 #[test]
 fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone() {
-    // The row ends 3.5 m on, half a turn more or less.
+    // The row ends after 3.5 m, with half a turn of tolerance.
     let ends_us = 3_500_000_000 / 1300;
     for (command, off_us) in
         [("servo in", -600), ("servo in", -200), ("servo in", 0), ("servo in", 300), ("calibrate servo", 0)]
@@ -104,7 +104,8 @@ fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone
         ask(&mut uno, "hold");
         let typed = "test row 1300\n";
         uno.send(typed.as_bytes());
-        // A byte takes ten bits' time; the row begins with the last of them, and the other line ends with its last, too.
+        // A byte takes ten bits. The row begins with the last byte of its command, and the other line also ends with
+        // its last byte.
         let bytes_us = |text: &str| text.len() as i64 * 1_000_000 * 10 / 115_200;
         let wait_us = bytes_us(typed) + ends_us + off_us - bytes_us(command) - bytes_us("\n");
         let cycle = uno.cycle() + wait_us as u64 * (CYCLES_PER_SECOND / 1_000_000);

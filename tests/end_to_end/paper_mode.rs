@@ -1,4 +1,5 @@
-//! Both leads at 0: the firmware schedules as the paper does, and damages plants as the paper reports, more at speed.
+//! Both leads at 0: the firmware schedules as the paper does. It damages plants as the paper reports, more at higher
+//! speed.
 
 use crate::common::outcome;
 use field::machine::Machine;
@@ -13,7 +14,7 @@ fn judgement(timing: Timing, speed_km_h: f64) -> Judgement {
     outcome(&Trial::at_speed(row, Machine::default(), timing, mm_s(speed_km_h))).judgement
 }
 
-/// How far into a canopy the tool came, in the mean of all plants; negative where it kept away from them.
+/// The tool's mean depth in the canopies; negative if it stays outside.
 fn mean_depth_mm(judgement: &Judgement) -> f64 {
     let depths: Vec<f64> =
         judgement.plants.iter().map(|plant| -plant.clearance_before_mm.expect("a swing out")).collect();

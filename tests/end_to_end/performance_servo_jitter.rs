@@ -1,4 +1,4 @@
-//! The servo's pulses while everything else is busy: each is as long as the last, to the cycle.
+//! The servo's pulses under full load: all have the same length, to the cycle.
 
 use crate::common::elf;
 use trial::bench::servo::{Jitter, PULSES, jitter};

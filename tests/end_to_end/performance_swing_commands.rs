@@ -1,12 +1,12 @@
-//! How late a swing's command comes to the servo's pin: hundreds of rows that grow by chance, and a machine four times as fast
-//! as it was made for.
+//! The timing error of swing commands at the servo's pin: hundreds of random rows, and a machine at four times its
+//! design speed.
 
 use crate::common::elf;
 use field::machine::Machine;
 use model_test::cases;
 use trial::bench::swings::{Lateness, Rows, lateness};
 
-/// Greatest and mean distance of a command from its ideal place at 2.5 km/h, in ticks.
+/// Greatest and mean distance of a command from its ideal position at 2.5 km/h, in ticks.
 const WORST_TICKS: f64 = 9.0;
 const MEAN_TICKS: f64 = 3.0;
 
@@ -36,7 +36,7 @@ fn over_many_rows_at_2_5_km_h_every_command_comes_close_to_its_place() {
 
 #[test]
 fn at_10_km_h_no_plant_is_damaged_and_commands_are_as_exact_in_time() {
-    // 180 ms are half a metre at this speed: the beam has to look farther ahead, and the plants need more room between them.
+    // 180 ms are half a metre at this speed: the beam must look farther ahead, and the plants need more distance.
     let machine = Machine { beam_to_tool_mm: 800.0, ..Machine::default() };
     let rows = Rows { seeds: 0..cases(20), machine, speed_km_h: 10.0, spacing_mm: 1400.0..1800.0, weeds: 0 };
     let lateness = lateness_without_damage(&rows);

@@ -1,5 +1,5 @@
-//! Resets, stalls, spoiled memory and counters at their end: the machine wakes up in HOLD with the tool out, says why, and
-//! works with nothing that it cannot trust.
+//! Resets, stalls, damaged memory and overflowing counters: the machine starts in HOLD with the tool out, reports the
+//! cause, and uses no damaged data.
 
 use crate::common::{
     Run, ask, assert_a_swing_each, assert_all_kept, assert_commands_in_place, bare_ground, elf, is_out_at_the_pin,
@@ -22,7 +22,7 @@ const GREETING_CYCLES: u64 = CYCLES_PER_SECOND / 2;
 /// Servo pulse for the tool out of the row, by default.
 const OUT_US: f64 = 2000.0;
 
-/// The greeting after a reset; no pulse since `cycle` has had the tool in the row.
+/// The greeting after a reset. Asserts that no pulse since `cycle` has the tool in the row.
 #[track_caller]
 fn greeting_with_the_tool_out_since(uno: &mut Uno, cycle: u64) -> String {
     let greeting = uno.run_until_serial("commands\r\n", GREETING_CYCLES).expect("the firmware wakes up");
@@ -52,7 +52,7 @@ fn a_reset_at_any_moment_wakes_up_in_hold_with_the_tool_out_and_tells_its_cause(
         (|uno| uno.power_cycle_to_noise(7), "power_on"),
     ] {
         let mut run = at_work();
-        // Moments that have nothing to do with the loop's turns: in the row, over the plant, behind it.
+        // Times that are independent of the loop's turns: in the row, over the plant, behind it.
         for wait_us in [0, 1_237, 250_011, 433_333, 700_003, 311] {
             let cycle = run.uno.cycle() + wait_us * (CYCLES_PER_SECOND / 1_000_000);
             run.uno.run_until(cycle).expect("the firmware runs");
@@ -62,7 +62,7 @@ fn a_reset_at_any_moment_wakes_up_in_hold_with_the_tool_out_and_tells_its_cause(
             let said = status(&mut run.uno);
             let expected = ["hold", "out", cause];
             assert_eq!(["state", "tool", "reset"].map(|key| value(&said, key)), expected, "{said}");
-            // 30 ms of rolling are known, and nothing before them.
+            // 30 ms of rolling are known, and no ground before them.
             assert!(number(&said, "unseen_mm") > 350, "{said}");
             ask(&mut run.uno, "start now");
         }
@@ -78,7 +78,7 @@ fn a_loop_that_stalls_has_the_tool_put_out_and_the_machine_reset_and_the_cause_t
         run.uno.stall().expect("the firmware runs");
         let greeting = run.uno.run_until_serial("commands\r\n", CYCLES_PER_SECOND).expect("the watchdog resets it");
         assert!(greeting.contains("reset by loop_stalled, state hold,"), "{greeting:?}");
-        // Out by the timer's interrupt 200 ms after the last turn, well before the watchdog's reset.
+        // The timer's interrupt puts it out 200 ms after the last turn, well before the watchdog's reset.
         let reset = run.uno.resets()[0].cycle;
         let ms_after = |cycle: u64| (cycle - stalled) as f64 / (CYCLES_PER_SECOND as f64 / 1000.0);
         assert!((240.0..300.0).contains(&ms_after(reset)), "{} ms", ms_after(reset));
@@ -87,7 +87,7 @@ fn a_loop_that_stalls_has_the_tool_put_out_and_the_machine_reset_and_the_cause_t
         assert!((195.0..225.0).contains(&ms_after(command.rise_cycle)), "{} ms", ms_after(command.rise_cycle));
         run_for_ms(&mut run.uno, 100);
         assert!(is_out_at_the_pin(&run.uno));
-        // The next reset has nothing to do with it.
+        // The cause does not carry over to the next reset.
         run.uno.reset();
         let greeting = greeting_with_the_tool_out_since(&mut run.uno, reset);
         assert!(greeting.contains("reset by reset_pin"), "{greeting:?}");
@@ -106,7 +106,7 @@ fn the_operator_has_the_watchdog_restart_a_machine_that_stands_in_hold() {
     run_for_ms(&mut run.uno, 100);
     let typed = run.uno.cycle();
     ask(&mut run.uno, "test watchdog");
-    // Two frames later at most, the servo has the pulse for out, and keeps it.
+    // At most two frames later the servo has the pulse for out, and keeps it.
     let greeting = greeting_with_the_tool_out_since(&mut run.uno, typed + CYCLES_PER_SECOND / 25);
     assert!(greeting.contains("reset by loop_stalled, state hold,"), "{greeting:?}");
     assert_eq!(run.uno.resets().len(), 1);
@@ -130,7 +130,7 @@ fn a_stack_that_nearly_reaches_the_variables_is_an_alarm() {
     assert!(is_out_at_the_pin(&run.uno));
 }
 
-/// An EEPROM that holds these settings, right or not, saved one after the other.
+/// An EEPROM with these settings, valid or not, saved one after the other.
 fn eeprom_with(saves: &[Settings]) -> Vec<u8> {
     let mut saved = SavedSettings::new(Volatile::new());
     for settings in saves {
@@ -148,7 +148,7 @@ fn with(values: &[(Setting, u16)]) -> Settings {
     settings
 }
 
-/// What wakes up with this in its EEPROM: the greeting, and the Uno.
+/// Starts with this EEPROM. Returns the greeting and the Uno.
 fn waking_up_with(eeprom: &[u8]) -> (String, Uno) {
     let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up").wired(&wiring::WIRES);
     let greeting = uno.run_until_serial("commands\r\n", GREETING_CYCLES).expect("the firmware greets");
@@ -262,7 +262,7 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_never_start() {
 
 #[test]
 fn the_saved_pulse_has_the_tool_out_from_the_first_one_on() {
-    // A machine whose servo sits the other way round.
+    // A machine with a mirrored servo.
     let eeprom = eeprom_with(&[with(&[(Setting::ServoOutUs, 1000), (Setting::ServoInUs, 2000)])]);
     let (_, mut uno) = waking_up_with(&eeprom);
     run_for_ms(&mut uno, 50);
@@ -274,7 +274,7 @@ fn the_saved_pulse_has_the_tool_out_from_the_first_one_on() {
 fn nothing_happens_where_position_and_time_wrap() {
     let mut uno = Uno::boot(&elf()).expect("the firmware can be run").wired(&wiring::WIRES);
     uno.run_until_symbol("main", GREETING_CYCLES).expect("the program starts");
-    // Both run over their end one and a half metres into the row, in the middle of a window.
+    // Both overflow one and a half metres into the row, in the middle of a zone.
     let count = (i32::MAX - 2_500).to_le_bytes();
     uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2]).expect("the count's lower half");
     uno.write("weeder_firmware::encoder::COUNT_HIGH", &count[2..]).expect("the count's upper half");

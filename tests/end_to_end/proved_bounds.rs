@@ -1,7 +1,7 @@
-//! What is measured never exceeds what is proved: the deepest stack, every handler, every critical section; and no count is lost at
-//! the rate that is said to be never lost.
+//! Measured values never exceed the proved bounds: the deepest stack, every handler, every critical section. No count
+//! is lost at the rate that is proved to be never lost.
 //!
-//! The proofs follow the ELF (`avr_bounds`); the measurements run it with all that keeps it busy.
+//! The proofs analyse the ELF (`avr_bounds`). The measurements run it under full load.
 
 use crate::common::{Run, ask, elf, run_for_ms, woken_up};
 use crate::interrupt_budgets::roll;
@@ -31,7 +31,7 @@ use uno::{CYCLES_PER_SECOND, Uno};
 /// Counts in a second beside which the loop still gets time to answer.
 const BUSY_PER_S: u64 = 150_000;
 
-/// Commands that are taken in HOLD, each with what it has done for it.
+/// Commands that work in HOLD.
 const COMMANDS: [&str; 25] = [
     "help",
     "help k",
@@ -69,7 +69,7 @@ fn proved() -> Bounds {
     prove(&program(&elf()), &budgets).expect("the firmware has bounds")
 }
 
-/// Holds what an Uno was measured to need against the bounds.
+/// Compares an Uno's measured values with the bounds.
 #[track_caller]
 fn assert_within(bounds: &Bounds, uno: &Uno) {
     let stack = uno.deepest_stack();
@@ -92,7 +92,8 @@ fn assert_within(bounds: &Bounds, uno: &Uno) {
     assert!(longest <= turn, "a turn of {longest} cycles");
 }
 
-/// The compiler may begin a 16-bit operand at an odd register, and these instructions then take another pair without a warning.
+/// The compiler may assign a 16-bit operand to an odd register. These instructions then use another pair, without a
+/// warning.
 #[test]
 fn instructions_that_take_a_pair_of_registers_name_it() {
     let sources = std::fs::read_dir(workspace_root().join("src")).expect("the firmware's sources are there");
@@ -138,7 +139,7 @@ fn weeding_and_every_command_stay_within_the_bounds() {
     run_for_ms(&mut run.uno, 500);
     ask(&mut run.uno, "hold");
     for command in COMMANDS {
-        // Some are refused as things stand, which is answered too.
+        // Some are refused in this state, which is also an answer.
         run.uno.send(format!("{command}\n").as_bytes());
         run_for_ms(&mut run.uno, 400);
     }
@@ -149,7 +150,7 @@ fn weeding_and_every_command_stay_within_the_bounds() {
 fn no_count_is_lost_at_the_rate_that_is_never_lost() {
     let edges = proved().edges.expect("the encoder is watched");
     println!("{} counts a second, {} cycles of wait", edges.never_lost_per_s, edges.wait_cycles);
-    // A rate whose counts go up in quarters.
+    // A rate that is a multiple of 100.
     roll(&mut woken_up(), edges.never_lost_per_s / 100 * 100);
 }
 
@@ -167,7 +168,7 @@ fn no_turn_lasts_until_the_heartbeat_takes_the_loop_for_stalled() {
 #[test]
 fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     let budgets = Budgets::read(&workspace_root().join("budgets.toml")).expect("there are budgets");
-    // Of the outermost loops of a function, and of those within them.
+    // The bounds for the outermost loops of a function, and for inner loops.
     let by_depth =
         |function: &str| budgets.loops[function].passes.iter().map(|&passes| passes as usize).collect::<Vec<_>>();
     let passes = |function: &str| match by_depth(function)[..] {
@@ -188,7 +189,7 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     for function in ["say::command::split_word", "say::command::number"] {
         assert_eq!(passes(&format!("control::{function}")), LINE_LENGTH + 1, "{function}");
     }
-    // A word that is typed may go on where the longest of a group ends.
+    // A typed word may continue after the longest word of a group.
     let words = [
         Setting::all().map(Setting::text).collect::<Vec<_>>(),
         (0..Word::COUNT).filter_map(Word::from_index).map(Word::text).collect(),
@@ -212,24 +213,24 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
             "{function}"
         );
     }
-    // A search goes in two directions, each of which comes to its end. Of the places, all but one move up.
+    // A search goes in two directions, and each comes to its end. All positions except one move up.
     let moving = usize::from(MAX_K);
     let search = by_depth("weeder_firmware::examples::BuiltIn::keep_nearest");
     assert_eq!(search, [examples::COUNT + 2, moving]);
     assert_eq!(by_depth("control::weeder::Controller::go_on_classifying"), [nearest::AT_ONCE + 2, moving]);
-    // What loops say themselves has to be in the ELF: the edges that are taken in a turn, and the bytes of the console.
+    // The ELF must have the loops' own records: of the edges that a turn takes, and of the console's bytes.
     let records = program(&elf()).records().len();
     assert_eq!(records, 2);
     assert_eq!(passes("knn::nearest::Nearest::answer"), usize::from(MAX_K) + 1);
-    // What moves up where something is taken out of a list; on the host a row of it takes no fewer bytes.
+    // Bytes that move when an entry of a list is removed. An entry takes at least as many bytes on the PC.
     let moves = [(event::CAPACITY - 1) * size_of::<Event>(), (keep_out::CAPACITY - 1) * size_of::<Detection>()];
     for function in ["memcpy", "memmove", "memset"] {
         assert!(moves.iter().all(|&moved| passes(function) > moved), "{function}: {moves:?}");
     }
 }
 
-/// Flash with a function that begins by writing to a register, in the place of its first instruction. `None` where that is none
-/// that only moves or compares.
+/// Flash with a function that begins by writing to a register. The write replaces its first instruction. `None` if that
+/// instruction is not a pure move or comparison.
 fn with_a_write(flash: &[u8], function: usize, register: u16) -> Option<Vec<u8>> {
     let first = u16::from_le_bytes([flash[function], flash[function + 1]]);
     let (is_movw, is_mov) = (first >> 8 == 0x01, first & 0xFC00 == 0x2C00);
@@ -246,12 +247,12 @@ fn a_function_that_writes_to_a_register_that_it_should_preserve_is_found() {
     let elf = elf();
     let image = Image::read(&elf).expect("it is an ELF");
     let file = std::fs::read(&elf).expect("it can be read");
-    // The code lies in the file as it lies in flash.
+    // The file has the code in the same order as flash.
     let start = file.windows(64).position(|window| *window == image.flash[..64]).expect("flash is in the file");
     assert_eq!(file[start..start + 0x4000], image.flash[..0x4000]);
-    // Whether the write was found; `None` where it could not be made.
+    // Whether the write was found; `None` if it was not possible.
     let is_found = |(name, &at): (&String, &u32)| {
-        // One register a function. The frame's pointer is left alone: without it the stack could not be followed.
+        // One register for each function. The frame pointer is left out: without it the stack could not be followed.
         let register = if at & 2 == 0 { 16 } else { 14 };
         let flash = with_a_write(&image.flash, at as usize, register)?;
         let mut file = file.clone();
@@ -271,7 +272,7 @@ fn a_function_that_writes_to_a_register_that_it_should_preserve_is_found() {
     let (found, unnoticed): (Vec<bool>, Vec<bool>) =
         functions.into_par_iter().step_by(apart).filter_map(is_found).partition(|is_found| *is_found);
     let (found, unnoticed) = (found.len(), unnoticed.len());
-    // The others never return, or nothing calls them.
+    // The others never return, or are never called.
     println!("{found} were found, {unnoticed} went unnoticed");
     let least = if is_thorough() { 10 } else { 0 };
     assert!(found > least, "{found} were found");
@@ -294,7 +295,7 @@ fn the_firmware_s_code_is_what_avr_objdump_takes_it_for() {
     let listed: Vec<_> = text.lines().filter_map(line).collect();
     assert!(listed.len() > 10_000, "{} instructions", listed.len());
     for (address, length, name) in listed {
-        // Tables stand among the code.
+        // There are tables between the code.
         if let Some(found) = instruction_at(&flash, address) {
             assert_eq!(found, (length, name), "{address:#06x}");
         } else {

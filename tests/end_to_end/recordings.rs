@@ -1,4 +1,4 @@
-//! Recordings of an encoder, made here and played to the firmware: it counts them to the step.
+//! Recordings of an encoder, made here and played to the firmware: it counts every step.
 
 use crate::common::{elf, encoder_steps};
 use field::wiring;
@@ -11,7 +11,7 @@ use trial::replay::{Counted, replay};
 use uno::capture::Capture;
 use uno::waveform;
 
-/// Writes the steps as a waveform file, has the firmware count it, and compares with the sum of the steps.
+/// Writes the steps as a waveform file, lets the firmware count it, and compares with the sum of the steps.
 #[track_caller]
 fn assert_counts(name: &str, steps: &[(u64, i32)]) {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name).with_extension("vcd");
@@ -32,7 +32,7 @@ fn assert_counts(name: &str, steps: &[(u64, i32)]) {
     assert_eq!(replay.counted, counted);
 }
 
-/// Steps from one turning point to the next, each with a time of its own around `mean_cycles`.
+/// Steps from one turning point to the next, with random times around `mean_cycles`.
 fn jittered(rng: &mut ChaCha8Rng, turning_points: &[i32], mean_cycles: u64) -> Vec<(u64, i32)> {
     let (mut cycle, mut count) = (mean_cycles, 0_i32);
     let mut steps = Vec::new();

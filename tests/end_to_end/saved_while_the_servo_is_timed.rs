@@ -1,12 +1,12 @@
-//! What is answered with `ok` is kept, although the settings change while their image is on its way into the EEPROM: the servo's
-//! swings end, and set the leads.
+//! A save that is answered with `ok` keeps its values, even if the settings change during the write to the EEPROM: the
+//! servo's swings end, and set the leads.
 
 use crate::common::{ask, run_for_ms, woken_up};
 use field::servo::Servo;
 use field::wiring;
 use uno::Uno;
 
-/// The end switch follows the servo's commands by this.
+/// Delay of the end switch after the servo's commands.
 const FOLLOWS_MS: u64 = 90;
 
 /// Runs for a time, with an end switch that follows the servo.

@@ -1,4 +1,5 @@
-//! A second beam: the wheel's slip is measured plant by plant, and a torn wire of either beam is told before it costs a plant.
+//! A second beam: it measures the wheel's slip plant by plant. A torn wire of either beam is reported before it costs a
+//! plant.
 
 use crate::common::{Run, is_out_at_the_pin, named, number, status, steady, trial, value, woken_up};
 use field::machine::{Machine, cycle_at};
@@ -19,14 +20,14 @@ fn plants(count: usize) -> Row {
         .expect("the plants stand apart")
 }
 
-/// A machine with two beams and a wheel that slips by so much in a leg, along seven plants.
+/// A machine with two beams, along seven plants. `slip` returns the wheel's slip in each leg.
 fn slipping(speed_km_h: f64, second_beam_mm: f64, slip: impl FnMut() -> f64) -> Trial {
     let trial = trial(plants(PLANTS), steady(mm_s(speed_km_h), 4300.0).with_slip(slip));
     Trial { machine: Machine { second_beam_mm, ..Machine::default() }, start: Start::Now, ..trial }
 }
 
 fn count(judgement: &Judgement, verdict: Verdict) -> usize {
-    // Two plants tell the slip.
+    // The first two plants measure the slip.
     judgement.plants[2..].iter().filter(|plant| plant.verdict == verdict).count()
 }
 
@@ -56,14 +57,14 @@ fn the_slip_is_told_plant_by_plant_and_dropped_by_an_alarm() {
     run.roll_to(2350.0);
     assert_eq!(run.events("slip").len(), 2, "of three plants that have passed, by the second on: {:#?}", run.lines());
     let begin = run.uno.cycle() + 1600;
-    // Chatter of the first beam, faster than it can be taken.
+    // The first beam chatters, too fast to be handled.
     run.uno.drive((0..400).map(|edge| PinChange { cycle: begin + edge * 160, pin: wiring::BEAM, high: edge % 2 == 1 }));
     run.roll_to(2450.0);
     let told = status(&mut run.uno);
     assert_eq!((value(&told, "state"), value(&told, "slip_permille")), ("alarm", "none"), "{told}");
 }
 
-/// Seven plants at 2 km/h, with a beam whose wire is torn where the machine comes to a place: its pin stays on the pull-up.
+/// Seven plants at 2 km/h. The wire of a beam tears at a position of the machine: its pin stays on the pull-up.
 fn with_torn_wire(pin: Pin, torn_mm: f64) -> Run {
     let trial = slipping(2.0, SECOND_BEAM_MM, || 0.0);
     let torn_s = trial.motion.passings(torn_mm).next().expect("the machine comes there").time_s;
@@ -81,7 +82,7 @@ fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
         let mut run = with_torn_wire(pin, 2400.0);
         run.roll_to(3525.0 + 3.0 * 75.0);
         assert_eq!(run.events("alarm"), [""; 0], "two plants may be chance");
-        // The third is at 3600 mm, and has passed the second beam; a fourth would yet have to come to the first.
+        // The third is at 3600 mm, and has passed the second beam. A fourth has not reached the first beam.
         run.roll_to(4020.0);
         let told = run.events("alarm");
         assert_eq!(told.len(), 1, "{:#?}", run.lines());

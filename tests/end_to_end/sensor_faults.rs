@@ -1,4 +1,4 @@
-//! Encoder and beam that fail on the way: the firmware notices, names the fault, and has the tool out of the row.
+//! Encoder and beam fail on the way: the firmware detects and names the fault, and has the tool out of the row.
 
 use crate::common::{
     Run, ask, bare_ground, is_out_at_the_pin, named, number, run_for_ms, status, steady, trial, value, woken_up,
@@ -11,7 +11,8 @@ use field::verdict::Verdict;
 use field::wiring;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange};
 
-/// Where the fault begins: the tool is in the row between the second plant and the third, which the beam has just passed.
+/// Position of the fault: the tool is in the row between the second plant and the third, which the beam has just
+/// passed.
 const FAULT_MM: f64 = 1720.0;
 
 /// Plants every 500 mm, the first at 600 mm.
@@ -27,7 +28,7 @@ fn with_fault(row: Row, length_mm: f64, alter: impl FnOnce(u64, Vec<PinChange>) 
     Run::begin_altered(trial, &[], |start_cycle, changes| alter(cycle_at(start_cycle, time_s), changes))
 }
 
-/// The alarm of this name and code was told once, and the tool is out.
+/// Asserts that the alarm of this name and code was reported once, and that the tool is out.
 #[track_caller]
 fn assert_alarm(run: &mut Run, alarm: &str) {
     run.roll_to_the_end();
@@ -51,7 +52,7 @@ fn an_encoder_that_falls_silent_harms_no_plant_and_is_an_alarm() {
     });
     run.roll_to(FAULT_MM);
     assert!(!is_out_at_the_pin(&run.uno));
-    // A machine that rolls does not stop from one moment to the next: the tool is out before it comes to the third plant.
+    // A rolling machine does not stop suddenly: the tool is out before it reaches the third plant.
     run.roll_to(FAULT_MM + 60.0);
     assert!(is_out_at_the_pin(&run.uno));
     assert_eq!(value(&status(&mut run.uno), "for"), "encoder_doubtful");
@@ -61,7 +62,7 @@ fn an_encoder_that_falls_silent_harms_no_plant_and_is_an_alarm() {
     }
 }
 
-/// Drops the encoder's edges while `is_lost` says so, given the time in seconds since the machine was at a place.
+/// Drops the encoder's edges while `is_lost` is true. It gets the time in seconds since the machine passed a position.
 fn losing_edges(row: Row, speed_km_h: f64, from_mm: f64, length_mm: f64, is_lost: impl Fn(f64) -> bool) -> Run {
     let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(speed_km_h), length_mm)) };
     let from_s = trial.motion.passings(from_mm).next().expect("the machine comes there").time_s;
@@ -91,7 +92,7 @@ fn one_silence_of_200_ms_costs_no_plant_wherever_it_comes_and_is_no_alarm() {
         let mut run = losing_edges(plants(), 2.5, silent_mm, 3400.0, |time_s| time_s < 0.2);
         run.roll_to(silent_mm + 60.0);
         assert!(is_out_at_the_pin(&run.uno), "{silent_mm} mm");
-        // It speaks again behind 139 mm, and the tool does not come back over what was seen before.
+        // The encoder works again after 139 mm, and the tool does not come back over ground that was seen before.
         let spoken = run.uno.cycle();
         run.roll_to(silent_mm + 139.0 + 420.0);
         assert!(run.commands().iter().all(|command| command.rise_cycle < spoken), "{silent_mm} mm");
@@ -108,8 +109,8 @@ fn an_encoder_that_stutters_at_a_crawl_costs_one_plant_at_most() {
 }
 
 #[test]
-fn an_encoder_of_which_one_edge_in_ten_does_not_come_costs_one_plant_at_most() {
-    // The pins keep their level where one is left out.
+fn an_encoder_that_loses_one_edge_in_ten_costs_one_plant_at_most() {
+    // A pin keeps its level if an edge is dropped.
     let lost = |time_s: f64| (time_s * CYCLES_PER_SECOND as f64) as u64 % 10 == 3;
     let mut run = losing_edges(plants(), 2.5, 500.0, 3500.0, lost);
     run.roll_to_the_end();
@@ -200,7 +201,7 @@ fn a_machine_that_is_pushed_faster_than_its_limit_is_an_alarm() {
 #[test]
 fn a_beam_that_flickers_in_dust_is_an_alarm() {
     let mut run = with_fault(bare_ground(), 2500.0, |fault, mut changes| {
-        // 600 edges a second, each of which can be followed.
+        // 600 edges a second: the firmware can follow each of them.
         changes.extend((0..300_u64).map(|edge| PinChange {
             cycle: fault + edge * CYCLES_PER_SECOND / 600,
             pin: wiring::BEAM,
@@ -229,7 +230,7 @@ fn a_beam_that_is_never_broken_is_a_warning_until_a_plant_comes() {
 
 #[test]
 fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
-    // The tool's window begins at 1075 - 50 mm; the machine is fast from 60 mm before that on.
+    // The tool's zone begins at 1075 - 50 mm. The machine is fast from 60 mm before that on.
     let row = Row::new(vec![Thing::plant(1150.0, 150.0)]).expect("a plant is a row");
     let jump_mm = 1150.0 - 75.0 - 50.0 + 400.0 - 60.0;
     let motion = Motion::starting_at(0.0)
@@ -266,7 +267,7 @@ fn rolling_back_farther_than_ground_is_remembered_is_an_alarm() {
 
 #[test]
 fn an_end_switch_that_does_not_follow_is_an_alarm() {
-    // In HOLD the tool is out: the switch should be closed.
+    // In HOLD the tool is out, so the switch must be closed.
     let mut run = Run::begin(trial(bare_ground(), steady(mm_s(1.0), 100.0)), &["hold"]);
     run.uno.set(wiring::END_SWITCH, false);
     run_for_ms(&mut run.uno, 50);

@@ -1,4 +1,5 @@
-//! Noise on the serial line while the machine weeds: the swings are those of the quiet run, and each bad line is told so.
+//! Noise on the serial line while the machine weeds: the swings are those of a run without noise, and each bad line
+//! gets an error.
 
 use crate::common::{Run, ask, assert_all_kept, exchange, number, run_for_ms, status, woken_up};
 use field::machine::Machine;
@@ -11,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 const SPEED_KM_H: f64 = 2.5;
 
-/// A command waits for a running pulse of 2 ms and a gap of 3 ms at most; the rest is the loop's turns.
+/// A command waits for a running pulse of 2 ms and a gap of 3 ms at most. The loop's turns take the rest.
 const GRAIN_MM: f64 = SPEED_KM_H / 3.6 * 6.0;
 
 fn set_out() -> Run {
@@ -19,7 +20,7 @@ fn set_out() -> Run {
     Run::begin(Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(SPEED_KM_H)), &["events off"])
 }
 
-/// The commands at the pin: out or in, and where.
+/// The commands at the pin: out or in, and the position.
 fn swings(run: &Run) -> Vec<(bool, f64)> {
     run.commands().iter().map(|command| (command.is_out(), run.place_mm(command.rise_cycle))).collect()
 }
@@ -35,7 +36,7 @@ fn answers_to(mut noise: impl FnMut() -> Vec<u8>) -> Vec<String> {
         noisy.uno.send(&noise());
         run_for_ms(&mut noisy.uno, 50);
     }
-    // What still waits in the firmware's queue is answered: 64 bytes are four times `help` and `get`, 0.9 s of the line.
+    // Lets the firmware answer its queue: 64 bytes are four times `help` and `get`, 0.9 s of the line.
     run_for_ms(&mut noisy.uno, 1000);
     let lines = noisy.lines();
 
@@ -46,7 +47,7 @@ fn answers_to(mut noise: impl FnMut() -> Vec<u8>) -> Vec<String> {
         assert_eq!(out, expected_out);
         assert!((place_mm - expected_mm).abs() <= GRAIN_MM, "{place_mm} mm instead of {expected_mm} mm");
     }
-    // Line ends first, for a line that the noise left half typed.
+    // First ends a line that the noise may have begun.
     noisy.uno.send(b"\n");
     run_for_ms(&mut noisy.uno, 50);
     let (noisy, quiet) = (status(&mut noisy.uno), status(&mut quiet.uno));
@@ -54,7 +55,7 @@ fn answers_to(mut noise: impl FnMut() -> Vec<u8>) -> Vec<String> {
     lines
 }
 
-/// Each bad line was answered by one error, and there was nothing else.
+/// Asserts that each bad line got one error, and that there was no other output.
 #[track_caller]
 fn assert_an_error_each(lines: &[String], bad_lines: usize) {
     assert!(lines.iter().all(|line| line.starts_with("error: ")), "{lines:#?}");
@@ -101,7 +102,7 @@ fn half_lines_change_no_swing() {
 
 #[test]
 fn a_flood_at_full_line_rate_changes_no_swing() {
-    // 50 ms of the line hold 576 bytes. There are more bad lines than can be answered; none of them does anything.
+    // 50 ms of the line hold 576 bytes. There are more bad lines than answers, and none of them has an effect.
     let lines = answers_to(|| b"hodl\n".repeat(576 / 5));
     assert!(lines.len() > 20, "{lines:#?}");
     assert!(lines.iter().all(|line| line.starts_with("error: ")), "{lines:#?}");
@@ -124,7 +125,7 @@ fn a_command_after_a_flood_is_carried_out() {
     let mut uno = woken_up();
     uno.send(&b"hodl\n".repeat(1000));
     run_for_ms(&mut uno, 1000);
-    // Ends the line that the flood may have left with a hole in it.
+    // Ends the line that the flood may have left incomplete.
     exchange(&mut uno, b"\n");
     ask(&mut uno, "set margin_mm 60");
     assert!(ask(&mut uno, "get margin_mm")[0].starts_with("margin_mm=60 "));

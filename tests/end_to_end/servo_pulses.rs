@@ -1,4 +1,4 @@
-//! The servo's signal at the pin: widths to a tenth of a microsecond, frames of 20 ms, and frames cut short for a swing.
+//! The servo's signal at the pin: widths to a tenth of a microsecond, frames of 20 ms, and shorter frames for a swing.
 
 use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
 use field::motion::mm_s;
@@ -11,7 +11,7 @@ fn microseconds(cycles: u64) -> f64 {
     cycles as f64 * 1e6 / CYCLES_PER_SECOND as f64
 }
 
-/// The pulse has one of these widths.
+/// Asserts that the pulse has one of these widths.
 #[track_caller]
 fn assert_width(pulse: Pulse, widths_us: &[f64]) {
     assert!(widths_us.iter().any(|width_us| (pulse.width_us() - width_us).abs() <= 0.1), "{} us", pulse.width_us());
@@ -28,7 +28,7 @@ fn pulses_while_weeding(gap_ms: u32) -> Vec<Pulse> {
     run.uno.pulses(wiring::SERVO)
 }
 
-/// Every pulse is whole; frames last 20 ms, but for those that a swing cut short after the gap.
+/// Asserts that every pulse is complete, and that frames last 20 ms. A swing may shorten a frame after the gap.
 #[track_caller]
 fn assert_frames(pulses: &[Pulse], gap_ms: u32) {
     let mut cut_short = 0;

@@ -1,4 +1,4 @@
-//! A short soak: what `weeder soak` does for a day and half an hour.
+//! A short soak: `weeder soak` runs a day and half an hour.
 
 use crate::common::elf;
 use trial::soak::{Plan, hours, minutes};
@@ -11,7 +11,7 @@ fn twenty_minutes_of_the_decisions_with_faults_harm_no_plant() {
     let tally = hours(PLAN, 1.0 / 3.0, |_| {}).expect("rows grow");
     assert!(tally.violations.is_empty(), "{tally}");
     assert!(tally.plants > 500 && tally.alarms.len() > 3 && tally.resets.len() > 3, "{tally}");
-    // One row in eight has a stand so dense that next to nothing of it may be weeded.
+    // One row in eight has a stand so dense that almost nothing of it may be weeded.
     assert!(tally.weeded_metres > 0.2 * tally.metres, "{tally}");
 }
 

@@ -1,11 +1,11 @@
-//! Motions that are not steady: the tool's place follows from the machine's place and speed, so plants are as safe.
+//! Unsteady motions: the tool's position follows from the machine's position and speed, so plants are equally safe.
 
 use crate::common::{Run, number, trial};
 use field::motion::{Motion, mm_s};
 use field::row::{Row, Thing};
 use field::verdict::{Judgement, Verdict};
 
-/// Where the three plants stand, far enough apart that each has a swing of its own.
+/// Positions of the three plants, far enough apart for a swing each.
 const PLACES_MM: [f64; 3] = [800.0, 1500.0, 2200.0];
 
 /// Rolls past the plants.
@@ -19,7 +19,7 @@ fn roll(motion: Motion) -> Run {
     run
 }
 
-/// Each plant was counted once and none damaged; the tool was in the row between them.
+/// Asserts that each plant was counted once and none damaged, and that the tool was in the row between them.
 #[track_caller]
 fn assert_unharmed_and_counted_once(run: &mut Run) -> Judgement {
     let judgement = run.judgement();
@@ -50,7 +50,7 @@ fn slow_at_the_beam_and_fast_at_the_tool_harms_no_plant() {
 fn slow_at_the_beam_and_fast_at_the_tool_for_each_plant_harms_none() {
     let mut motion = Motion::starting_at(0.0).change_speed(mm_s(1.0), 1000.0);
     for place_mm in PLACES_MM {
-        // Slow while the beam passes the canopy, fast before the tool comes to it.
+        // Slow while the beam passes the canopy, fast before the tool reaches it.
         motion = motion
             .roll_to(place_mm + 90.0)
             .change_speed(mm_s(2.5), 3000.0)

@@ -1,4 +1,4 @@
-//! Weeds tall enough for the beam, and canopies with gaps: what breaks the beam is not always a plant, or one plant.
+//! Weeds tall enough for the beam, and canopies with gaps: a detection is not always a plant, or a single plant.
 
 use crate::common::{Run, assert_a_swing_each, assert_all_kept, number, status};
 use field::machine::Machine;

@@ -1,4 +1,4 @@
-//! What the firmware says of each plant against the paper's Eq. 1 to 3, worked out from where the plants truly stand.
+//! The firmware's output for each plant, compared with the paper's Eq. 1 to 3 for the plants' true positions.
 
 use crate::common::{Run, assert_all_kept, assert_commands_in_place, number};
 use field::machine::Machine;

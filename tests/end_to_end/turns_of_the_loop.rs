@@ -1,8 +1,8 @@
-//! How long the main loop takes to turn, whatever is typed and told.
+//! The longest turn of the main loop, for all commands and all output.
 //!
-//! Between two turns nobody looks at the ground: what the loop decides is as late as a turn is long. A turn may
-//! therefore take a millisecond, in which a machine at 5 km/h rolls 1.4 mm, and what takes longer is done over several. It is
-//! counted in cycles from one reset of the watchdog to the next, what interrupts take of it included.
+//! The loop reads the ground once a turn, so its decisions are late by up to a turn. A turn may therefore take a
+//! millisecond. In that time a machine at 5 km/h rolls 1.4 mm. Longer work is divided over several turns. The time is
+//! counted in cycles from one reset of the watchdog to the next, interrupts included.
 
 use crate::common::{Run, run_for_ms, steady, trial, woken_up};
 use control::ground::field_examples;
@@ -16,7 +16,7 @@ use uno::Uno;
 /// A turn's cycles at most: 1 ms.
 const TURN: u64 = CYCLES_PER_SECOND / 1000;
 
-/// Every line that the grammar knows, and some for each way in which a line can be wrong.
+/// Every valid line of the grammar, and some lines for each kind of error.
 fn lines() -> Vec<String> {
     let mut lines: Vec<String> = [
         "help",
@@ -120,18 +120,18 @@ fn lines() -> Vec<String> {
         lines.extend([range.least, range.greatest, range.default].map(|value| format!("set {name} {value}")));
     }
     lines.push("defaults".to_owned());
-    // Of every length, and one that is too long.
+    // Lines of every length, and one that is too long.
     lines.extend((1..=LINE_LENGTH + 1).step_by(8).map(|length| "s".repeat(length)));
     lines.extend((4..=LINE_LENGTH + 1).step_by(8).map(|length| format!("{:length$}", "get")));
     lines
 }
 
-/// A machine on its way along a row at 5 km/h, telling all that it sees.
+/// A machine that rolls along a row at 5 km/h, with all events on.
 fn under_way() -> Run {
     under_way_after(&["plot on"], 60)
 }
 
-/// The same, along so many plants and behind commands that it got before.
+/// The same, along this number of plants and after these commands.
 fn under_way_after(commands: &[&str], plants: usize) -> Run {
     let planting = Planting { plants, weeds: plants / 2, spacing_mm: 300.0, ragged: true, ..Planting::default() };
     let row = planting.grow(1).expect("everything has room");
@@ -140,7 +140,7 @@ fn under_way_after(commands: &[&str], plants: usize) -> Run {
 }
 
 #[test]
-fn no_turn_takes_more_than_a_millisecond_whatever_is_typed_and_told() {
+fn no_turn_takes_more_than_a_millisecond_for_all_commands_and_output() {
     let mut uno = woken_up();
     let mut worst = (0, String::new());
     for line in lines() {
@@ -161,7 +161,7 @@ fn no_turn_takes_more_than_a_millisecond_while_a_row_rolls_by() {
             run = under_way();
             end = run.cycles().end;
         }
-        // An alarm would have the machine stand still in its decisions.
+        // An alarm would end the decisions, so it is cleared.
         for typed in [line.as_str(), "clear", "start"] {
             worst = worst.max((typed_takes(&mut run.uno, typed), typed.to_owned()));
         }
@@ -172,7 +172,7 @@ fn no_turn_takes_more_than_a_millisecond_while_a_row_rolls_by() {
 
 #[test]
 fn no_turn_takes_more_than_a_millisecond_where_fifteen_examples_vote_of_as_many_as_can_be_taught() {
-    // In the midst of the built-in ones, so that they find places among the nearest.
+    // Among the built-in examples, so that they become nearest neighbours.
     let teach = |number| {
         let features = [128, 100 + number, 128, 90 + 2 * number, 128].map(|feature| format!("teach {feature}"));
         features.into_iter().chain([format!("teach {}", if number % 2 == 0 { "plant" } else { "weed" })])

@@ -1,4 +1,5 @@
-//! Plants that the beam does not see, in a crop at even distances: with their spacing set, the ground where they are due is kept.
+//! Plants that the beam does not see, in a crop at even distances: with a set spacing, the ground of expected plants is
+//! kept.
 
 use crate::common::{Run, is_out_at_the_pin, number, steady, trial};
 use field::motion::mm_s;
@@ -7,14 +8,14 @@ use field::row::{Row, Thing};
 /// From beam to tool.
 const X_MM: f64 = 400.0;
 
-/// A run past plants half a metre apart, the third of which the beam does not see; behind the fourth the row is at its end.
+/// A run past plants half a metre apart. The beam does not see the third plant. The row ends behind the fourth.
 fn past_an_unseen_plant(commands: &[&str]) -> Run {
     let seen = [600.0, 1100.0, 2100.0].map(|place_mm| Thing::plant(place_mm, 150.0));
     let row = Row::new(seen.to_vec()).expect("the plants stand apart");
     Run::begin(trial(row, steady(mm_s(2.0), 4900.0)), commands)
 }
 
-/// Whether the tool is out of the row when it comes to a place.
+/// Whether the tool is out of the row when it reaches a position.
 fn is_out_at(run: &mut Run, place_mm: f64) -> bool {
     run.roll_to(place_mm + X_MM);
     is_out_at_the_pin(&run.uno)

@@ -1,4 +1,5 @@
-//! Waking up: in HOLD with the tool out, whatever the switch says, and in the row only over ground that was seen.
+//! Start-up: in HOLD with the tool out, for every level of the switch. The tool enters the row only over ground that
+//! the beam has seen.
 
 use crate::common::{
     Run, SWING_TOLERANCE_TICKS, assert_all_kept, bare_ground, elf, is_out_at_the_pin, number, run_for_ms, status,
@@ -23,7 +24,7 @@ fn assert_in_hold_with_tool_out(uno: &mut Uno) {
     assert!(is_out_at_the_pin(uno));
 }
 
-/// Rolls the machine over bare ground while nothing else happens.
+/// Rolls the machine over bare ground without other inputs.
 fn roll(uno: &mut Uno, length_mm: f64) {
     let motion = steady(mm_s(2.0), length_mm);
     uno.drive(Machine::default().pin_changes(&bare_ground(), &motion, uno.cycle()));
@@ -80,7 +81,7 @@ fn the_status_says_how_far_seen_ground_still_is() {
         run.roll_to(place_mm);
         number(&status(&mut run.uno), "unseen_mm")
     };
-    // The answer tells of a moment some milliseconds later, and the beam answers for a millisecond before it.
+    // The answer is for a moment some milliseconds later, and the beam's response is a millisecond.
     for (place_mm, unseen_mm) in [(50.0, 350), (300.0, 100), (390.0, 10)] {
         let said = uno_says(place_mm);
         assert!((unseen_mm - 3..=unseen_mm + 1).contains(&said), "{said} mm at {place_mm} mm");
@@ -99,7 +100,7 @@ fn told_to_start_now_the_tool_enters_the_row_over_unseen_ground() {
 
 #[test]
 fn a_plant_in_the_beam_at_power_up_is_kept() {
-    // Half of the canopy is left, or no more of it than a weed is wide.
+    // Half of the canopy is left, or no more than a weed's width.
     for centre_mm in [0.0, -55.0, -60.0, -65.0] {
         let plants = vec![Thing::plant(centre_mm, 150.0), Thing::plant(700.0, 150.0)];
         let row = Row::new(plants).expect("the plants stand apart");

@@ -1,4 +1,4 @@
-//! The four walking speeds over irregular rows: every plant has a swing of its own, in its place, and is kept.
+//! The four walking speeds over irregular rows: every plant has its own swing, at the right position, and is kept.
 
 use crate::common::{assert_a_swing_each, assert_all_kept, assert_commands_in_place, assert_position_exact, outcome};
 use field::machine::Machine;

@@ -1,4 +1,4 @@
-//! `cargo avr-bounds FILE.elf`: the same command, as Cargo looks for it.
+//! `cargo avr-bounds FILE.elf`: the same command, under the name that Cargo looks for.
 
 fn main() -> std::process::ExitCode {
     avr_bounds::command::main()

@@ -1,7 +1,8 @@
-//! Programs that others wrote, built from what Debian and simavr bring: arduino-core-avr with its bootloaders, avr-libc's manual, simavr's
-//! tests.
+//! Builds test programs that Debian and simavr supply: arduino-core-avr with its bootloaders, avr-libc's manual,
+//! simavr's tests.
 //!
-//! They are linked with `--emit-relocs`, which changes no byte of the program. A built program is kept in the target folder.
+//! They are linked with `--emit-relocs`, which changes no byte of the program. A built program is kept in the target
+//! folder.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,11 +12,11 @@ use std::sync::{Mutex, OnceLock};
 const ARDUINO: &str = "/usr/share/arduino/hardware/arduino/avr";
 const MANUAL: &str = "/usr/share/doc/avr-libc/examples";
 
-/// A program, and what the budgets say of it.
+/// A program, and its facts for the budgets.
 pub struct Sample {
     pub name: String,
     pub elf: PathBuf,
-    /// The chip, where the ELF does not name it.
+    /// The chip, if the ELF does not name it.
     pub chip: Option<&'static str>,
     pub facts: String,
 }
@@ -24,7 +25,7 @@ pub struct Sample {
 const BOARDS: [(&str, &str, &str); 3] =
     [("uno", "atmega328p", "standard"), ("mega", "atmega2560", "mega"), ("leonardo", "atmega32u4", "leonardo")];
 
-/// What the sources tell of functions: of the one that calls itself, and of one that calls by a virtual table while its own address is taken.
+/// Facts about functions: one calls itself, and one calls by a virtual table while its own address is taken.
 const FACTS: [(&str, &str); 2] = [
     (
         "uart_putchar",
@@ -55,19 +56,19 @@ pub fn samples() -> Vec<Sample> {
     built.iter().map(sample).collect()
 }
 
-/// The folder for what is built.
+/// The folder for built files.
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("programs").join(name);
     std::fs::create_dir_all(&folder).expect("there is room for a folder");
     folder
 }
 
-/// Runs a compiler; whether it took the program.
+/// Runs a compiler. Returns whether it succeeded.
 fn run(command: &mut Command) -> bool {
     command.output().unwrap_or_else(|error| panic!("{command:?}: {error}: run ./setup.sh")).status.success()
 }
 
-/// Files below a folder whose names end so.
+/// Files below a folder with this ending of their names.
 fn files(folder: &Path, end: &str) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let mut found = Vec::new();
@@ -152,7 +153,7 @@ fn as_cpp(sketch: &str) -> String {
     format!("#include <Arduino.h>\n{heads}{sketch}")
 }
 
-/// The programs of simavr's tests, for the chip that their names begin with.
+/// The programs of simavr's tests. Each name begins with its chip.
 fn of_simavr() -> Vec<(String, PathBuf)> {
     // Packages for other machines need not be there.
     let host = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
@@ -217,7 +218,8 @@ fn of_manual() -> Vec<(String, PathBuf)> {
     built
 }
 
-/// The bootloaders of the Arduino core that need nothing else, built as their Makefiles say, each at the flash's end.
+/// The bootloaders of the Arduino core that need nothing else. They are built as in their Makefiles, each at the
+/// flash's end.
 fn of_bootloaders() -> Vec<(String, PathBuf)> {
     // Without the LED: with it, Debian's compiler needs more than the 512 bytes.
     let optiboot = ["-fno-split-wide-types", "-mrelax", "-nostartfiles", "-nostdlib", "-DLED_START_FLASHES=0"];
@@ -255,7 +257,7 @@ fn of_bootloaders() -> Vec<(String, PathBuf)> {
     built
 }
 
-/// Holds that README.md has this between its markers; `UPDATE_EXPECT=1` writes it there.
+/// Asserts that README.md has this text between its markers; `UPDATE_EXPECT=1` writes it there.
 pub fn expect_in_readme(name: &str, text: &str) {
     static WRITING: Mutex<()> = Mutex::new(());
     let _alone = WRITING.lock();

@@ -1,7 +1,8 @@
-//! Alarms and commands: a fault is played, and the tester measures when the tool is out and which code the LED flashes.
+//! Alarms and commands: the check plays a fault. The tester measures when the tool goes out and which code the LED
+//! flashes.
 //!
-//! Each scene begins at work with the tool in, on ground that the weeder was told to take as seen. The time counts from the fault's edge to the
-//! first pulse for out.
+//! Each scene begins at work with the tool in, on ground that the weeder takes as seen. Times count from the fault's
+//! edge to the first pulse for out.
 
 use crate::error::CheckError;
 use crate::plan::Plan;
@@ -14,13 +15,13 @@ use tester_core::piece::Action;
 use tester_core::pins::{AT_REST, Line};
 use uno::CYCLES_PER_SECOND;
 
-/// From the plan's start to the fault, or to the roll ahead of it, in ms.
+/// From the plan's start to the fault, or to the roll before it, in ms.
 const STILL_MS: u32 = 200;
 
-/// Time behind the fault in which the tool has to go out, in ms.
+/// Time after the fault in which the tool must go out, in ms.
 const AFTER_MS: u32 = 1000;
 
-/// Counts a second where the machine rolls: 1.9 km/h with the factory settings' wheel.
+/// Counts a second while the machine rolls: 1.9 km/h with the factory settings' wheel.
 const COUNTS_PER_S: f64 = 1000.0;
 
 /// A quarter of a second of the LED, in ms: 2^16 steps of 4 us.
@@ -49,7 +50,7 @@ impl Scene {
     pub const ALL: [Self; 5] =
         [Self::BlockedBeam, Self::FlickeringBeam, Self::SilentEncoder, Self::DeadChannel, Self::EndSwitch];
 
-    /// The alarm that it should raise.
+    /// The alarm that it must raise.
     pub const fn alarm(self) -> Alarm {
         match self {
             Self::BlockedBeam => Alarm::BeamBlocked,
@@ -60,7 +61,7 @@ impl Scene {
         }
     }
 
-    /// What it is, in the report.
+    /// Its description in the report.
     pub const fn words(self) -> &'static str {
         match self {
             Self::BlockedBeam => "blocked beam",
@@ -111,14 +112,14 @@ impl Scene {
     }
 }
 
-/// What came of a scene.
+/// The result of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Raised {
-    /// From the fault to the first pulse for out, in ms by the weeder's clock; infinite if none came.
+    /// From the fault to the first pulse for out, in ms by the weeder's clock; infinite without one.
     pub out_ms: f64,
     /// Whether the expected alarm was raised.
     pub is_expected: bool,
-    /// The code that the LED flashed, as a number of two digits; NaN if it was none.
+    /// The LED's code as a number of two digits; NaN without a code.
     pub code: f64,
 }
 
@@ -133,7 +134,7 @@ pub fn play(scene: Scene, weeder: &mut Weeder, tester: &mut Tester, clock_ratio:
     let played = tester.play(&plan.finish(), || weeder.drain())?;
     let status = weeder.status()?;
     let (first, second) = scene.alarm().code();
-    // The record may begin anywhere: a code with the pauses ahead of it and behind it.
+    // The record may begin at any phase: so it must hold a code with the pauses before and after it.
     let code_ms = f64::from(2 * (2 * u16::from(first + second) + 8) + 10) * QUARTER_MS;
     let records = tester.record_for_ms(code_ms as u32)?;
     tester.play(&freed(), || weeder.drain())?;
@@ -152,9 +153,10 @@ fn freed() -> Vec<tester_core::piece::Piece> {
     plan.finish()
 }
 
-/// Puts the weeder to work with the tool in, and with the end switch if it is asked for.
+/// Puts the weeder to work with the tool in, and with the end switch if `has_end_switch` is set.
 fn to_work(weeder: &mut Weeder, tester: &mut Tester, has_end_switch: bool) -> Result<(), CheckError> {
-    // What the weeder remembers of an earlier scene or burst, such as a wheel that stopped dead, counts toward some alarms.
+    // The weeder's memory of an earlier scene or burst, such as a wheel that stopped suddenly, counts toward some
+    // alarms. A reset clears it.
     wiring::reset(weeder, tester)?;
     weeder.to_hold()?;
     let end_switch = Line::EndSwitch.bit();
@@ -169,11 +171,12 @@ fn to_work(weeder: &mut Weeder, tester: &mut Tester, has_end_switch: bool) -> Re
     Ok(())
 }
 
-/// From a moment to the beginning of the first pulse for out behind it, in ms; infinite without one, and NaN if the tool was out before.
+/// From a moment to the beginning of the next pulse for out, in ms; infinite without one, and NaN if the tool was out
+/// before.
 fn first_out(pulses: &[Measured], moment: u64, clock_ratio: f64) -> f64 {
     let is_out = |measured: &&Measured| measured.pulse.width_us() * clock_ratio > MIDDLE_US;
     let behind = pulses.iter().position(|measured| measured.pulse.rise >= moment).unwrap_or(pulses.len());
-    // A tool that was out before is no answer to the fault.
+    // If the tool was already out, the pulse does not show the reaction to the fault.
     if pulses[..behind].last().is_none_or(|last| is_out(&last)) {
         return f64::NAN;
     }
@@ -181,14 +184,14 @@ fn first_out(pulses: &[Measured], moment: u64, clock_ratio: f64) -> f64 {
     first.map_or(f64::INFINITY, |cycles| cycles * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio)
 }
 
-/// The code that the LED flashed from pause to pause, if it did.
+/// The LED's code between two pauses, if there is one.
 fn code(records: &[Record], clock_ratio: f64) -> Option<(u8, u8)> {
     let lit = |record: &Record| match *record {
         Record::Led { time, lit: true } => Some(time),
         _ => None,
     };
     let rises: Vec<u32> = records.iter().filter_map(lit).collect();
-    // A flash is two quarters, one with the gap between the digits behind it four, and one with the pause eight.
+    // From a flash to the next are two quarters. The gap between the digits makes it four, and the pause eight.
     let gaps = rises.windows(2).map(|two| {
         let ms = f64::from(two[1].wrapping_sub(two[0])) * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
         (ms / QUARTER_MS).round() as u32
@@ -217,7 +220,7 @@ fn code(records: &[Record], clock_ratio: f64) -> Option<(u8, u8)> {
 pub fn switch_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
     let switch = Line::WorkSwitch.bit();
     tester.set(switch, 0)?;
-    // `start now` at work would leave the ground unseen, so `to_work` goes to hold ahead of it.
+    // `start now` at work would leave the ground unseen, so `to_work` first goes to hold.
     to_work(weeder, tester, false)?;
     let mut plan = Plan::new();
     plan.at(u64::from(ms(2 * STILL_MS)), Action::Levels { mask: switch, levels: switch });
@@ -227,17 +230,18 @@ pub fn switch_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f
     Ok(first_out(&servo::pulses(&played.records, played.start), ORIGIN + opened, clock_ratio))
 }
 
-/// The machine that is tried by [`beam_to_window_ms`]: beam and tool 100 mm apart, a margin of 50 mm, and no lead.
+/// The machine for [`beam_to_window_ms`]: beam and tool 100 mm apart, a margin of 50 mm, and no lead.
 const NEAR_MACHINE: [&str; 4] = ["top_speed_mm_s 200", "lead_out_ms 0", "margin_mm 50", "beam_to_tool_mm 100"];
 
-/// From the beam's edge to the window: 50 mm in counts of the factory settings' wheel, 400 mm and 2400 counts around.
+/// From the beam's edge to the keep-out zone: 50 mm in counts of the factory settings' wheel, 400 mm and 2400 counts
+/// around.
 const WINDOW_COUNTS: f64 = 50.0 * 2400.0 / (std::f64::consts::PI * 400.0);
 
 /// Counts a second there: 0.1 m/s.
 const SLOW_COUNTS_PER_S: f64 = 191.0;
 
-/// From the moment that a window is due at the tool to the first pulse for out, in ms; below 0 if the pulse comes first. The window follows
-/// from the beam's edge, half a second before.
+/// From the moment that a keep-out zone is due at the tool to the first pulse for out, in ms; negative if the pulse
+/// comes first. The zone follows from the beam's edge, half a second before.
 ///
 /// # Errors
 /// If a board does not answer.
@@ -261,7 +265,8 @@ pub fn beam_to_window_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: 
     Ok(out_ms - WINDOW_COUNTS * 1000.0 / SLOW_COUNTS_PER_S * clock_ratio)
 }
 
-/// From before `hold` is typed to the first pulse for out, in ms: what the computer and the lines take is in it.
+/// From typing `hold` to the first pulse for out, in ms. This includes the delays of the computer and of the serial
+/// lines.
 ///
 /// # Errors
 /// If a board does not answer.

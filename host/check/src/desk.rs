@@ -1,6 +1,6 @@
-//! Two virtual Unos on a desk: wire to wire, each at a pseudo terminal, in a thread of their own.
+//! Two virtual Unos, wired to each other. Each has a pseudo terminal, and both run in one thread.
 //!
-//! They run as fast as the computer can. Opening a port resets its board, as the modem line DTR does on a real one.
+//! They run at full speed. Opening a port resets its board, as the modem line DTR does on a real one.
 
 use crate::pair::{Pair, PairError, Side, Wiring};
 use std::io;
@@ -12,7 +12,7 @@ use thiserror::Error;
 use uno::CYCLES_PER_SECOND;
 use uno::pty::{Pty, PtyError};
 
-/// Bytes that may be on their way to a board. More are left to the terminal.
+/// Greatest number of bytes on their way to a board. Others stay in the terminal.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
 
 /// Why the desk could not be set up, or stopped.
@@ -38,10 +38,10 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// Powers both up. `second` is the program of another simulator for the weeder's, if one is to take its place.
+    /// Powers both up. `second` is the program of another simulator that replaces the weeder's, if it is given.
     ///
     /// # Errors
-    /// If an ELF cannot be run, or no pseudo terminal is to be had.
+    /// If an ELF cannot be run, or no pseudo terminal is available.
     pub fn start(tester_elf: &Path, weeder_elf: &Path, second: Option<&Path>) -> Result<Self, DeskError> {
         let (tester_pty, weeder_pty) = (Pty::open()?, Pty::open()?);
         let (tester, weeder) = (tester_pty.path().to_owned(), weeder_pty.path().to_owned());
@@ -80,7 +80,7 @@ impl Desk {
     /// Stops both.
     ///
     /// # Errors
-    /// If one of them had stopped by itself.
+    /// If one of them had already stopped.
     pub fn stop(mut self) -> Result<(), DeskError> {
         self.stop.store(true, Ordering::Relaxed);
         let panicked = |_| Err(DeskError::Thread(io::Error::other("the thread panicked")));
@@ -97,7 +97,7 @@ impl Drop for Desk {
 /// Moves bytes between a board and its terminal.
 fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<(), DeskError> {
     if pty.was_opened()? {
-        // A port that is not open keeps nothing.
+        // Output to a closed port is dropped.
         pair.received(side).clear();
         pair.reset(side)?;
     }

@@ -12,7 +12,7 @@ const PITCH: usize = 34;
 /// Pixels above the first wire.
 const TOP: usize = 70;
 
-/// Every wire except ground has this in it.
+/// Every wire except ground has this resistor.
 const RESISTOR: &str = "1 k";
 
 /// The drawing.

@@ -9,10 +9,10 @@ use thiserror::Error;
 /// Why a check could not go on.
 #[derive(Debug, Error)]
 pub enum CheckError {
-    /// The weeder's console does not answer as it should.
+    /// The weeder's console gave an unexpected answer.
     #[error("the weeder")]
     Weeder(#[from] LinkError),
-    /// The weeder's answer lacks something.
+    /// The weeder's answer lacks a part.
     #[error("the weeder's answer to `{0}` is not understood: flash the firmware that belongs to this command")]
     Answer(&'static str),
     /// The weeder's examples cannot be read or taught.
@@ -52,7 +52,7 @@ pub enum CheckError {
     /// The servo's line has fallen silent.
     #[error("the servo's pulses have stopped: check the wire from D9 of the weeder to D8 of the tester")]
     NoPulses,
-    /// There is no such row or machine.
+    /// The row or machine cannot be made.
     #[error("the simulated row cannot be made: {0}")]
     Row(String),
 }

@@ -1,12 +1,13 @@
-//! The check of a real board by a second one, the tester.
+//! Checks a real board by a second one, the tester.
 //!
-//! [`mod@run`] does all of it: [`wiring`] finds missing and swapped wires, [`servo`] measures pulses and the clocks' ratio, [`rates`] turns the
-//! encoder as fast as it may, [`alarms`] plays faults, [`resets`] resets the weeder at work and while it saves, and [`row`] has it weed a row.
-//! [`report`] sets measured, simulated and proved side by side.
+//! [`mod@run`] runs the whole check. [`wiring`] finds missing and swapped wires. [`servo`] measures pulses and the
+//! clocks' ratio. [`rates`] turns the encoder at its highest rates. [`alarms`] plays faults. [`resets`] resets the
+//! weeder at work and during a save. [`row`] lets it weed a row. [`report`] lists measured, simulated and proved
+//! figures side by side.
 //!
-//! [`ports`] finds both boards. [`tester`] talks to the tester, and `link` to the weeder. [`plan`] turns levels at cycles into a plan.
-//! [`pair`] has two virtual Unos in the place of the boards, wire to wire, [`second`] has another simulator's for one of them, [`desk`] puts
-//! them at ports, and [`drawing`] shows the wires.
+//! [`ports`] finds both boards. [`tester`] talks to the tester, and `link` to the weeder. [`plan`] turns levels at
+//! cycles into a plan. [`pair`] replaces the boards by two virtual Unos, wired to each other. [`second`] replaces one
+//! of them by another simulator's, [`desk`] connects them to ports, and [`drawing`] draws the wires.
 
 pub mod alarms;
 pub mod desk;

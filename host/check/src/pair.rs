@@ -1,8 +1,9 @@
-//! Two virtual Unos, wire to wire, in the place of the boards.
+//! Two virtual Unos that replace the boards, wired to each other.
 //!
-//! Both run in lock step, [`STEP`] cycles at a time. The tester's clock is the world's, and the weeder's is faster or slower by a known share.
-//! An edge from the tester reaches the weeder at its cycle. One from the weeder reaches the tester [`STEP`] cycles late, always, so widths
-//! and distances are right. [`Wiring`] can be wrong on purpose, for tests of the check.
+//! Both run in lock step, [`STEP`] cycles at a time. The tester's clock is the reference. The weeder's clock is faster
+//! or slower by a known share. An edge from the tester reaches the weeder at its cycle. An edge from the weeder reaches
+//! the tester always [`STEP`] cycles late, so widths and distances are right. Tests of the check use a wrong [`Wiring`]
+//! on purpose.
 
 use crate::second::SecondUno;
 use std::cell::RefCell;
@@ -14,10 +15,10 @@ use tester_core::pins::Line;
 use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno, UnoError};
 
-/// Cycles between two looks at the wires: 1 us.
+/// Cycles between two checks of the wires: 1 us.
 pub const STEP: u64 = 16;
 
-/// Steps between two looks at the reset, which is pulled for milliseconds.
+/// Steps between two checks of the reset, which is pulled for milliseconds.
 const STEPS_TO_RESET: u64 = 64;
 
 /// The difference of the clocks in parts per million: the weeder's is faster by 0.3 %.
@@ -36,10 +37,10 @@ const TESTER_RESET: Pin = Pin::D7;
 const TESTER_LED: Pin = Pin::D6;
 const TESTER_SERVO: Pin = Pin::D8;
 
-/// A line from the tester, the weeder's pin that it leads to, and whether something inverts it on the way.
+/// A line from the tester, the weeder's pin at its other end, and whether it is inverted.
 pub type InputWire = (Line, Pin, bool);
 
-/// Changes an edge on its way from the weeder: what it becomes, and nothing if it is lost. Cycles are the tester's.
+/// Changes an edge from the weeder: returns the new edge, or `None` if it is lost. Cycles are the tester's.
 pub type Edge = Box<dyn FnMut(PinChange) -> Option<PinChange>>;
 
 /// Changes the content of an EEPROM.
@@ -55,16 +56,16 @@ pub struct Wiring {
     pub outputs: Vec<Pin>,
     /// How much faster the weeder's clock is, in parts per million.
     pub clock_ppm: i64,
-    /// What happens to edges from the weeder.
+    /// Changes the edges from the weeder.
     pub from_weeder: Option<Edge>,
-    /// What happens to edges to the weeder. Cycles are the tester's.
+    /// Changes the edges to the weeder. Cycles are the tester's.
     pub to_weeder: Option<Edge>,
-    /// What becomes of the weeder's EEPROM when its reset is pulled. It starts as at power-up then.
+    /// Changes the weeder's EEPROM when its reset is pulled. The weeder then starts as at power-up.
     pub eeprom_at_reset: Option<Spoil>,
 }
 
 impl Wiring {
-    /// All wires as they should be.
+    /// The correct wiring.
     pub fn right() -> Self {
         use field::wiring::{BEAM, ENCODER_A, ENCODER_B, END_SWITCH, LED, SECOND_BEAM, SERVO, WORK_SWITCH};
         let pins = [ENCODER_A, ENCODER_B, BEAM, SECOND_BEAM, END_SWITCH, WORK_SWITCH];
@@ -91,7 +92,7 @@ pub enum PairError {
     Second(#[from] io::Error),
 }
 
-/// The weeder's virtual Uno: of this project's simulator, or of another one.
+/// The weeder's virtual Uno, of this project's simulator or of another one.
 enum WeederUno {
     Own(Uno),
     Second(SecondUno),
@@ -168,7 +169,7 @@ impl Pair {
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
     }
 
-    /// The same with another simulator's Uno as the weeder, which `program` runs.
+    /// The same, but `program` runs the weeder in another simulator.
     ///
     /// # Errors
     /// If an ELF cannot be run, or the other simulator.
@@ -204,7 +205,7 @@ impl Pair {
         self.shared.0 + (since * 1_000_000 / (1_000_000 + self.wiring.clock_ppm)) as u64
     }
 
-    /// Lets the tester's clock run by so many cycles, and the weeder's as long.
+    /// Lets the tester's clock run by this number of cycles, and the weeder's for the same time.
     ///
     /// # Errors
     /// If one of them stops.
@@ -238,7 +239,7 @@ impl Pair {
         Ok(())
     }
 
-    /// While the reset is pulled, the weeder's clock stands still, and both are counted from there on.
+    /// While the reset is pulled, the weeder's clock stands still. Afterwards both clocks are counted from that moment.
     fn look_at_reset(&mut self) -> Result<(), PairError> {
         if self.is_reset_pulled {
             self.shared = (self.tester.cycle(), self.weeder.cycle());
@@ -274,7 +275,8 @@ impl Pair {
         Ok(())
     }
 
-    /// How long the check would have taken two real boards so far, in seconds: each of their resets has a bootloader wait for `bootloader_s`.
+    /// The duration of the check so far with real boards, in seconds. At each reset of a real board its bootloader
+    /// waits for `bootloader_s`.
     pub fn duration_s(&self, bootloader_s: f64) -> f64 {
         self.tester.cycle() as f64 / CYCLES_PER_SECOND as f64 + f64::from(self.resets) * bootloader_s
     }
@@ -329,7 +331,7 @@ pub enum Side {
     Weeder,
 }
 
-/// A port of one of the boards, without a terminal between. Both clocks run while it is read, as fast as they can.
+/// A port of one of the boards, without a terminal. Both clocks run while it is read, at full speed.
 pub struct PairPort {
     /// Both boards.
     pub pair: Rc<RefCell<Pair>>,
@@ -350,7 +352,7 @@ impl Pair {
         }
     }
 
-    /// What has come from a board and was not read yet.
+    /// Unread output of a board.
     pub fn received(&mut self, side: Side) -> &mut VecDeque<u8> {
         match side {
             Side::Tester => &mut self.from_tester,

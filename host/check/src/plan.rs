@@ -1,14 +1,15 @@
-//! Plans: from levels at cycles to the pieces that the tester plays.
+//! Plans: converts levels at cycles to the pieces that the tester plays.
 //!
-//! A wheel makes thousands of counts a second, and the serial line carries 11 bytes a millisecond. So counts that follow each other evenly
-//! become one piece. Each count is at most `TOLERANCE` away from its time, and what comes after is not shifted by it.
+//! A wheel makes thousands of counts a second, and the serial line carries 11 bytes a millisecond. So evenly spaced
+//! counts become one piece. Each count is at most `TOLERANCE` away from its time. Its error does not shift later
+//! events.
 
 use field::wiring;
 use tester_core::piece::{Action, Piece};
 use tester_core::pins::Line;
 use uno::{Pin, PinChange};
 
-/// How far a count may be from its time, in cycles: 20 us, 0.02 mm at 4 km/h.
+/// Greatest error of a count's time, in cycles: 20 us, 0.02 mm at 4 km/h.
 const TOLERANCE: f64 = 320.0;
 
 /// The shortest time between two events, in cycles.
@@ -35,19 +36,19 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan without an event, which begins at cycle 0.
+    /// An empty plan, which begins at cycle 0.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// An event at a cycle, or as soon after the one before as it can be.
+    /// Adds an event at a cycle, or as soon after the previous one as possible.
     pub fn at(&mut self, cycle: u64, action: Action) {
         let cycle = cycle.max(self.last + SHORTEST);
         self.pieces.push(Piece { wait: (cycle - self.last) as u32, count: 1, action });
         self.last = cycle;
     }
 
-    /// So many counts at a rate, from the last event on.
+    /// Adds counts at a rate, from the last event on.
     pub fn roll(&mut self, counts: i32, per_s: f64) {
         let action = if counts > 0 { Action::Forward } else { Action::Backward };
         let wait = (uno::CYCLES_PER_SECOND as f64 / per_s).round() as u32;
@@ -60,7 +61,7 @@ impl Plan {
         }
     }
 
-    /// The same action up to 255 times, each so many cycles after the one before.
+    /// Adds the same action up to 255 times, each `wait` cycles after the one before.
     pub fn repeat(&mut self, count: u8, wait: u32, action: Action) {
         self.pieces.push(Piece { wait, count, action });
         self.last += u64::from(wait) * u64::from(count);
@@ -71,13 +72,13 @@ impl Plan {
         self.last
     }
 
-    /// The pieces, with the end.
+    /// The pieces, with the end marker.
     pub fn finish(mut self) -> Vec<Piece> {
         self.at(self.last + SHORTEST, Action::End);
         self.pieces
     }
 
-    /// Counts at these cycles, all in one direction.
+    /// Adds counts at these cycles, all in one direction.
     fn counts(&mut self, cycles: &[u64], action: Action) {
         let mut rest = cycles;
         while !rest.is_empty() {
@@ -107,7 +108,7 @@ impl Plan {
         (found.0, found.1 as u32)
     }
 
-    /// Adds what happens on the weeder's pins, `offset` cycles later; in the order of time.
+    /// Adds changes of the weeder's pins, `offset` cycles later, in the order of time.
     pub fn follow(&mut self, changes: &[PinChange], offset: u64) {
         let (mut a, mut b) = (false, false);
         let mut run: (Vec<u64>, Option<Action>) = (Vec::new(), None);

@@ -1,14 +1,14 @@
-//! The two boards' ports: what is not named is looked for among those of all Unos.
+//! The two boards' ports: a port that is not named is found among those of all Unos.
 
 use crate::error::CheckError;
 use crate::tester::Tester;
 use crate::wiring::Weeder;
 
-/// Opens both boards. A port that is not named is one of `unos` at which such a board answers: the tester by its protocol, the weeder by its
-/// console.
+/// Opens both boards. A port without a name is one of `unos` where such a board answers: the tester by its protocol,
+/// the weeder by its console.
 ///
 /// # Errors
-/// If a port that is named cannot be opened or does not answer, or no other port has such a board.
+/// If a named port cannot be opened or does not answer, or no other port has such a board.
 pub fn open(weeder: Option<&str>, tester: Option<&str>, unos: &[String]) -> Result<(Weeder, Tester), CheckError> {
     let (tester_port, tester) = opened("tester", tester, weeder, unos, |port| {
         Tester::over(link::open_other(port).map_err(CheckError::TesterPort)?)
@@ -17,7 +17,7 @@ pub fn open(weeder: Option<&str>, tester: Option<&str>, unos: &[String]) -> Resu
     Ok((weeder, tester))
 }
 
-/// The board at the port that is named, or at the first of the others where it answers; none of them is the one that is `taken`.
+/// The board at the named port, or at the first other port where it answers. The port `taken` is skipped.
 fn opened<T>(
     board: &'static str,
     named: Option<&str>,

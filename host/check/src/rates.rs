@@ -1,7 +1,8 @@
-//! Rates: bursts of the encoder, beyond the rate that is proved, and whether the weeder has lost a count; and glitches of a channel.
+//! Rates: bursts of the encoder up to and beyond the proved rate, and whether the weeder loses a count; and glitches of
+//! a channel.
 //!
-//! The tester counts cycles between two edges, so a rate is exact by its clock. The weeder is in hold. Busy means that it prints all its
-//! settings meanwhile, and that the beam changes once in 128 counts.
+//! The tester counts cycles between two edges, so a rate is exact by its clock. The weeder is in hold. Busy means that
+//! it prints all its settings meanwhile, and that the beam changes once in 128 counts.
 
 use crate::error::CheckError;
 use crate::tester::Tester;
@@ -11,33 +12,35 @@ use tester_core::message::{Command, PATTERN_STEPS, REPEAT_CYCLES, STEP_CYCLES, S
 use tester_core::pins::Line;
 use uno::CYCLES_PER_SECOND;
 
-/// Counts of a burst behind its run-up: 0.1 s at the highest rate, less than the time after which the weeder takes its loop for dead.
+/// Counts of a burst after its run-up: 0.1 s at the highest rate. This is shorter than the weeder's timeout for its
+/// main loop.
 const COUNTS: u32 = 29_000;
 
-/// Counts of the run-up, and how much longer its steps are, in units of [`STEP_CYCLES`]: 40,000 counts a second. The weeder takes the jumps of a
-/// wheel that is fast from one moment to the next for noise.
+/// Counts of the run-up, and the length of its steps, in units of [`STEP_CYCLES`]: 40,000 counts a second. Without it
+/// the weeder takes the jumps of a suddenly fast wheel for noise.
 const RUN_UP_COUNTS: u32 = 1280;
 const SLOWER: u8 = 115;
 
 /// Cycles between two counts at the rate that `weeder bounds` proves: 290,909 a second.
 pub const PROVED_CYCLES: u32 = 55;
 
-/// The most by which [`highest`] shortens them: every handler takes longer than what is left.
+/// Greatest shortening in [`highest`], in cycles. Every handler takes longer than the rest.
 const SHORTER_CYCLES: u32 = 42;
 
-/// The share of the time between two edges by which each comes early or late, with jitter: a disc that is worn or off its centre.
+/// Jitter: how early or late an edge comes, as a share of the time between two. It stands for a worn or eccentric
+/// disc.
 const JITTER: f64 = 0.3;
 
 /// Time in which the weeder answers the last question, in ms.
 const SETTLE_MS: u32 = 100;
 
-/// Reads of 20 ms in which it has to.
+/// Reads of 20 ms until it must have answered.
 const ANSWER_READS: usize = 100;
 
 /// How the encoder turns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Turning {
-    /// Cycles from one count to the next in the mean, 13 or more.
+    /// Mean cycles between two counts, 13 or more.
     pub cycles: u32,
     /// Which way.
     pub forward: bool,
@@ -78,7 +81,7 @@ impl Turning {
     }
 }
 
-/// Counts that the weeder has less than were made; `None` if it has started afresh.
+/// Lost counts: the counts that were made less the weeder's. `None` if it has restarted.
 ///
 /// # Errors
 /// If a board does not answer.
@@ -112,9 +115,9 @@ pub fn lost(turning: Turning, weeder: &mut Weeder, tester: &mut Tester) -> Resul
     Ok(Some((made - counted).abs()))
 }
 
-/// The highest rate at which no count is lost, in counts a second; `None` if counts are lost at the proved rate.
+/// The highest rate at which no count is lost, in counts a second. `None` if counts are lost at the proved rate.
 ///
-/// It is looked for from the proved rate on, in the steps that the tester can make.
+/// The search goes up from the proved rate, in the steps that the tester can make.
 ///
 /// # Errors
 /// If a board does not answer.
@@ -134,13 +137,14 @@ pub fn highest(forward: bool, busy: bool, weeder: &mut Weeder, tester: &mut Test
     Ok(highest)
 }
 
-/// Lengths of glitches in cycles, from 0.8 us to longer than both handlers of the encoder take one after the other.
+/// Lengths of glitches in cycles, from 0.8 us to longer than both handlers of the encoder together.
 const GLITCH_CYCLES: [u32; 8] = [13, 16, 22, 31, 43, 55, 79, 121];
 
 /// How often the pattern of 64 glitches is played for each length.
 const GLITCH_REPEATS: u16 = 4;
 
-/// Counts that glitches of a channel leave behind: the level changes and changes back, for each length. The sum over all lengths.
+/// Counts that remain after glitches of a channel: the level changes and changes back, for each length. Returns the sum
+/// over all lengths.
 ///
 /// # Errors
 /// If a board does not answer.

@@ -1,7 +1,8 @@
-//! The report: what was measured, beside what the simulation shows and what is proved.
+//! The report: measured figures, beside simulated and proved ones.
 //!
-//! A [`Line`] is one figure. It fails if it is outside its limits, and it differs if it is within them, but farther from the simulation's figure
-//! than its tolerance. The simulation's figures are in `simulated.json`, written by the same check of two virtual Unos.
+//! A [`Line`] is one figure. It fails if it is outside its limits. It differs if it is within them, but farther from
+//! the simulated figure than its tolerance. The simulated figures are in `simulated.json`, written by the same check of
+//! two virtual Unos.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -10,10 +11,10 @@ use std::fmt::Write;
 /// The version of the report's form.
 pub const FORM: u32 = 1;
 
-/// What the simulation shows, by the lines' ids.
+/// The simulated figures, by the lines' ids.
 const SIMULATED: &str = include_str!("simulated.json");
 
-/// What came of a line.
+/// The verdict on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
@@ -26,7 +27,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// As the report has it.
+    /// Its word in the report.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -43,19 +44,19 @@ pub struct Line {
     pub id: String,
     /// What it is.
     pub what: String,
-    /// Its unit; empty for a number of things.
+    /// Its unit; empty for a count.
     pub unit: String,
-    /// What was measured; `None` if it never came, such as a pulse behind a fault.
+    /// The measured value. `None` if the event never came, such as a pulse after a fault.
     pub measured: Option<f64>,
-    /// What the simulation shows; `None` if nothing is recorded.
+    /// The simulated value. `None` if none is recorded.
     pub simulated: Option<f64>,
-    /// What is proved of the firmware; `None` if nothing is.
+    /// The proved value. `None` if there is no proof.
     pub proved: Option<f64>,
-    /// The lowest value that is right; `None` if there is no limit.
+    /// The lowest valid value. `None` if there is no limit.
     pub lowest: Option<f64>,
     /// The highest.
     pub highest: Option<f64>,
-    /// How far it may be from the simulation's.
+    /// The tolerance against the simulated value.
     pub tolerance: f64,
     /// What came of it.
     pub verdict: Verdict,
@@ -68,7 +69,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A figure without limits, which may be that far from the simulation's. If `measured` is no finite number, it never came.
+    /// A figure without limits and with this tolerance. If `measured` is not finite, the event never came.
     pub fn new(id: &str, what: &str, unit: &str, measured: f64, tolerance: f64) -> Self {
         let line = Line {
             id: id.to_owned(),
@@ -100,7 +101,7 @@ impl Figure {
         self
     }
 
-    /// The same, with what is proved of it.
+    /// The same, with its proved value.
     #[must_use]
     pub fn proved(mut self, proved: f64) -> Self {
         self.line.proved = Some(proved);
@@ -124,20 +125,20 @@ impl Figure {
     }
 }
 
-/// All that was measured on a board.
+/// All measurements of a board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// The version of this form.
     pub form: u32,
-    /// The weeder's board, as the user named it; empty if it was not named.
+    /// The weeder's board, as named by the user; empty without a name.
     pub board: String,
     /// The weeder's firmware.
     pub firmware: String,
-    /// What was checked: `boards` or `simulated`.
+    /// The kind of check: `boards` or `simulated`.
     pub checked: String,
-    /// Whether the check was the brief one.
+    /// Whether it was the brief check.
     pub brief: bool,
-    /// What is wrong with the wires. If anything is, nothing else was measured.
+    /// The errors of the wires. If there are any, nothing else was measured.
     pub wires: Vec<String>,
     /// The figures.
     pub lines: Vec<Line>,
@@ -162,10 +163,10 @@ impl Report {
         }
     }
 
-    /// Reads a report, and checks its form: what a file in `reports/` has to be.
+    /// Reads a report, and checks its form. Files in `reports/` must have this form.
     ///
     /// # Errors
-    /// If it is no report, of another form, or its verdicts do not follow from its figures.
+    /// If it is no report, has another form, or has verdicts that do not follow from its figures.
     pub fn parse(json: &str) -> Result<Self, String> {
         let report: Self = serde_json::from_str(json).map_err(|error| error.to_string())?;
         if report.form != FORM {
@@ -196,7 +197,7 @@ impl Report {
         self.lines.iter().filter(move |line| line.verdict == verdict)
     }
 
-    /// The page: one file of HTML, without anything from elsewhere.
+    /// The page: one file of HTML, without external parts.
     pub fn page(&self) -> String {
         let mut page = String::from(HEAD);
         let mode = if self.brief { "brief check" } else { "whole check" };

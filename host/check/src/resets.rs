@@ -1,7 +1,7 @@
-//! Resets: the time without a pulse, the state afterwards, and settings that are saved while the reset comes.
+//! Resets: the time without a pulse, the state afterwards, and resets during a save.
 //!
-//! `save` writes the EEPROM byte by byte, for some hundred milliseconds. A reset at any moment of that must leave the old settings or the new
-//! ones. Only `max_width_mm` is changed for this, and put back at the end.
+//! `save` writes the EEPROM byte by byte, for some hundred milliseconds. A reset at any moment of that must leave the
+//! old or the new settings. Only `max_width_mm` is changed for this, and restored at the end.
 
 use crate::error::CheckError;
 use crate::plan::Plan;
@@ -15,26 +15,28 @@ use link::{ConsoleLine, Mode};
 use tester_core::message::Command;
 use uno::CYCLES_PER_SECOND;
 
-/// How the weeder rolls when it is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as the tester has room for.
+/// The weeder's rate when it is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as fit
+/// into the tester.
 const ROLL_COUNTS_PER_S: f64 = 1000.0;
 const ROLL_COUNTS: i32 = 8000;
 
 /// Time for which the reset is pulled, in ms.
 const PULLED_MS: u32 = 20;
 
-/// Time in which the firmware starts behind its bootloader, in ms.
+/// Time limit of the firmware's start after its bootloader, in ms.
 const START_MS: u32 = 3000;
 
-/// The same for a virtual Uno, which has none: the heartbeat's 200 ms are the longest part of it.
+/// The same for a virtual Uno, which has no bootloader: the heartbeat's 200 ms are the longest part of it.
 const SIMULATED_START_MS: u32 = 500;
 
-/// Before the end of this time, pulses are there again for so long, in ms: five frames.
+/// At the end of this time, pulses must have come for this long, in ms: five frames.
 const AGAIN_MS: u32 = 100;
 
-/// The resets come within this time of the command, in ms. A byte takes 3.4 ms, and in simulation a changed number is there after 50 ms.
+/// The resets come within this time of the command, in ms. A byte takes 3.4 ms, and in simulation a changed number is
+/// there after 50 ms.
 const SAVE_MS: u32 = 120;
 
-/// The longest time that a save of all settings takes, in ms.
+/// The longest time of a save of all settings, in ms.
 const SAVED_MS: u32 = 1000;
 
 /// The setting that is changed.
@@ -45,29 +47,30 @@ const SETTING: &str = "max_width_mm";
 pub enum Way {
     /// The tester pulls the reset.
     Pin,
-    /// The computer opens the port, which pulls it by the modem line DTR.
+    /// The computer opens the port, which resets the weeder through the modem line DTR.
     Port,
     /// `test watchdog` ends the main loop's heartbeat, in hold.
     Watchdog,
 }
 
 impl Way {
-    /// Whether the weeder works and rolls then. Only a weeder that stands in hold tests its watchdog.
+    /// Whether the weeder works and rolls then. The watchdog can be tested only in hold.
     pub const fn is_at_work(self) -> bool {
         !matches!(self, Self::Watchdog)
     }
 }
 
-/// What came of a reset.
+/// The result of a reset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restart {
-    /// From the last pulse's end to the first one's beginning behind the reset, in ms by the weeder's clock; infinite if none came.
+    /// From the last pulse's end to the beginning of the first one after the reset, in ms by the weeder's clock;
+    /// infinite without one.
     pub without_pulse_ms: f64,
-    /// Whether all pulses behind it are for out, and the weeder is not at work.
+    /// Whether all pulses after it are for out, and the weeder is not at work.
     pub is_out: bool,
 }
 
-/// Resets the weeder, if it can be at work while it rolls with the tool in.
+/// Resets the weeder, if possible at work, while it rolls with the tool in.
 ///
 /// # Errors
 /// If a board does not answer.
@@ -99,13 +102,13 @@ pub fn restart(
     records.extend(tester.record_for_ms(if is_simulated { SIMULATED_START_MS } else { START_MS })?);
     let ended = tester.command(&Command::Clock)?.time;
     if way != Way::Port && weeder.greeting()?.is_none() {
-        // What is left out must not end the check.
+        // If the weeder does not restart, the check still goes on.
         wiring::reset(weeder, tester)?;
     }
     tester.command(&Command::Stop)?;
     let status = weeder.status()?;
     let pulses = servo::pulses(&records, reset);
-    // While it is reset, pulses are missing; a machine that runs has one every 20 ms.
+    // During the reset, pulses are missing. A running machine has one every 20 ms.
     let gap = |number: &usize| pulses[number + 1].pulse.rise - pulses[*number].pulse.fall;
     let longest = (0..pulses.len().saturating_sub(1)).max_by_key(gap);
     let again = ORIGIN + u64::from(ended.wrapping_sub(reset).saturating_sub(ms(AGAIN_MS)));
@@ -119,7 +122,7 @@ pub fn restart(
     })
 }
 
-/// What a reset must not change: the saved settings and the taught examples, as the console shows them.
+/// Data that a reset must not change: the saved settings and the taught examples, as the console shows them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
     settings: Vec<(String, u16)>,
@@ -127,7 +130,7 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// What the weeder has behind a reset.
+    /// The weeder's data after a reset.
     ///
     /// # Errors
     /// If a board does not answer, or the weeder was built with other examples than this program.
@@ -143,7 +146,7 @@ impl Kept {
         })
     }
 
-    /// How many of them another one lacks, or has with another value.
+    /// How many of them are missing or changed in `later`.
     pub fn lost(&self, later: &Self) -> usize {
         let settings = self.settings.iter().filter(|setting| !later.settings.contains(setting));
         let examples = self.examples.iter().filter(|example| !later.examples.contains(example));
@@ -151,10 +154,11 @@ impl Kept {
     }
 }
 
-/// Has the weeder know an example while something is tried, if it knows none, so that one can be lost.
+/// Runs a trial while the weeder has at least one taught example, so that one can be lost. If it has none, one is
+/// taught and then forgotten.
 ///
 /// # Errors
-/// What the trial says, or if the weeder does not take the example or does not forget it.
+/// The errors of the trial, or if the weeder refuses the example or does not forget it.
 pub fn with_an_example<T>(
     weeder: &mut Weeder,
     tester: &mut Tester,
@@ -173,18 +177,18 @@ pub fn with_an_example<T>(
     tried
 }
 
-/// What came of resets while settings were saved.
+/// The results of resets during a save.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Saves {
     /// Resets.
     pub resets: u32,
-    /// Behind so many of them the settings were neither the old ones nor the new ones.
+    /// Resets after which the settings were neither the old nor the new ones.
     pub torn: u32,
-    /// Behind so many the new ones were there.
+    /// Resets after which the new settings were there.
     pub new: u32,
 }
 
-/// Saves settings, and pulls the reset at so many moments from the command on until the save has ended.
+/// Saves settings, and pulls the reset at this number of moments, from the command until the save has ended.
 ///
 /// # Errors
 /// If a board does not answer, or refuses.
@@ -192,7 +196,7 @@ pub fn while_saving(moments: u32, weeder: &mut Weeder, tester: &mut Tester) -> R
     reset(weeder, tester)?;
     let kept = value(weeder)?;
     save(weeder, tester, kept)?;
-    // The old value is put back, also after an error.
+    // The old value is restored, also after an error.
     let saves = saves(moments, kept, weeder, tester);
     save(weeder, tester, kept)?;
     saves
@@ -227,7 +231,7 @@ fn value(weeder: &mut Weeder) -> Result<u32, CheckError> {
     value.ok_or(CheckError::Answer("get"))
 }
 
-/// Saves this value, and waits until it is there.
+/// Saves this value, and waits until it is stored.
 fn save(weeder: &mut Weeder, tester: &mut Tester, value: u32) -> Result<(), CheckError> {
     weeder.ask(&format!("set {SETTING} {value}"))?;
     weeder.ask("save")?;

@@ -1,4 +1,5 @@
-//! A row: the weeder weeds it, the tester plays wheel and beam and records the pulses, and `weeder sim`'s measure judges them.
+//! A row: the weeder weeds it, the tester plays wheel and beam and records the pulses, and the verdict is that of
+//! `weeder sim`.
 
 use crate::error::CheckError;
 use crate::plan::Plan;
@@ -13,7 +14,7 @@ use link::settings::name;
 use tester_core::piece::Action;
 use uno::{CYCLES_PER_SECOND, Pulse};
 
-/// The presets' field, as `weeder sim` has it.
+/// The preset of `weeder sim`.
 const FIELD: &str = "set-up";
 
 /// The seed of row and machine.
@@ -22,10 +23,10 @@ const SEED: u64 = 1;
 /// From the plan's start to the motion's, in ms: some pulses come before.
 const STILL_MS: u32 = 100;
 
-/// What came of a row.
+/// The result of a row.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What happened to the plants and weeds.
+    /// The results for the plants and weeds.
     pub judgement: Judgement,
     /// Counts that the weeder has less than were played.
     pub lost_counts: i64,
@@ -52,7 +53,7 @@ impl Outcome {
     }
 }
 
-/// The row of `weeder sim` with so many plants and tall weeds, at a speed.
+/// The row of `weeder sim` with this number of plants and tall weeds, at a speed.
 ///
 /// # Errors
 /// If it cannot be grown.
@@ -75,10 +76,12 @@ pub fn trial(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Trial, Chec
     Ok(trial)
 }
 
-/// A width that is this near to one of the two that the servo is set to is taken for it, in us: the simulated servo would follow less.
+/// A width this near to one of the servo's two settings counts as that setting, in us. The simulated servo would
+/// otherwise follow smaller differences.
 const SAME_WIDTH_US: f64 = 1.0;
 
-/// Has the weeder weed a row. `clock_ratio` is its clock over the tester's. It is in hold afterwards, with settings that are not saved.
+/// Lets the weeder weed a row. `clock_ratio` is its clock over the tester's. Afterwards it is in hold, with unsaved
+/// settings.
 ///
 /// # Errors
 /// If one of the boards does not answer.

@@ -32,11 +32,12 @@ impl Extent {
     }
 }
 
-/// Checks a board. `progress` is told what comes next, and the share done from 0 to 1. The weeder has its saved settings again at the end,
-/// also where that is an error.
+/// Checks a board. `progress` gets the next step, and the completed share from 0 to 1. At the end the weeder has its
+/// saved settings again, also after an error.
 ///
 /// # Errors
-/// If a board does not answer, or the check is interrupted. Wrong wires are no error: the report has them, and nothing else then.
+/// If a board does not answer, or the check is interrupted. Wrong wires are no error: the report has them, and then
+/// nothing else.
 pub fn run(
     weeder: &mut Weeder,
     tester: &mut Tester,
@@ -85,7 +86,7 @@ fn check(
     Ok(report(figures))
 }
 
-/// The pulses in hold: the clocks' ratio, width and spread.
+/// The pulses in hold: the clocks' ratio, the width and the spread.
 fn pulses(tester: &mut Tester, extent: Extent) -> Result<Steady, CheckError> {
     tester.take_records();
     let records = tester.record_for_ms(extent.pulses_ms())?;
@@ -106,7 +107,7 @@ fn of_pulses(steady: &Steady) -> Vec<Figure> {
 /// The rate that `weeder bounds` proves, in counts a second.
 const PROVED_PER_S: f64 = 290_909.0;
 
-/// With jitter of 30 %, two counts come in 1.4 times the mean at least: so many cycles keep to the proof.
+/// With jitter of 30 %, two counts take at least 1.4 times the mean. This number of cycles keeps to the proof.
 const JITTERED_CYCLES: u32 = 79;
 
 /// The bursts' figures.
@@ -116,7 +117,7 @@ fn rates(weeder: &mut Weeder, tester: &mut Tester, extent: Extent) -> Result<Vec
     for &(forward, busy) in if extent.brief { &all[..1] } else { &all[..] } {
         let way = if forward { "forward" } else { "backward" };
         let load = if busy { "busy" } else { "idle" };
-        // Counts are lost below the proved rate if there is none.
+        // If no rate passes, counts are lost even at the proved rate.
         let highest = rates::highest(forward, busy, weeder, tester)?.unwrap_or(f64::INFINITY);
         let what = format!("highest rate without a lost count, {way}, {load}");
         figures.push(
@@ -126,7 +127,7 @@ fn rates(weeder: &mut Weeder, tester: &mut Tester, extent: Extent) -> Result<Vec
         );
         let turning = Turning { cycles: JITTERED_CYCLES, forward, jittered: true, busy };
         let what = format!("counts lost at {}/s {way}, {load}, 30 % jitter", turning.per_s().round());
-        // A weeder that has started afresh has lost all.
+        // A weeder that has restarted has lost all counts.
         let lost = rates::lost(turning, weeder, tester)?.map_or(f64::INFINITY, |lost| lost as f64);
         figures.push(Figure::new(&format!("lost_jitter_{way}_{load}"), &what, "", lost, 0.0).at_most(0.0).proved(0.0));
     }
@@ -138,13 +139,14 @@ fn rates(weeder: &mut Weeder, tester: &mut Tester, extent: Extent) -> Result<Vec
     Ok(figures)
 }
 
-/// How far the highest rate may be from the simulation's, in counts a second: a step of the search.
+/// Tolerance of the highest rate against the simulation's, in counts a second: a step of the search.
 const RATE_TOLERANCE: f64 = 40_000.0;
 
-/// The time within which the tool has to be out behind a fault, in ms: what the manual says of each, and a frame and a half of the servo.
+/// The time limit until the tool is out after a fault, in ms: the manual's limit for each, and a frame and a half of
+/// the servo.
 const fn limit_ms(scene: Scene) -> f64 {
     match scene {
-        // The tool goes out for a plant first. The alarm comes after `max_width_mm`, 400 mm: 764 counts of the scene.
+        // The tool first goes out for a plant. The alarm comes after `max_width_mm`, 400 mm: 764 counts of the scene.
         Scene::BlockedBeam => 794.0,
         // 41 edges.
         Scene::FlickeringBeam => 71.0,
@@ -157,10 +159,10 @@ const fn limit_ms(scene: Scene) -> f64 {
     }
 }
 
-/// Figures of times may differ by a servo's frame, and some turns of the loop, in ms.
+/// Tolerance of times: a servo's frame and some turns of the loop, in ms.
 const TIME_TOLERANCE_MS: f64 = 25.0;
 
-/// The alarms' figures, and those of the commands that take the tool out.
+/// The figures of alarms, and of commands that take the tool out.
 fn alarms(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) -> Result<Vec<Figure>, CheckError> {
     let mut figures = Vec::new();
     let scenes: &[Scene] = if extent.brief { &[Scene::FlickeringBeam, Scene::DeadChannel] } else { &Scene::ALL };
@@ -204,7 +206,7 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
         ] {
             let restart = resets::restart(way, weeder, tester, ratio, extent.simulated)?;
             let what = |what: &str| format!("{words}: {what}");
-            // A bootloader takes 2 s at most, and a virtual Uno has none: only the whole is limited.
+            // A bootloader takes 2 s at most, and a virtual Uno has none: so only the total is limited.
             figures.extend([
                 Figure::new(
                     &format!("reset_{id}_pulse"),
@@ -237,8 +239,9 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
     })
 }
 
-/// How far the mean error of a swing may be from the simulation's, in counts. Where two zones nearly touch, a run merges them or does not,
-/// by a fraction of a count: single swings of 79 counts come and go with that, and runs of the same firmware had means from 9.1 to 13.0.
+/// Tolerance of a swing's mean error against the simulation's, in counts. Where two zones nearly touch, a fraction of a
+/// count decides whether a run merges them. Single swings of 79 counts depend on that, and runs of the same firmware
+/// had means from 9.1 to 13.0.
 const SWING_MEAN_TOLERANCE: f64 = 6.0;
 
 /// A row's figures.

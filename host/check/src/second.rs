@@ -1,8 +1,8 @@
-//! Another simulator's virtual Uno in the weeder's place: a process that answers turn by turn.
+//! Another simulator's virtual Uno that replaces the weeder's: a process that answers turn by turn.
 //!
-//! A turn has 1600 cycles, so that there are not too many of them. What happens on its inputs comes at its cycle. What it does is known
-//! when its turn is over, and counts as done a little more than a turn later, always: widths and distances are right, and delays are longer
-//! by 0.1 ms.
+//! A turn has 1600 cycles, which limits their number. Changes of its inputs come at their cycles. Its outputs are known
+//! when a turn is over. They always count as made a little more than a turn later. So widths and distances are right,
+//! and delays are longer by 0.1 ms.
 
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, BufReader, Write};
@@ -14,14 +14,13 @@ use uno::{Pin, PinChange, hex};
 /// Cycles of a turn: 0.1 ms.
 const TURN: u64 = 1600;
 
-/// By how much later its edges count as done: a turn, and by how much one can be longer, since both programs go on to the end of an
-/// instruction.
+/// The delay of its edges: a turn, and its greatest excess, since both programs run on to the end of an instruction.
 const DELAY: u64 = TURN + 64;
 
 /// The edges of a turn: cycle, number of the board's pin, level.
 type Edges = Vec<(u64, usize, bool)>;
 
-/// What happens in a turn. `page/src/uno/lockstep.ts` has the other end.
+/// The inputs of a turn. `page/src/uno/lockstep.ts` reads them.
 #[derive(Serialize)]
 struct Turn {
     until: u64,
@@ -36,19 +35,19 @@ struct PowerUp {
     hex: String,
 }
 
-/// What came of a turn.
+/// The outputs of a turn.
 #[derive(Deserialize)]
 struct Done {
     edges: Edges,
     said: Vec<u8>,
 }
 
-/// The virtual Uno. Dropped, its process ends.
+/// The virtual Uno. Dropping it ends its process.
 pub struct SecondUno {
     process: Child,
     to: ChildStdin,
     from: BufReader<ChildStdout>,
-    /// The cycle until which it was asked to run, and the one until which it has run.
+    /// The requested end of its run, and the reached one, in cycles.
     asked: u64,
     run: u64,
     edges: Edges,
@@ -61,7 +60,7 @@ impl SecondUno {
     /// Powers it up with the firmware of an ELF. `program` is `page/build/lockstep.mjs`, which `./setup.sh page` makes.
     ///
     /// # Errors
-    /// If node cannot be started, or the ELF not be read.
+    /// If node cannot be started, or the ELF cannot be read.
     pub fn power_up(program: &Path, elf: &Path) -> io::Result<Self> {
         let flash = Image::read(elf).map_err(io::Error::other)?.flash;
         let mut process = Command::new("node")
@@ -81,12 +80,12 @@ impl SecondUno {
         Ok(uno)
     }
 
-    /// The cycle until which it was asked to run.
+    /// The requested end of its run, in cycles.
     pub fn cycle(&self) -> u64 {
         self.asked
     }
 
-    /// Lets its clock run. It does so once there is a whole turn.
+    /// Lets its clock run, one whole turn at a time.
     ///
     /// # Errors
     /// If the process has ended.
@@ -101,7 +100,7 @@ impl SecondUno {
         self.edges.push((change.cycle, pin, change.high));
     }
 
-    /// What it did, and did not say yet.
+    /// Its new output edges.
     pub fn take_changes(&mut self) -> Vec<PinChange> {
         std::mem::take(&mut self.changes)
     }
@@ -111,12 +110,12 @@ impl SecondUno {
         self.typed.extend(bytes);
     }
 
-    /// Bytes that are typed and have not reached it.
+    /// Typed bytes that have not reached it.
     pub fn bytes_on_their_way(&self) -> usize {
         self.typed.len()
     }
 
-    /// What it has said since it was asked.
+    /// Its new serial output.
     pub fn received(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.said)
     }
@@ -156,7 +155,7 @@ impl SecondUno {
 
 impl Drop for SecondUno {
     fn drop(&mut self) {
-        // It ends by itself when its input is closed; this does not wait for it.
+        // It also ends when its input is closed, but that takes time.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

@@ -1,7 +1,8 @@
-//! The servo's pulses: widths, frames, and from them the ratio of the clocks.
+//! The servo's pulses: widths and frames, and from them the ratio of the clocks.
 //!
-//! The weeder's timer makes a frame of exactly 20 ms by its own crystal. The tester measures the frame by its own. So the mean frame gives the
-//! ratio, and every other time is corrected by it. Both crystals may be off by the same share, which no measure here can see.
+//! The weeder's timer makes a frame of exactly 20 ms by its own crystal. The tester measures the frame by its own. So
+//! the mean frame gives the ratio, which corrects every other time. If both crystals are off by the same share, no
+//! measurement here can show it.
 
 use tester_core::message::Record;
 use uno::{CYCLES_PER_SECOND, Pulse};
@@ -9,7 +10,7 @@ use uno::{CYCLES_PER_SECOND, Pulse};
 /// A frame by the weeder's clock, in cycles.
 pub const FRAME_CYCLES: f64 = CYCLES_PER_SECOND as f64 / 50.0;
 
-/// Pulses are placed this far behind 0, so that some may lie before the plan's start.
+/// Times are shifted by this, so that pulses before the plan's start have times above 0.
 pub const ORIGIN: u64 = 1 << 31;
 
 /// A pulse that the tester measured, by its clock.
@@ -33,7 +34,7 @@ pub fn pulses(records: &[Record], start: u32) -> Vec<Measured> {
     records.iter().filter_map(pulse).collect()
 }
 
-/// What pulses of one width look like.
+/// Statistics of pulses with one width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steady {
     /// The weeder's clock over the tester's: above 1 if the weeder's is faster.
@@ -46,7 +47,7 @@ pub struct Steady {
     pub frame_spread_us: f64,
 }
 
-/// Measures pulses whose width was not changed; `None` for fewer than three.
+/// Measures pulses of constant width; `None` for fewer than three.
 pub fn steady(pulses: &[Measured]) -> Option<Steady> {
     let frames: Vec<f64> = pulses.windows(2).map(|two| (two[1].pulse.rise - two[0].pulse.rise) as f64).collect();
     if frames.len() < 2 {

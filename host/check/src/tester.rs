@@ -1,7 +1,8 @@
-//! The computer's end of the tester's serial line.
+//! The PC's end of the tester's serial line.
 //!
-//! A command that gets no answer is sent again with the same number. Records are kept in the order in which they came, and a gap in their
-//! numbers is an error. The line may be real, or a simulated one whose clock runs only while it is read; so time is the tester's own.
+//! A command without an answer is sent again with the same number. Records are kept in order, and a gap in their
+//! numbers is an error. The clock of a simulated line runs only while it is read. So times come from the tester, not
+//! from the PC.
 
 use crate::error::CheckError;
 use link::Port;
@@ -17,7 +18,7 @@ use uno::CYCLES_PER_SECOND;
 /// Reads after which a command is sent again: up to 20 ms each, and shorter while the servo's pulses come.
 const READS: usize = 30;
 
-/// Times that a command is sent. A board that opening the port has reset needs up to 2 s to start.
+/// Tries of a command. A board that was reset by opening its port needs up to 2 s to start.
 const TRIES: usize = 8;
 
 /// What the tester answered.
@@ -33,10 +34,10 @@ pub struct Done {
     pub levels: u8,
 }
 
-/// What came of a plan.
+/// The result of a plan.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// When it began, in cycles modulo 2^32.
+    /// Its start, in cycles modulo 2^32.
     pub start: u32,
     /// The tester's position before it.
     pub before: i32,
@@ -44,7 +45,7 @@ pub struct Played {
     pub ticks: i32,
     /// Events that came more than 10 us late.
     pub late: u16,
-    /// Everything else that was recorded meanwhile.
+    /// All other records of that time.
     pub records: Vec<Record>,
 }
 
@@ -53,7 +54,7 @@ pub struct Tester {
     port: Box<dyn Port>,
     receiver: Receiver,
     number: u8,
-    /// The number of the next record; none before the first.
+    /// The number of the next record; `None` before the first.
     expected: Option<u8>,
     missing: u32,
     records: VecDeque<Record>,
@@ -64,7 +65,7 @@ impl Tester {
     /// The tester at this port, with its lines at rest.
     ///
     /// # Errors
-    /// If something else is at the port, or nothing.
+    /// If no tester is at the port.
     pub fn over(port: impl Port + 'static) -> Result<Self, CheckError> {
         let mut tester = Self {
             port: Box::new(port),
@@ -81,12 +82,12 @@ impl Tester {
         Ok(tester)
     }
 
-    /// Once this is set, the next command fails, and those behind it do not: they put things back.
+    /// Once this is set, the next command fails. Later ones work, because they restore settings.
     pub fn interrupted_by(&mut self, interrupt: Arc<AtomicBool>) {
         self.interrupt = interrupt;
     }
 
-    /// Has the tester obey a command.
+    /// Sends a command to the tester.
     ///
     /// # Errors
     /// If it does not answer, refuses, or records are missing; and [`CheckError::Interrupted`].
@@ -97,7 +98,7 @@ impl Tester {
         self.number = self.number.wrapping_add(1);
         let frame = frame::encode(self.number, command).expect("the longest command fits a frame");
         for _ in 0..TRIES {
-            // The zero byte in front ends what noise has begun.
+            // The zero byte first ends a frame that noise may have begun.
             self.port.write_all(&[0]).map_err(CheckError::TesterGone)?;
             self.port.write_all(&frame).map_err(CheckError::TesterGone)?;
             self.port.flush().map_err(CheckError::TesterGone)?;
@@ -113,7 +114,7 @@ impl Tester {
                     return match refusal {
                         _ if protocol != PROTOCOL => Err(CheckError::Protocol(protocol)),
                         Some(refusal) => Err(CheckError::Refused(refusal)),
-                        // What was recorded before the greeting is no loss.
+                        // Records from before the greeting may be missing.
                         None if self.missing > 0 && *command != Command::Hello => {
                             Err(CheckError::Missing(self.missing))
                         }
@@ -125,7 +126,7 @@ impl Tester {
         Err(CheckError::TesterSilent)
     }
 
-    /// Reads what is there, or waits up to 20 ms for it. Returns whether something came.
+    /// Reads the input, or waits up to 20 ms for it. Returns whether there was any.
     fn hear(&mut self) -> Result<bool, CheckError> {
         let mut bytes = [0; 256];
         let count = match self.port.read(&mut bytes) {
@@ -150,7 +151,7 @@ impl Tester {
         Ok(true)
     }
 
-    /// Everything that was recorded and not yet taken, oldest first.
+    /// All new records, oldest first.
     pub fn take_records(&mut self) -> Vec<Record> {
         self.records.drain(..).collect()
     }
@@ -163,7 +164,7 @@ impl Tester {
         self.command(&Command::Lines { mask, levels })
     }
 
-    /// Waits by the tester's clock, in milliseconds up to 60,000, and returns what was recorded since the last taking.
+    /// Waits by the tester's clock, in milliseconds up to 60,000. Returns the records since the last call.
     ///
     /// # Errors
     /// As [`Tester::command`].
@@ -229,7 +230,7 @@ impl Tester {
         }
     }
 
-    /// Puts steps into the tester's pattern.
+    /// Loads steps into the tester's pattern.
     ///
     /// # Errors
     /// As [`Tester::command`].

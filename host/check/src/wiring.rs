@@ -1,4 +1,4 @@
-//! The wires: each line is toggled, and the weeder's console tells whether it noticed, and what it took the line for.
+//! The wires: the tester toggles each line, and the weeder's console shows whether it noticed, and as which input.
 
 use crate::error::CheckError;
 use crate::plan::Plan;
@@ -10,7 +10,7 @@ use tester_core::message::{Command, Record};
 use tester_core::piece::Action;
 use tester_core::pins::{AT_REST, Line};
 
-/// Reads of 20 ms in which the greeting has to come after a reset: an old bootloader waits for 2 s.
+/// Reads of 20 ms until the greeting must have come after a reset: an old bootloader waits for 2 s.
 const GREETING_READS: usize = 150;
 
 /// Time for a switch to stop bouncing and for the LED and the curves to follow, in ms.
@@ -19,24 +19,25 @@ const SETTLE_MS: u32 = 150;
 /// Time in which a stuck tool raises its alarm: the longest lead, 0.1 s, and as much again, in ms.
 const STUCK_MS: u32 = 800;
 
-/// The width of the pulse by which the tester checks its own capture, in cycles.
+/// Width of the pulse with which the tester checks its own capture, in cycles.
 const OWN_PULSE: u16 = 16_000;
 
-/// What the tester may measure of its own pulse too much: the loop that makes it looks at the clock every few microseconds.
+/// Greatest positive error of the tester's measurement of its own pulse, in cycles: its loop reads the clock every few
+/// microseconds.
 const OWN_PULSE_ERROR: u32 = 800;
 
 /// The weeder's console.
 pub struct Weeder {
-    /// `None` while the port is opened again, and where that failed.
+    /// `None` while the port is opened again, and if that failed.
     link: Option<Link>,
     open: Box<dyn FnMut() -> Result<Link, LinkError>>,
 }
 
 impl Weeder {
-    /// The weeder at the port that this opens, which resets the board.
+    /// The weeder at the port that `open` opens. This resets the board.
     ///
     /// # Errors
-    /// If the port cannot be opened, or something else is there.
+    /// If the port cannot be opened, or no weeder answers.
     pub fn over(mut open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, CheckError> {
         Ok(Self { link: Some(open()?), open: Box::new(open) })
     }
@@ -44,13 +45,13 @@ impl Weeder {
     /// The weeder at the port of this name.
     ///
     /// # Errors
-    /// If the port cannot be opened, or something else is there.
+    /// If the port cannot be opened, or no weeder answers.
     pub fn open(port: &str) -> Result<Self, CheckError> {
         let port = port.to_owned();
         Self::over(move || Link::open(Some(&port)))
     }
 
-    /// Closes the port and opens it again, which resets the board by the modem line DTR.
+    /// Closes the port and opens it again, which resets the board through the modem line DTR.
     ///
     /// # Errors
     /// As [`Weeder::open`].
@@ -74,7 +75,7 @@ impl Weeder {
         self.link.as_ref().map_or("", Link::version)
     }
 
-    /// The lines that a command is answered by.
+    /// The lines of a command's answer.
     ///
     /// # Errors
     /// If it is refused, or not answered.
@@ -91,7 +92,7 @@ impl Weeder {
         lines.iter().find_map(|line| Status::parse(line)).ok_or(CheckError::Answer("status"))
     }
 
-    /// Takes it to hold, with its alarm cleared and factory settings, which are not saved.
+    /// Takes it to hold, clears its alarm, and restores factory settings without saving them.
     ///
     /// # Errors
     /// If it refuses.
@@ -103,7 +104,7 @@ impl Weeder {
         self.ask("defaults").map(drop)
     }
 
-    /// Takes the lines that the machine has said by itself.
+    /// Drops the lines that the machine has sent by itself.
     ///
     /// # Errors
     /// If the port is gone.
@@ -112,7 +113,7 @@ impl Weeder {
         Ok(())
     }
 
-    /// The next line that the machine says by itself; `None` if none came within 20 ms.
+    /// The next line that the machine sends by itself; `None` if none came within 20 ms.
     ///
     /// # Errors
     /// If the port is gone.
@@ -128,7 +129,7 @@ impl Weeder {
         Ok(self.link()?.send(command)?)
     }
 
-    /// Waits for the greeting of a firmware that starts; `None` if none came.
+    /// Waits for the greeting of a starting firmware; `None` if none came.
     ///
     /// # Errors
     /// If the port is gone.
@@ -178,7 +179,7 @@ pub fn reset(weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<String>,
     weeder.greeting()
 }
 
-/// What is wrong with the wires, in sentences; empty if all are right. The weeder is in hold afterwards.
+/// The errors of the wires, in sentences; empty if all are right. Afterwards the weeder is in hold.
 ///
 /// # Errors
 /// If one of the boards does not answer.
@@ -208,7 +209,7 @@ pub fn look(weeder: &mut Weeder, tester: &mut Tester) -> Result<Vec<String>, Che
     Ok(wrong)
 }
 
-/// The tester measures a pulse of its own, while the weeder is in reset and drives nothing.
+/// The tester measures its own pulse, while the weeder is in reset and drives nothing.
 fn capture(tester: &mut Tester) -> Result<Option<String>, CheckError> {
     tester.command(&Command::Reset { pulled: true })?;
     tester.record_for_ms(40)?;
@@ -267,7 +268,7 @@ fn encoder(weeder: &mut Weeder, tester: &mut Tester) -> Result<Vec<String>, Chec
     })
 }
 
-/// What the weeder can take a line for.
+/// The weeder's possible reactions to a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Seen {
     Work,
@@ -318,7 +319,7 @@ fn switches_and_beams(weeder: &mut Weeder, tester: &mut Tester) -> Result<Vec<St
     Ok(wrong)
 }
 
-/// What the weeder notices while these lines are low.
+/// The weeder's reactions while these lines are low.
 fn noticed(weeder: &mut Weeder, tester: &mut Tester, low: u8) -> Result<Vec<Seen>, CheckError> {
     let mut seen = Vec::new();
     weeder.to_hold()?;
@@ -333,7 +334,7 @@ fn noticed(weeder: &mut Weeder, tester: &mut Tester, low: u8) -> Result<Vec<Seen
     weeder.ask("hold").map(drop).or_else(not_refused)?;
     weeder.ask("set end_switch on")?;
     tester.record_for_ms(STUCK_MS)?;
-    // In hold the tool is out, and an end switch that is open says that it is not.
+    // In hold the tool is out. An open end switch contradicts that, which is an alarm.
     if weeder.status()?.mode != Mode::Alarm {
         seen.push(Seen::Out);
     }
@@ -343,7 +344,8 @@ fn noticed(weeder: &mut Weeder, tester: &mut Tester, low: u8) -> Result<Vec<Seen
     Ok(seen)
 }
 
-/// Plants that pass both beams in hold, and the weeder should measure slip between them, if it is none.
+/// Plants pass both beams in hold, and the weeder must measure the slip between them. Returns the error, if it does
+/// not.
 fn second_beam(weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<String>, CheckError> {
     weeder.to_hold()?;
     weeder.ask(&format!("set second_beam_mm {SECOND_BEAM_MM}"))?;
@@ -373,7 +375,7 @@ fn second_beam(weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<String
     }))
 }
 
-/// How far the second beam is behind the first: in mm, and in counts of the factory settings' wheel.
+/// Distance of the second beam behind the first, in mm, and in counts of the factory settings' wheel.
 const SECOND_BEAM_MM: u16 = 100;
 const SECOND_BEAM_COUNTS: i32 = 191;
 

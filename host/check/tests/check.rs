@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
 
-/// The most SRAM that the tester may need, static and stack, of 2048 bytes.
+/// The most SRAM of the tester, static and stack, of 2048 bytes.
 const SRAM_USED: usize = 1750;
 
 /// The longest time of a whole check, and of a bootloader's wait, in seconds.
@@ -44,7 +44,7 @@ fn figures(report: &Report) -> BTreeMap<String, f64> {
     report.lines.iter().map(|line| (line.id.clone(), line.measured.expect("it was measured"))).collect()
 }
 
-/// Whether the whole check is tried too, and whether what it shows is recorded.
+/// Whether this variable is set: one runs the whole check, another records its figures.
 fn is_set(variable: &str) -> bool {
     std::env::var_os(variable).is_some()
 }
@@ -87,7 +87,7 @@ fn a_row_is_measured_as_the_simulation_judges_it() {
         let errors = [measured, simulated].map(|plant| [plant.out_error_ticks, plant.in_error_ticks]);
         for (measured, simulated) in errors[0].into_iter().zip(errors[1]) {
             let difference = measured.zip(simulated).map_or(0.0, |(measured, simulated)| measured - simulated);
-            // What the loop's turn and the servo's frame come to at this speed.
+            // The effect of the loop's turn and the servo's frame at this speed.
             assert!(measured.is_some() == simulated.is_some() && difference.abs() < 10.0, "{measured:?} {simulated:?}");
         }
     }
@@ -97,7 +97,7 @@ fn a_row_is_measured_as_the_simulation_judges_it() {
 fn the_boards_are_found_at_two_terminals() {
     let (tester, weeder) = (firmware::build_tester().expect("it is built"), firmware::build().expect("it is built"));
     let desk = Desk::start(&tester, &weeder, None).expect("it starts");
-    // The weeder's stands first, and no port is named.
+    // The weeder's port is first, and no port is named.
     let unos = [desk.weeder(), desk.tester()].map(|path: &Path| path.to_str().expect("it is text").to_owned());
     let (mut weeder, mut tester) = ports::open(None, None, &unos).expect("both are found");
     assert_eq!(wiring::look(&mut weeder, &mut tester).expect("both answer"), Vec::<String>::new());

@@ -20,13 +20,13 @@ use tester_core::pins::Line;
 use trial::firmware;
 use uno::{Pin, PinChange};
 
-/// What the check says of these wires.
+/// The check's sentences about these wires.
 fn said(wires: Wiring) -> Vec<String> {
     let (mut weeder, mut tester) = boards(wires);
     wiring::look(&mut weeder, &mut tester).expect("both boards answer")
 }
 
-/// The check says a sentence with all of these words of wires that are changed like this.
+/// Asserts that the check reports these changed wires in a sentence with all of these words.
 #[track_caller]
 fn assert_named(change: impl FnOnce(&mut Wiring), words: &[&str]) {
     let mut wires = Wiring::right();
@@ -106,7 +106,7 @@ fn a_missing_servo_and_a_missing_led_are_named() {
     assert_named(|wires| wires.outputs.retain(|pin| *pin != pins::LED), &["LED", "D13"]);
 }
 
-/// The pulses in hold, with edges from the weeder that are changed like this.
+/// The pulses in hold. `change` changes the edges from the weeder.
 fn steady(change: impl FnMut(PinChange) -> Option<PinChange> + 'static, clock_ppm: i64) -> servo::Steady {
     let wires = Wiring { from_weeder: Some(Box::new(change)), clock_ppm, ..Wiring::right() };
     let (mut weeder, mut tester) = boards(wires);
@@ -171,7 +171,7 @@ fn counts_that_are_lost_above_150_000_a_second_are_counted() {
 
 #[test]
 fn a_channel_that_hides_the_end_of_a_glitch_is_counted() {
-    // What comes within 5 us of an edge is lost, as behind a filter of 1 k and 4.7 nF that only one channel has.
+    // Edges within 5 us of another are lost, as behind a filter of 1 k and 4.7 nF on one channel only.
     let mut last = 0;
     let filter = move |change: PinChange| {
         let is_short = change.pin == Pin::A0 && change.cycle - last < 80;
@@ -187,7 +187,7 @@ fn a_channel_that_hides_the_end_of_a_glitch_is_counted() {
 
 #[test]
 fn a_code_of_the_led_that_is_off_by_one_is_read_as_it_is_flashed() {
-    // The first flash behind each pause does not come through.
+    // The first flash after each pause is lost.
     let (mut fell, mut hides) = (0, false);
     let swallow = move |change: PinChange| {
         if is_servo(&change) {
@@ -220,7 +220,8 @@ fn a_swing_that_is_late_by_10_ms_is_measured() {
         outcome.judgement.swing_errors_ticks()
     };
     let (right, wrong) = (swings(0), swings(160_000));
-    // 10 ms at 2.5 km/h are 13.3 counts. One swing may come a servo's frame earlier or later from run to run, by 26 counts.
+    // 10 ms at 2.5 km/h are 13.3 counts. One swing may come a servo's frame earlier or later from run to run, by 26
+    // counts.
     let later = right.iter().zip(&wrong).map(|(right, wrong)| wrong - right).sum::<f64>() / right.len() as f64;
     assert!(right.len() == wrong.len() && (later - 13.3).abs() < 8.0, "{right:?} {wrong:?}");
 }
@@ -232,7 +233,7 @@ fn a_channel_that_falls_silent_on_the_way_costs_counts_in_a_row() {
     let drops = move |change: PinChange| {
         let is_a = change.pin == Pin::A0;
         *seen.borrow_mut() += u32::from(is_a);
-        // One edge of a thousand, and the next with it: two steps in all.
+        // One edge of a thousand, and the next one: two steps in all.
         (!is_a || *seen.borrow() % 1000 > 1).then_some(change)
     };
     let wires = Wiring { to_weeder: Some(Box::new(drops)), ..Wiring::right() };
@@ -242,7 +243,7 @@ fn a_channel_that_falls_silent_on_the_way_costs_counts_in_a_row() {
     assert!(outcome.lost_counts > 0, "{}", outcome.lost_counts);
 }
 
-/// The firmware without what writes WDTCSR, so that the watchdog is never on.
+/// The firmware without the writes of WDTCSR, so that the watchdog is never on.
 fn without_watchdog() -> NamedTempFile {
     /// `sts 0x60, r0`; the register is in the bits that are masked out.
     const STS: (u16, u16) = (0x9200, 0xFE0F);

@@ -1,4 +1,4 @@
-//! The manual's wires are those of both firmwares, and the reports have the form that the check writes.
+//! Tests that the manual's wires are those of both firmwares, and that the reports have the check's form.
 
 use check::plan::line;
 use check::report::Report;

@@ -1,4 +1,4 @@
-//! `weeder bench-uno`: what the firmware and its classifier can take and what they cost on an Arduino Uno.
+//! `weeder bench-uno`: limits and costs of the firmware and its classifier on an Arduino Uno.
 
 use crate::output::say;
 use crate::progress::Progress;
@@ -23,13 +23,13 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The rows whose swings are held against their places.
+/// The rows whose swings are compared with their ideal positions.
 const ROWS: u64 = 50;
 
 /// Measures and prints the figures.
 ///
 /// # Errors
-/// Where the bench or the firmware cannot be built or run.
+/// If the bench or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bench_elf = firmware::build_bench()?;
     let elf = firmware::build()?;
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What was measured, without the figures of others that the tables set beside it.
+/// The measured values, without the published figures in the tables.
 fn in_json(figures: &Figures) -> Value {
     let Figures { classifier, firmware, rates, jitter, lateness } = figures;
     let rates: Vec<Value> = rates

@@ -1,6 +1,6 @@
-//! `weeder bounds`: what the firmware can need at most, proved from its ELF, beside what it may need. The proof and its words are those
-//! of `avr-bounds`; the firmware and its budgets are this repository's. What writes a firmware for an Uno asks here first whether that is
-//! proved.
+//! `weeder bounds`: the proved limits of the firmware, beside its budgets. `avr-bounds` makes the proof and the texts.
+//! The firmware and its budgets are this repository's. Commands that flash a firmware first check here whether its
+//! bounds are proved.
 
 use crate::finding::Finding;
 use crate::output::{print, tell};
@@ -11,7 +11,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use trial::firmware;
 
-/// What the user asks of the bounds.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     Ok(if keeps { Finding::Good } else { Finding::Bad })
 }
 
-/// Where this repository's budgets stand.
+/// Path of this repository's budgets.
 fn repository_budgets() -> PathBuf {
     firmware::workspace_root().join("budgets.toml")
 }
@@ -60,7 +60,7 @@ fn prove(elf: &Path, budgets: &Path) -> Result<Vec<Held>> {
     Ok(budgets.hold(&avr_bounds::prove(&program, &budgets)?)?)
 }
 
-/// Which firmware is written for an Uno, and whether it may be one without proved bounds.
+/// The firmware to flash, and whether it may have unproved bounds.
 #[derive(Args)]
 pub struct Firmware {
     /// Take this ELF instead of building the firmware of this repository.
@@ -75,7 +75,7 @@ pub struct Firmware {
     unproved: bool,
 }
 
-/// What an unproved firmware may do.
+/// The risk of an unproved firmware.
 const RISK: &str = "its stack may overwrite its data, and plants may be missed, without an alarm";
 
 impl Firmware {
@@ -94,7 +94,7 @@ impl Firmware {
     /// Proves this ELF's bounds, and says where that fails but is insisted on.
     ///
     /// # Errors
-    /// Where it fails, or a bound is over its budget, without `--unproved`.
+    /// If it fails, or a bound is over its budget, without `--unproved`.
     pub fn check(&self, elf: &Path) -> Result<()> {
         let budgets = if self.tester { tester_budgets() } else { repository_budgets() };
         let why = match prove(elf, &budgets) {

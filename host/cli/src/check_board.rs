@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
 
-/// What the user asks of the check.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 The tester is an Uno with the tester's firmware, wired to the weeder's Uno: docs/check-board.md has the wires.

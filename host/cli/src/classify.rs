@@ -1,6 +1,6 @@
-//! `weeder classify`: what the firmware's classifier says of recorded objects.
+//! `weeder classify`: classifies recorded detections as the firmware does.
 //!
-//! The built-in examples, the scale and the radius are those of the firmware, and so is the code that searches them.
+//! The built-in examples, the scale, the radius and the code of the search are the firmware's.
 
 use crate::finding::Finding;
 use crate::numbers::whole_within;
@@ -14,7 +14,7 @@ use field::row::Kind;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// What the user asks to be classified.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -42,7 +42,7 @@ pub struct Arguments {
 /// Classifies, and prints a line an object and, where there are labels, who was taken for whom.
 ///
 /// # Errors
-/// Where the file or its contents are wrong.
+/// If the file or its contents are wrong.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let objects = table::read(&arguments.file)?;
     let mut model = Model::built_in();
@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     if confusion.plants_taken_for_weeds() == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
 }
 
-/// What each object is taken for, and what speaks for it.
+/// The class of each detection, with its votes.
 fn as_json(model: &Model, objects: &[Recorded]) -> Result<Value> {
     let row = |object: &Recorded| {
         let answer = model.answer(&object.features)?;

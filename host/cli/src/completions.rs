@@ -1,14 +1,14 @@
-//! `weeder completions`: what a shell has to be told so that Tab completes the command's words.
+//! `weeder completions`: scripts that let a shell complete the command's words.
 //!
-//! The words are those of the arguments themselves, by clap_complete. Presets and what an axis can be are among them,
-//! ports and values of settings are not.
+//! clap_complete makes them from the arguments themselves. They include presets and the axes of sweeps, but neither
+//! ports nor values of settings.
 
 use crate::output;
 use anyhow::Result;
 use clap::Args;
 use clap_complete::Shell;
 
-/// What the user asks of the completions.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -23,7 +23,7 @@ pub struct Arguments {
 /// Prints the script that the shell reads.
 ///
 /// # Errors
-/// Where it cannot be printed.
+/// If it cannot be printed.
 pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "weeder", &mut script);

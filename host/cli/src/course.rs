@@ -12,7 +12,7 @@ use files::csv_table;
 use std::fs;
 use std::path::PathBuf;
 
-/// What the user asks of row and machine.
+/// The arguments.
 #[derive(Args)]
 pub struct CourseArguments {
     /// Speed in km/h, 0.1 to 10.
@@ -48,11 +48,11 @@ pub struct CourseArguments {
     row: Option<PathBuf>,
 }
 
-/// Tall weeds in a row for which nobody has said how many, where there is room for them.
+/// The default number of tall weeds in a row. A row without room for them gets fewer.
 const WEEDS: usize = 5;
 
-/// Scatter of a grown row, as shares of the mean spacing and the mean canopy; never more than a quarter of the gap
-/// between two mean canopies each, so that the plants stay apart.
+/// Scatter of a random row, as shares of the mean spacing and the mean canopy. Each is at most a quarter of the gap
+/// between two mean canopies, so that the plants do not touch.
 const SPACING_SCATTER: f64 = 0.08;
 const CANOPY_SCATTER: f64 = 0.15;
 
@@ -60,12 +60,12 @@ impl CourseArguments {
     /// The row, read or grown.
     ///
     /// # Errors
-    /// Where the file is wrong, or the numbers make no row.
+    /// If the file is wrong, or the numbers make no row.
     pub fn row(&self) -> Result<Row> {
         self.nth_row(0)
     }
 
-    /// A row beside that one: grown, it has plants of its own.
+    /// A neighbouring row. A random row has other plants.
     ///
     /// # Errors
     /// As [`CourseArguments::row`].
@@ -100,11 +100,11 @@ impl CourseArguments {
     /// The machine and what is around it, in this field.
     ///
     /// # Errors
-    /// Where it is no field, or its machine has no room for the distance from beam to tool.
+    /// If it is no field, or its machine has no room for the distance from beam to tool.
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
         let mut conditions = Conditions::load(field, |file| fs::read_to_string(file))?;
         if let Some(beam_to_tool_mm) = self.beam_to_tool {
-            // A second beam stands no farther back, and not on a machine with a beam so far ahead.
+            // A second beam cannot be farther back, and a beam cannot be that far ahead on a machine with two.
             if conditions.machine.second_beam_mm > 0.0 && !(300..=1000).contains(&beam_to_tool_mm) {
                 conditions.set("machine.second_beam_mm", 0.0)?;
             }
@@ -113,7 +113,7 @@ impl CourseArguments {
         Ok(conditions)
     }
 
-    /// The machine in a field, which is one of all the possible ones as the row is.
+    /// The machine in a field. The row's seed selects its random deviations.
     pub fn machine(&self, conditions: &Conditions) -> Machine {
         conditions.machine(self.seed)
     }

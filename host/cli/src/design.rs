@@ -1,5 +1,5 @@
-//! `weeder design`: what a machine's engine, servo, shanks, chain, wheels and handle have to be like, and how its tool has to
-//! swing, as settings for the firmware.
+//! `weeder design`: the required engine, servo, shanks, chain, wheels and handle of a machine, and its tool's swing as
+//! settings for the firmware.
 
 use crate::output::{print, say};
 use crate::source;
@@ -12,7 +12,7 @@ use mechanics::{file, paper, report};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// What the user asks of the design calculations.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -37,7 +37,7 @@ pub struct Arguments {
 /// Calculates and prints.
 ///
 /// # Errors
-/// Where the machine's file cannot be read, or makes no machine that could be calculated.
+/// If the machine's file cannot be read, or makes no machine that could be calculated.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let own = arguments.machine.as_deref().map(file::read).transpose()?;
     let machine = own.unwrap_or_default();

@@ -1,13 +1,13 @@
-//! Where a command writes its files: one way for all, checked before any work is done.
+//! The output files of all commands, checked before any work.
 //!
-//! The rule for `--out`: a report, which is a page or several files, goes into a folder (`FOLDER`), which is made where
-//! there is none; a single table goes to a file (`FILE.csv`), and so does a study's part. An argument can only be
-//! written to once it has been checked, and a command checks before it works. What is wrong all the same after the
-//! work, such as a disk that has filled up, is told after the result has been printed.
+//! The rule for `--out`: a report of a page or several files goes into a folder (`FOLDER`), which is created if needed.
+//! A single table goes to a file (`FILE.csv`), and so does a study's part. The types ensure that an argument is checked
+//! before it is written to. A command checks before it works. Errors after the work, such as a full disk, are reported
+//! after the result has been printed.
 //!
-//! A file that is there may hold a user's work: a table that was filled in, settings that were tuned, comments. No command
-//! can tell by looking, so none replaces one without [`Replace`], the option `--force`. A test in `main.rs` holds every
-//! argument with which a command writes to that.
+//! An existing file may hold a user's work: a filled-in table, tuned settings, comments. A command cannot detect that.
+//! So no command replaces a file without [`Replace`], the option `--force`. A test in `main.rs` checks every argument
+//! that names an output.
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
@@ -17,7 +17,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// How files end that commands write: a folder is hardly meant to.
+/// Endings of files that commands write. A folder's name hardly ends so.
 const FILE_ENDINGS: [&str; 9] = ["csv", "geojson", "hex", "html", "json", "rs", "svg", "toml", "vcd"];
 
 /// Whether files that are there are replaced.
@@ -28,11 +28,11 @@ pub struct Replace {
     force: bool,
 }
 
-/// A file's name, as it was typed.
+/// A file name as typed.
 #[derive(Clone, Debug)]
 pub struct FileName(PathBuf);
 
-/// A folder's name, as it was typed.
+/// A folder name as typed.
 #[derive(Clone, Debug)]
 pub struct FolderName(PathBuf);
 
@@ -48,11 +48,11 @@ impl From<OsString> for FolderName {
     }
 }
 
-/// A file that could be written when it was checked.
+/// A file that was writable when it was checked.
 #[derive(Debug)]
 pub struct OutFile<'a>(&'a Path);
 
-/// A folder in which these files could be written when it was checked. It may not be there yet.
+/// A folder in which these files were writable when it was checked. It may not exist yet.
 #[derive(Debug)]
 pub struct OutFolder<'a> {
     folder: &'a Path,
@@ -60,7 +60,7 @@ pub struct OutFolder<'a> {
 }
 
 impl Replace {
-    /// Whether a file may be written: none is there, it is empty or a device, or it is to be replaced.
+    /// Whether a file may be written: it does not exist, is empty, is a device, or is to be replaced.
     fn check(self, path: &Path) -> Result<()> {
         let holds_something = path.metadata().is_ok_and(|there| there.is_file() && there.len() > 0);
         ensure!(
@@ -76,7 +76,7 @@ impl FileName {
     /// Whether it could be written, and nothing is lost by it.
     ///
     /// # Errors
-    /// Where it could not, and why.
+    /// If it could not, and why.
     pub fn check(&self, replace: Replace) -> Result<OutFile<'_>> {
         ensure!(!self.0.is_dir(), "{} is a folder, and a file has to be named", self.0.display());
         replace.check(&self.0)?;
@@ -106,7 +106,7 @@ impl OutFile<'_> {
     /// Writes it whole, or leaves what was there.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub fn write<E>(&self, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
     where
         E: From<io::Error>,
@@ -125,7 +125,7 @@ impl FolderName {
     /// Whether files could be written there, and nothing is lost by those of these names.
     ///
     /// # Errors
-    /// Where they could not, and why.
+    /// If they could not, and why.
     pub fn check<N: Into<String>>(
         &self,
         names: impl IntoIterator<Item = N>,
@@ -155,7 +155,7 @@ impl FolderName {
     /// Makes it where there is none.
     ///
     /// # Errors
-    /// Where it cannot be made.
+    /// If it cannot be made.
     pub fn make(&self) -> Result<()> {
         fs::create_dir_all(&self.0).with_context(|| format!("the folder {} cannot be made", self.0.display()))
     }
@@ -165,7 +165,7 @@ impl OutFolder<'_> {
     /// Writes a file there whole, or leaves what was there; makes the folder where there is none.
     ///
     /// # Errors
-    /// Where folder or file cannot be written, or this name was not checked.
+    /// If folder or file cannot be written, or this name was not checked.
     pub fn write<E>(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
     where
         E: From<io::Error>,

@@ -1,4 +1,4 @@
-//! `weeder evaluate`: judges a field trial by what was counted and measured in its plots.
+//! `weeder evaluate`: evaluates a field trial from the counts and measurements of its plots.
 
 use crate::destination::{FolderName, OutFolder, Replace};
 use crate::output::{self, say};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// The report's name in its folder.
 const REPORT: &str = "report.html";
 
-/// What the user asks of a trial.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder evaluate trial.csv                   the results, and what they depend on\n  \
@@ -37,7 +37,7 @@ pub struct Arguments {
 /// Reads, judges and prints.
 ///
 /// # Errors
-/// Where the table cannot be read or has a plot that cannot be, or the report cannot be written.
+/// If the table cannot be read or has a plot that cannot be, or the report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.check([REPORT], arguments.replace)).transpose()?;
     let records = evaluation::read_csv(&arguments.file)?;
@@ -73,7 +73,7 @@ fn write_report(analysis: &Analysis, file: &Path, folder: &OutFolder) -> Result<
     folder.write(REPORT, |to| to.write_all(html.as_bytes()))
 }
 
-/// The whole analysis; where there is no model, `no_model` says why.
+/// The whole analysis. Without a model, `no_model` says why.
 fn in_json(analysis: &Analysis) -> Value {
     let plots = analysis.records.iter().zip(&analysis.performances);
     let plots: Vec<Value> = plots.map(|(record, result)| json!({ "record": record, "performance": result })).collect();

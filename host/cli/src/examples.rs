@@ -1,4 +1,5 @@
-//! `weeder examples`: what a machine was taught in the field as a table that can be kept, learned from, and taught to another.
+//! `weeder examples`: the taught examples of a machine as a table, to save, to train from, and to teach to another
+//! machine.
 
 use crate::destination::{FileName, Replace};
 use crate::finding::Finding;
@@ -14,7 +15,7 @@ use link::examples::{self, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// What the user asks of the examples.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder examples pull chilli.csv             write the taught examples into a table
@@ -79,7 +80,7 @@ Example: weeder examples push chilli.csv --replace")]
 /// Pulls, pushes or compares.
 ///
 /// # Errors
-/// Where table or machine cannot be used; each says what would be right.
+/// If table or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, port } => {
@@ -134,7 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
 }
 
-/// What the machine was taught, in the order of its numbers.
+/// The machine's taught examples, in the order of their numbers.
 fn on_machine(port: &Port) -> Result<Vec<Taught>> {
     Ok(examples::read(&mut port.open()?)?.into_iter().map(|(_, example)| example).collect())
 }
@@ -142,7 +143,7 @@ fn on_machine(port: &Port) -> Result<Vec<Taught>> {
 /// A table's examples, each once; at least one.
 ///
 /// # Errors
-/// Where it is no such table.
+/// If it is no such table.
 pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let objects = table::read(file)?;
     let mut examples = Vec::new();
@@ -180,7 +181,8 @@ fn refuse_contradictions(wanted: &[Taught]) -> Result<()> {
     )
 }
 
-/// An example in millimetres; what comes from a machine or a table has them.
+/// An example in millimetres. `None` for bytes that no detection has: examples from a machine or a table have no such
+/// bytes.
 fn object(example: &Taught) -> Option<Labelled> {
     let kind = if example.label == label_of(Kind::Plant) { Kind::Plant } else { Kind::Weed };
     features_of(example).map(|features| Labelled { features, kind })

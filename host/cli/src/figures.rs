@@ -1,8 +1,8 @@
-//! `weeder figures`: the figures that stand in the manual, each from the command that stands above it.
+//! `weeder figures`: updates or checks the figures in the manual, each by the command above it.
 //!
-//! A figure is a fenced block right behind a comment that names its command, such as `<!-- figures: weeder trial --speeds 1,2 -->`.
-//! The command is run, and what it prints becomes the block: that is the same on every machine. How long it took is told on standard
-//! error, which is left out.
+//! A figure is a fenced block directly behind a comment that names its command, such as `<!-- figures: weeder trial
+//! --speeds 1,2 -->`. The command runs, and its output becomes the block. The output is the same on every machine: run
+//! times go to standard error, which is left out.
 
 use crate::finding::Finding;
 use crate::output::{say, tell};
@@ -14,7 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Which figures are to be written.
+/// The figures to update.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -30,25 +30,25 @@ pub struct Arguments {
     check: bool,
 }
 
-/// What stands in front of a figure's command.
+/// The text before a figure's command.
 const MARK: &str = "<!-- figures: ";
 
 /// Writes the figures, or compares them.
 ///
 /// # Errors
-/// Where a page cannot be read or written, has a figure without a block, or a command fails.
+/// If a page cannot be read or written, has a figure without a block, or a command fails.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut differ = Vec::new();
     for path in &arguments.pages {
         let page = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-        let anew = renew(&page, path)?;
-        if anew == page {
+        let renewed = renew(&page, path)?;
+        if renewed == page {
             continue;
         }
         if arguments.check {
-            differ.push(format!("{}\n{}", path.display(), difference(&page, &anew)));
+            differ.push(format!("{}\n{}", path.display(), difference(&page, &renewed)));
         } else {
-            whole_file::write(path, |to| Ok::<_, anyhow::Error>(to.write_all(anew.as_bytes())?))
+            whole_file::write(path, |to| Ok::<_, anyhow::Error>(to.write_all(renewed.as_bytes())?))
                 .with_context(|| format!("{} cannot be written", path.display()))?;
         }
     }
@@ -62,9 +62,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 
 /// The page with the figures that its commands print now.
 fn renew(page: &str, path: &Path) -> Result<String> {
-    let (mut anew, mut lines) = (String::new(), page.lines().enumerate());
+    let (mut renewed, mut lines) = (String::new(), page.lines().enumerate());
     while let Some((_, line)) = lines.next() {
-        anew += &format!("{line}\n");
+        renewed += &format!("{line}\n");
         let Some(command) = line.strip_prefix(MARK).and_then(|rest| rest.strip_suffix(" -->")) else { continue };
         let place = |number: usize| format!("{}:{}", path.display(), number + 1);
         let Some((number, fence)) = lines.next() else {
@@ -77,12 +77,12 @@ fn renew(page: &str, path: &Path) -> Result<String> {
         );
         ensure!(lines.by_ref().any(|(_, line)| line == "```"), "{}: the figure's block has no end", place(number));
         let figure = print(command).with_context(|| place(number))?;
-        anew += &format!("{fence}\n{figure}```\n");
+        renewed += &format!("{fence}\n{figure}```\n");
     }
-    Ok(anew)
+    Ok(renewed)
 }
 
-/// What a command prints, which does not depend on the machine that it runs on.
+/// A command's output, which does not depend on the machine.
 fn print(command: &str) -> Result<String> {
     let words = shlex::split(command).with_context(|| format!("unbalanced quotes in `{command}`"))?;
     let [program, arguments @ ..] = words.as_slice() else { bail!("there is no command") };
@@ -90,7 +90,7 @@ fn print(command: &str) -> Result<String> {
     tell!("{command}");
     let weeder = env::current_exe().context("the running program cannot be found")?;
     let output = Command::new(weeder).args(arguments).stderr(Stdio::null()).output()?;
-    // Status 1 is a finding, such as a plant that was damaged.
+    // Status 1 is a finding, such as a damaged plant.
     ensure!(matches!(output.status.code(), Some(0 | 1)), "`{command}` fails: run it to see why");
     let printed = String::from_utf8(output.stdout).with_context(|| format!("`{command}` prints no text"))?;
     let lines = printed.lines().map(str::trim_end);
@@ -100,12 +100,12 @@ fn print(command: &str) -> Result<String> {
 }
 
 /// The lines that differ, those of the page first.
-fn difference(page: &str, anew: &str) -> String {
-    let (page, anew): (Vec<&str>, Vec<&str>) = (page.lines().collect(), anew.lines().collect());
+fn difference(page: &str, renewed: &str) -> String {
+    let (page, renewed): (Vec<&str>, Vec<&str>) = (page.lines().collect(), renewed.lines().collect());
     let only = |sign: char, these: &[&str], others: &[&str]| -> String {
         these.iter().filter(|line| !others.contains(line)).map(|line| format!("{sign} {line}\n")).collect()
     };
-    only('-', &page, &anew) + &only('+', &anew, &page)
+    only('-', &page, &renewed) + &only('+', &renewed, &page)
 }
 
 #[cfg(test)]

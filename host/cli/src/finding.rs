@@ -1,6 +1,6 @@
-//! What a command found out, which becomes its status.
+//! A command's finding, which becomes its exit status.
 
-/// What a command found out, for scripts that ask by its status.
+/// A command's finding, for scripts that check its exit status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finding {
     /// No plant was damaged, nothing differs.

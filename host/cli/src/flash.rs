@@ -1,4 +1,4 @@
-//! `weeder flash`: builds the firmware, proves its bounds, and has avrdude put it on the Uno.
+//! `weeder flash`: builds the firmware, proves its bounds, and flashes it with avrdude.
 
 use crate::bounds::Firmware;
 use crate::output::say;
@@ -13,7 +13,7 @@ use trial::firmware;
 use uno::elf::Image;
 use uno::hex;
 
-/// What the user asks of flashing.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -38,19 +38,19 @@ pub struct Arguments {
 const BAUD: u32 = 115_200;
 const OLD_BAUD: u32 = 57_600;
 
-/// Flash that each leaves to the firmware, in bytes: they take the last 512 and the last 2048 of 32 KiB.
+/// Flash for the firmware, in bytes, with each bootloader: they take the last 512 and the last 2048 of 32 KiB.
 const AVAILABLE_BYTES: usize = 32_256;
 pub const OLD_AVAILABLE_BYTES: usize = 30_720;
 
 /// Flashes, with each of avrdude's own messages once on the terminal.
 ///
 /// # Errors
-/// Where there is no Uno, it cannot be opened, or building, proving or writing fails; each says what to do.
+/// If there is no Uno, it cannot be opened, or building, proving or writing fails; each says what to do.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let (baud, available) =
         if arguments.old_bootloader { (OLD_BAUD, OLD_AVAILABLE_BYTES) } else { (BAUD, AVAILABLE_BYTES) };
     let port = arguments.port.board()?.port()?;
-    // For an error that says more than avrdude's, and before anything is built.
+    // This check comes before the build, and its error says more than avrdude's.
     link::try_port(&port)?;
     let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
@@ -60,14 +60,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     say!("Writing {} to the Uno at {port}", elf.display())?;
-    // What stands beside the ELF is the user's.
+    // Files beside the ELF belong to the user.
     let folder = tempfile::tempdir().context("there is no room for a temporary file")?;
     let image = folder.path().join("weeder.hex");
     std::fs::write(&image, hex::text(&flash)).context("there is no room for a temporary file")?;
     run_avrdude(&image, &port, baud, arguments.old_bootloader)
 }
 
-/// Has ravedude flash an ELF. Returns whether it is installed.
+/// Flashes an ELF with ravedude. Returns whether it is installed.
 fn run_ravedude(elf: &Path, port: &str) -> Result<bool> {
     let elf = path::absolute(elf).with_context(|| format!("{} has no absolute path", elf.display()))?;
     // Its settings lie in the workspace.
@@ -83,10 +83,10 @@ fn run_ravedude(elf: &Path, port: &str) -> Result<bool> {
     }
 }
 
-/// Has avrdude write an Intel HEX file and verify it.
+/// Writes and verifies an Intel HEX file with avrdude.
 fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Result<()> {
     let mut avrdude = Command::new("avrdude")
-        // Each page is erased as it is written; a bootloader cannot erase the chip.
+        // Each page is erased before it is written: a bootloader cannot erase the chip.
         .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])
         .arg("-U")
         .arg(format!("flash:w:{}:i", image.display()))
@@ -113,7 +113,7 @@ fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Res
     Ok(())
 }
 
-/// What avrdude says of itself, each message once, however often it tries; its progress as it comes.
+/// Passes on avrdude's messages, each once over all tries, and its progress at once.
 struct Messages<W> {
     to: W,
     line: Vec<u8>,
@@ -131,12 +131,12 @@ impl<W: Write> Messages<W> {
         Self { to, line: Vec::new(), passed: 0, said: HashSet::new() }
     }
 
-    /// Passes on what comes until it ends.
+    /// Passes on the input until it ends.
     fn pass(&mut self, mut from: impl Read) {
         let mut buffer = [0; 256];
         while let Ok(count @ 1..) = from.read(&mut buffer) {
             buffer[..count].iter().for_each(|&byte| self.take(byte));
-            // Nobody is left who could be told, and avrdude goes on.
+            // The output is closed, so no message can be shown. avrdude goes on.
             let _ = self.to.flush();
         }
         self.end_line();
@@ -151,7 +151,7 @@ impl<W: Write> Messages<W> {
         }
     }
 
-    /// Whether the line is a message as far as it has come.
+    /// Whether the line so far may be a message.
     fn may_be_message(&self) -> bool {
         self.line.starts_with(MESSAGE) || MESSAGE.starts_with(&self.line)
     }

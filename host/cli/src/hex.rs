@@ -1,5 +1,5 @@
-//! `weeder hex`: the firmware as an Intel HEX file, which a computer without Rust can put on an Uno. The page and the release
-//! take theirs from here, so that they carry what is proved.
+//! `weeder hex`: the firmware as an Intel HEX file, for flashing from a computer without Rust. The page and the release
+//! use this command, so they contain a proved firmware.
 
 use crate::bounds::Firmware;
 use crate::destination::{FileName, Replace};
@@ -9,7 +9,7 @@ use clap::Args;
 use uno::elf::Image;
 use uno::hex;
 
-/// What the user asks of the file.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -31,7 +31,7 @@ pub struct Arguments {
 /// Writes it.
 ///
 /// # Errors
-/// Where the firmware cannot be built, read or proved, or the file cannot be written.
+/// If the firmware cannot be built, read or proved, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.check(arguments.replace)?;
     let elf = arguments.firmware.elf()?;

@@ -1,10 +1,10 @@
-//! The `weeder` command: tries the firmware on a simulated field, and puts it on an Arduino Uno.
+//! The `weeder` command: runs the firmware on a simulated field, and flashes and operates an Arduino Uno.
 //!
-//! `weeder sim` and `weeder classify` end with status 0 where no plant was damaged, or would be, and 1 where one was;
-//! commands that compare end with 1 where something differs, `weeder bounds` where a bound is over its budget. Whatever else
-//! goes wrong ends with status 2 and a message that says what would be right.
+//! `weeder sim` and `weeder classify` exit with 0 if no plant was damaged, or would be, and with 1 otherwise. Commands
+//! that compare exit with 1 if something differs. `weeder bounds` exits with 1 if a bound is over its budget. All other
+//! errors exit with 2 and print a message that says what would be right.
 
-// A result is printed in one way, which a closed pipe or a full disk does not bring down.
+// Results are printed by one function, which handles a closed pipe and a full disk.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
@@ -130,18 +130,18 @@ enum Command {
     Completions(completions::Arguments),
 }
 
-/// The commands with all their arguments.
+/// The grammar of all commands.
 fn grammar() -> clap::Command {
     numbers::with_negative_numbers(Arguments::command())
 }
 
-/// What these words ask for.
+/// Parses a command line.
 fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
     let found = grammar().try_get_matches_from(&words);
     found.and_then(|found| Arguments::from_arg_matches(&found)).map_err(|error| with_known_commands(error, &words))
 }
 
-/// The same error; one of an unknown command says which there are.
+/// The same error. For an unknown command, it lists the known ones.
 fn with_known_commands(mut error: clap::Error, words: &[OsString]) -> clap::Error {
     if error.kind() == ErrorKind::InvalidSubcommand {
         let mut command = grammar();
@@ -171,7 +171,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs a command, and says what came of it.
+/// Runs a command and returns its finding.
 fn run(command: Command) -> Result<Finding> {
     match command {
         Command::Sim(arguments) => sim::run(&arguments),
@@ -254,15 +254,16 @@ mod tests {
         settings.diff:file settings.push:file sim:capture sim:elf sim:field sim:row soak:elf sweep:field train:files trial:elf \
         trial:examples trial:field virtual-uno:bootloader virtual-uno:elf virtual-uno:field virtual-uno:row";
 
-    /// Of files that are gone on with, where they are of the command's own kind, and else refused: logs, an EEPROM, and what was set up.
+    /// Arguments whose files are continued: logs, an EEPROM, and the state of a set-up. A file of another kind is
+    /// refused.
     const CONTINUED: &str = "monitor:log record:out set-up:state virtual-uno:eeprom";
 
-    /// Of files in which a command changes its own lines, and keeps the others: the rows' names, and figures of the manual. And links to a
-    /// virtual Uno's port, which take no file's place.
+    /// Arguments whose files are edited: the command changes its own lines and keeps the others. These are the rows'
+    /// names, and figures of the manual. Links to a virtual Uno's port are also here, because they replace no file.
     const EDITED: &str =
         "figures:pages rows:rows_file rows.name:rows_file rows.forget:rows_file virtual-uno:gps_link virtual-uno:link";
 
-    /// Of the file with the rows' names, where it is only read.
+    /// Arguments that only read the file with the rows' names.
     const NAMES: &str = "examples.diff examples.pull examples.push flash monitor record serve set-up settings.diff settings.pull \
         settings.push";
 
@@ -270,8 +271,8 @@ mod tests {
     const NO_FILE: &str = "bounds:chip bounds:function check-board:board check-board:port check-board:tester examples.diff:port examples.pull:port examples.push:port flash:port rows.forget:name rows.name:name \
         rows.name:port set-up:port sim:channel_a sim:channel_b sim:channel_beam";
 
-    /// What stands before the name of each file or folder that a command writes, and for a folder the files that come there. `DIR` is a
-    /// folder that has what they ask for.
+    /// The words before the name of each file or folder that a command writes; for a folder also its files. `DIR` is a
+    /// folder with the required inputs.
     const WRITERS: [(&str, &str, &[&str]); 18] = [
         ("check-board:page", "check-board --simulated --page", &[]),
         ("evaluate:out", "evaluate DIR/filled.csv --out", &["report.html"]),
@@ -293,7 +294,7 @@ mod tests {
         ("trial:out", "trial --out", &["report.html", "trial.csv", "controllers.csv"]),
     ];
 
-    /// Writers of files whose names end as their form does.
+    /// Writers whose file name ends with its format.
     const BY_ENDING: [(&str, &str, &[&str]); 2] =
         [("train:out", "train --synthetic --out", &["rs", "csv"]), ("trial:out", "trial --shard 1/2 --out", &["part"])];
 
@@ -308,7 +309,7 @@ mod tests {
         commands.iter().flat_map(of_one).collect()
     }
 
-    /// Whether it takes free text or a path, and not numbers, a few known words, or what else is read by a parser of its own.
+    /// Whether it takes free text or a path, not a number, a list of known words, or a value with its own parser.
     fn is_free(argument: &Arg) -> bool {
         let parser = argument.get_value_parser();
         let found = parser.type_id();
@@ -323,7 +324,7 @@ mod tests {
         kinds.iter().any(|kind| found == *kind) && !has_words_alone
     }
 
-    /// Whether it names something to write.
+    /// Whether it names an output.
     fn writes(argument: &Arg) -> bool {
         let found = argument.get_value_parser().type_id();
         [TypeId::of::<FileName>(), TypeId::of::<FolderName>(), TypeId::of::<OsString>()]
@@ -409,7 +410,7 @@ mod tests {
                 assert_kept(words, &there, &there);
             }
         }
-        // Told to, it does; and what is empty holds nothing.
+        // With `--force` it does, and an empty file holds no work.
         let table = path("plan.csv");
         fs::write(&table, "mine").unwrap();
         run_with("plan --force --out", folder.path(), &table).expect("it is told to");
@@ -427,7 +428,7 @@ mod tests {
         for (name, command) in subcommands(&grammar(), "weeder") {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             let lines = help.lines().map(|line| line.trim_start().trim_start_matches("Example: "));
-            // What stands behind a pipe, `&&` or some blanks is not the command's.
+            // Text behind a pipe, `&&` or some blanks is not part of the command.
             let examples = lines.filter(|line| line.starts_with(&name)).map(|line| {
                 let end = ["  ", " |", " >", " &&"].into_iter().filter_map(|end| line.find(end)).min();
                 &line[..end.unwrap_or(line.len())]

@@ -1,4 +1,4 @@
-//! `weeder map`: records with a satellite receiver as a map, and what they come to.
+//! `weeder map`: shows logs with a satellite receiver on a map, and summarises them.
 
 use crate::destination::{FileName, Replace};
 use crate::numbers::number_within;
@@ -16,7 +16,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What the user asks of the map.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It writes GeoJSON (WGS84) for QGIS: a point for each plant, weed, swing, alarm and label.\n\
@@ -60,7 +60,7 @@ pub struct Arguments {
 /// Reads the records, writes the map, and prints the count.
 ///
 /// # Errors
-/// Where a record cannot be read, or a file not be written.
+/// If a record cannot be read, or a file not be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
     let out = arguments.out.check(replace)?;
@@ -103,12 +103,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     printed
 }
 
-/// A record's name on the map: that of its file.
+/// A log's name on the map: its file's name.
 fn name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-/// What is counted, in words, for a table that people read.
+/// The counts in words, as a table.
 fn rows(summary: &Summary) -> [(&'static str, String); 19] {
     let mm = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.0}"));
     [

@@ -1,6 +1,6 @@
-//! `weeder merge`: the parts of a study put together, to the result that one machine would have given.
+//! `weeder merge`: joins the parts of a study into the result of an undivided study.
 //!
-//! It computes nothing anew: the parts hold all outcomes, which go to the code that shows those of an undivided study.
+//! It simulates nothing. The parts hold all outcomes, and the code of an undivided study shows them.
 
 use crate::destination::Replace;
 use crate::finding::Finding;
@@ -16,7 +16,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// What the user asks for.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -50,7 +50,7 @@ pub struct Arguments {
 /// Puts them together and prints the result.
 ///
 /// # Errors
-/// Where the parts are not all of one study, or the result cannot be written.
+/// If the parts are not all of one study, or the result cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let headers = arguments.parts.iter().map(|path| Ok((name(path), header(path)?)));
     let headers: Vec<(String, Header)> = headers.collect::<Result<_>>()?;
@@ -96,7 +96,7 @@ fn header(path: &Path) -> Result<Header, PartError> {
     shard::read_header(&name(path), &mut open(path)?)
 }
 
-/// All outcomes, in the order in which an undivided study has them.
+/// All outcomes, in the order of an undivided study.
 fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
     let read = |path: &PathBuf| {
         let mut file = open(path)?;

@@ -1,7 +1,7 @@
-//! `weeder monitor`: what the machine does, as it does it, with its console below; of several rows all at a glance.
+//! `weeder monitor`: the machine's state, live, with its console below; for several rows, an overview of all.
 //!
-//! [`Rows`](link::rows::Rows) talk to the machine, [`model`] keeps what is known of it, [`view`] draws that, and
-//! [`terminal`] joins them with the keyboard. [`plain`] does without a screen: lines in, lines out.
+//! [`Rows`](link::rows::Rows) talk to the machine, [`model`] stores its state, [`view`] draws that, and [`terminal`]
+//! adds the keyboard. [`plain`] works without a screen: lines in, lines out.
 
 mod command_line;
 mod model;
@@ -17,7 +17,7 @@ use clap::Args;
 use link::row_names::ALL;
 use std::path::PathBuf;
 
-/// What the user asks of the monitor.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Keys:\n  \
@@ -42,10 +42,10 @@ pub struct Arguments {
     log: Option<PathBuf>,
 }
 
-/// To which rows a line goes.
+/// The rows that a line addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum To {
-    /// It names none: to those that are chosen.
+    /// It names no row: the chosen rows.
     Chosen,
     /// To all of them.
     All,
@@ -56,7 +56,7 @@ pub enum To {
 /// What a typed line says: of several rows, the one that stands before a colon or all, and the command.
 ///
 /// # Errors
-/// Where there is no such row, or the rest is no command; in words.
+/// If there is no such row, or the rest is no command; in words.
 fn addressed<'a>(line: &'a str, names: &[String]) -> Result<(To, &'a str), String> {
     let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim(), names), command.trim())) {
         Some((Ok(to), command)) => (to, command),
@@ -83,7 +83,7 @@ fn row(name: &str, names: &[String]) -> Result<To, String> {
 /// Watches until the user has seen enough.
 ///
 /// # Errors
-/// Where there is no Uno to begin with, or terminal or log fail.
+/// If there is no Uno to begin with, or terminal or log fail.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let chosen = arguments.ports.choose()?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;

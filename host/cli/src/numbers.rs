@@ -1,4 +1,4 @@
-//! Numbers on the command line: each within its range, which is said where one is not, and in `--help`.
+//! Numbers on the command line. Each has a range, which errors and `--help` show.
 
 use clap::{Arg, Command};
 use std::fmt::Display;
@@ -23,13 +23,13 @@ fn within<T: FromStr + PartialOrd + Display>(text: &str, range: &RangeInclusive<
     number.ok_or_else(|| format!("it has to be {kind} from {} to {}", range.start(), range.end()))
 }
 
-/// The same command, whose options take what begins with a minus for their value: what is wrong with it is then said by its
+/// The same command, but options accept a value that begins with a minus. So the error for a wrong value shows its
 /// range, and not that it is no option.
 pub fn with_negative_numbers(command: Command) -> Command {
     let take = |option: Arg| match option.get_value_delimiter() {
         _ if option.is_positional() || !option.get_action().takes_values() => option,
         None => option.allow_negative_numbers(true),
-        // Several numbers are not one.
+        // An option with several numbers is no single number.
         Some(_) => option.allow_hyphen_values(true),
     };
     command.mut_args(take).mut_subcommands(with_negative_numbers)

@@ -1,9 +1,9 @@
-//! The one way in which all commands print: results on standard output, words beside them on standard error.
+//! Printing of all commands: results go to standard output, other messages to standard error.
 //!
-//! Whoever closes a pipe early has read enough: what else is printed goes nowhere, and the command ends as if it had been read.
-//! Whatever else keeps a result from being printed, such as a full disk, is the command's error. Words beside the result are
-//! for whoever watches: where they cannot be told, nothing is lost. They quote files and machines, which may send anything: a terminal
-//! gets no orders from there.
+//! A reader that closes a pipe early has read enough. The command then drops the rest of its output and ends with its
+//! usual status. Any other failure to print a result, such as a full disk, is the command's error. Messages beside the
+//! result are for an operator who watches, so a failure to print them is ignored. Messages quote files and machines,
+//! which may contain control characters. These are removed before they reach a terminal.
 
 use anyhow::{Context, Result};
 use files::in_a_line;
@@ -11,22 +11,22 @@ use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 
-/// Prints a line of a result; takes what `println!` does, and returns what [`print()`] does.
+/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`].
 macro_rules! say {
     ($($words:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($words)*))) };
 }
 
-/// Tells a line beside the result; takes what `eprintln!` does.
+/// Prints a message. Takes the arguments of `eprintln!`.
 macro_rules! tell {
     ($($words:tt)*) => { $crate::output::tell_line(format_args!($($words)*)) };
 }
 
 pub(crate) use {say, tell};
 
-/// Prints a part of the result as it is.
+/// Prints a part of the result, unchanged.
 ///
 /// # Errors
-/// Whatever standard output suffers from, but for a pipe that its reader has closed.
+/// Any error of standard output, except a pipe that its reader has closed.
 pub fn print(text: Arguments) -> Result<()> {
     let mut output = io::stdout().lock();
     match output.write_fmt(text).and_then(|()| output.flush()) {
@@ -35,16 +35,16 @@ pub fn print(text: Arguments) -> Result<()> {
     }
 }
 
-/// Tells a line beside the result, by [`tell!`].
+/// Prints a message, for [`tell!`].
 pub fn tell_line(line: Arguments) {
-    // Nobody is left who could be told.
+    // Standard error is closed: there is no other place for the message.
     let _ = writeln!(io::stderr(), "{}", in_a_line(&line.to_string()));
 }
 
 /// The command as it was typed, for a report that says how to make it again.
 ///
 /// # Errors
-/// Where a word cannot be quoted for a shell.
+/// If a word cannot be quoted for a shell.
 pub fn command_line() -> Result<String> {
     let words: Vec<String> = ["weeder".to_owned()].into_iter().chain(env::args().skip(1)).collect();
     Ok(shlex::try_join(words.iter().map(String::as_str))?)

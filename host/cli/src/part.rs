@@ -1,7 +1,7 @@
-//! `--shard`: a part of a study goes to a file, for `weeder merge`.
+//! `--shard`: writes a part of a study to a file, for `weeder merge`.
 //!
-//! A part tells by which program it was computed: by the version, and by a check sum of the program's own file, since what is not
-//! released yet has the version of what was.
+//! A part names the program that computed it: the version, and a checksum of the program's file. The version alone is
+//! not enough, because an unreleased build has the version of the last release.
 
 use crate::destination::{FileName, OutFile, Replace};
 use crate::output::{say, tell};
@@ -13,7 +13,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-/// A part that is to be written, to a file that could be written when it was checked.
+/// A part, and a file that was writable when it was checked.
 pub struct Part<'a> {
     shard: Shard,
     out: OutFile<'a>,
@@ -25,7 +25,7 @@ impl<'a> Part<'a> {
     /// A shard's.
     ///
     /// # Errors
-    /// Where the file could not be written, or this program cannot be read.
+    /// If the file could not be written, or this program cannot be read.
     pub fn new(shard: Shard, out: &'a FileName, replace: Replace) -> Result<Self> {
         Ok(Self { shard, out: out.check(replace)?, program: program()?, began: Instant::now() })
     }
@@ -38,7 +38,7 @@ impl<'a> Part<'a> {
     /// Writes it whole, once all is computed, and says so.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write<T: Serialize>(
         self,
         command: &str,
@@ -59,7 +59,7 @@ impl<'a> Part<'a> {
 /// This program.
 ///
 /// # Errors
-/// Where its file cannot be read.
+/// If its file cannot be read.
 pub fn program() -> Result<Program> {
     let file = env::current_exe().context("the running program cannot be found")?;
     Ok(Program { version: env!("WEEDER_VERSION").to_owned(), build: check_sum(&file)? })
@@ -68,7 +68,7 @@ pub fn program() -> Result<Program> {
 /// A file's check sum, CRC-32 as of zip: it tells builds apart that differ by accident.
 ///
 /// # Errors
-/// Where it cannot be read.
+/// If it cannot be read.
 pub fn check_sum(file: &Path) -> Result<String> {
     let bytes = fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     Ok(format!("{:08x}", crc32fast::hash(&bytes)))

@@ -8,7 +8,7 @@ use clap::Args;
 use experiments::plan::Plan;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 
-/// What the user asks of a plan.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -44,7 +44,7 @@ pub struct Arguments {
 /// Draws the plan and prints or writes it.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.as_ref().map(|out| out.check(arguments.replace)).transpose()?;
     let plan = Plan {

@@ -1,7 +1,7 @@
-//! Which rows a command talks to: those at the ports that are named, the only Uno, or all.
+//! The rows that a command talks to: those at the named ports, the only Uno, or all.
 //!
-//! A port is a path, such as /dev/ttyACM0, or the name that `weeder rows` has given to a board, wherever that is plugged in now. What has
-//! a name is said under it.
+//! A port is a path, such as /dev/ttyACM0, or a board's name from `weeder rows`. The name finds the board at any port.
+//! Messages about a named board begin with its name.
 
 use crate::output::tell;
 use anyhow::{Context, Result, bail, ensure};
@@ -30,7 +30,7 @@ impl NamesFile {
     /// Its path.
     ///
     /// # Errors
-    /// Where the user has no folder.
+    /// If the user has no folder.
     pub fn path(&self) -> Result<PathBuf> {
         match &self.rows_file {
             Some(path) => Ok(path.clone()),
@@ -45,7 +45,7 @@ impl NamesFile {
     /// The names in it.
     ///
     /// # Errors
-    /// Where it cannot be read; one that was named has to be there.
+    /// If it cannot be read; one that was named has to be there.
     pub fn read(&self) -> Result<Names> {
         let path = self.path()?;
         ensure!(
@@ -57,7 +57,7 @@ impl NamesFile {
     }
 }
 
-/// Where the Unos of one row or several are.
+/// The ports of one row or several.
 #[derive(Args)]
 pub struct Ports {
     /// Serial port of an Uno (/dev/ttyACM0, COM3), a row's name, or NAME=PORT; once for each row. Default: the only
@@ -71,7 +71,7 @@ pub struct Ports {
     names: NamesFile,
 }
 
-/// Where the only Uno is that a command talks to.
+/// The port of a command that talks to one Uno.
 #[derive(Args)]
 pub struct Port {
     /// Serial port of the Uno (/dev/ttyACM0, COM3), or a row's name. Default: the only Uno.
@@ -85,7 +85,7 @@ impl Port {
     /// The board there.
     ///
     /// # Errors
-    /// Where the file of the names cannot be read.
+    /// If the file of the names cannot be read.
     pub fn board(&self) -> Result<Board> {
         match &self.port {
             Some(port) if may_be_name(port) => Ok(board(port, Some(&self.names.read()?))),
@@ -97,7 +97,7 @@ impl Port {
     /// The machine there.
     ///
     /// # Errors
-    /// Where there is none, or another than a weeder.
+    /// If there is none, or another than a weeder.
     pub fn open(&self) -> Result<Link> {
         Ok(self.board()?.open()?)
     }
@@ -115,10 +115,10 @@ pub struct Named {
 /// Reads `NAME=PORT`, or a port or a row's name alone.
 ///
 /// # Errors
-/// Where it is neither, in words.
+/// If it is neither, in words.
 pub fn named(text: &str) -> Result<Named, String> {
     let (name, port) = match text.split_once('=') {
-        // A path may have the sign in it.
+        // A path may contain the sign.
         Some((name, port)) if !name.contains(['/', '\\']) => (Some(name.trim().to_owned()), port),
         _ => (None, text),
     };
@@ -135,7 +135,7 @@ pub fn named(text: &str) -> Result<Named, String> {
 pub struct Chosen {
     /// The rows, at least one.
     pub rows: Vec<Row>,
-    /// Whether there may be several: what is said names the row then.
+    /// Whether there may be several rows. Messages then begin with the row's name.
     pub are_several: bool,
 }
 
@@ -143,7 +143,7 @@ impl Ports {
     /// The rows that are meant.
     ///
     /// # Errors
-    /// Where there is none, two have a name, or the file of the names cannot be read.
+    /// If there is none, two have a name, or the file of the names cannot be read.
     pub fn choose(&self) -> Result<Chosen> {
         let rows = if self.all {
             every_row(&self.names.read()?)?
@@ -168,12 +168,12 @@ impl Ports {
     }
 }
 
-/// Whether it may be a row's name: a path is none, and needs no file of names.
+/// Whether it may be a row's name. A path is no name, and needs no file of names.
 fn may_be_name(port: &str) -> bool {
     !port.contains(['/', '\\'])
 }
 
-/// The board of the row that has this name, or else the one at this port.
+/// The board of the row with this name, or else the one at this port.
 fn board(port: &str, names: Option<&Names>) -> Board {
     let known = names.and_then(|names| names.find(port));
     known.map_or_else(|| Board::Port(port.to_owned()), |row| row.board.clone())
@@ -226,7 +226,7 @@ impl Chosen {
         self.rows.iter().map(opener).collect()
     }
 
-    /// Does this with each row, with all at the same time: what came of it, in the rows' order.
+    /// Runs `work` on all rows at the same time. Returns the results in the order of rows.
     pub fn each<T: Send>(&self, work: impl Fn(&Row, &mut Link) -> Result<T> + Sync) -> Vec<Result<T>> {
         let of_row = |row: &Row| -> Result<T> { work(row, &mut row.board.open()?) };
         thread::scope(|scope| {
@@ -238,7 +238,7 @@ impl Chosen {
     /// What came of a work with each row, told of those with which it went wrong, under their names.
     ///
     /// # Errors
-    /// Where it went wrong with one: the only one's own error, or which rows those were.
+    /// If it went wrong with one: the only one's own error, or which rows those were.
     pub fn check<T>(&self, mut done: Vec<Result<T>>) -> Result<()> {
         if let (false, [_]) = (self.are_several, done.as_slice()) {
             return done.remove(0).map(drop);
@@ -254,12 +254,12 @@ impl Chosen {
         Ok(())
     }
 
-    /// The name of a row's own file, where there may be several.
+    /// The name of a row's own file, if there may be several rows.
     pub fn name_in(row: &Row, ending: &str) -> String {
         format!("{}.{ending}", row.name)
     }
 
-    /// A row's own file, where there may be several: in a folder, by the row's name.
+    /// The path of a row's own file, if there may be several rows: in a folder, by the row's name.
     pub fn file_in(folder: &Path, row: &Row, ending: &str) -> PathBuf {
         folder.join(Self::name_in(row, ending))
     }
@@ -267,13 +267,13 @@ impl Chosen {
     /// The row of this name.
     ///
     /// # Errors
-    /// Where there is none.
+    /// If there is none.
     pub fn find(&self, name: &str) -> Result<usize> {
         let found = self.rows.iter().position(|row| row.name == name);
         found.with_context(|| format!("there is no row {name}: there are {}", self.names().join(", ")))
     }
 
-    /// What is said of a row, under its name where there may be several.
+    /// A message about a row, with its name if there may be several.
     pub fn under_name(&self, row: usize, text: &str) -> String {
         match self.rows.get(row) {
             Some(row) if self.are_several => format!("{}: {text}", row.name),

@@ -1,6 +1,6 @@
-//! The bar that shows how far a simulation is.
+//! The progress bar of a simulation.
 //!
-//! Whoever interrupts the command finds the terminal's line empty, not half a bar.
+//! After an interrupt of the command the terminal's line is empty, without half a bar.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::process;
@@ -15,11 +15,11 @@ const INTERRUPTED: i32 = 130;
 /// The bar on the terminal.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// A bar on standard error; none where that is not a terminal.
+/// A bar on standard error, if that is a terminal.
 pub struct Progress(ProgressBar);
 
 impl Progress {
-    /// An empty bar behind these words.
+    /// An empty bar behind a text.
     pub fn new(words: &'static str) -> Self {
         let bar = ProgressBar::new(STEPS).with_message(words);
         if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar:.green} {percent:>3} %, {eta} to go") {
@@ -48,11 +48,11 @@ fn shown() -> std::sync::MutexGuard<'static, Option<ProgressBar>> {
     SHOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Has Ctrl-C take the bar away before it ends the command.
+/// Makes Ctrl-C remove the bar before it ends the command.
 fn clear_when_interrupted() {
     static CAUGHT: Once = Once::new();
     CAUGHT.call_once(|| {
-        // Where it cannot be caught, it ends the command as it does without a bar.
+        // If Ctrl-C cannot be caught, it ends the command without removing the bar.
         let _ = ctrlc::set_handler(|| {
             if let Some(bar) = shown().take() {
                 bar.finish_and_clear();

@@ -1,7 +1,6 @@
-//! A satellite receiver beside a record: its options, and its port, which is opened again where it went away.
+//! A satellite receiver for a log: its options, and its port, which is opened again after a loss.
 //!
-//! What its lines mean stands in [`gps`]. A file takes the place of a port as well: it is read at the pace of the
-//! times in it.
+//! [`gps`] interprets its lines. A file can replace the port: it is read at the pace of its times.
 
 use crate::numbers::{number_within, whole_within};
 use crate::ports::{Chosen, Named, named};
@@ -46,7 +45,7 @@ pub struct AntennaArguments {
 }
 
 impl AntennaArguments {
-    /// What the user has told, and the rest of this.
+    /// The user's values, and those of `antenna` for the rest.
     pub fn over(&self, antenna: Antenna) -> Antenna {
         Antenna {
             beam_ahead_mm: self.beam_ahead.unwrap_or(antenna.beam_ahead_mm),
@@ -77,7 +76,7 @@ impl GpsArguments {
     /// The receiver, where there is to be one, and the first lines of the record.
     ///
     /// # Errors
-    /// Where its row is not among those that are recorded, or its port cannot be opened now: later that is no error.
+    /// If its row is not among those that are recorded, or its port cannot be opened now: later that is no error.
     pub fn open(&self, chosen: &Chosen) -> Result<Option<(Gps, Lines)>> {
         let antenna = self.antenna.over(Antenna::default());
         let Some(Named { name, port }) = &self.gps else {
@@ -105,11 +104,11 @@ impl GpsArguments {
 
 /// A receiver at its port.
 pub struct Gps {
-    /// The row in whose record it stands.
+    /// The row whose log has its lines.
     pub row: usize,
     port: String,
     baud: u32,
-    /// None while it is gone.
+    /// `None` while it is lost.
     source: Option<Source>,
     retry_at: Option<Instant>,
     recorder: Recorder,
@@ -121,14 +120,14 @@ impl Gps {
         self.recorder.happened(time_ms, happening);
     }
 
-    /// What has come by now, as lines of the record. It waits for a millisecond at the most.
+    /// The received input, as lines of the log. Waits for a millisecond at most.
     pub fn turn(&mut self, time_ms: u64, now: Instant) -> Lines {
         let Some(source) = &mut self.source else {
             if self.retry_at.is_some_and(|at| now < at) {
                 return Lines::new();
             }
             self.retry_at = Some(now + RETRY);
-            // Why it does not open was told when it was lost.
+            // The reason for a failure was reported when it was lost.
             self.source = Source::open(&self.port, self.baud).ok();
             return if self.source.is_some() { self.recorder.found(time_ms, &self.port) } else { Lines::new() };
         };
@@ -143,7 +142,7 @@ impl Gps {
         }
     }
 
-    /// What is to be said of the receiver at the end.
+    /// The summary of the receiver at the end.
     pub fn summary(&self) -> String {
         let counts = self.recorder.counts();
         format!(
@@ -153,7 +152,7 @@ impl Gps {
     }
 }
 
-/// Where the lines come from.
+/// The source of the lines.
 enum Source {
     Port(Box<dyn Read + Send>),
     File(Paced),
@@ -188,7 +187,7 @@ impl Source {
     }
 }
 
-/// A file's lines, each when it is due by the times in them.
+/// The lines of a file, each at its due time.
 struct Paced {
     began: Instant,
     /// Milliseconds since the first time, and the bytes of the line.
@@ -202,7 +201,7 @@ impl Paced {
             if let Line::Report(report) = Line::parse(line)
                 && let Some(time_ms) = report.time_ms
             {
-                // Past midnight it begins anew.
+                // The time of day restarts at 0 at midnight.
                 due_ms += last_ms.map_or(0, |last_ms| (time_ms - last_ms).rem_euclid(DAY_MS)).unsigned_abs();
                 last_ms = Some(time_ms);
             }

@@ -1,4 +1,4 @@
-//! `weeder record`: what the machine does, in a file; of several rows a file for each.
+//! `weeder record`: logs the machine's output to a file, or each row's to its own file.
 
 use crate::destination::{FolderName, Replace};
 use crate::output::tell;
@@ -15,10 +15,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time after which it looks again at whether to end.
+/// Time between two checks whether to end.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What the user asks of the recording.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It records plants, swings and alarms, and the status ten times a second, until Ctrl-C.\n\
@@ -43,7 +43,7 @@ pub struct Arguments {
 /// Records until Ctrl-C.
 ///
 /// # Errors
-/// Where there is no Uno or no receiver to begin with, or a file cannot be written.
+/// If there is no Uno or no receiver to begin with, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let chosen = arguments.ports.choose()?;
     let gps = arguments.gps.open(&chosen)?;
@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// Opens all rows, and says which of them are there. With several, those that are not are heard of, and waited for.
 ///
 /// # Errors
-/// Where none is there.
+/// If none is there.
 pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
     let (rows, missing) = Rows::open(chosen.openers());
     let are_there = missing.iter().map(Option::is_none).collect();
@@ -130,7 +130,7 @@ impl Logs {
     /// Opens them all, so that their times begin together.
     ///
     /// # Errors
-    /// Where one cannot be written, or is something else.
+    /// If one cannot be written, or is something else.
     pub fn open(out: &std::path::Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
             let folder = FolderName::from(out.as_os_str().to_owned());
@@ -147,7 +147,7 @@ impl Logs {
     /// Writes down what happened to a row. After a log could not be written it is left as it is.
     ///
     /// # Errors
-    /// Where it cannot be written for the first time.
+    /// If it cannot be written for the first time.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
         match self.logs.get_mut(row) {
             Some(log) if log.is_written => log.writer.write(happening).inspect_err(|_| log.is_written = false),
@@ -163,7 +163,7 @@ impl Logs {
     /// Writes the lines that this gives for the present into a row's log. After a log could not be written it is left as it is.
     ///
     /// # Errors
-    /// Where it cannot be written for the first time.
+    /// If it cannot be written for the first time.
     fn lines_at(&mut self, row: usize, lines: impl FnOnce(u64) -> Lines) -> Result<(), LogError> {
         let Some(log) = self.logs.get_mut(row) else { return Ok(()) };
         let time_ms = log.writer.now_ms();
@@ -177,7 +177,7 @@ impl Logs {
     /// Tells of a log that could not be written: the other rows' logs still are.
     ///
     /// # Errors
-    /// Where none is written any more.
+    /// If none is written any more.
     fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
         if let Err(error) = written {
             tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
@@ -189,7 +189,7 @@ impl Logs {
     /// Says what is in them.
     ///
     /// # Errors
-    /// Where one could not be written.
+    /// If one could not be written.
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.logs {
             tell!("{} lines were added: {} has {} now", writer.added(), path.display(), writer.lines());
@@ -200,7 +200,7 @@ impl Logs {
     /// Says whether all of them are whole.
     ///
     /// # Errors
-    /// Where one could not be written.
+    /// If one could not be written.
     pub fn check(&self) -> Result<()> {
         match self.logs.iter().find(|log| !log.is_written) {
             Some(log) => bail!("{} is not whole: it could not be written", log.path.display()),

@@ -1,4 +1,4 @@
-//! `weeder replay`: a log's swings, decided anew on the host.
+//! `weeder replay`: repeats the decisions of a log on the PC.
 
 use crate::finding::Finding;
 use crate::output::say;
@@ -9,7 +9,7 @@ use link::{log, replay};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// What the user asks to be replayed.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It shows the first difference between log and replay, and the status is then 1.\n\
@@ -26,7 +26,7 @@ pub struct Arguments {
 /// Replays, and prints on what log and replay agree.
 ///
 /// # Errors
-/// Where the log cannot be read or replayed.
+/// If the log cannot be read or replayed.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let name = arguments.log.display();
     let replayed = replay::replay(&log::read(&arguments.log)?).with_context(|| format!("{name} cannot be replayed"))?;

@@ -1,4 +1,4 @@
-//! `weeder rows`: which Uno is which row's, told apart after they were plugged in anew.
+//! `weeder rows`: lists the Unos and the rows that they control, and finds them again at other ports.
 
 use crate::output::say;
 use crate::ports::NamesFile;
@@ -8,7 +8,7 @@ use comfy_table::{Table, presets};
 use link::row_names::{Board, Names, Plugged, plugged};
 use serde_json::{Value, json};
 
-/// What the user asks of the rows.
+/// The arguments.
 #[derive(Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -58,7 +58,7 @@ enum Action {
 /// Lists, names or forgets.
 ///
 /// # Errors
-/// Where the file, a name or a port is wrong.
+/// If the file, a name or a port is wrong.
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.action {
         None => list(&arguments.file.read()?, arguments.json),
@@ -113,7 +113,7 @@ fn list(names: &Names, json: bool) -> Result<()> {
     say!("The names are in {}", names.path().display())
 }
 
-/// The rows, then the Unos that are none.
+/// The rows, then the Unos without a row.
 fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<Line> {
     let now = |board: &Board| match board {
         Board::Port(port) if exists(port) => Some(port.clone()),

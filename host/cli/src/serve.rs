@@ -15,10 +15,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
 
-/// The TCP port, unless another is given.
+/// The default TCP port.
 const HTTP_PORT: u16 = 8866;
 
-/// What the user asks of the server.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 At this computer, the page may do the same as `weeder monitor`. In the network (--lan), it needs the
@@ -57,7 +57,7 @@ pub struct Arguments {
 /// Serves until Ctrl-C.
 ///
 /// # Errors
-/// Where there is no page, two machines have a name, or an address cannot be had.
+/// If there is no page, two machines have a name, or an address cannot be had.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let page = match (&arguments.page, Page::inside()) {
         (Some(folder), _) => Page::read(folder)?,
@@ -101,7 +101,7 @@ fn open_in_browser(address: &str) {
         _ => vec!["xdg-open"],
     };
     words.push(address);
-    // It may go on for as long as the browser does.
+    // The program may run as long as the browser.
     let opened = Command::new(words[0]).args(&words[1..]).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
     if let Err(error) = opened {
         tell!("No browser can be opened from here ({}: {error}): open the address by hand.", words[0]);

@@ -1,7 +1,8 @@
-//! `weeder set-up`: the steps of the manual's page, one after the other, at a machine or on the simulated one.
+//! `weeder set-up`: the steps of the manual's page, on a machine or on the simulated one.
 //!
-//! It asks, measures, sets and saves after each step. What was done and measured is kept in a file, so that it goes on there. The
-//! steps come from the manual's page and the margin from [`link::set_up`], as in the monitor and on the page.
+//! It asks, measures, sets, and saves after each step. A file stores the completed steps and the measurements, so that
+//! a set-up can be continued. The steps come from the manual's page, and the margin from [`link::set_up`], as in the
+//! monitor and on the page.
 
 mod simulated;
 
@@ -20,7 +21,7 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What the user asks of the set-up.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It goes through the steps of docs/set-up.md. Enter accepts, s skips a step, q stops.
@@ -44,18 +45,18 @@ pub struct Arguments {
     simulated: bool,
 }
 
-/// Time for which the servo's three swings may last, and the time for which plants are waited for.
+/// Time limit for the servo's three swings, and for waiting for plants.
 const SWINGS: Duration = Duration::from_secs(30);
 const PLANTS: Duration = Duration::from_secs(600);
 
-/// Time between two looks at whether the machine stands, and the ticks behind which it has rolled from a mark.
+/// Time between two checks whether the machine stands, and the ticks after which it has left a mark.
 const POLL: Duration = Duration::from_millis(200);
 const ROLLED_TICKS: u32 = 500;
 
 /// Leads through the steps.
 ///
 /// # Errors
-/// Where file or machine cannot be used; each says what would be right.
+/// If file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.simulated {
         return say!("{}", simulated::table()?);
@@ -73,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Guide { link, state, path: path.clone() }.lead()
 }
 
-/// What was done and measured.
+/// The completed steps and the measurements.
 struct State {
     done: BTreeSet<usize>,
     measured: SetUp,
@@ -82,7 +83,7 @@ struct State {
 /// The first line of its file.
 const HEAD: &str = "# What `weeder set-up` has done and measured: it goes on from here.";
 
-/// What stands before the number of a step that was done.
+/// The text before the number of a completed step.
 const DONE: &str = "done ";
 
 impl State {
@@ -105,7 +106,7 @@ impl State {
     }
 }
 
-/// What the user answers to a step.
+/// The user's answer to a step.
 enum Answer {
     Go,
     LeaveOut,
@@ -129,7 +130,7 @@ struct Guide {
 impl Guide {
     fn lead(mut self) -> Result<()> {
         if self.status()?.mode == Mode::Alarm {
-            // A new board has no settings yet, which is an alarm: what it has now becomes its own.
+            // A new board has no saved settings, which is an alarm. This saves the present ones.
             self.link.ask("save")?;
             self.link.ask("clear")?;
         }
@@ -166,7 +167,7 @@ impl Guide {
         lines.iter().find_map(|line| Status::parse(line)).context("the machine gives no status")
     }
 
-    /// Asks for a line; none where there are no more.
+    /// Asks for a line. `None` at the end of the input.
     fn prompt(&self, question: &str) -> Result<Option<String>> {
         let mut out = io::stdout().lock();
         write!(out, "  {question}: ")?;
@@ -234,7 +235,7 @@ impl Guide {
         Ok(())
     }
 
-    /// Asks for a setting's value; none where the user stops.
+    /// Asks for a setting's value. `None` if the user stops.
     fn value(&mut self, setting: Setting, of_the_manual: Option<u16>) -> Result<Option<u16>> {
         let now = settings::read(&mut self.link)?.get(setting);
         let range_of = setting.description();
@@ -268,7 +269,7 @@ impl Guide {
         Ok(None)
     }
 
-    /// Types a command; none, with the reason told, where the machine refuses it.
+    /// Types a command. `None` if the machine refuses it; the reason was printed.
     fn ask(&mut self, command: &str) -> Result<Option<Vec<String>>> {
         match self.link.ask(command) {
             Ok(answer) => Ok(Some(answer)),
@@ -280,7 +281,7 @@ impl Guide {
         }
     }
 
-    /// Times the servo until it was timed often enough over the present stroke.
+    /// Times the servo until there are enough measurements over the present stroke.
     fn time_servo(&mut self) -> Result<bool> {
         self.push(&[])?;
         loop {
@@ -337,7 +338,7 @@ impl Guide {
         }
     }
 
-    /// Where the machine stands, once it does; and once it has rolled from this place, if there is one.
+    /// Waits until the machine stands, and returns its position. With `from`, it must first have left that position.
     fn stands_at(&mut self, from: Option<i32>) -> Result<i32> {
         let mut before = None;
         loop {
@@ -385,7 +386,7 @@ impl Guide {
         }
     }
 
-    /// Sets the margin that the measurements ask for, or says what is missing.
+    /// Sets the margin that follows from the measurements, or prints what is missing.
     fn set_margin(&mut self) -> Result<bool> {
         self.push(&[])?;
         let settings = settings::read(&mut self.link)?;

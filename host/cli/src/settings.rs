@@ -1,4 +1,4 @@
-//! `weeder settings`: the machine's settings as a file that can be kept, compared, and given to the next machine.
+//! `weeder settings`: saves the machine's settings to a file, compares them, and sends them to a machine.
 
 use crate::destination::{FileName, FolderName, Replace};
 use crate::finding::Finding;
@@ -15,7 +15,7 @@ use serde_json::{Map, Value, json};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// What the user asks of the settings.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder settings pull machine.toml           write the machine's settings into a file\n  \
@@ -83,7 +83,7 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
 /// Pulls, pushes or compares.
 ///
 /// # Errors
-/// Where file or machine cannot be used; each says what would be right.
+/// If file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose()?),
@@ -182,7 +182,7 @@ fn diff(file: &Path, json: bool, chosen: &Chosen) -> Result<Finding> {
 }
 
 impl Chosen {
-    /// The settings that each row is to have, by its name: all of them are read before anything is sent.
+    /// The settings for each row, by its name. All files are read before anything is sent.
     fn wanted(&self, file: &Path) -> Result<HashMap<String, Vec<(Setting, u16)>>> {
         if !file.is_dir() {
             let wanted = wanted(file)?;
@@ -200,12 +200,12 @@ impl Chosen {
         }
     }
 
-    /// Whether there is something to print: where the only row has failed, its error is all.
+    /// Whether there is a result to print. If the only row has failed, there is only its error.
     fn has_answer<T>(&self, done: &[Result<T>]) -> bool {
         self.are_several || done.iter().all(Result::is_ok)
     }
 
-    /// The only row's value, or each row's by its name; `null` of one with which it went wrong.
+    /// The only row's value, or each row's by its name. A failed row has `null`.
     fn in_json<T>(&self, done: &[Result<T>], value: impl Fn(&T) -> Value) -> Value {
         let value = |done: &Result<T>| done.as_ref().map_or(Value::Null, &value);
         match done {
@@ -215,7 +215,7 @@ impl Chosen {
     }
 }
 
-/// The settings of a preset of the simulated field, to begin from. The margin is not among them: it covers only what was measured.
+/// The settings of a preset, as a start. The margin is left out: it must cover measured values.
 fn of_preset(file: &Path) -> Option<Result<Vec<(Setting, u16)>>> {
     let conditions = Conditions::preset(file.to_str()?).filter(|_| !file.exists())?;
     let settings = |conditions: Conditions| {
@@ -225,7 +225,7 @@ fn of_preset(file: &Path) -> Option<Result<Vec<(Setting, u16)>>> {
     Some(conditions.map(settings).map_err(Into::into))
 }
 
-/// A file's settings, or a preset's, at least one.
+/// The settings of a file or a preset, at least one.
 fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
     if let Some(wanted) = of_preset(file) {
         let wanted = wanted?;

@@ -22,7 +22,7 @@ use uno::PinChange;
 use uno::capture::Capture;
 use uno::waveform;
 
-/// What the user asks of a simulation.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -76,7 +76,7 @@ const REPORT: [&str; 5] = ["row.svg", "weeding.svg", "row.csv", "plants.csv", "w
 /// Runs it and prints the result.
 ///
 /// # Errors
-/// Where an argument or a file is wrong, or the firmware cannot be run.
+/// If an argument or a file is wrong, or the firmware cannot be run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
     let folder = arguments.out.as_ref().map(|out| out.check(REPORT, replace)).transpose()?;
@@ -154,7 +154,7 @@ fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinCh
     if arguments.json { Ok(()) } else { say!("Waveform    {}", vcd.path().display()) }
 }
 
-/// What happened to the row, with the names of the CSV tables.
+/// The result for the row, with the names of the CSV tables.
 fn in_json(arguments: &Arguments, trial: &Trial, outcome: &Outcome) -> Value {
     let judgement = &outcome.judgement;
     json!({

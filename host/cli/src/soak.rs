@@ -1,4 +1,4 @@
-//! `weeder soak`: hours of the decisions and minutes of the real firmware, with everything going wrong now and then.
+//! `weeder soak`: hours of the decisions and minutes of the real firmware, with random faults.
 
 use crate::destination::{FileName, Replace};
 use crate::finding::Finding;
@@ -16,10 +16,10 @@ use std::time::Instant;
 use trial::firmware;
 use trial::soak::{self, Plan, SoakError, Tally};
 
-/// What the parts of a soak say that they are of.
+/// The name of the command in its parts.
 pub const COMMAND: &str = "soak";
 
-/// What the user asks of a soak.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -57,14 +57,14 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What decides a soak's result.
+/// The parameters that decide a soak's result.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Study {
     seed: u64,
     faults: u32,
     hours: u32,
     uno_minutes: u32,
-    /// The check sum of the firmware, where it is run.
+    /// The checksum of the firmware, if it is run.
     firmware: Option<String>,
 }
 
@@ -82,7 +82,7 @@ impl Study {
 /// Runs it and prints what it has shown, or writes a part of it.
 ///
 /// # Errors
-/// Where nothing is asked for, or the firmware cannot be built or run.
+/// If nothing is asked for, or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { hours, uno_minutes, seed, faults, json, .. } = arguments;
     ensure!(
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     conclude(&study, &stages, json)
 }
 
-/// Computes a shard's hours and rows: the hours have the numbers from 0, and the rows those behind.
+/// Computes a shard's hours and rows. The numbers of rows follow those of hours.
 fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> {
     let hours = u64::from(study.hours);
     let all = hours + study.rows()?;
@@ -139,7 +139,7 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
 /// Prints what all hours and rows have shown, which were computed somewhere.
 ///
 /// # Errors
-/// Where it cannot be printed.
+/// If it cannot be printed.
 pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Finding> {
     let rows = tallies.split_off((study.hours as usize).min(tallies.len()));
     let mut stages = Vec::new();
@@ -153,7 +153,7 @@ pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Findi
     conclude(study, &stages, json)
 }
 
-/// What is left to say of all stages, and whether all is well.
+/// Prints the summary of all stages. Returns whether all is well.
 fn conclude(study: &Study, stages: &[Stage], json: bool) -> Result<Finding> {
     let &Study { seed, faults, .. } = study;
     let is_good = stages.iter().all(|stage| stage.tally.violations.is_empty());
@@ -172,14 +172,14 @@ type Title = (&'static str, &'static str);
 const DECISIONS: Title = ("decisions", "The decision core on the host");
 const FIRMWARE: Title = ("firmware", "The firmware on the virtual Uno");
 
-/// A stage of a soak, and what it has shown.
+/// A stage of a soak, and its result.
 struct Stage {
     title: Title,
     tally: Tally,
 }
 
 impl Stage {
-    /// Runs it behind its progress bar, and says what it has shown, unless that is for programs.
+    /// Runs it with a progress bar, and prints its result, unless the output is JSON.
     fn of(title: Title, json: bool, work: impl FnOnce(&Progress) -> Result<Tally, SoakError>) -> Result<Self> {
         let began = Instant::now();
         let bar = Progress::new(title.1);
@@ -192,7 +192,7 @@ impl Stage {
         Ok(stage)
     }
 
-    /// Says what it has shown, unless that is for programs.
+    /// Prints its result, unless the output is JSON.
     fn say(&self, json: bool) -> Result<()> {
         if json { Ok(()) } else { say!("{}\n{}", self.title.1, self.tally) }
     }

@@ -1,5 +1,5 @@
-//! Where a command reads a file: `-` is standard input, as everywhere. And words that are no file but known names, which a shell that
-//! completes is told.
+//! Input files of commands: `-` is standard input. Some words are known names instead of files, and a shell's
+//! completion offers them.
 
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
@@ -7,19 +7,19 @@ use field::conditions::presets;
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
-/// Standard input as a file, where the system has one.
+/// Standard input as a file, if the system has one.
 #[cfg(unix)]
 const STANDARD_INPUT: &str = "/dev/stdin";
 
-/// The file of this name, for the command line.
+/// The file with this name, for the command line.
 ///
 /// # Errors
-/// Never, or where the system has no file for standard input.
+/// Only if the system has no file for standard input.
 pub fn file(name: &str) -> Result<PathBuf, String> {
     named(name).map(PathBuf::from)
 }
 
-/// What a word names that is a file, or else has a meaning of its own, such as a preset.
+/// A file's name, or a word with another meaning, such as a preset.
 ///
 /// # Errors
 /// As [`file()`].
@@ -38,7 +38,7 @@ pub fn preset_or_file() -> impl TypedValueParser<Value = String> {
     offering(|| presets().collect(), named)
 }
 
-/// What `parser` reads, with names of which a shell that completes offers those that fit. Other words are read as well.
+/// A value that `parser` reads. A shell's completion offers these names, but other words are also accepted.
 pub fn offering<P: TypedValueParser>(
     names: fn() -> Vec<&'static str>,
     parser: P,

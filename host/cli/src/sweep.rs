@@ -20,10 +20,10 @@ use std::fmt::Write;
 use std::fs;
 use std::sync::LazyLock;
 
-/// What the parts of a sweep say that they are of.
+/// The name of the command in its parts.
 pub const COMMAND: &str = "sweep";
 
-/// The result that is shown unless another one is asked for.
+/// The default result.
 pub const RESULT: &str = Results::NAMES[0];
 
 /// The examples in the help.
@@ -37,7 +37,7 @@ Examples:
   weeder sweep --x k=1..9:2 --shard 2/4 --out 2.part      the second of four parts, for `weeder merge`
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
 
-/// The examples, and all that an axis can be.
+/// The examples, and all possible axes.
 fn long_help() -> String {
     let lines = axes();
     let longest = |part: fn(&AxisHelp) -> &str| lines.iter().map(|line| part(line).len()).max().unwrap_or(0);
@@ -50,14 +50,14 @@ fn long_help() -> String {
     text
 }
 
-/// What is said of an axis in the help.
+/// The help of an axis.
 struct AxisHelp {
     name: String,
     range: String,
     meaning: String,
 }
 
-/// All that an axis can be.
+/// All possible axes.
 fn axes() -> Vec<AxisHelp> {
     let line = |name: &str, least: f64, greatest: f64, meaning: &str| AxisHelp {
         name: name.to_owned(),
@@ -81,7 +81,7 @@ fn axis() -> impl TypedValueParser<Value = Axis> {
     offering(|| NAMES.iter().map(String::as_str).collect(), |text: &str| text.parse::<Axis>())
 }
 
-/// What the user asks of a sweep.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = format!("{EXAMPLES} `weeder sweep --help` lists them all."), after_long_help = long_help())]
 pub struct Arguments {
@@ -143,15 +143,15 @@ impl From<ControllerName> for Treatment {
     }
 }
 
-/// How a sweep's points are to be shown.
+/// How to show a sweep's points.
 pub struct Shown {
     /// Where they are written.
     pub out: Option<FileName>,
-    /// Whether what is there is replaced.
+    /// Whether to replace existing files.
     pub replace: Replace,
     /// Whether for programs.
     pub json: bool,
-    /// Which of the results, where there are two axes.
+    /// The result to show, if there are two axes.
     pub result: String,
 }
 
@@ -164,7 +164,7 @@ impl Shown {
 /// Runs it and prints the result, or writes a part of it.
 ///
 /// # Errors
-/// Where an axis or the field is wrong, or the file cannot be written.
+/// If an axis or the field is wrong, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let &Arguments { ref out, replace, json, ref result, .. } = arguments;
     let sweep = Sweep {
@@ -194,7 +194,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// Prints the result of all points' plots, which were weeded somewhere.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
     let out = shown.out()?;
     show(sweep, &sweep.points(outcomes)?, shown, out.as_ref())
@@ -214,7 +214,7 @@ fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<&OutFile>) -
     printed
 }
 
-/// The table, and what spoils it.
+/// The table, and notes on invalid values.
 fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
     let mut text = match &sweep.y {
         Some(y) => format!(
@@ -232,7 +232,7 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
     text
 }
 
-/// All results of all points, by the names of the file's columns; a result that there is not is null.
+/// All results of all points, by the names of the file's columns. A missing result is null.
 fn in_json(sweep: &Sweep, points: &[Point]) -> Value {
     let point = |point: &Point| {
         let values = place(point).chain(point.results.values()).map(Value::from);
@@ -252,7 +252,7 @@ fn place(point: &Point) -> impl Iterator<Item = f64> {
     [Some(point.x), point.y].into_iter().flatten()
 }
 
-/// A result for people: with a mark where alarms spoil it, and a stroke where there is none.
+/// A value as text: with a mark if alarms make it invalid, and a dash if there is none.
 fn shown(value: f64, point: &Point) -> String {
     match (value.is_finite(), point.results.alarms_percent > 0.0) {
         (false, _) => "-".to_owned(),

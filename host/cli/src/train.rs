@@ -1,4 +1,5 @@
-//! `weeder train`: makes an example table of labelled objects, and says how well it tells plants from weeds.
+//! `weeder train`: trains an example table from labelled detections, and reports how well it separates plants from
+//! weeds.
 
 use crate::destination::{FileName, OutFile, Replace};
 use crate::finding::Finding;
@@ -18,7 +19,7 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// What the user asks of a training.
+/// The arguments.
 #[derive(Args)]
 #[command(group = ArgGroup::new("objects").required(true).args(["files", "synthetic"]), after_help = "\
 Examples:
@@ -105,7 +106,7 @@ impl FromStr for Votes {
 /// Trains, and prints what came of it.
 ///
 /// # Errors
-/// Where a file or its contents are wrong, or the table would not fit.
+/// If a file or its contents are wrong, or the table would not fit.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
     let table = arguments.out.as_ref().map(|out| Destination::of(out, replace)).transpose()?;
@@ -182,7 +183,7 @@ impl Arguments {
     }
 }
 
-/// Chooses what a machine is taught beside its built-in table, and prints what came of it.
+/// Chooses the examples to teach in addition to the built-in table, and prints the result.
 fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelled], k: Option<u8>) -> Result<Finding> {
     if table.is_some_and(|table| matches!(table.form, Form::Rust)) {
         bail!("what a machine is taught beside its built-in table is written as CSV (.csv)");
@@ -214,7 +215,7 @@ fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelle
     Ok(Finding::Good)
 }
 
-/// What is said of a training; `another_field` are the seed of another field and how its objects were classified.
+/// The report of a training. `another_field` has the seed of another field and the classification of its detections.
 fn report(training: &Training, objects: &[Labelled], another_field: Option<&(u64, Confusion)>) -> Result<()> {
     say!("Objects     {}", objects.len())?;
     say!("k           {}", training.k)?;
@@ -259,14 +260,14 @@ enum Form {
     Csv,
 }
 
-/// Where a table goes, and how it is written there.
+/// The table's destination and format.
 struct Destination<'a> {
     file: OutFile<'a>,
     form: Form,
 }
 
 impl<'a> Destination<'a> {
-    /// A file that says by its name's ending how the table is written.
+    /// A file. The ending of its name selects the format.
     fn of(name: &'a FileName, replace: Replace) -> Result<Self> {
         let form = match name.path().extension().and_then(|ending| ending.to_str()) {
             Some("rs") => Form::Rust,

@@ -28,13 +28,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 use trial::{firmware, picture};
 
-/// What the parts of a trial say that they are of.
+/// The name of the command in its parts.
 pub const COMMAND: &str = "trial";
 
-/// Most plants of a trial, roughly: what they come to is counted to four billion.
+/// Most plants of a trial, roughly: counts are limited to four billion.
 const MOST_PLANTS: f64 = 2e9;
 
-/// What the user asks of a trial.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -135,7 +135,7 @@ impl Arguments {
         Treatment::ALL.into_iter().filter(takes_part).collect()
     }
 
-    /// The command that gives the same result: what of it is not so by itself, always in one order.
+    /// The command that gives the same result: its options that differ from the defaults, in a fixed order.
     fn words(&self) -> Result<Vec<String>> {
         let nothing = Self::augment_args(Command::new(COMMAND)).try_get_matches_from([COMMAND])?;
         let otherwise = Self::from_arg_matches(&nothing)?.options();
@@ -148,7 +148,7 @@ impl Arguments {
         Ok(words)
     }
 
-    /// What decides the result, as it would be typed.
+    /// The options that decide the result, as typed.
     fn options(&self) -> [(&'static str, Option<String>); 9] {
         fn list<T>(values: &[T], word: impl Fn(&T) -> String) -> Option<String> {
             Some(values.iter().map(word).collect::<Vec<_>>().join(","))
@@ -171,38 +171,38 @@ impl Arguments {
     }
 }
 
-/// What decides a trial's result, and how it is asked for.
+/// The parameters that decide a trial's result, and its command.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Study {
     experiment: Experiment,
     engine: EngineName,
-    /// The check sum of the firmware, where it is run on the virtual Uno.
+    /// The checksum of the firmware, if it runs on the virtual Uno.
     firmware: Option<String>,
-    /// The field as it was named.
+    /// The field, as named by the user.
     field: String,
-    /// The command that gives the same result, without what it is to do with it.
+    /// The command that gives the same result, without its output options.
     words: Vec<String>,
 }
 
-/// What came of a plot.
+/// The outcome of a plot.
 #[derive(Serialize, Deserialize)]
 pub struct PlotPart {
     /// By each controller.
     by_controller: Vec<PlotOutcome>,
-    /// The first plot's brings the report's picture of a row along, which the merging machine may have no firmware for.
+    /// The first plot also has the report's picture of a row: the merging machine may have no firmware.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     picture: Option<String>,
 }
 
-/// How a trial is to be shown.
+/// How to show a trial.
 pub struct Shown {
     /// Where its report goes.
     pub out: Option<FolderName>,
-    /// Whether what is there is replaced.
+    /// Whether to replace existing files.
     pub replace: Replace,
     /// Whether for programs.
     pub json: bool,
-    /// Whether what counts most is enough.
+    /// Whether to show only the most important results.
     pub brief: bool,
 }
 
@@ -218,7 +218,7 @@ impl Shown {
 /// Runs it and prints the result, or writes a part of it.
 ///
 /// # Errors
-/// Where the field is wrong, the firmware cannot be built or run, or a file cannot be written.
+/// If the field is wrong, the firmware cannot be built or run, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { replace, json, brief, .. } = arguments;
     let file = arguments.out.as_ref().map(FileName::from);
@@ -275,7 +275,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 /// Prints the result of all plots, which were weeded somewhere.
 ///
 /// # Errors
-/// Where a file cannot be written.
+/// If a file cannot be written.
 pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Finding> {
     let folder = shown.folder()?;
     let picture = plots.first_mut().and_then(|plot| plot.picture.take());
@@ -283,7 +283,7 @@ pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Fi
     show(&study, &outcomes, shown, folder.as_ref(), || Ok(picture))
 }
 
-/// A picture of a row as the firmware weeded it, as SVG.
+/// A picture of a row that the firmware weeded, as SVG.
 fn picture_of(experiment: &Experiment, engine: &Engine) -> Result<Option<String>> {
     let example = experiment.example(engine)?;
     Ok(example.map(|(row, judgement)| picture::draw(&row, &judgement).to_string()))
@@ -312,7 +312,7 @@ fn show(
     let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.alarms).sum();
     let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.effect.injured()).sum();
     if let Some(folder) = folder {
-        // What it has to say of the paper is for those who read on.
+        // Only the report has the comparison with the paper.
         let summary = [summary, against_the_paper(outcomes)].concat();
         let findings = Findings { outcomes, totals, analysis, summary };
         write_report(folder, study, picture()?, &findings)?;
@@ -324,7 +324,7 @@ fn show(
     Ok(if damaged == 0 && alarms == 0 { Finding::Good } else { Finding::Bad })
 }
 
-/// Where the paper's controller does here what the paper did not find of it, at the paper's speeds.
+/// The differences between the paper's controller here and in the paper, at the paper's speeds.
 fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     let (slowest, fastest) = published::SPEEDS_KM_H;
     let mut records = experiment::records(outcomes, Treatment::Paper);
@@ -333,7 +333,7 @@ fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     said.into_iter().map(|said| format!("The paper's controller at {slowest} to {fastest} km/h: {said}")).collect()
 }
 
-/// Everything that came of a trial.
+/// All results of a trial.
 struct Findings<'a> {
     outcomes: &'a [PlotOutcome],
     totals: Vec<Total>,
@@ -349,12 +349,12 @@ fn ascending(levels: &[f64]) -> Vec<f64> {
     levels
 }
 
-/// What one controller did, by speed.
+/// The totals of one controller, by speed.
 fn of(totals: &[Total], controller: Treatment) -> impl Iterator<Item = &Total> {
     totals.iter().filter(move |total| total.controller == controller)
 }
 
-/// A column: its heading, how a total fills it, and the tables that have it.
+/// A column: its heading, its value for a total, and the tables that have it.
 type Column = (&'static str, fn(&Total) -> String, &'static [Contents]);
 
 /// The tables of a trial, each with a line for each speed and controller.
@@ -362,7 +362,7 @@ type Column = (&'static str, fn(&Total) -> String, &'static [Contents]);
 enum Contents {
     /// The most important columns, for `--brief`.
     Brief,
-    /// What happened to the plants.
+    /// The results for plants.
     Plants,
     /// What was weeded.
     Ground,
@@ -389,7 +389,7 @@ const COLUMNS: [Column; 12] = [
     ("weeds\ngone in\nplot, %", |total| gone(total.effect.in_plot), &[Ground]),
 ];
 
-/// A controller's title without its article, as a table has it.
+/// A controller's title without its article, for a table.
 fn name(controller: Treatment) -> &'static str {
     let title = controller.title();
     ["a ", "the "].iter().find_map(|article| title.strip_prefix(article)).unwrap_or(title)
@@ -409,7 +409,7 @@ fn by_speed(totals: &[Total], contents: Contents) -> Table {
     table
 }
 
-/// What stands above the loss budget.
+/// The heading of the loss budget.
 const WHERE_IT_GOES: &str = "Where the row's ground goes with this firmware, %";
 
 /// The firmware's loss budget, a line a speed: each adds up to 100 %.
@@ -437,7 +437,7 @@ fn most_lost(total: &Total) -> String {
     format!("{} {:.1}", part.key(), 100.0 * share)
 }
 
-/// The share of the row's ground that was weeded, and how far its mean may be off.
+/// The weeded share of the row's ground, and the confidence range of its mean.
 fn weeded(total: &Total) -> String {
     let mean = total.weeded_percent.mean;
     total.weeded_percent.within.map_or(format!("{mean:.1}"), |within| format!("{mean:.1} ± {within:.1}"))
@@ -448,7 +448,7 @@ fn gone(weeds: WeedCount) -> String {
     weeds.efficiency_percent().map_or("-".to_owned(), |percent| format!("{percent:.1}"))
 }
 
-/// What came of it, in plain words.
+/// The result in words.
 fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let mut sentences: Vec<String> =
         experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
@@ -500,7 +500,7 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     sentences
 }
 
-/// How many plants a controller damaged, and where most of them.
+/// How many plants a controller damaged, and where it damaged most.
 fn damage(totals: &[Total], controller: Treatment) -> String {
     let name = controller.title();
     let (damaged, plants) = of(totals, controller)

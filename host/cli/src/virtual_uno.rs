@@ -17,7 +17,7 @@ use trial::live::{Course, Setup};
 use trial::receiver::{ReceiverSetup, Trouble};
 use uno::hex::{Bootloader, HexError};
 
-/// What the user asks of the virtual Uno.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 The firmware runs as on a real Uno, with a simulated machine that rolls along the row repeatedly.
@@ -102,7 +102,7 @@ fn bootloader(name: &Path) -> Result<Bootloader, HexError> {
 /// Runs until Ctrl-C, or until it is asked to end by SIGTERM or SIGHUP.
 ///
 /// # Errors
-/// Where a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
+/// If a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
     let count = arguments.rows;
@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         bootloader: bootloader.clone(),
         eeprom: of_row(&arguments.eeprom, row),
         link: of_row(&arguments.link, row),
-        // It stands on the machine, which has one.
+        // The machine has one receiver.
         receiver: receiver.clone().filter(|_| row == 0),
         course: (!arguments.stand).then_some(course),
         fast: arguments.fast,
@@ -160,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What to type next: an Uno that has only a bootloader asks for a firmware.
+/// The next command to type. An Uno with only a bootloader needs a firmware.
 fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<String> {
     let is_old = |bootloader: &Bootloader| usize::from(bootloader.start()) == flash::OLD_AVAILABLE_BYTES;
     let (begin, ports): (&[&str], _) = match bootloader {
@@ -174,7 +174,7 @@ fn next_command(ports: &[&Path], bootloader: Option<&Bootloader>) -> Result<Stri
     Ok(shlex::try_join(begin.iter().copied().chain(ports))?)
 }
 
-/// A row's own file or link: the number is at its end where there are several.
+/// A row's own file or link. Its name ends with the row's number if there are several rows.
 fn of_row(path: &Path, row: usize, count: usize) -> PathBuf {
     if count == 1 {
         return path.to_owned();
@@ -184,7 +184,7 @@ fn of_row(path: &Path, row: usize, count: usize) -> PathBuf {
     name.into()
 }
 
-/// What the rows have cost.
+/// The computing time of the rows.
 fn cost(ran: Ran, count: usize) -> String {
     let rows = if count == 1 { "a row".to_owned() } else { format!("{count} rows") };
     let threads = if ran.threads == 1 { "one thread".to_owned() } else { format!("{} threads", ran.threads) };

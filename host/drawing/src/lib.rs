@@ -1,7 +1,7 @@
-//! What all pictures are drawn with: paper, ink, the colours of what stands in a row, and a few shapes and words in SVG.
+//! The shared style of all pictures: paper, ink, colours, and a few shapes and texts in SVG.
 //!
-//! A picture brings its own light background, so that it reads the same on a light page and on a dark one. Places and
-//! sizes are pixels, downwards and to the right, rounded to a tenth.
+//! A picture has its own light background, so it looks the same on light and dark pages. Positions and sizes are
+//! pixels, downwards and to the right, rounded to a tenth.
 
 use svg::Document;
 use svg::node::Node;
@@ -10,7 +10,7 @@ use svg::node::element::{Group, Line, Rectangle, Text};
 /// The background.
 pub const PAPER: &str = "#fbfaf6";
 
-/// Colour of what is to be read.
+/// Colour of text.
 pub const INK: &str = "#33312c";
 
 /// Colour of axes and their marks.
@@ -28,19 +28,19 @@ pub const WEEDED: &str = "#b99a72";
 /// Ground that was left alone.
 pub const LEFT_ALONE: &str = "#dfe7ee";
 
-/// What is neither right nor wrong: a margin that was cut, a plant that was not known.
+/// Colour of doubtful results: a cut margin, an unknown plant.
 pub const DOUBTFUL: &str = "#e0a526";
 
-/// What is wrong: a plant that was damaged, an alarm.
+/// Colour of errors: a damaged plant, an alarm.
 pub const WRONG: &str = "#cf3a32";
 
-/// What was written or measured beside it: a label, the tool's curve.
+/// Colour of notes and measurements: a label, the tool's curve.
 pub const NOTE: &str = "#2a6f97";
 
 /// Width and height of a legend's mark.
 pub const MARK_SIZE: f64 = 12.0;
 
-/// A picture of that size, without anything in it.
+/// An empty picture of this size.
 pub fn document(width: f64, height: f64) -> Document {
     Document::new()
         .set("viewBox", (0, 0, width.round() as i32, height.round() as i32))
@@ -78,7 +78,7 @@ pub fn line(x1: f64, y1: f64, x2: f64, y2: f64, stroke: &str) -> Line {
         .set("stroke", stroke)
 }
 
-/// A line of text that begins at `x` and stands on `y`.
+/// A line of text with its left end at `x` and its baseline at `y`.
 pub fn words(x: f64, y: f64, words: &str, fill: &str) -> Text {
     Text::new(words).set("x", tenth(x)).set("y", tenth(y)).set("fill", fill)
 }
@@ -96,12 +96,12 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// A legend whose first mark has its upper left corner there.
+    /// A legend. Its first mark has its upper left corner at this position.
     pub fn new(x: f64, y: f64) -> Self {
         Self { drawn: Group::new(), x, y }
     }
 
-    /// Adds what `mark` draws at its upper left corner, and what that means.
+    /// Adds an entry: `mark` draws the mark at its upper left corner.
     pub fn explain<Mark: Node>(&mut self, mark: impl FnOnce(f64, f64) -> Mark, meaning: &str) {
         const LETTER_WIDTH: f64 = 6.4;
         self.drawn.append(mark(self.x, self.y));

@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# Has Slurm compute a study in N shards, a task of a job array each, and put the parts together in a job that waits for them.
+# Computes a study with Slurm in N shards. Each shard is a task of a job array. A second job waits for them and joins
+# the parts.
 #
 #     host/experiments/slurm/array.sh N FOLDER [option of sbatch ...] -- trial --replications 20
 #
-# Behind -- stands a `weeder trial`, `weeder sweep` or `weeder soak` without --shard and --out. FOLDER is made; it has to be one that all
-# nodes see. There come parts/I.part, logs/I.txt with what task I said, and at the end result.txt with what the undivided command
-# would have printed; of a trial also report/, of a sweep points.csv. The numbers of both jobs are printed.
+# The command after -- is `weeder trial`, `weeder sweep` or `weeder soak`, without --shard and --out. FOLDER is made,
+# and all nodes must see it. It gets parts/I.part, and logs/I.txt with the output of task I. At the end it gets
+# result.txt, with the output of the undivided command. A trial also writes report/, and a sweep points.csv. The script
+# prints the numbers of both jobs.
 #
-# A task whose program is killed, or whose node goes away, starts anew, up to three times; one that fails by itself (status 2)
-# fails, and the merging job with it. A task with $WEEDER, if that is set, is run by that program instead of `weeder`.
+# A task is started again up to three times if its program is killed or its node fails. A task that exits with an error
+# (status 2) fails, and so does the merging job. If $WEEDER is set, tasks run that program instead of `weeder`.
 set -euo pipefail
 
 usage() {

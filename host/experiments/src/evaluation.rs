@@ -1,9 +1,10 @@
-//! A field trial judged: from what somebody with a notebook writes down of each plot to the paper's measures (Eq. 22 to 27),
-//! and from these to models and analyses of variance, with the paper's own figures beside them.
+//! The evaluation of a field trial: from the counts of each plot to the paper's measures (Eq. 22 to 27), and from these
+//! to models and analyses of variance, beside the paper's own figures.
 //!
-//! A trial has plots of some speeds and plant spacings, with replications. [`PlotRecord`] is one plot, [`table`] reads and
-//! writes them as CSV, [`PlotRecord::performance`] is what follows from one, [`Analysis`] what follows from all, and [`published`] is what
-//! the paper printed. Nothing here knows whether a plot was real or simulated.
+//! A trial has plots at some speeds and plant spacings, with replications. [`PlotRecord`] is one plot. [`table`] reads
+//! and writes plots as CSV. [`PlotRecord::performance`] calculates the measures of one plot, and [`Analysis`] analyses
+//! all plots. [`published`] holds the paper's printed figures. The code does not distinguish real plots from simulated
+//! plots.
 
 mod findings;
 mod plot;
@@ -32,38 +33,38 @@ pub enum AnalysisError {
     Plot {
         /// The plot, counted from 1.
         plot: usize,
-        /// What is wrong with it.
+        /// The problem.
         problem: Implausible,
     },
 }
 
-/// What follows from all plots of a trial.
+/// The analysis of all plots of a trial.
 #[derive(Clone, Debug)]
 pub struct Analysis {
     /// The plots.
     pub records: Vec<PlotRecord>,
-    /// What follows from each, in the same order.
+    /// The measures of each plot, in the same order.
     pub performances: Vec<Performance>,
-    /// What follows for each measure, in the order of [`Response::ALL`].
+    /// The analysis of each measure, in the order of [`Response::ALL`].
     pub responses: Vec<ResponseAnalysis>,
 }
 
-/// What all plots together say of one measure.
+/// The analysis of one measure over all plots.
 #[derive(Clone, Debug)]
 pub struct ResponseAnalysis {
     /// The measure.
     pub response: Response,
     /// Its lowest and its highest value in a plot, in its unit.
     pub range: (f64, f64),
-    /// It as a linear function of speed in km/h and spacing in cm.
+    /// The measure as a linear function of speed in km/h and spacing in cm.
     pub model: Result<LinearModel, NoModel>,
-    /// What that model's residuals say; none without one.
+    /// The checks of that model's residuals; `None` without a model.
     pub checks: Option<Checks>,
-    /// The binomial model of its counts; none for a measure that is not counted.
+    /// The binomial model of its counts; `None` for a measure that is not counted.
     pub binomial: Option<Result<BinomialModel, NoModel>>,
     /// Its two-way analysis of variance by speed and spacing, with their interaction, and the replications as blocks.
     pub variance: Result<AnalysisOfVariance, NoModel>,
-    /// What the paper printed of it.
+    /// The paper's figures for it.
     pub published: Published,
 }
 
@@ -78,9 +79,9 @@ pub struct Treatment {
     pub plots: usize,
     /// The mean of each measure over them.
     pub mean: Performance,
-    /// The plants of all of them together that were damaged.
+    /// Damaged plants of all these plots together.
     pub damaged: Share,
-    /// Their mean weeding efficiency, %, and how far it may be off.
+    /// Their mean weeding efficiency in %, with its interval.
     pub weeding_efficiency: Mean,
 }
 
@@ -88,7 +89,7 @@ impl Analysis {
     /// Analyses the plots of a trial.
     ///
     /// # Errors
-    /// Where there is no plot, or one that cannot be. What a single measure has no model for is said in its place.
+    /// If there is no plot, or one that cannot be. What a single measure has no model for is said in its place.
     pub fn of(records: Vec<PlotRecord>) -> Result<Self, AnalysisError> {
         if records.is_empty() {
             return Err(AnalysisError::NoPlots);
@@ -118,8 +119,8 @@ impl Analysis {
         Ok(Self { records, performances, responses })
     }
 
-    /// The plots, numbered from 1, that cover more ground than their speed and width allow: a field efficiency above
-    /// 100 %, which is a mistake in area, time, width or speed.
+    /// The plots, numbered from 1, that cover more ground than their speed and width allow. Their field efficiency is
+    /// above 100 %, so area, time, width or speed is wrong.
     pub fn faster_than_possible(&self) -> Vec<usize> {
         let plots = (1..).zip(&self.performances);
         plots.filter(|(_, plot)| plot.field_efficiency_percent > 100.0).map(|(number, _)| number).collect()

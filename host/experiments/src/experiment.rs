@@ -1,11 +1,11 @@
-//! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on the
-//! same ground.
+//! The paper's experiment: speeds by plant spacings by replications, in a simulated field, with several controllers on
+//! the same ground.
 //!
-//! Each plot's rows grow and are driven from the seed, the plot and the row alone, so that the result depends neither
-//! on the number of threads or machines nor on which controllers take part. The firmware is either its native run
-//! ([`field::native`]) or the ELF on the virtual Uno ([`mod@trial`]); its baselines ([`field::baselines`]) are models in both
-//! cases. A plot comes out as somebody with a notebook would write it down ([`PlotRecord`]), and is judged by the same
-//! code as a real one.
+//! The rows of a plot and the motion depend on the seed, the plot and the row only. So the result depends neither on
+//! the number of threads or machines, nor on the choice of controllers. The firmware runs as a native run
+//! ([`field::native`]), or as the ELF on the virtual Uno ([`mod@trial`]). Its baselines ([`field::baselines`]) are
+//! models in both cases. A simulated plot has the same record as one counted by hand ([`PlotRecord`]), and the same
+//! code evaluates both.
 
 mod taught;
 
@@ -52,17 +52,18 @@ pub enum Engine {
     Uno(PathBuf),
 }
 
-/// Who swings the tool: what the plots of an experiment are given to compare.
+/// A controller of the tool. The experiment compares controllers on the same plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Treatment {
     /// The firmware with its leads.
     Firmware,
-    /// The firmware with both leads at 0: a queue of windows, without look-ahead.
+    /// The firmware with both leads at 0: a queue of keep-out zones, without look-ahead.
     WithoutLookAhead,
-    /// The paper's: one slot, no look-ahead, a loop that polls.
+    /// The paper's controller: one slot, no look-ahead, a polling loop.
     Paper,
-    /// Who knows where each stem stands and allows for the servo's slowest swing: whose damage, if any, nobody can avoid.
+    /// The ideal controller: it knows every stem and allows for the servo's slowest swing. No controller can avoid the
+    /// damage that it does.
     Ideal,
 }
 
@@ -94,10 +95,10 @@ pub struct Experiment {
     pub controllers: Vec<Treatment>,
     /// Where.
     pub conditions: Conditions,
-    /// What the firmware is taught beforehand.
+    /// Examples that are taught to the firmware.
     #[serde(with = "taught")]
     pub examples: Vec<Example<{ features::COUNT }>>,
-    /// Which of all the possible fields.
+    /// Selects the random fields.
     pub seed: u64,
 }
 
@@ -114,11 +115,11 @@ pub struct PlotOutcome {
     pub zones: Zones,
     /// Share of the rows' ground that the tool weeded, from 0 to 1.
     pub weeded_share: f64,
-    /// Share that could be weeded at best with this servo and every margin kept ([`field::verdict::weedable_share`]).
+    /// The largest share that this servo could weed with every margin kept ([`field::verdict::weedable_share`]).
     pub weedable_share: f64,
     /// Share that could be weeded at best without a plant damaged ([`field::optimum::undamaged_share`]).
     pub undamaged_share: f64,
-    /// Where the rows' ground went ([`field::budget`]).
+    /// The loss budget ([`field::budget`]).
     pub budget: Budget,
     /// Rows in which an alarm took the tool out.
     pub alarms: u32,
@@ -126,15 +127,15 @@ pub struct PlotOutcome {
     pub moved_s: f64,
 }
 
-/// What the firmware keeps of each plant, and how the tool passed it: the canopy, or with `stem_zone_mm` the zone round its stem
-/// ([`field::verdict`]). A stricter measure than damage, which is the tool in the zone that no tool may enter.
+/// The tool's distance from each plant's zone in the firmware: its canopy, or with `stem_zone_mm` the zone round its
+/// stem ([`field::verdict`]). This is stricter than damage, which is the tool in the protected zone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Zones {
-    /// All of them; plants that have grown together have one.
+    /// All zones. Joined plants have one.
     pub all: u32,
-    /// Those over which the tool was not fully out.
+    /// Zones over which the tool was not fully out.
     pub reached: u32,
-    /// Those whose margin was cut, but not they.
+    /// Other zones whose margin was cut.
     pub margins_cut: u32,
 }
 
@@ -158,7 +159,7 @@ pub enum ExperimentError {
         /// The spacing.
         spacing_cm: f64,
     },
-    /// There is no plant, or none that the beam could see.
+    /// There is no plant, or no visible one.
     #[error(
         "nothing for the beam stands in a row of {row_m} m with plants {spacing_cm} cm apart: \
          ask for a longer row or a smaller spacing"
@@ -177,7 +178,7 @@ pub enum ExperimentError {
     Trial(#[from] TrialError),
 }
 
-/// A plot's place in the experiment.
+/// A plot's position in the experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Plot {
     index: u64,
@@ -186,7 +187,7 @@ struct Plot {
     spacing_cm: f64,
 }
 
-/// What one controller did in one row.
+/// The result of one controller in one row.
 #[derive(Clone, Copy, Debug)]
 struct RowOutcome {
     effect: Effect,
@@ -195,20 +196,20 @@ struct RowOutcome {
     weedable_share: f64,
     undamaged_share: f64,
     budget: Budget,
-    /// For the row and its turn, and of these what was simulated.
+    /// The time of the row and its turn, and the simulated part of it.
     seconds: f64,
     moved_s: f64,
     alarm: bool,
 }
 
-/// Rows of a plot that are kept in memory at once.
+/// Rows of a plot that are in memory at once.
 const BATCH: u32 = 256;
 
 /// Ground of the row that is drawn.
 const DRAWN_MM: f64 = 4500.0;
 
 impl Experiment {
-    /// The paper's: its Table 2, by all controllers.
+    /// The paper's experiment (its Table 2), by all controllers.
     pub fn as_in_the_paper(conditions: Conditions, seed: u64) -> Self {
         Self {
             speeds_km_h: vec![1.0, 1.5, 2.0, 2.5],
@@ -231,7 +232,7 @@ impl Experiment {
             .collect()
     }
 
-    /// Number of plots, each of which all controllers weed.
+    /// Number of plots. All controllers weed each of them.
     pub fn size(&self) -> u64 {
         self.plots().len() as u64
     }
@@ -241,24 +242,25 @@ impl Experiment {
         self.plots().len() * self.conditions.plot.rows as usize
     }
 
-    /// Number of plants, roughly: as many as there are places for.
+    /// Approximate number of plants: the number of planting positions.
     pub fn plants(&self) -> f64 {
         let row_cm = 100.0 * self.conditions.plot.row_m;
         let of_rows: f64 = self.spacings_cm.iter().map(|spacing_cm| row_cm / spacing_cm).sum();
         of_rows * self.speeds_km_h.len() as f64 * f64::from(self.replications) * f64::from(self.conditions.plot.rows)
     }
 
-    /// Weeds the field: an outcome for each plot and each controller, by speed, spacing and replication. `progress` is told
-    /// the share of the rows done, from 0 to 1.
+    /// Weeds the field. Returns an outcome for each plot and each controller, by speed, spacing and replication.
+    /// `progress` gets the completed share of rows, from 0 to 1.
     ///
     /// # Errors
-    /// The first that a row meets.
+    /// The first error in a row.
     pub fn run(&self, engine: &Engine, progress: impl Fn(f64) + Sync) -> Result<Vec<PlotOutcome>, ExperimentError> {
         let of_plots = self.run_shard(Shard::WHOLE, engine, progress)?;
         Ok(of_plots.into_iter().flat_map(|plot| plot.outcome).collect())
     }
 
-    /// Weeds a shard's plots: for each an outcome of each controller. All shards' together are what [`Experiment::run`] gives.
+    /// Weeds a shard's plots. Returns for each plot an outcome of each controller. All shards together equal
+    /// [`Experiment::run`].
     ///
     /// # Errors
     /// As [`Experiment::run`].
@@ -279,8 +281,7 @@ impl Experiment {
         mine.par_iter().map(weed).collect()
     }
 
-    /// One row of the experiment, the first plot's at the highest speed, and what the firmware did to it: its first metres, to
-    /// be drawn.
+    /// The first metres of one row, the first plot's at the highest speed, with the firmware's result, for a picture.
     ///
     /// # Errors
     /// As [`Experiment::run`].
@@ -322,7 +323,7 @@ impl Experiment {
         Ok(outcomes)
     }
 
-    /// A plot that nobody has weeded yet.
+    /// A plot before weeding.
     fn untouched(&self, plot: &Plot, controller: Treatment) -> PlotOutcome {
         let Conditions { plot: area, machine, .. } = &self.conditions;
         let width_m = area.row_spacing_mm / 1000.0;
@@ -353,7 +354,7 @@ impl Experiment {
         }
     }
 
-    /// What every controller does in the same row.
+    /// The results of all controllers in one row.
     fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
         let (stand, drive, trial) = self.grow(plot, row)?;
         let sensors = sensors(&trial);
@@ -390,9 +391,9 @@ impl Experiment {
         self.controllers.iter().map(outcome).collect()
     }
 
-    /// A row that has grown, how it is driven, and both as a trial for the firmware.
+    /// A grown row, its drive, and both as a trial for the firmware.
     fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial), ExperimentError> {
-        // What grows, how it is driven and what the machine is like have a chance of their own each.
+        // Growth, drive and machine have separate random numbers.
         let chance = |of: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
             rng.set_stream(plot.index << 34 | u64::from(row) << 2 | of);
@@ -418,7 +419,7 @@ impl Experiment {
     }
 }
 
-/// What came of a row.
+/// The result of a row.
 struct Weeded {
     pulses: Vec<Pulse>,
     start_cycle: u64,
@@ -426,7 +427,7 @@ struct Weeded {
     reasons: Vec<Reason>,
 }
 
-/// What a trial's sensors tell the native run, whatever it is set to; worked out where somebody asks.
+/// The sensors of a trial for native runs. They do not depend on the settings. They are calculated at first use.
 fn sensors(trial: &Trial) -> LazyCell<Sensors, impl FnOnce() -> Sensors> {
     LazyCell::new(|| Sensors::new(trial, native::TURN_S))
 }
@@ -440,7 +441,7 @@ fn weed(
     engine: &Engine,
 ) -> Result<Weeded, ExperimentError> {
     let firmware = |trial: &Trial| {
-        // The ELF does not say why it swings: its native run decides the same, within a servo's frame.
+        // The ELF does not report why it swings. Its native run makes the same decisions, within a servo's frame.
         let native::Weeded { pulses, state, reasons } = native::weed(trial, sensors)?;
         match engine {
             Engine::Native => Ok(Weeded { pulses, start_cycle: 0, alarm: state != State::Work, reasons }),
@@ -464,7 +465,7 @@ fn weed(
 }
 
 impl PlotOutcome {
-    /// Adds one of the plot's rows.
+    /// Adds a row of the plot.
     fn add(&mut self, row: &RowOutcome, rows: u32) {
         self.effect += row.effect;
         self.zones += row.zones;
@@ -475,9 +476,9 @@ impl PlotOutcome {
         self.alarms += u32::from(row.alarm);
         self.moved_s += row.moved_s;
         let Effect { plants, in_plot, counted, .. } = self.effect;
-        // As many as a plot can have stand in its record.
+        // A plot's record has `u32` counts.
         let in_a_plot = |weeds: u64| u32::try_from(weeds).unwrap_or(u32::MAX);
-        // Where no weed stands on the ground that was to be counted, somebody counts the plot.
+        // If no weed stands on the counted ground, the whole plot is counted.
         let weeds = if counted.before > 0 { counted } else { in_plot };
         self.record = PlotRecord {
             weeds_before: in_a_plot(weeds.before),
@@ -490,7 +491,7 @@ impl PlotOutcome {
     }
 }
 
-/// The records of what one controller did.
+/// The records of one controller.
 pub fn records(outcomes: &[PlotOutcome], controller: Treatment) -> Vec<PlotRecord> {
     outcomes.iter().filter(|outcome| outcome.controller == controller).map(|outcome| outcome.record).collect()
 }

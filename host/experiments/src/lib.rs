@@ -1,12 +1,13 @@
-//! Studies of many rows, and what is made of them.
+//! Studies of many rows, and their evaluation.
 //!
-//! - **Field trials**: [`experiment`] has controllers weed the same plots, on the virtual Uno or as the firmware's native run, and
-//!   [`sweep`] maps a result against parameters. [`plan`] draws a trial to be weeded in a real field, [`evaluation`]
-//!   judges the plots of one, real or simulated, with the [`statistics`] that this takes, and [`page`] shows them in a browser.
-//! - **Several machines**: [`shard`] says which of a study's plots, points or runs each of them has, and puts their parts together.
-//! - **Training**: [`training`] makes the example table that the firmware carries, of labelled objects.
+//! - **Field trials**: [`experiment`] compares controllers on the same plots, on the virtual Uno or as the firmware's
+//!   native run. [`sweep`] maps a result against parameters. [`plan`] creates the plan of a real field trial.
+//!   [`evaluation`] evaluates the plots of a real or simulated trial, with [`statistics`], and [`page`] shows them in a
+//!   browser.
+//! - **Several machines**: [`shard`] divides a study's plots, points or runs between machines, and joins their parts.
+//! - **Training**: [`training`] makes the firmware's example table from labelled detections.
 //!
-//! How a single row is weeded is not here: that is for [`field`] and [`trial`].
+//! [`field`] and [`trial`] simulate the single row.
 
 pub mod evaluation;
 pub mod experiment;

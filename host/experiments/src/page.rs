@@ -1,8 +1,8 @@
-//! A trial's report as a page for a browser: one file with its charts and tables, that needs nothing beside it.
+//! A trial's report as a page for a browser: one file with its charts and tables.
 //!
-//! [`Page`] says what is on it. The charts are SVG within the page, and its colours follow the reader's choice of light
-//! or dark. It holds no script, asks no network, and comes out the same for the same trial: there is no clock in it. The
-//! words and their order are in `templates/page.html`, its looks in `templates/page.css`.
+//! [`Page`] is its content. The charts are SVG within the page. Its colours follow the reader's choice of light or
+//! dark. It has no script and sends no request. It has no clock either, so the same trial gives the same page. The
+//! texts and their order are in `templates/page.html`, and the style is in `templates/page.css`.
 
 mod chart;
 mod comparison;
@@ -23,38 +23,38 @@ use response::Chapter;
 use table::{Table, fixed, short};
 use thiserror::Error;
 
-/// One row drawn along the ground, as [`trial::picture::draw`] draws it.
+/// A picture of one row along the ground, by [`trial::picture::draw`].
 #[derive(Debug, Clone)]
 pub struct RowPicture {
     /// The drawing, as SVG.
     pub drawing: String,
-    /// What is to be seen in it, in a sentence.
+    /// Its content, in a sentence.
     pub caption: String,
 }
 
 /// A trial's report.
 #[derive(Debug, Clone)]
 pub struct Page<'a> {
-    /// What was tried, as in a heading.
+    /// The trial's title.
     pub title: &'a str,
-    /// What came out of it, in plain sentences; the first is the most important.
+    /// The results in sentences, the most important one first.
     pub summary: Vec<String>,
     /// The command line that makes the same report again.
     pub command: &'a str,
-    /// What else it takes to repeat the trial, by name: the field, its seed, the engine, the version.
+    /// The other parameters of the trial, by name: the field, its seed, the engine, the version.
     pub parameters: &'a [(String, String)],
-    /// The plots, and what follows from them.
+    /// The plots and their analysis.
     pub analysis: &'a Analysis,
-    /// Controllers side by side; a real trial has none.
+    /// Controllers side by side; `None` for a real trial.
     pub comparison: Option<&'a Comparison>,
-    /// One row of the trial; a real trial has none.
+    /// One row of the trial; `None` for a real trial.
     pub row: Option<&'a RowPicture>,
 }
 
 /// A page cannot be made.
 #[derive(Debug, Error)]
 pub enum PageError {
-    /// There is a figure that is none.
+    /// A figure is not finite.
     #[error("{what} is {value} at {speed_km_h} km/h: a report shows finite figures only")]
     NotFinite {
         /// Whose figure.
@@ -76,7 +76,7 @@ impl Page<'_> {
     /// The page as HTML, to be written to a file as it is.
     ///
     /// # Errors
-    /// Where a figure of the comparison is not finite, or plotters cannot draw.
+    /// If a figure of the comparison is not finite, or plotters cannot draw.
     pub fn html(&self) -> Result<String, PageError> {
         let comparison = self.comparison.map(Headline::of).transpose()?;
         let analysis = self.analysis;
@@ -97,7 +97,7 @@ impl Page<'_> {
     }
 }
 
-/// What the template puts on the page.
+/// The values for the template.
 #[derive(Template)]
 #[template(path = "page.html")]
 struct Sheet<'a> {
@@ -151,7 +151,7 @@ impl Headline {
 }
 
 impl Comparison {
-    /// Every figure that is shown, with whose it is and at which speed.
+    /// Checks every figure on the page, with its controller and speed.
     fn check(&self) -> Result<(), PageError> {
         let of_controllers = self.controllers.iter().flat_map(|controller| {
             controller.points.iter().flat_map(|point| {
@@ -182,7 +182,7 @@ fn by_speed(caption: &str, curves: &[(String, Vec<(f64, f64)>)]) -> Table {
     table
 }
 
-/// The simulated machine in the terms of published ones, and these.
+/// The simulated machine beside published ones, in their measures.
 fn beside_others(work: &[Work]) -> Table {
     let columns = ["machine", "crop", "sees by", "speed, km/h", "weeds gone, %", "plants damaged, %", "source"];
     let mut table = Table { is_prose: true, ..Table::new("This machine, simulated, and machines in fields", columns) };
@@ -207,7 +207,7 @@ fn beside_others(work: &[Work]) -> Table {
     table
 }
 
-/// The measures of a plot or of a treatment, and what stands above them.
+/// The measures of a plot or a treatment, as column headings.
 const MEASURES: [&str; 6] = [
     "plant damage, %",
     "weeding efficiency, %",
@@ -244,7 +244,7 @@ fn means(analysis: &Analysis) -> Table {
     table
 }
 
-/// Each plot, as it was written down and what follows from it.
+/// Each plot, with its record and its measures.
 fn plots(analysis: &Analysis) -> Table {
     let written_down = [
         "plot",

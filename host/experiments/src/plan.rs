@@ -1,15 +1,14 @@
-//! The plan of a field trial: which plot is weeded at which speed and spacing, and in which order, drawn by lot; and the table for
-//! it, in which somebody fills in by hand what was counted.
+//! The plan of a field trial: the speed, spacing and order of the plots, randomised, and the table for the counts.
 //!
-//! A block has each treatment once, in an order of its own: neighbouring plots are alike, and what differs from block to block
-//! can be told from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
+//! A block has each treatment once, in random order. Neighbouring plots are alike, so the differences between blocks
+//! can be separated from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use std::io;
 
-/// What a trial is to compare.
+/// The treatments of a trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Forward speeds, km/h.
@@ -18,11 +17,11 @@ pub struct Plan {
     pub spacings_cm: Vec<f64>,
     /// Blocks, each with every treatment once.
     pub blocks: u32,
-    /// Working width, m, and power, hp, where they are known: they go into the table.
+    /// Working width, m, and power, hp, if they are known: they go into the table.
     pub width_m: Option<f64>,
     /// See `width_m`.
     pub power_hp: Option<f64>,
-    /// Which of all the possible orders.
+    /// Selects the random order.
     pub seed: u64,
 }
 
@@ -57,10 +56,10 @@ impl Plan {
         drawn.map(planned).collect()
     }
 
-    /// Writes the table to be filled in, with `notes` above it, a line each. What is not known yet is left empty.
+    /// Writes the table to be filled in, with `notes` above it, one a line. Unknown values are left empty.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn write_csv(&self, notes: &[String], mut to: impl io::Write) -> io::Result<()> {
         for note in notes {
             writeln!(to, "# {note}")?;

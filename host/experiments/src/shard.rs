@@ -1,13 +1,12 @@
-//! A study on several machines: which of its plots, points or runs each of them computes, and how the parts that they write
-//! become the whole again.
+//! A study on several machines: which plots, points or runs each machine computes, and how their parts are joined.
 //!
-//! A study numbers what it computes from 0. Each of these has random numbers of its own, from the seed and its number.
-//! Shard I of N has every Nth, from the Ith on, so that each has some of what is quick and of what takes long. A part is
-//! lines of JSON: a [`Header`] that says what decides the study's result, then each outcome with its number. Numbers
-//! are written such that the same bits are read. [`together`] holds parts against each other, and [`outcomes`] puts
-//! them in order; from there on it does not matter where they were computed.
+//! A study numbers its outcomes from 0. Each has its own random numbers, from the seed and its number. Shard I of N has
+//! every Nth outcome, from the Ith on, so that quick and slow ones are distributed evenly. A part is lines of JSON: a
+//! [`Header`] with everything that decides the study's result, then each outcome with its number. Numbers are written
+//! so that exactly the same bits are read. [`together`] compares the parts, and [`outcomes`] sorts them. From there on
+//! the result does not depend on the machines.
 //!
-//! Nothing here computes, opens files or starts anything: who runs the shards is the user's scheduler.
+//! This module computes nothing, opens no files and starts no programs: the user's scheduler runs the shards.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -17,13 +16,13 @@ use std::io::{self, BufRead, Write};
 use std::str::FromStr;
 use thiserror::Error;
 
-/// The form of a part; another one gets the next number.
+/// The format version of a part. A change of the format increments it.
 const FORM: u32 = 1;
 
 /// Most shards of a study.
 pub const MOST_SHARDS: u64 = 100_000;
 
-/// Missing parts that an error names one by one.
+/// The most missing parts that an error lists by number.
 const MOST_NAMED: usize = 8;
 
 /// A share of a study's plots, points or runs.
@@ -44,7 +43,7 @@ impl Shard {
     /// All of a study.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
-    /// What it computes of so many plots, points or runs: their numbers, from 0, going up.
+    /// The numbers of its plots, points or runs, ascending from 0.
     pub fn numbers(self, all: u64) -> impl ExactSizeIterator<Item = u64> {
         let count = all.saturating_sub(self.number - 1).div_ceil(self.of);
         // A range of u64 does not know its length.
@@ -69,38 +68,38 @@ impl fmt::Display for Shard {
     }
 }
 
-/// The program that computes: two that are the same give the same outcomes.
+/// The program that computes. Equal programs give equal outcomes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Program {
     /// Its version.
     pub version: String,
-    /// What tells its builds apart, such as a check sum.
+    /// Distinguishes its builds, such as a checksum.
     pub build: String,
 }
 
-/// What a part says of itself.
+/// The first line of a part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
-    /// The form of what follows: [`FORM`].
+    /// The format version: [`FORM`].
     weeder_part: u32,
     /// Who computed it.
     pub program: Program,
     /// The command, such as `trial`.
     pub command: String,
-    /// Which of the parts it is.
+    /// The part's shard.
     pub shard: Shard,
     /// How many plots, points or runs the whole study has.
     pub all: u64,
-    /// All else that decides the study's result.
+    /// All other inputs of the study's result.
     pub settings: Value,
 }
 
-/// A part of a study, as it was read.
+/// A part of a study, after reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part<T> {
-    /// Where it is from: its file's name.
+    /// Its file's name.
     pub name: String,
-    /// What it says of itself.
+    /// Its header.
     pub header: Header,
     /// The outcomes of its shard, by their numbers.
     pub outcomes: Vec<Numbered<T>>,
@@ -131,7 +130,7 @@ pub enum PartError {
     NoPart {
         /// The file.
         name: String,
-        /// What is wrong with its first line.
+        /// The problem of its first line.
         problem: String,
     },
     /// Another program wrote it.
@@ -173,7 +172,7 @@ pub enum PartError {
     /// Shards are not there.
     #[error("{missing} missing: name all parts of the study, or compute what is missing by --shard")]
     Missing {
-        /// Which ones, with a verb.
+        /// The missing parts, with a verb.
         missing: String,
     },
     /// A line of it is wrong.
@@ -197,16 +196,16 @@ impl fmt::Display for Program {
 }
 
 impl Header {
-    /// That of a shard of a study of `all` plots, points or runs.
+    /// The header of a shard of a study with `all` plots, points or runs.
     pub fn new(program: Program, command: &str, shard: Shard, all: u64, settings: Value) -> Self {
         Self { weeder_part: FORM, program, command: command.to_owned(), shard, all, settings }
     }
 }
 
-/// Writes a part, a line each: the header, and the outcomes as they come.
+/// Writes a part, line by line: the header, and the outcomes in their order.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write<T: Serialize>(
     header: &Header,
     outcomes: impl IntoIterator<Item = Numbered<T>>,
@@ -224,7 +223,7 @@ pub fn write<T: Serialize>(
 /// Reads the first line of a part, called `name`.
 ///
 /// # Errors
-/// Where it cannot be read, or is something else.
+/// If it cannot be read, or is something else.
 pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header, PartError> {
     let no_part = |problem: String| PartError::NoPart { name: name.to_owned(), problem };
     let mut line = Vec::new();
@@ -233,7 +232,7 @@ pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header, PartErr
     if line.is_empty() {
         return Err(no_part("it is empty".to_owned()));
     }
-    // Where the parser stopped says nothing to a user who named the wrong file.
+    // The parser's position would not help a user who named the wrong file.
     let value: Value = serde_json::from_slice(&line)
         .map_err(|_| no_part("line 1 is not the head of a part, or was cut".to_owned()))?;
     match value.get("weeder_part").and_then(Value::as_u64) {
@@ -249,13 +248,13 @@ pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header, PartErr
     Ok(header)
 }
 
-/// Longest header that is read, in bytes: what is no part may have no end of a line.
+/// Longest header, in bytes: a file that is no part may have an endless line.
 const MOST_HEADER: u64 = 1 << 24;
 
 /// Reads the outcomes of a part behind its header: all of them, in the order of their numbers.
 ///
 /// # Errors
-/// Where it cannot be read, a line is wrong, or one is missing or too many.
+/// If it cannot be read, a line is wrong, or one is missing or too many.
 pub fn read_outcomes<T: DeserializeOwned>(
     name: &str,
     header: Header,
@@ -285,11 +284,10 @@ pub fn read_outcomes<T: DeserializeOwned>(
     }
 }
 
-/// Whether parts, each with its name, make one whole study that this program computed.
+/// Checks that parts, each with its name, make one whole study that this program computed.
 ///
 /// # Errors
-/// The first thing that is wrong: a part of another program, of another study, one that is there twice, or those that are
-/// missing.
+/// The first problem: a part of another program or another study, a part that occurs twice, or missing parts.
 pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<(), PartError> {
     let Some((first_name, first)) = parts.first() else {
         return Err(PartError::Missing { missing: "all parts are".to_owned() });
@@ -331,14 +329,14 @@ pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<(), PartEr
     }
 }
 
-/// All outcomes in the order of their numbers, of parts that are [`together`].
+/// All outcomes in the order of their numbers. The parts must have passed [`together`].
 pub fn outcomes<T>(parts: Vec<Part<T>>) -> Vec<T> {
     let mut outcomes: Vec<Numbered<T>> = parts.into_iter().flat_map(|part| part.outcomes).collect();
     outcomes.sort_by_key(|outcome| outcome.number);
     outcomes.into_iter().map(|outcome| outcome.outcome).collect()
 }
 
-/// Where two values differ first: the place within them, behind `place`, and what stands there.
+/// The first difference of two values: its path, below `place`, and both values.
 fn difference(place: &str, theirs: &Value, ours: &Value) -> Option<(String, String, String)> {
     let (theirs_fields, ours_fields) = match (theirs, ours) {
         _ if theirs == ours => return None,
@@ -347,7 +345,7 @@ fn difference(place: &str, theirs: &Value, ours: &Value) -> Option<(String, Stri
     };
     let mut pairs = theirs_fields.iter().zip(ours_fields.values());
     pairs.find_map(|((name, theirs), ours)| {
-        // What stands in the settings has names enough.
+        // Paths within the settings need no prefix.
         let place = if place == "settings" { name.clone() } else { format!("{place}.{name}") };
         difference(&place, theirs, ours)
     })

@@ -1,7 +1,8 @@
 //! Sweeps: a result of the experiment as a function of one or two of its parameters.
 //!
 //! An axis is a speed, a plant spacing, a parameter of the conditions or a setting of the firmware, with its values
-//! ([`Axis`]). At each point the firmware's native run weeds a plot, always the same ground for the same conditions.
+//! ([`Axis`]). At each point the firmware's native run weeds a plot. The ground is always the same for the same
+//! conditions.
 
 use crate::experiment::{Engine, Experiment, ExperimentError, PlotOutcome, Treatment};
 use crate::shard::{Numbered, Shard};
@@ -21,7 +22,7 @@ pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
 /// Most values of an axis.
 const MOST_VALUES: usize = 1000;
 
-/// A parameter and the values that it takes.
+/// A parameter and its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// `speed` in km/h, `spacing` in cm, or a name that [`Conditions::set`] takes.
@@ -36,7 +37,7 @@ pub enum AxisError {
     /// It has another form.
     #[error("`{0}` has to be NAME=FROM..TO:STEP, as lead_out_ms=0..300:20")]
     Form(String),
-    /// It never ends, or has too many values.
+    /// It does not ascend, or has too many values.
     #[error("`{0}` has to go up, in steps above 0, with at most {MOST_VALUES} values")]
     Range(String),
 }
@@ -58,13 +59,13 @@ impl FromStr for Axis {
         if step <= 0.0 || !(0.0..MOST_VALUES as f64).contains(&steps) {
             return Err(AxisError::Range(text.to_owned()));
         }
-        // Three decimals are kept, so that 0.1 + 0.2 is 0.3.
+        // Rounded to three decimals, so that 0.1 + 0.2 is 0.3.
         let values = (0..=steps as u32).map(|index| ((from + f64::from(index) * step) * 1e3).round() / 1e3).collect();
         Ok(Self { parameter, values })
     }
 }
 
-/// What a point of a sweep came to.
+/// The results of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Results {
     /// Plants damaged, % (Eq. 23).
@@ -73,7 +74,7 @@ pub struct Results {
     pub weeding_efficiency_percent: f64,
     /// Ground of the row that was weeded, %.
     pub in_row_weeding_percent: f64,
-    /// The most of it that the servo allows with every canopy and its margin kept, %.
+    /// The largest share that the servo allows with every canopy and margin kept, %.
     pub in_row_bound_percent: f64,
     /// Field efficiency, % (Eq. 24).
     pub field_efficiency_percent: f64,
@@ -84,7 +85,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// What they are called, in the order of [`Results::values`].
+    /// Their names, in the order of [`Results::values`].
     pub const NAMES: [&str; 7] = [
         "plant_damage",
         "weeding_efficiency",
@@ -112,7 +113,7 @@ impl Results {
         let performance = outcome.record.performance();
         Self {
             plant_damage_percent: performance.plant_damage_percent,
-            // Of all weeds: a square metre's scatter would hide what is swept.
+            // Of all weeds: the scatter of a square metre would hide the effect.
             weeding_efficiency_percent: outcome
                 .effect
                 .in_plot
@@ -138,11 +139,11 @@ pub struct Sweep {
     pub controller: Treatment,
     /// What does not vary.
     pub conditions: Conditions,
-    /// Speed where no axis has it, km/h.
+    /// Speed if no axis has it, km/h.
     pub speed_km_h: f64,
-    /// Plant spacing where no axis has it, cm.
+    /// Plant spacing if no axis has it, cm.
     pub spacing_cm: f64,
-    /// Which of all the possible fields.
+    /// Selects the random fields.
     pub seed: u64,
 }
 
@@ -157,7 +158,7 @@ pub struct Point {
     pub results: Results,
 }
 
-/// Where a point is, and what is tried there.
+/// A point's values, and its conditions.
 struct Place {
     x: f64,
     y: Option<f64>,
@@ -173,7 +174,7 @@ pub enum SweepError {
     /// Both axes have the same parameter.
     #[error("both axes are `{0}`: the second one needs a parameter of its own")]
     Twice(String),
-    /// Speed or spacing are none that a machine works at.
+    /// Speed or spacing is out of range.
     #[error("{name} is {value}, but has to be {least} to {greatest} {unit}")]
     Treatment {
         /// Which of both.
@@ -198,10 +199,10 @@ pub enum SweepError {
 }
 
 impl Sweep {
-    /// Weeds a plot at each point, the first axis running fastest. `progress` is told the share done, from 0 to 1.
+    /// Weeds a plot at each point. The first axis varies fastest. `progress` gets the completed share, from 0 to 1.
     ///
     /// # Errors
-    /// Before anything is weeded where an axis has a value that cannot be; else the first that a plot meets.
+    /// A wrong value of an axis, before anything is weeded; else the first error in a plot.
     pub fn run(&self, progress: impl Fn(f64) + Sync) -> Result<Vec<Point>, SweepError> {
         let outcomes = self.run_shard(Shard::WHOLE, progress)?;
         self.points(&outcomes.into_iter().map(|point| point.outcome).collect::<Vec<_>>())
@@ -238,7 +239,7 @@ impl Sweep {
     /// The points, of what came of all their plots.
     ///
     /// # Errors
-    /// Where an axis has a value that cannot be.
+    /// If an axis has a value that cannot be.
     pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>, SweepError> {
         let point = |(place, outcome): (&Place, &PlotOutcome)| {
             let results = Results::of(outcome, place.experiment.conditions.plot.rows);
@@ -247,7 +248,7 @@ impl Sweep {
         Ok(self.places()?.iter().zip(outcomes).map(point).collect())
     }
 
-    /// Where all points are, the first axis running fastest.
+    /// All points. The first axis varies fastest.
     fn places(&self) -> Result<Vec<Place>, SweepError> {
         if let Some(y) = self.y.as_ref().filter(|y| y.parameter == self.x.parameter) {
             return Err(SweepError::Twice(y.parameter.clone()));
@@ -258,7 +259,7 @@ impl Sweep {
         places.map(|(x, y)| Ok(Place { x, y, experiment: self.at(x, y)? })).collect()
     }
 
-    /// A place on the axes, in words.
+    /// A point's values, in words.
     fn describe(&self, place: &Place) -> String {
         let second = self.y.as_ref().zip(place.y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
         format!("{} = {}{}", self.x.parameter, place.x, second.unwrap_or_default())

@@ -1,11 +1,11 @@
-//! Learning to tell plants from tall weeds: from labelled objects to the example table that the firmware carries.
+//! Training of the classifier: from labelled detections of plants and tall weeds to the firmware's example table.
 //!
-//! [`table`] reads objects with their labels from CSV files, and [`synthetic`] meets some on simulated rows. [`train`]
-//! makes the table of them, [`condense`] chooses the few that it holds, and [`Confusion`] counts who was taken for whom.
-//! [`listing`] writes a table down as Rust or CSV, and [`regions`] draws what it decides.
+//! [`table`] reads labelled detections from CSV files, and [`synthetic`] gets some from simulated rows. [`train`] makes
+//! the table. [`condense`] chooses its few examples, and [`Confusion`] counts the errors. [`listing`] writes a table as
+//! Rust or CSV, and [`regions`] draws its decisions.
 //!
-//! Everything is decided by the crate `knn` on the same bytes as on the machine, so that what is measured here holds
-//! there. The training chooses among what the crate offers (scale, radius, k, examples) and knows no other classifier.
+//! The crate `knn` makes all decisions, on the same bytes as on the machine. So measurements here are valid there. The
+//! training selects among the options of that crate (scale, radius, k, examples), and has no other classifier.
 
 pub mod condense;
 mod confusion;
@@ -32,10 +32,10 @@ use thiserror::Error;
 /// Most examples that the firmware's flash budget has room for.
 pub const MOST_EXAMPLES: usize = examples::CAPACITY;
 
-/// Most examples where nobody asks for more: enough for the simulated field, and each makes the search longer.
+/// Default maximum of examples. It suffices for the simulated field, and each example makes the search longer.
 pub const DEFAULT_MOST_EXAMPLES: usize = 64;
 
-/// What the training learned, and how well.
+/// The result of a training, with its accuracy.
 #[derive(Clone, Debug)]
 pub struct Training {
     /// The values of each feature that map onto 0 and 255.
@@ -46,11 +46,11 @@ pub struct Training {
     pub k: u8,
     /// Objects that Wilson's rule took out.
     pub edited_out: usize,
-    /// The table: the objects that were kept as examples.
+    /// The table: the detections that were chosen as examples.
     pub kept: Vec<Labelled>,
-    /// All objects, each classified by all others.
+    /// All detections, each classified by all others.
     pub leave_one_out: Confusion,
-    /// All objects, classified by the table.
+    /// All detections, classified by the table.
     pub by_table: Confusion,
 }
 
@@ -62,7 +62,7 @@ impl Training {
     }
 }
 
-/// Why there is nothing to be learned, and what would help.
+/// Why no training is possible, and what would help.
 #[derive(Debug, Error, PartialEq)]
 pub enum TrainingError {
     /// No objects at all.
@@ -76,13 +76,13 @@ pub enum TrainingError {
     TooFew {
         /// Objects given.
         objects: usize,
-        /// Examples that are to vote.
+        /// Number of voting examples.
         k: u8,
     },
-    /// k is not one that the classifier takes.
+    /// k is out of the classifier's range.
     #[error("k is {0}: it has to be 1 to {MAX_K}")]
     KOutOfRange(u8),
-    /// The few examples would cut plants that all objects together spare.
+    /// The few examples would cut plants that all detections together spare.
     #[error(
         "with a vote of {k}, so few examples cut {} that all objects together spare: choose a smaller --k",
         counted(plants, "plant")
@@ -90,7 +90,7 @@ pub enum TrainingError {
     Outvoted {
         /// Examples that vote.
         k: u8,
-        /// Plants cut by the table, beyond those that all objects cut.
+        /// Plants cut by the table, in addition to those that all detections cut.
         plants: usize,
     },
     /// The table would not fit.
@@ -98,23 +98,27 @@ pub enum TrainingError {
     TooMany(#[from] TooMany),
 }
 
-/// An object is a stranger when it is farther from every example than nearly all objects are from their nearest fellow:
-/// the share that is nearly all, and how much farther, as a factor of the squared distance (twice as far).
+/// A detection is a stranger if it is farther from every example than nearly all detections are from their nearest
+/// neighbour of the same class. These are the share that is nearly all, and the factor of the squared distance (twice
+/// as far).
 const FELLOW_QUANTILE: f64 = 0.99;
 const FELLOW_FACTOR: u32 = 4;
 
-/// Nor may the radius reach more than half way to the other class (a quarter of the squared distance), for nearly all.
+/// For nearly all detections, the radius must also not exceed half the distance to the other class (a quarter of the
+/// squared distance).
 const ENEMY_QUANTILE: f64 = 0.01;
 const ENEMY_DIVISOR: u32 = 4;
 
-/// Learns from objects, and condenses them to at most `most` examples.
+/// Trains from detections, and condenses them to at most `most` examples.
 ///
-/// - **Scale**: [`Scale::learn_ranges`] of all objects.
-/// - **Radius**: four times the 99 % quantile of the squared distances from each object to the nearest other of its
-///   class, but at most a quarter of the 1 % quantile of those to the nearest of the other class. Noise does not count.
-/// - **k**, where none is given: each odd k is tried by leaving one object out and asking all others. The best has the
-///   fewest plants taken for weeds, then the fewest weeds taken for plants, then the fewest plants unknown. Among
-///   equals the smallest from 3 on wins: with a k of 1 a single object with a wrong label decides.
+/// - **Scale**: [`Scale::learn_ranges`] of all detections.
+/// - **Radius**: four times the 99 % quantile of the squared distances from each detection to the nearest other of its
+///   class. It is at most a quarter of the 1 % quantile of the distances to the nearest of the other class. Noise does
+///   not count.
+/// - **k**, if none is given: each odd k is tried by leaving one detection out and classifying it by all others. The
+///   best k has the fewest plants classified as weeds, then the fewest weeds classified as plants, then the fewest
+///   unknown plants. Among equals the smallest from 3 on wins: with a k of 1 a single detection with a wrong label
+///   decides.
 /// - **Examples**: see [`condense`].
 ///
 /// # Errors
@@ -168,19 +172,20 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     }
 }
 
-/// Examples that are taught in the field, beside the built-in ones.
+/// Examples to teach in the field, in addition to the built-in ones.
 #[derive(Clone, Debug)]
 pub struct Beside {
     /// The objects that were chosen.
     pub chosen: Vec<Labelled>,
-    /// All objects, classified by the built-in examples alone.
+    /// All detections, classified by the built-in examples alone.
     pub before: Confusion,
-    /// All objects, classified by both together.
+    /// All detections, classified by both together.
     pub after: Confusion,
 }
 
-/// Chooses at most `most` of the objects to be taught beside the built-in table, on its scale and with its radius and k: so that no
-/// plant is taken for a weed, and as many weeds as can be are known ([`condense::beside`]).
+/// Chooses at most `most` of the detections to teach in addition to the built-in table, on its scale and with its
+/// radius and k. No plant may be classified as a weed, and as many weeds as possible are recognised
+/// ([`condense::beside`]).
 ///
 /// # Errors
 /// [`TrainingError::NoObjects`] and [`TrainingError::TooMany`].
@@ -198,7 +203,8 @@ pub fn beside(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Beside
     Ok(Beside { chosen: chosen.into_iter().map(|index| objects[index]).collect(), before, after })
 }
 
-/// The radius, from the distances between objects of one class and of both, of those whose places are `edited`.
+/// The radius, from the distances between detections of one class and of both. `edited` has the indices of those that
+/// are no noise.
 fn learn_radius(examples: &[Example<COUNT>], edited: &[usize]) -> u32 {
     let distances = |of_one_class: bool| {
         let nearest = |&index: &usize| {
@@ -211,17 +217,17 @@ fn learn_radius(examples: &[Example<COUNT>], edited: &[usize]) -> u32 {
     };
     let near = quantile(distances(true), FELLOW_QUANTILE).map_or(0, |distance| distance * FELLOW_FACTOR);
     let far = quantile(distances(false), ENEMY_QUANTILE).map_or(u32::MAX, |distance| distance / ENEMY_DIVISOR);
-    // Rounding to bytes moves an object by up to one in each feature: that alone makes no stranger.
+    // Rounding to bytes moves a detection by up to one in each feature. That alone must not make a stranger.
     near.min(far).max(COUNT as u32)
 }
 
-/// The value that a share of all does not exceed; `None` of nothing.
+/// The value that a share of all does not exceed; `None` without values.
 fn quantile(mut values: Vec<u32>, share: f64) -> Option<u32> {
     values.sort_unstable();
     values.get((values.len() as f64 * share) as usize).copied()
 }
 
-/// Each object classified by all others.
+/// Each detection classified by all others.
 fn leave_one_out(examples: &[Example<COUNT>], objects: &[Labelled], k: u8, radius: u32) -> Confusion {
     let class = |index| answer_of_others(examples, index, k, radius).map_or(Class::Unknown, |answer| class_of(&answer));
     objects.iter().enumerate().map(|(index, object)| (object.kind, class(index))).collect()

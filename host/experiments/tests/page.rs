@@ -1,4 +1,4 @@
-//! The page of a trial, as a browser and a reader get it.
+//! Tests of a trial's page, in a browser's and a reader's view.
 
 use expect_test::expect;
 use experiments::evaluation::{Analysis, PlotRecord};
@@ -8,7 +8,7 @@ use field::budget::{Budget, Part, Reason};
 use field::{Machine, Motion};
 use roxmltree::{Document, Node, ParsingOptions};
 
-/// Four speeds, two spacings, three replications, with damage that grows with speed where `damages` says so.
+/// Four speeds, two spacings, three replications. With `damages`, damage grows with speed.
 fn trial(damages: bool) -> Analysis {
     let mut records = Vec::new();
     for replication in 1..=3 {
@@ -56,7 +56,7 @@ fn comparison() -> Comparison {
     }
 }
 
-/// A metre of row, of which so much was weeded; three tenths are a canopy, and the rest went to swings.
+/// One metre of row: `weeded_mm` of it weeded, 300 mm of canopy, and the rest lost to swings.
 fn work(speed_km_h: f64, weeded_mm: f64) -> Work {
     let machine = Machine::default();
     let motion = Motion::steady(machine.beam_to_tool_mm, 1e9, 1000.0, machine.beam_to_tool_mm + 1000.0);
@@ -78,7 +78,7 @@ fn row() -> RowPicture {
     RowPicture { drawing: drawing.to_string(), caption: "Three plants & a weed".to_owned() }
 }
 
-/// A page with everything on it.
+/// A page with all parts.
 fn full_page() -> String {
     let parameters = [("seed".to_owned(), "7".to_owned()), ("engine".to_owned(), "native".to_owned())];
     let (analysis, comparison, row) = (trial(true), comparison(), row());
@@ -120,7 +120,7 @@ fn parse(xml: &str) -> Document<'_> {
     Document::parse_with_options(xml, ParsingOptions { allow_dtd: true, ..Default::default() }).unwrap()
 }
 
-/// What a reader reads in an element.
+/// The visible text of an element.
 fn text(node: Node) -> String {
     node.descendants().filter(Node::is_text).filter_map(|text| text.text()).collect()
 }
@@ -247,7 +247,7 @@ fn models_stand_beside_what_the_paper_printed() {
             assert!(text(page.root_element()).contains(contradiction), "{contradiction}");
         }
     }
-    // The equation of the weeding efficiency says the opposite of its text.
+    // The equation of the weeding efficiency contradicts its text.
     let chapter = page
         .descendants()
         .filter(|node| node.has_tag_name("section"))

@@ -1,7 +1,7 @@
-//! The statistics of a trial agree with R's, and say in words what the plots cannot tell.
+//! The statistics of a trial: they agree with R's, and report in words what the plots do not allow.
 //!
-//! The reference values were printed by R 4.2.2 with `options(digits = 15)`; the lines of R stand above each test. The
-//! responses are invented.
+//! R 4.2.2 printed the reference values with `options(digits = 15)`. The lines of R are above each test. The responses
+//! are invented.
 
 use experiments::statistics::{AnalysisOfVariance, Checks, Design, LinearModel, NoModel, Remark, Source};
 use rand::{RngExt, SeedableRng};
@@ -195,7 +195,7 @@ fn a_treatment_without_plots_takes_a_degree_of_freedom_from_the_interaction() {
     assert_eq!(analysis.remarks, [Remark::Unbalanced]);
 }
 
-/// What the model and the analysis of variance of a trial are refused for.
+/// The errors of the model and of the analysis of variance.
 fn refusals(plots: &[(f64, f64)], values: &[f64]) -> (Option<NoModel>, Option<NoModel>) {
     let design = Design::new(plots.iter().copied());
     (LinearModel::fit(&design, values).err(), AnalysisOfVariance::of(&design, values).err())
@@ -245,7 +245,7 @@ fn a_factor_that_does_not_vary_is_left_out_and_the_reader_is_told() {
         let model = LinearModel::fit(&design, &values).unwrap();
         assert_eq!(model.terms.iter().map(|term| term.name).collect::<Vec<_>>(), ["constant", left]);
         assert_eq!(model.remarks, [remark]);
-        // By hand: the means are 1.5 and 4, so that 6.25 goes with the factor and 2.5 is left.
+        // By hand: the means are 1.5 and 4, so the factor has 6.25 and the residual 2.5.
         let analysis = AnalysisOfVariance::of(&design, &values).unwrap();
         assert_eq!(analysis.remarks, [remark]);
         assert_close(analysis.source(left).unwrap().sum_of_squares, 6.25);
@@ -269,7 +269,7 @@ fn plots_without_scatter_have_estimates_but_no_tests() {
 }
 
 #[test]
-fn whatever_was_left_of_a_trial_no_figure_is_infinite_or_none() {
+fn every_part_of_a_trial_gives_finite_figures() {
     let mut chance = ChaCha8Rng::seed_from_u64(1);
     let (mut modelled, mut analysed) = (0, 0);
     for _ in 0..5000 {

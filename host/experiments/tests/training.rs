@@ -1,4 +1,4 @@
-//! The training: what it learns from simulated rows, what it makes of noise, and what it says to tables that are wrong.
+//! Tests of the training: on simulated rows, on noise, and on wrong tables.
 
 use control::ground::examples::{EXAMPLES, K};
 use control::ground::features::{Features, SPEED_CLASSES_MM_S};
@@ -18,7 +18,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// Plants that may be taken for weeds, and weeds for plants, as shares of all.
+/// Allowed shares of plants classified as weeds, and of weeds classified as plants.
 const PLANTS_CUT: f64 = 0.001;
 const WEEDS_SPARED: f64 = 0.01;
 
@@ -73,7 +73,7 @@ fn the_simulated_field_has_every_speed_slip_missing_plants_and_weeds_everywhere(
         assert!(is(Kind::Weed, &|features| features.speed_mm_s == speed && features.spacing_mm < 120), "{speed}");
         assert!(is(Kind::Weed, &|features| features.speed_mm_s == speed && features.spacing_mm > 700), "{speed}");
     }
-    // 650 mm is the widest spacing that was planted, and 180 mm of canopy are 280 mm of hold.
+    // 650 mm is the widest planted spacing, and 180 mm of canopy are 280 mm of hold.
     assert!(is(Kind::Plant, &|features| features.spacing_mm > 800), "a plant behind one that is missing");
     assert!(is(Kind::Plant, &|features| features.hold_mm > 281), "a wheel that drags counts more than it rolled");
     let widest_weed = objects.iter().filter(|object| object.kind == Kind::Weed).map(|object| object.features.hold_mm);
@@ -186,13 +186,13 @@ fn the_picture_has_a_panel_for_each_speed_and_a_ring_for_each_example() {
     let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
     let drawn = regions::draw(&training, &objects).to_string();
     assert_eq!(drawn.matches("km/h").count(), 2);
-    // The legend has one circle more.
+    // The legend has one more circle.
     assert_eq!(drawn.matches("<circle").count(), objects.len() + training.kept.len() + 1);
 }
 
 const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
 
-/// What reading files with these texts says; they are called 0.csv, 1.csv and so on.
+/// The result of reading files with these texts. Their names are 0.csv, 1.csv and so on.
 fn read_text(texts: &[&str]) -> Result<Vec<Labelled>, String> {
     let (folder, paths) = files(texts);
     let lesson = read_labelled(&paths).map(|lesson| lesson.objects);

@@ -1,7 +1,7 @@
-//! How far figures may be off, and the binomial model of counts: both as R has them.
+//! Intervals of figures and the binomial model of counts: both agree with R.
 //!
-//! The reference values were printed by R 4.2.2 with `options(digits = 15)`; the lines of R stand above each test. The
-//! counts are invented.
+//! R 4.2.2 printed the reference values with `options(digits = 15)`. The lines of R are above each test. The counts are
+//! invented.
 
 use experiments::statistics::{BinomialModel, Design, Mean, NoModel, OddsTerm, Remark, Share};
 
@@ -190,7 +190,7 @@ fn counts_that_carry_no_binomial_model_are_refused_with_a_reason() {
     };
     assert_eq!(model(&with(|_, _| 0)), Err(NoModel::Constant { value: 0.0 }));
     assert_eq!(model(&with(|_, of| of)), Err(NoModel::Constant { value: 100.0 }));
-    // All plants at the highest speed, and none at any other: the steeper the slope, the better it fits.
+    // All plants at the highest speed, and none at any other: the steeper the slope, the better the fit.
     assert_eq!(model(&with(|speed, of| if speed > 2.0 { of } else { 0 })), Err(NoModel::OneSided));
     let one_speed: Vec<_> = paper_plots().into_iter().filter(|((speed, _), _)| *speed == 2.5).collect();
     assert_eq!(model(&one_speed).unwrap().remarks, [Remark::OneSpeed]);

@@ -1,16 +1,18 @@
-//! Other controllers for the same field, to hold the firmware against: the paper's, and one that knows everything.
+//! Baselines for the same field: the paper's controller, and an ideal controller.
 //!
-//! The paper's sketch was never published. [`as_in_the_paper`] is what its text describes, in the kindest reading: one slot holds
-//! the place at which to swing out and the place at which to come back (Eq. 1 to 3), a loop polls beam and encoder, nothing is
-//! led, and the Arduino's servo library shows a new pulse in the next frame. It measures the next canopy while the slot is
-//! still in use, closes the gaps in a canopy as the firmware does, and takes no weed for a plant.
+//! The paper's sketch was never published. [`as_in_the_paper`] follows its text, in the most favourable reading. One
+//! slot holds the position to swing out and the position to come back (Eq. 1 to 3). A loop polls beam and encoder, and
+//! nothing leads. The Arduino's servo library shows a new pulse in the next frame. The controller measures the next
+//! canopy while the slot is still in use. It closes the gaps in a canopy as the firmware does, and takes no weed for a
+//! plant.
 //!
-//! Where the beam stands nearer to the tool than a canopy is wide, it is late for another reason than its authors knew.
+//! If the distance from beam to tool is shorter than a canopy, it is late for a further reason, which its authors did
+//! not know.
 //!
-//! [`ideal`] knows where each stem stands and what the servo may take: it has the tool out over the zones round
-//! the stems, by the servo's slowest swing, and in the row everywhere else. Nobody could keep a plant that it damages. It is no
-//! bound: it allows for the slowest swing each time, and keeps the whole length of a zone that is round. The bound is
-//! [`crate::optimum`]. Both have the machine of the [`Trial`], with the same servo.
+//! [`ideal`] knows every stem and the servo's slowest swing. It has the tool out over the zones round the stems, timed
+//! for that swing, and in the row everywhere else. No controller can save a plant that it damages. It is no upper
+//! bound: it allows for the slowest swing each time, and keeps the whole length of a round zone. The upper bound is
+//! [`crate::optimum`]. Both baselines use the machine and the servo of the [`Trial`].
 
 use crate::budget::{Part, Reason, Reasons, part_of};
 use crate::ground::union;
@@ -23,25 +25,26 @@ use control::operate::servo;
 use std::ops::Range;
 use uno::Pulse;
 
-/// A turn of the paper's loop: `Arduino_KNN` takes 92,309 cycles for 32 examples, measured on the Uno.
+/// A turn of the paper's loop, in seconds: `Arduino_KNN` takes 92,309 cycles for 32 examples, measured on the Uno.
 const PAPER_TURN_S: f64 = 92_309.0 / 16e6;
 
-/// Ground that the paper leaves alone on both sides of a canopy.
+/// The paper's margin on both sides of a canopy.
 const PAPER_MARGIN_MM: f64 = 50.0;
 
 /// Clear stretches shorter than this belong to the canopy: the firmware's default.
 const GAP_MM: f64 = 21.0;
 
-/// Objects narrower than this are no plants: half way between the built-in examples' widest weed and narrowest plant.
+/// Detections narrower than this are no plants: half way between the built-in examples' widest weed and narrowest
+/// plant.
 const NARROWEST_PLANT_MM: f64 = 60.0;
 
-/// A turn of the loop that knows everything.
+/// A turn of the ideal controller's loop, in seconds.
 const TURN_S: f64 = 0.001;
 
 /// Shortest gap between two servo pulses, the firmware's default; 0 for fixed frames.
 const SERVO_GAP_MS: u8 = 3;
 
-/// What a baseline did.
+/// The result of a baseline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weeded {
     /// The first of the servo's pulses of each width.
@@ -95,7 +98,7 @@ pub fn as_in_the_paper(trial: &Trial) -> Weeded {
     Weeded { pulses, reasons: reasons.until(motion.duration_s()) }
 }
 
-/// Whoever knows where each stem stands weeds the trial's row.
+/// The ideal controller weeds the trial's row.
 pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
     let Trial { machine, motion, .. } = trial;
     let Servo { dead_time_ms, scatter, out_us, .. } = machine.servo;
@@ -106,7 +109,7 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
     let passed_s = |place_mm: f64| Some(motion.passings(place_mm + machine.beam_to_tool_mm).next()?.time_s);
     let zones =
         union(stems.iter().map(|stem| stem.along_mm - stem.protected_mm..stem.along_mm + stem.protected_mm).collect());
-    // What is neither a zone nor weeded is lost to swings.
+    // Ground that is neither a zone nor weeded is lost to swings.
     let mut reasons = vec![Reason { times_s: 0.0..motion.duration_s(), part: Part::Swings }];
     reasons.extend(
         zones.iter().filter_map(|zone| {
@@ -117,7 +120,7 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
         .into_iter()
         .filter_map(|zone| Some(passed_s(zone.start)? - slowest_s..passed_s(zone.end)? - quickest_s))
         .collect();
-    // A tool that has no time to be in the row and out again stays out.
+    // If there is no time to swing in and out again, the tool stays out.
     let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
     let out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).collect();
     Weeded { pulses: swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, out_during(out_s)), reasons }
@@ -138,8 +141,9 @@ fn out_during(times_s: Vec<Range<f64>>) -> impl FnMut(f64) -> (bool, f64) {
     }
 }
 
-/// A loop that has the tool out whenever `is_out` at the time of a turn says so, which also says before which time it says nothing
-/// else: turns until then are passed over, once the line shows it. It begins in the row.
+/// A loop that has the tool out while `is_out` says so at the time of a turn. `is_out` also returns the time until
+/// which its answer stays the same. The turns until then are skipped, once the line shows the answer. The tool begins
+/// in the row.
 fn swing(
     trial: &Trial,
     servo: Servo,
@@ -191,7 +195,7 @@ mod tests {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let machine = Machine::default();
             let trial = Trial::at_speed(row.clone(), machine, Timing::default(), rng.random_range(200.0..1500.0));
-            // From less than a turn to many frames, and some that begin with a turn.
+            // Times from less than a turn to many frames. Some begin with a turn.
             let mut time_s = 0.0;
             let out_s: Vec<Range<f64>> = (0..40)
                 .map(|_| {
@@ -211,13 +215,13 @@ mod tests {
     }
 
     #[test]
-    fn who_knows_everything_has_the_tool_out_over_whatever_zone_is_to_be_kept() {
+    fn the_ideal_controller_has_the_tool_out_over_every_zone() {
         for speed_km_h in [1.0, 1.5, 2.0, 2.5, 3.0] {
             let reached = |protected_mm: f64| {
                 let stems = PLACES.map(|along_mm| Stem { along_mm, across_mm: 0.0, protected_mm, is_seen: true });
                 reached_by(|trial| ideal(trial, &stems), speed_km_h)
             };
-            // As wide as the canopy, and narrower.
+            // Stroke as wide as the canopy, and narrower.
             assert_eq!(reached(75.0), 0, "at {speed_km_h} km/h");
             assert_eq!(reached(40.0), PLACES.len(), "at {speed_km_h} km/h");
         }

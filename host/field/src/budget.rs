@@ -1,13 +1,13 @@
-//! The loss budget: where a row's ground goes. Its parts add up to the whole row.
+//! The loss budget: how a row's ground divides into weeded ground and losses. Its parts add up to the whole row.
 //!
-//! A controller hands over why it kept the tool out, over the time of the trial ([`Reason`]); the tool's path says what was weeded all
-//! the same ([`Budget::of`]). Ground that was weeded is [`Part::Weeded`], whatever the controller thought of it. The rest belongs
-//! to the reason that held when the tool passed it. Ground that the controller had open and the tool did not weed is
-//! [`Part::Swings`]: dead time, travel, and the lead that waits for both.
+//! A controller records its reason for keeping the tool out, over the time of the trial ([`Reason`]). The tool's path
+//! shows which ground was weeded ([`Budget::of`]). Weeded ground is [`Part::Weeded`], for any reason of the controller.
+//! Other ground belongs to the reason that held when the tool passed it. If the controller had the ground open and the
+//! tool did not weed it, the ground is [`Part::Swings`]: dead time, travel, and the lead that waits for both.
 //!
-//! A zone is the one that the controller kept: a stem zone where it keeps that, else a whole canopy. Whether a plant stands in it, the
-//! row says ([`part_of`]): what was kept for a weed, for dust or for something unknown is [`Part::Weeds`], with its margins. Ground
-//! that was passed several times belongs to the first part, in the order of [`Part::ALL`].
+//! A zone is the controller's own keep-out zone: a stem zone if it uses stem zones, else a whole canopy. The row tells
+//! whether a plant stands in it ([`part_of`]). A zone round a weed, dust or an unknown detection is [`Part::Weeds`],
+//! with its margins. Ground that was passed several times belongs to the first part, in the order of [`Part::ALL`].
 
 use crate::ground::{share_of, union};
 use crate::machine::Machine;
@@ -16,7 +16,7 @@ use crate::row::{Kind, Row};
 use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Div, Index, Range};
 
-/// What became of a stretch of the row.
+/// The parts of a row's ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// The tool worked the row's line.
@@ -25,7 +25,7 @@ pub enum Part {
     Plants,
     /// The margins of these zones.
     Margins,
-    /// What was kept for something that is no crop plant, with its margins.
+    /// The zone round a detection that is no crop plant, with its margins.
     Weeds,
     /// Ground that was guarded because a plant was expected, with its margins.
     Guarded,
@@ -71,17 +71,18 @@ impl Part {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Budget([f64; Part::ALL.len()]);
 
-/// Why a controller did as it did for some time.
+/// A controller's reason, for some time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
-    /// When.
+    /// The time.
     pub times_s: Range<f64>,
-    /// To what that puts the ground down which the tool passed meanwhile without weeding it.
+    /// The part that gets the ground which the tool passed in this time without weeding it.
     pub part: Part,
 }
 
 impl Budget {
-    /// That of a row over whose ground `weeded_mm` the tool worked, a union; the reasons are those of the whole motion.
+    /// The budget of one row. `weeded_mm` is a union of the ground that the tool worked. The reasons cover the whole
+    /// motion.
     pub fn of(
         span_mm: &Range<f64>,
         weeded_mm: &[Range<f64>],
@@ -110,8 +111,8 @@ impl Budget {
         Part::ALL.into_iter().zip(self.0)
     }
 
-    /// Each part in tenths of a percent, rounded so that they add up to 1000: what was weeded to the nearest, as everywhere; of the
-    /// others the largest remainders are rounded up.
+    /// Each part in tenths of a percent, rounded so that they add up to 1000. Weeded ground is rounded to the nearest.
+    /// Of the other parts those with the largest remainders are rounded up.
     pub fn tenths(&self) -> [(Part, u32); Part::ALL.len()] {
         let exact = self.0.map(|share| (1000.0 * share).max(0.0));
         let mut tenths = exact.map(|tenths| tenths as u32);
@@ -124,7 +125,7 @@ impl Budget {
         Part::ALL.map(|part| (part, tenths[index.next().unwrap_or_default()]))
     }
 
-    /// The part, other than what was weeded, to which most ground went: with its share.
+    /// The largest part except weeded ground, with its share.
     pub fn largest_loss(&self) -> (Part, f64) {
         let losses = self.shares().filter(|(part, _)| *part != Part::Weeded);
         losses.fold((Part::Closed, 0.0), |most, loss| if loss.1 > most.1 { loss } else { most })
@@ -153,8 +154,8 @@ impl Div<f64> for Budget {
     }
 }
 
-/// The part of a zone that a controller keeps over some ground: a crop plant's, or else. A slipping wheel has the zone beside what
-/// it is kept for, so the nearest middle decides; a zone over a plant's middle is the plant's in any case.
+/// The part for a controller's zone: a crop plant's, or not. A slipping wheel puts the zone beside its detection, so
+/// the nearest middle decides. A zone over a plant's middle is always the plant's.
 pub fn part_of(zone_mm: &Range<f64>, row: &Row) -> Part {
     let middle_mm = (zone_mm.start + zone_mm.end) / 2.0;
     let nearest_mm = |places_mm: &mut dyn Iterator<Item = f64>| {
@@ -167,12 +168,12 @@ pub fn part_of(zone_mm: &Range<f64>, row: &Row) -> Part {
     if is_over_plant || to_plant_mm <= nearest_mm(&mut of(Kind::Weed).chain(dust)) { Part::Plants } else { Part::Weeds }
 }
 
-/// Reasons as they are found, turn by turn: those of the same part become one.
+/// Collects reasons, turn by turn. Successive reasons for the same part are joined.
 #[derive(Clone, Debug, Default)]
 pub struct Reasons(Vec<Reason>);
 
 impl Reasons {
-    /// From `time_s` on, and until another one comes, it is this.
+    /// Sets the part from `time_s` on, until the next call.
     #[inline]
     pub fn turn_to(&mut self, part: Part, time_s: f64) {
         if self.0.last().is_some_and(|last| last.part == part) {
@@ -184,7 +185,7 @@ impl Reasons {
         self.0.push(Reason { times_s: time_s..f64::INFINITY, part });
     }
 
-    /// All of them, the last one until a motion ends.
+    /// All reasons. The last one holds until `end_s`.
     pub fn until(mut self, end_s: f64) -> Vec<Reason> {
         if let Some(last) = self.0.last_mut() {
             last.times_s.end = end_s;
@@ -233,9 +234,9 @@ mod tests {
         let row = row.with_dust(vec![1300.0..1302.0]);
         let part = |zone_mm: Range<f64>| part_of(&zone_mm, &row);
         assert_eq!(part(905.0..1055.0), Part::Plants);
-        // The weed's, 20 mm early: nearer to the canopy than to the weed.
+        // The weed's zone, 20 mm early: nearer to the canopy than to the weed.
         assert_eq!(part(1082.0..1098.0), Part::Weeds);
-        // Canopy and weed are one: the middle is nearer to the weed.
+        // Canopy and weed as one detection: its middle is nearer to the weed.
         assert_eq!(part(995.0..1125.0), Part::Plants);
         assert_eq!(part(1290.0..1292.0), Part::Weeds);
         assert_eq!(part(1470.0..1480.0), Part::Plants);

@@ -1,10 +1,11 @@
 //! The conditions of a field trial: plot, crop, weeds, ground, driving, sensors, machine and firmware settings.
 //!
-//! One table gives each parameter's name, default, range, meaning and where its number comes from; TOML files, sweeps and the
-//! report's list of parameters follow from it. A file names what differs from the default, and so do the presets. No public
-//! data of places of crop plants in a row, in millimetres, was found: scatter and shares are assumed, and say so.
+//! One table gives each parameter's name, default, range, meaning and source. TOML files, sweeps and the report's list
+//! of parameters follow from it. A file lists only values that differ from the default, and so do the presets. No
+//! public data of plant positions in a row, in millimetres, was found. So scatter and shares are assumed, and the table
+//! says so.
 //!
-//! What the conditions do is not here: [`crate::stand`] grows plants and weeds, [`crate::driving`] rolls.
+//! [`crate::stand`] and [`crate::driving`] apply the conditions.
 
 mod errors;
 mod parameters;
@@ -23,10 +24,10 @@ use std::io;
 use std::path::Path;
 
 impl Conditions {
-    /// Those of a preset, or of a file, whose text `read` gives.
+    /// The conditions of a preset, or of a file. `read` returns the file's text.
     ///
     /// # Errors
-    /// Where it is neither, or something in the file is wrong: with the line.
+    /// If the name is neither a preset nor a readable file, or if the file is wrong; then with the line.
     pub fn load(preset_or_file: &str, read: impl FnOnce(&Path) -> io::Result<String>) -> Result<Self, ConditionsError> {
         let path = Path::new(preset_or_file);
         match Self::preset(preset_or_file) {
@@ -39,7 +40,7 @@ impl Conditions {
         }
     }
 
-    /// Those of a preset; none where it has another name.
+    /// The conditions of a preset. `None` if there is no such preset.
     pub fn preset(name: &str) -> Option<Result<Self, ConditionsError>> {
         let (preset, text) = PRESETS.iter().find(|(preset, _)| *preset == name)?;
         Some(Self::parse(Path::new(preset), text))
@@ -66,7 +67,7 @@ impl Conditions {
             (name.to_owned(), value, least, greatest, meaning.to_owned())
         });
         for (name, value, least, greatest, meaning) in parameters {
-            // A number that is none is in no range.
+            // NaN is in no range.
             if !(least..=greatest).contains(&value) {
                 return Err(WrongValue::OutOfRange { name, value, least, greatest, meaning });
             }
@@ -124,10 +125,10 @@ impl Conditions {
         Err(WrongValue::OutOfRange { name: NAME.to_owned(), value: second_beam_mm, least, greatest, meaning })
     }
 
-    /// Changes a parameter, named `table.key`, or a setting of the firmware, named as the firmware does.
+    /// Changes a parameter, named `table.key`, or a setting of the firmware, by the firmware's name.
     ///
     /// # Errors
-    /// Where there is no such name, or the value is out of its range.
+    /// If the name is unknown, or the value is out of range.
     pub fn set(&mut self, parameter: &str, value: f64) -> Result<(), WrongValue> {
         let whole = || {
             let not_whole = || WrongValue::NotWhole { name: parameter.to_owned(), value };
@@ -152,12 +153,12 @@ impl Conditions {
         Ok(())
     }
 
-    /// The machine, whose servo and encoder are the `seed`'s of all the possible ones.
+    /// The machine. The seed selects its servo's and encoder's random deviations.
     pub fn machine(&self, seed: u64) -> Machine {
         let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, tool_width_mm, .. } = self.machine;
         let Mechanism { dead_time_ms, dead_time_scatter_ms, travel_ms, load_kg_cm, stall_kg_cm, .. } = self.machine;
         let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
-        // The stroke is what the firmware is told of it.
+        // The stroke follows from the firmware's settings.
         let default = Servo::default();
         let in_us = self.setting_or(Setting::ServoInUs, default.in_us);
         let out_us = self.setting_or(Setting::ServoOutUs, default.out_us);
@@ -174,7 +175,7 @@ impl Conditions {
         }
     }
 
-    /// Margin, leads and zone that the firmware is told.
+    /// The firmware's margin, leads and stem zone.
     pub fn timing(&self) -> Timing {
         let of = |setting: Setting| self.setting_or(setting, setting.description().default.into()) as u32;
         Timing {
@@ -190,7 +191,7 @@ impl Conditions {
         self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
     }
 
-    /// The firmware's settings beside those of machine and timing.
+    /// The firmware's other settings, without those from machine and timing.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let timing = [Setting::MarginMm, Setting::LeadOutMs, Setting::LeadInMs];
         self.settings
@@ -272,9 +273,9 @@ mod tests {
     fn every_parameter_can_be_set_to_the_ends_of_its_range_and_not_beyond() {
         for parameter in PARAMETERS {
             let mut conditions = Conditions::default();
-            // Without sweeps, which are in the way of many an extreme.
+            // Without sweeps: they contradict many extreme values.
             conditions.set("machine.sweeps_a_side", 0.0).unwrap();
-            // As far as a second beam lets the first stand ahead.
+            // The longest distance that a second beam allows.
             conditions.set("machine.beam_to_tool_mm", SLIPPING_BEAM_TO_TOOL_MM.into()).unwrap();
             for end in [parameter.least, parameter.greatest] {
                 if parameter.name == "machine.sweeps_a_side" && end > 0.0 {

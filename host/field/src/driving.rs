@@ -1,7 +1,9 @@
-//! How a person drives a row: speed that wanders, stops on the way, a wheel that slips, and a machine that strays from the line.
+//! A driver's motion along a row: speed varies, the machine stops, the wheel slips, and the machine strays from the
+//! line.
 //!
-//! The row begins after a run-up, in which the machine gains its speed and the tool enters the ground, and ends when the tool
-//! has passed it. A turn at the row's end takes a way, at the working speed, and some time beside that: it is a number, not a motion.
+//! The row begins after a run-up, in which the machine accelerates and the tool enters the ground. It ends when the
+//! tool has passed it. A turn at the headland takes a distance at working speed, and some extra time. It is a number,
+//! not a motion.
 
 use crate::conditions::Conditions;
 use crate::motion::{Motion, mm_s};
@@ -14,7 +16,7 @@ use std::ops::Range;
 const ACCELERATION_MM_S2: f64 = 500.0;
 const BRAKING_MM_S2: f64 = 1000.0;
 
-/// Distance over which speed and slip stay as they are, beside what changing the speed takes.
+/// Distance of constant speed and slip, without the distance for changing the speed.
 const LEG_MM: Range<f64> = 1000.0..2000.0;
 
 /// Distance and time ahead of the row in which the machine rolls at its speed and the tool swings in.
@@ -24,7 +26,7 @@ const SWING_IN_S: f64 = 0.6;
 /// Distance that the tool rolls on behind the row.
 const RUN_OUT_MM: f64 = 300.0;
 
-/// A stop takes its mean time within this share.
+/// Scatter of a stop's time, as a share of its mean.
 const STOP_SCATTER: f64 = 0.5;
 
 /// A row, driven.
@@ -36,20 +38,20 @@ pub struct Drive {
     pub row_s: f64,
     /// How long the turn behind it takes.
     pub turn_s: f64,
-    /// Where the machine is across the row.
+    /// The machine's position across the row.
     pub steering: Steering,
 }
 
-/// Drives the ground of a row at a mean speed.
+/// The drive along a row at a mean speed.
 pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng: &mut impl Rng) -> Drive {
     let Conditions { ground, driving, machine, .. } = conditions;
     let wander = |rng: &mut _| mm_s(speed_km_h) * (1.0 + scatter(rng, driving.speed_scatter_percent / 100.0));
     let fastest_mm_s = mm_s(speed_km_h) * (1.0 + driving.speed_scatter_percent / 100.0);
-    // To gain the highest speed and to lose it.
+    // The distance to reach the highest speed and to stop from it.
     let change_mm = fastest_mm_s.powi(2) * (0.5 / ACCELERATION_MM_S2 + 0.5 / BRAKING_MM_S2);
     let speed_mm_s = wander(rng);
     let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
-    // No braking before the tool is out of the row.
+    // The machine does not brake before the tool is out of the row.
     let braking_mm = fastest_mm_s.powi(2) * 0.5 / BRAKING_MM_S2;
     let end_mm = span_mm.end + machine.beam_to_tool_mm + RUN_OUT_MM + braking_mm;
     let mut motion = Motion::starting_at(span_mm.start - run_up_mm).change_speed(speed_mm_s, ACCELERATION_MM_S2);

@@ -1,17 +1,19 @@
-//! The simulated field: what stands in the row, the machine that rolls past it, who weeds it, and what became of each plant.
+//! The simulated field: the row, the machine that rolls past it, the controllers that weed it, and the result for each
+//! plant.
 //!
-//! - **The row**: [`row`] says what stands in it, [`planting`] grows one by chance, [`ground`] counts which ground is covered. Under
-//!   some [`conditions`], [`stand`] grows what beam and tools meet, [`sight`] says what a beam sees of it, [`driving`] rolls through it
-//!   and [`steering`] off its line.
-//! - **The machine**: [`motion`] is how it rolls, [`machine`] turns motion and row into levels on the Uno's pins, [`servo`] is
-//!   what pulses do to the tool, and [`wiring`] says which pin is wired to what. In a [`rolling`] machine they are joined, for as long
-//!   as it rolls.
-//! - **Who weeds**: a [`trial`] is a row, a machine and the firmware's settings. The [`native`] run weeds it by the firmware's own decisions,
-//!   compiled for the host, and its [`baselines`] are models.
-//! - **What became of it**: [`verdict`] judges canopies and margins, [`tool_path`] counts stems and weeds, and [`optimum`] says what no
-//!   controller can do better.
+//! - **The row**: [`row`] is its content, [`planting`] grows a random one, and [`ground`] measures covered ground.
+//!   Under some [`conditions`], [`stand`] grows everything that beam and tools meet. [`sight`] calculates what a beam
+//!   sees, [`driving`] rolls along the row, and [`steering`] strays from its line.
+//! - **The machine**: [`motion`] is its motion. [`machine`] converts motion and row into levels on the Uno's pins.
+//!   [`servo`] converts pulses into the tool's angle. [`wiring`] assigns wires to pins. A [`rolling`] machine joins
+//!   these parts, without an end.
+//! - **The controllers**: a [`trial`] is a row, a machine and the firmware's settings. The [`native`] run weeds it by
+//!   the firmware's own decisions, compiled for the PC. The [`baselines`] are models.
+//! - **The result**: [`verdict`] judges canopies and margins, [`tool_path`] counts stems and weeds, and [`optimum`] is
+//!   the upper bound for every controller.
 //!
-//! The firmware's ELF is not run here, and no file is opened: texts are given, and the crate is at home in a browser as well.
+//! This crate does not run the firmware's ELF and opens no file: the caller passes texts. It also compiles for a
+//! browser.
 
 pub mod baselines;
 pub mod budget;

@@ -1,15 +1,15 @@
 //! The machine between row and firmware: wheel, encoder, beam, servo, arm and tool.
 //!
-//! The machine's position `p` is a place along the row: the beam sees the ground at `p`, and the tool works the ground at
-//! `p` less the distance from beam to tool. Rolling along a [`Motion`] past a [`Row`], the machine gives the firmware the
-//! levels of its encoder and its beam as a list of [`PinChange`]s. The motion does not depend on what the firmware does,
-//! so the list is complete before the firmware runs.
+//! The machine's position `p` is a distance along the row. The beam sees the ground at `p`. The tool works the ground
+//! at `p` less the distance from beam to tool. While the machine rolls along a [`Motion`] past a [`Row`], it gives the
+//! firmware the levels of encoder and beam as a list of [`PinChange`]s. The motion does not depend on the firmware, so
+//! the list is complete before the firmware runs.
 //!
 //! The arm swings sideways about a pivot beside the row. At an angle `a` the tool's middle is `arm * sin(a)` beside the
-//! row's line, so the tool works the line while that is less than half its width. It is *clear* of the row only when it is
-//! fully out: that is the strict measure by which a trial judges plants, since canopies reach sideways as well.
+//! row's line. So the tool works the line while that is less than half its width. It is *clear* of the row only when it
+//! is fully out. A trial uses this strict measure for plants, because canopies also reach sideways.
 //!
-//! The encoder has no jitter; where its disc is dirty, pulses of its channel A are missing.
+//! The encoder has no jitter. If its disc is dirty, pulses of its channel A are missing.
 
 use crate::motion::{Motion, marks};
 use crate::row::Row;
@@ -35,7 +35,7 @@ pub struct Machine {
     pub second_beam_mm: f64,
     /// Time after which the beam's sensor reports a change. A change that lasts less is not reported.
     pub beam_response_ms: f64,
-    /// Diameter of the beam: its sensor reports it broken while more than half of it is. 0 is a line.
+    /// Diameter of the beam; 0 is a line. Its sensor reports it broken while more than half of it is covered.
     pub beam_mm: f64,
     /// The servo.
     pub servo: Servo,
@@ -49,12 +49,12 @@ pub struct Machine {
     pub dirt: Dirt,
 }
 
-/// Dirt that hides slots of the encoder's disc from channel A, by chance: a hidden pulse loses four counts.
+/// Dirt that hides random slots of the encoder's disc from channel A. A hidden pulse loses four counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dirt {
     /// Share of the pulses that are hidden, from 0 to 1.
     pub share: f64,
-    /// Which of all the possible discs.
+    /// Selects the random disc.
     pub seed: u64,
 }
 
@@ -62,8 +62,8 @@ pub struct Dirt {
 pub const PULSE_TICKS: i64 = 4;
 
 impl Dirt {
-    /// Whether pulse number `pulse` is hidden: always the same ones for the same seed. It is asked for each pulse of a row, so
-    /// its chance is a quick one.
+    /// Whether pulse number `pulse` is hidden: always the same pulses for the same seed. The hash is a quick one,
+    /// because each pulse of a row calls it.
     pub fn hides(&self, pulse: i64) -> bool {
         self.share > 0.0
             && Xoshiro256PlusPlus::seed_from_u64(self.seed ^ pulse.cast_unsigned())
@@ -101,7 +101,7 @@ impl Machine {
         position_mm - self.beam_to_tool_mm
     }
 
-    /// Counts of a clean encoder, net, from the beginning of a motion to a time.
+    /// Net counts of a clean encoder, from the beginning of a motion to a time.
     pub fn ticks(&self, motion: &Motion, time_s: f64) -> i64 {
         marks(motion.wheel_mm(time_s) - motion.start_mm(), self.tick_mm())
     }
@@ -111,18 +111,18 @@ impl Machine {
         clean_ticks.div_euclid(PULSE_TICKS)
     }
 
-    /// Counts that are missing so far of the hidden pulse in which a clean encoder is: while A is hidden, B alone counts one back
-    /// and then one forward.
+    /// Missing counts within the hidden pulse at this count of a clean encoder. While A is hidden, B alone counts one
+    /// back and then one forward.
     pub fn hidden_in_pulse(&self, clean_ticks: i64) -> i64 {
         [0, 1, 3, 4][clean_ticks.rem_euclid(PULSE_TICKS) as usize]
     }
 
-    /// How far the tool's middle is beside the row's line at an angle.
+    /// Distance of the tool's middle from the row's line at an angle.
     pub fn across_mm(&self, degrees: f64) -> f64 {
         self.arm_mm * degrees.to_radians().sin()
     }
 
-    /// Angle from which on the tool no longer works the row's line.
+    /// The angle beyond which the tool no longer works the row's line.
     pub fn line_degrees(&self) -> f64 {
         (self.tool_width_mm / 2.0 / self.arm_mm).min(1.0).asin().to_degrees()
     }
@@ -168,7 +168,7 @@ impl Machine {
         self.has_second_beam().then(|| self.level_before(wiring::SECOND_BEAM, self.second_beam_mm, row, motion))
     }
 
-    /// The level of a beam that stands so far behind the first.
+    /// The level of a beam `behind_mm` behind the first.
     fn level_before(&self, pin: Pin, behind_mm: f64, row: &Row, motion: &Motion) -> PinChange {
         let ground_mm = motion.start_mm() - behind_mm;
         let broken = self.seen_mm(row.blocks_mm()).iter().any(|block| block.contains(&ground_mm));
@@ -180,7 +180,8 @@ impl Machine {
         self.second_beam_mm > 0.0
     }
 
-    /// The stretches over which the sensor has the beam broken by these leaves, a [`union`](crate::ground::union).
+    /// The stretches over which the sensor reports the beam as broken by these leaves, a
+    /// [`union`](crate::ground::union).
     pub(crate) fn seen_mm(&self, leaves_mm: Vec<Range<f64>>) -> Vec<Range<f64>> {
         half_covered(leaves_mm, self.beam_mm)
     }
@@ -201,8 +202,8 @@ impl Machine {
         self.encoder_changes_since(&mut 0, 0.0, motion, start_cycle)
     }
 
-    /// As above, in the pieces of the motion that begin at a time or later. `ticks` are the counts of a clean encoder before them,
-    /// and then behind them.
+    /// As above, for the pieces of the motion that begin at a time or later. `ticks` is the count of a clean encoder
+    /// before them, and is updated to the count after them.
     pub(crate) fn encoder_changes_since(
         &self,
         ticks: &mut i64,
@@ -238,7 +239,7 @@ impl Machine {
         before.map_or_else(Vec::new, |before| self.changes(before, self.second_beam_mm, row, motion, start_cycle))
     }
 
-    /// What a beam that stands so far behind the first does to its pin, which was at a level before.
+    /// The pin changes of a beam `behind_mm` behind the first. `before` is its level at the start.
     fn changes(
         &self,
         before: PinChange,
@@ -252,7 +253,7 @@ impl Machine {
     }
 }
 
-/// The sensor of a beam: it reports what passes the beam, each change later by its response.
+/// The sensor of a beam: it reports each change with a delay, its response.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensor {
     /// Its pin, with the level that it has reported last.
@@ -260,17 +261,18 @@ pub(crate) struct Sensor {
     /// How far it stands behind the first.
     pub behind_mm: f64,
     response_s: f64,
-    /// When the beam changed, where that is not reported yet.
+    /// Time of a change that is not reported yet.
     changed_s: Option<f64>,
 }
 
 impl Sensor {
-    /// One that stands so far behind the first, and has reported this before the motion begins.
+    /// A sensor `behind_mm` behind the first. `before` is the level that it has reported before the motion begins.
     pub(crate) fn new(machine: &Machine, before: PinChange, behind_mm: f64) -> Self {
         Self { last: before, behind_mm, response_s: machine.beam_response_ms / 1000.0, changed_s: None }
     }
 
-    /// What it reports during a time while the pieces of the motion that begin then roll past these leaves.
+    /// The reported changes during a time, while the pieces of the motion that begin in this time roll past these
+    /// leaves.
     pub(crate) fn changes(
         &mut self,
         leaves_mm: &[Range<f64>],
@@ -293,7 +295,7 @@ impl Sensor {
         };
         for time_s in changes_s {
             match self.changed_s.take() {
-                // It had not yet reported the change that this one takes back.
+                // This change cancels one that was not reported yet.
                 Some(changed_s) if time_s - changed_s < self.response_s => continue,
                 Some(changed_s) => report(&mut self.last, changed_s + self.response_s),
                 None => {}
@@ -376,7 +378,7 @@ mod tests {
         };
         assert!((60..160).contains(&missing(clean)), "{} of {clean}", missing(clean));
         assert_eq!(decode(&changes), clean - missing(clean));
-        // Half way as well, wherever in a pulse that is.
+        // Also half way, at any phase of a pulse.
         for passing in motion.mark_passings(machine.tick_mm()).iter().skip(600).take(200) {
             let so_far = changes.iter().filter(|change| change.cycle <= cycle_at(START_CYCLE, passing.time_s));
             let ticks = machine.ticks(&motion, passing.time_s + 1e-7);

@@ -1,17 +1,16 @@
-//! How the machine rolls: its position in millimetres as an exact function of time.
+//! The motion of the machine: its position in millimetres as an exact function of time.
 //!
-//! A [`Motion`] is a chain of pieces of constant acceleration, put together one manoeuvre after the other: stand, change
-//! speed, roll to a place, stop at a place, roll back. Each piece keeps its direction, so the moment at which a place is
-//! passed follows from one quadratic equation and no time step is involved: the edges of an encoder come out at their
-//! exact times.
+//! A [`Motion`] is a chain of pieces of constant acceleration. Each call appends a manoeuvre: stand, change speed, roll
+//! to a position, stop at a position, roll back. A piece does not change its direction. So the time at which it passes
+//! a position follows from one quadratic equation, without time steps, and the edges of an encoder are exact.
 //!
-//! A driven wheel turns farther than the machine rolls: its slip is the share of the wheel's way that is lost. Below 0 it is that
-//! of a dragged wheel that skids, and turns less far. Each piece of the motion may have its own ([`Motion::with_slip`], or
-//! [`Motion::slipping`] from some time on).
+//! A driven wheel turns farther than the machine rolls. Its slip is the share of the wheel's distance that is lost. A
+//! dragged wheel that skids turns less far, and has a slip below 0. Each piece of the motion may have its own slip
+//! ([`Motion::with_slip`], or [`Motion::slipping`] from some time on).
 //!
-//! A motion that is not decided yet is cut where it is to become another one ([`Motion::until`]), and what follows is put behind it.
+//! A motion that is not decided yet is cut at a time ([`Motion::until`]), and new pieces are appended.
 //!
-//! It knows no machine: what position 0 means is the user's choice.
+//! It knows no machine: the user defines position 0.
 
 use std::ops::Range;
 
@@ -29,7 +28,7 @@ pub struct Passing {
     pub forward: bool,
 }
 
-/// The machine's position as a function of time, see the module's words.
+/// The machine's position as a function of time: see the module.
 #[derive(Clone, Debug)]
 pub struct Motion {
     start_mm: f64,
@@ -37,7 +36,8 @@ pub struct Motion {
     end_s: f64,
     end_mm: f64,
     end_speed_mm_s: f64,
-    /// Where the wheel's rim is at the end, and how far it turns while the machine rolls a millimetre from there on.
+    /// The position of the wheel's rim at the end, and how far it turns from there on for each millimetre of the
+    /// machine.
     wheel_end_mm: f64,
     wheel_mm_a_mm: f64,
 }
@@ -51,7 +51,8 @@ struct Piece {
     end_mm: f64,
     speed_mm_s: f64,
     acceleration_mm_s2: f64,
-    /// Where the wheel's rim is when the piece begins, and how far it turns while the machine rolls a millimetre.
+    /// The position of the wheel's rim at the piece's beginning, and how far it turns for each millimetre of the
+    /// machine.
     wheel_start_mm: f64,
     wheel_mm_a_mm: f64,
 }
@@ -62,8 +63,8 @@ impl Piece {
         self.start_mm + self.speed_mm_s * t + self.acceleration_mm_s2 * t * t / 2.0
     }
 
-    /// When the piece reaches a place between its ends. The form of the quadratic's root that adds two terms of one sign
-    /// stays exact for small accelerations as well as from standstill.
+    /// The time at which the piece reaches a position between its ends. This form of the quadratic's root adds two
+    /// terms of one sign. So it stays exact for small accelerations and from standstill.
     fn time_at(&self, place_mm: f64) -> f64 {
         let distance_mm = place_mm - self.start_mm;
         if distance_mm == 0.0 {
@@ -80,7 +81,7 @@ impl Piece {
         self.wheel_start_mm + (place_mm - self.start_mm) * self.wheel_mm_a_mm
     }
 
-    /// The place at which the wheel's rim is at `wheel_mm`.
+    /// The machine's position when the wheel's rim is at `wheel_mm`.
     fn place_at(&self, wheel_mm: f64) -> f64 {
         self.start_mm + (wheel_mm - self.wheel_start_mm) / self.wheel_mm_a_mm
     }
@@ -105,17 +106,17 @@ impl Motion {
         Self::starting_at(start_mm).change_speed(speed_mm_s, acceleration_mm_s2).roll_to(end_mm)
     }
 
-    /// Goes on at the speed reached for a time: stands, where the machine stood.
+    /// Continues at the current speed for a time. A standing machine stands.
     pub fn go_on_for(self, duration_s: f64) -> Self {
         let end_mm = self.end_mm + self.end_speed_mm_s * duration_s;
         let speed_mm_s = self.end_speed_mm_s;
         self.then(duration_s, 0.0, end_mm, speed_mm_s)
     }
 
-    /// Changes to a speed, negative for rolling back, with an acceleration whose sign does not matter.
+    /// Changes to a speed, negative for rolling back. The sign of the acceleration does not matter.
     ///
     /// # Panics
-    /// With an acceleration of 0: the speed would never be reached.
+    /// If the acceleration is 0: the speed would never be reached.
     pub fn change_speed(self, speed_mm_s: f64, acceleration_mm_s2: f64) -> Self {
         assert!(acceleration_mm_s2 != 0.0, "a change of speed needs an acceleration");
         if self.end_speed_mm_s * speed_mm_s < 0.0 {
@@ -128,10 +129,10 @@ impl Motion {
         self.then(duration_s, acceleration_mm_s2, end_mm, speed_mm_s)
     }
 
-    /// Rolls on at the speed reached until `place_mm`.
+    /// Rolls on at the current speed until `place_mm`.
     ///
     /// # Panics
-    /// Where the machine does not roll towards the place.
+    /// If the machine does not roll towards this position.
     pub fn roll_to(self, place_mm: f64) -> Self {
         let duration_s = (place_mm - self.end_mm) / self.end_speed_mm_s;
         assert!(
@@ -147,7 +148,7 @@ impl Motion {
     /// Rolls on, brakes in time and stands at `place_mm`.
     ///
     /// # Panics
-    /// Where the place is nearer than the braking distance.
+    /// If the position is nearer than the braking distance.
     pub fn stop_at(self, place_mm: f64, acceleration_mm_s2: f64) -> Self {
         let braking_mm = (self.end_speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2.abs())).copysign(self.end_speed_mm_s);
         self.roll_to(place_mm - braking_mm).change_speed(0.0, acceleration_mm_s2)
@@ -190,18 +191,18 @@ impl Motion {
         Self { end_s: time_s, end_mm, end_speed_mm_s, wheel_end_mm, ..self }
     }
 
-    /// What follows has the wheel lose this share of its way, below 1.
+    /// In the pieces that follow, the wheel loses this share of its distance, below 1.
     pub fn slipping(self, share: f64) -> Self {
         Self { wheel_mm_a_mm: 1.0 / (1.0 - share), ..self }
     }
 
-    /// The same motion without what was over before a time: of those times nothing may be asked any more.
+    /// Removes the pieces that ended before a time. Later calls must not ask for those times.
     pub fn forget(&mut self, time_s: f64) {
         self.pieces.drain(..self.pieces.partition_point(|piece| piece.end_s <= time_s));
     }
 
-    /// Makes one of its last two pieces where the machine rolled, or stood, alike in both: who adds to a motion again and again for hours
-    /// does not fill the memory.
+    /// Joins the last two pieces if their motion is alike. So a motion that is extended for hours does not fill the
+    /// memory.
     pub fn join(&mut self) {
         let [.., before, last] = self.pieces.as_mut_slice() else { return };
         let alike = |piece: &Piece| (piece.speed_mm_s, piece.acceleration_mm_s2, piece.wheel_mm_a_mm);
@@ -211,7 +212,7 @@ impl Motion {
         }
     }
 
-    /// What there is of it from a time on, as a motion of its own whose time begins there. Its wheel does not slip.
+    /// The motion from a time on, as its own motion with time 0 there. Its wheel does not slip.
     pub fn since(&self, time_s: f64) -> Self {
         let first = self.pieces.partition_point(|piece| piece.end_s <= time_s);
         self.pieces[first..].iter().fold(Self::starting_at(self.position_mm(time_s)), |motion, piece| {
@@ -225,7 +226,7 @@ impl Motion {
         })
     }
 
-    /// The same motion of a machine whose wheel slips: `slip` is asked for the share of the wheel's way that is lost, below 1,
+    /// The same motion with a slipping wheel: `slip` returns the share of the wheel's distance that is lost, below 1,
     /// for each piece in turn.
     pub fn with_slip(mut self, mut slip: impl FnMut() -> f64) -> Self {
         let mut wheel_mm = self.start_mm;
@@ -257,7 +258,7 @@ impl Motion {
         self.end_s
     }
 
-    /// How far the machine rolls from the end on while a point on the wheel's rim moves by a millimetre.
+    /// Distance of the machine for each millimetre of the wheel's rim, from the end on.
     pub fn ground_mm_a_wheel_mm(&self) -> f64 {
         1.0 / self.wheel_mm_a_mm
     }
@@ -271,7 +272,7 @@ impl Motion {
         }
     }
 
-    /// Where a point on the wheel's rim is, counted as if it had rolled on the ground without slip.
+    /// Position of a point on the wheel's rim, as if it had rolled on the ground without slip.
     pub fn wheel_mm(&self, time_s: f64) -> f64 {
         match self.piece_at(time_s) {
             Some(piece) => piece.wheel_mm(piece.position_mm(time_s)),
@@ -314,7 +315,7 @@ impl Motion {
 
     /// As [`passings`](Self::passings), in the pieces that begin at a time or later.
     pub fn passings_since(&self, place_mm: f64, from_s: f64) -> impl Iterator<Item = Passing> + Clone {
-        // A place belongs to what lies ahead of it: it is passed forward on arrival and backward on leaving, so that a
+        // A position belongs to the stretch ahead of it. It is passed forward on arrival and backward on leaving. So a
         // machine that stops on it exactly and turns has passed it twice, not once.
         let is_past = move |position_mm: f64| position_mm >= place_mm;
         self.pieces_since(from_s)
@@ -339,7 +340,7 @@ impl Motion {
             .collect()
     }
 
-    /// The edges of a wheel that is divided into marks `pitch_mm` apart: each mark's passing, in order of time.
+    /// The edges of a wheel with marks `pitch_mm` apart: each mark's passing, in order of time.
     ///
     /// The motion begins half way between two marks.
     pub fn mark_passings(&self, pitch_mm: f64) -> Vec<Passing> {
@@ -375,10 +376,10 @@ impl Motion {
     }
 }
 
-/// A motion as somebody sees it who goes along: asked for one time after the other, it need not search for the piece.
+/// A cursor on a motion, for times that ascend: it does not search for the piece each time.
 #[derive(Clone, Debug)]
 pub struct Course<'a> {
-    /// The piece of the last time asked for, those behind it, and behind all of them the machine that stands.
+    /// The piece of the last call, the pieces after it, and at the end the standing machine.
     piece: Piece,
     to_come: std::slice::Iter<'a, Piece>,
     end: Piece,
@@ -401,7 +402,8 @@ impl<'a> Course<'a> {
         Self { piece: *to_come.next().unwrap_or(&end), to_come, end }
     }
 
-    /// Of each of these times, makes [`Motion::wheel_mm`]. They are in ascending order, from 0 and the last one asked for on.
+    /// Replaces each of these times by [`Motion::wheel_mm`]. They must ascend, and start at 0 or at the last time of
+    /// the previous call.
     #[inline]
     pub fn roll(&mut self, times_s: &mut [f64]) {
         let mut rest = times_s;
@@ -410,7 +412,7 @@ impl<'a> Course<'a> {
                 self.piece = *self.to_come.next().unwrap_or(&self.end);
             }
             let piece = self.piece;
-            // Mostly all of them lie within the piece.
+            // Usually all times lie within the piece.
             let within = rest.partition_point(|&time_s| time_s < piece.end_s);
             let (now, later) = rest.split_at_mut(within);
             for time_s in now {
@@ -421,9 +423,9 @@ impl<'a> Course<'a> {
     }
 }
 
-/// Marks passed, net, after a distance rolled from half way between two of them: the counts of an ideal encoder.
+/// Net marks passed after a distance, from half way between two marks: the counts of an ideal encoder.
 pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
-    // The floor, without a call: this is asked for in each turn of a loop.
+    // The floor without a call, because each turn of a loop calls this.
     let marks = distance_mm / pitch_mm + 0.5;
     let towards_zero = marks as i64;
     towards_zero - i64::from(towards_zero as f64 > marks)

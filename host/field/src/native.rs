@@ -128,9 +128,11 @@ impl ServoLine {
     }
 }
 
-/// What the machine's sensors say, turn by turn of a loop: the encoder's count, and the beams' edges since the turn before.
+/// The readings of the machine's sensors, turn by turn: the encoder's count, and the beams' edges since the turn
+/// before.
 ///
-/// None of it depends on what the firmware does: whoever weeds the same row with the same machine and motion is told the same.
+/// They do not depend on the firmware: every controller of the same row with the same machine and motion gets the same
+/// readings.
 pub struct Sensors {
     turn_s: f64,
     /// The encoder's count in each turn.
@@ -138,7 +140,7 @@ pub struct Sensors {
     edges: Vec<Seen>,
 }
 
-/// Turns of which the counts are worked out at once.
+/// Turns whose counts are calculated together.
 const AT_ONCE: usize = 64;
 
 /// What the sensors say in a turn.
@@ -486,7 +488,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// The encoder's count at a time, all of the way to there looked at anew.
+    /// The encoder's count at a time, calculated from the start of the motion.
     fn count_at(Trial { machine, motion, .. }: &Trial, time_s: f64) -> i64 {
         let ticks = machine.ticks(motion, time_s);
         let pulse = machine.pulse(ticks);

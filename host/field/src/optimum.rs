@@ -1,11 +1,13 @@
-//! The most of a row's ground that anybody could weed with this machine and damage no plant: a bound, not a controller.
+//! The upper bound of weeded ground: the most that any controller could weed with this machine without damage to a
+//! plant.
 //!
-//! Whoever keeps it would have to know each stem, the exact zone round it, how the machine strays and rolls, and each swing's dead time
-//! ahead; and each swing would have to be as quick as the servo is without load. At every place beside a stem the tool needs an angle at
-//! which its edge is past the zone. A servo that turns at its rate can be below the angle at which the tool works the row's
-//! line only so long before and behind. What is left of the row is the bound: no tool path that touches no zone weeds more.
+//! It is not a controller. To reach it, a controller would need to know in advance each stem, the exact zone round it,
+//! the machine's deviations, and each swing's dead time. Each swing would also have to be as quick as the servo is
+//! without load. At every position beside a stem the tool needs an angle at which its edge is past the zone. The
+//! servo's rate limits how close to a zone the tool can still work the row's line. The remaining ground is the bound:
+//! no tool path that touches no zone weeds more.
 //!
-//! It asks nothing of canopies and margins. With these, [`crate::verdict::weedable_share`] is the bound.
+//! Canopies and margins play no part here. With them, [`crate::verdict::weedable_share`] is the bound.
 
 use crate::ground::{share_of, union};
 use crate::machine::Machine;
@@ -15,8 +17,8 @@ use crate::stand::Stand;
 use crate::steering::Steering;
 use std::ops::Range;
 
-/// Distance of the places in a zone at which the angle is asked for. A zone is round, so that those between ask for no less
-/// than the lesser of both.
+/// Distance between the positions in a zone at which the angle is calculated. A zone is round, so the positions between
+/// need at least the smaller angle of the two.
 const STEP_MM: f64 = 1.0;
 
 /// The share of the row's ground, from 0 to 1, that can be weeded at most without the tool touching the zone round a stem.
@@ -77,8 +79,9 @@ mod tests {
         };
         // As good as standing still: the zone of 90 mm, but for its ends that the tool may touch.
         assert!((share(1.0) - (1.0 - 90.0 / 2000.0)).abs() < 0.002, "{}", share(1.0));
-        // At 500 mm/s the tool has to be past the zone's middle by 72.5 mm aside, which takes 12 less 4.5 degrees: 20 ms, 10 mm.
-        // Nearer to its ends it needs less, but has less time: the stretch is a little wider than the zone.
+        // At 500 mm/s the tool has to be 72.5 mm aside of the zone's middle: 12 degrees less 4.5. This takes 20
+        // ms or 10 mm. Nearer to the zone's ends it needs less, but has less time: the stretch is a little wider than
+        // the zone.
         let lost_mm = 2000.0 * (1.0 - share(500.0));
         assert!((90.0..110.0).contains(&lost_mm), "{lost_mm} mm");
         assert!(share(1500.0) < share(500.0));

@@ -1,7 +1,7 @@
-//! Rows that grow by chance: crop plants at a spacing with scatter, tall weeds between them, and canopies with gaps.
+//! Random rows: crop plants at a spacing with scatter, tall weeds between them, and canopies with gaps.
 //!
-//! A [`Planting`] says how much of each, a seed says which row of all the possible ones: the same seed gives the same row
-//! on every machine. Scatter is spread evenly, so that it has limits that a test can state.
+//! A [`Planting`] has the numbers and sizes, and a seed selects the row: the same seed gives the same row on every
+//! machine. Scatter is evenly distributed, so that it has limits that a test can check.
 
 use crate::counted;
 use crate::row::{Kind, Problem, Row, Thing};
@@ -37,7 +37,7 @@ pub enum PlantingError {
     Row(#[from] Problem),
 }
 
-/// Distance that a generated weed keeps from everything else, so that the beam sees it as an object of its own.
+/// Distance of a generated weed from everything else. It makes the weed a detection of its own.
 pub const WEED_MARGIN_MM: f64 = 60.0;
 
 /// Widths of generated tall weeds at the beam's height.
@@ -47,7 +47,7 @@ pub(crate) const WEED_WIDTHS_MM: Range<f64> = 12.0..20.0;
 const LEAF_GAPS_MM: Range<f64> = 2.0..8.0;
 const LEAF_WIDTHS_MM: Range<f64> = 12.0..40.0;
 
-/// How a row is planted by chance. The same planting and seed give the same row on every machine.
+/// The parameters of a random row. The same planting and seed give the same row on every machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Planting {
     /// Number of crop plants.
@@ -85,7 +85,7 @@ impl Planting {
     /// The row that grows from a seed. The first plant's centre is half a spacing from the origin.
     ///
     /// # Errors
-    /// Where plants or weeds do not fit.
+    /// If plants or weeds do not fit.
     pub fn grow(&self, seed: u64) -> Result<Row, PlantingError> {
         let tightest_mm = self.spacing_mm - self.spacing_scatter_mm;
         let widest_mm = self.canopy_mm + self.canopy_scatter_mm;
@@ -109,23 +109,24 @@ impl Planting {
         Ok(Row::new(things)?)
     }
 
-    /// As [`Planting::grow`], with as many of the weeds as there is room for.
+    /// As [`Planting::grow`], but leaves out weeds that do not fit.
     ///
     /// # Errors
-    /// Where the plants do not fit.
+    /// If the plants do not fit.
     pub fn grow_with_room(&self, seed: u64) -> Result<Row, PlantingError> {
         let fewest = Self { weeds: 0, ..*self }.grow(seed);
         (1..=self.weeds).rev().find_map(|weeds| Self { weeds, ..*self }.grow(seed).ok()).map_or(fewest, Ok)
     }
 
-    /// Spreads the weeds over the gaps between neighbouring plants, a second one to a gap only when each has one.
+    /// Distributes the weeds over the gaps between neighbouring plants. A gap gets a second weed only if each gap has
+    /// one.
     fn weeds_between(&self, plants: &[Thing], rng: &mut impl Rng) -> Result<Vec<Thing>, PlantingError> {
         let mut gaps: Vec<Range<f64>> =
             plants.windows(2).map(|pair| pair[0].span_mm().end..pair[1].span_mm().start).collect();
         gaps.shuffle(rng);
         let mut weeds = Vec::with_capacity(self.weeds);
         while weeds.len() < self.weeds {
-            // Each weed halves its gap; the halves go to the end of the queue.
+            // Each weed halves its gap. The halves go to the end of the queue.
             let room = gaps.iter().position(|gap| gap.end - gap.start > NARROWEST_GAP_MM);
             let gap = room.map(|index| gaps.remove(index)).ok_or(PlantingError::NoRoomForWeeds(self.weeds))?;
             let width_mm = rng.random_range(WEED_WIDTHS_MM);
@@ -140,10 +141,10 @@ impl Planting {
     }
 }
 
-/// A row without an end, which is sown ahead of the machine. What is to come may be changed on the way.
+/// A row without an end, sown ahead of the machine. Its parameters may change on the way.
 #[derive(Clone, Debug)]
 pub struct Sowing {
-    /// Spacing, canopies and their scatter. It has no number of plants or weeds.
+    /// Spacing, canopies and their scatter. Its numbers of plants and weeds are not used.
     pub planting: Planting,
     /// Share of the gaps between plants in which a tall weed stands.
     pub weed_share: f64,
@@ -152,12 +153,13 @@ pub struct Sowing {
 }
 
 impl Sowing {
-    /// One whose first plant's centre is at a place. The same seed gives the same row for the same changes.
+    /// An endless row whose first plant's centre is at `first_mm`. The same seed gives the same row for the same
+    /// changes.
     pub fn new(planting: Planting, weed_share: f64, first_mm: f64, seed: u64) -> Self {
         Self { planting, weed_share, first_mm, rng: ChaCha8Rng::seed_from_u64(seed) }
     }
 
-    /// Sows behind what stands in a row already, until it reaches a place.
+    /// Appends plants and weeds to a row, until it reaches a position.
     pub fn sow(&mut self, row: &mut Vec<Thing>, until_mm: f64) {
         let Self { planting, weed_share, first_mm, rng } = self;
         loop {
@@ -170,7 +172,7 @@ impl Sowing {
             let spacing_mm = planting.spacing_mm + scatter(rng, planting.spacing_scatter_mm);
             let width_mm = planting.canopy_mm + scatter(rng, planting.canopy_scatter_mm);
             let position_mm = if last.is_some() { last_mm + spacing_mm } else { *first_mm };
-            // A canopy that would reach into the one before it stands right behind that.
+            // A canopy that would reach into the one before it is moved directly behind that one.
             let position_mm = position_mm.max(gap_from_mm + 1.0 + width_mm / 2.0);
             let plant = Thing::plant(position_mm, width_mm);
             let (weed_mm, where_in_room, grows) = (
@@ -240,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_without_an_end_is_sown_in_order_and_apart_whatever_is_asked_of_it() {
+    fn a_row_without_an_end_is_sown_in_order_and_without_overlaps_for_all_parameters() {
         let tight = Planting {
             spacing_mm: 150.0,
             spacing_scatter_mm: 80.0,

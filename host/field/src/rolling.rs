@@ -1,8 +1,8 @@
 //! A machine that rolls without an end, past a row that grows ahead of it.
 //!
-//! [`Machine::pin_changes`] knows a whole motion; here the motion is decided while it goes on. [`Rolling::roll_until`] gives what
-//! happens at the pins until a cycle of the Uno's clock, by the same arithmetic. Between two calls speed, slip, row and faults may
-//! change, and the servo hears what the Uno says ([`Rolling::hear`]).
+//! [`Machine::pin_changes`] needs a whole motion. Here the motion is decided step by step. [`Rolling::roll_until`]
+//! returns the pin changes until a cycle of the Uno's clock, by the same calculation. Between two calls speed, slip,
+//! row and faults may change, and the servo receives the Uno's pulses ([`Rolling::hear`]).
 
 use crate::ground::union;
 use crate::machine::{Machine, Sensor, channels, cycle_at, time_at_s};
@@ -16,41 +16,41 @@ use uno::{Pin, PinChange, Pulse};
 /// How fast the machine gains and loses speed.
 const ACCELERATION_MM_S2: f64 = 500.0;
 
-/// What is broken on the machine.
+/// The faults of the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Faults {
     /// The first beam's wire is torn: its pin stays on the pull-up, as over bare ground.
     pub beam_wire_torn: bool,
-    /// The encoder says nothing more: its pins stay as they are.
+    /// The encoder has failed: its pins keep their levels.
     pub encoder_dead: bool,
 }
 
-/// A machine that rolls, see the module's words. Its place is what the first beam sees.
+/// A rolling machine: see the module. Its position is the ground at the first beam.
 #[derive(Clone, Debug)]
 pub struct Rolling {
     /// The machine.
     pub machine: Machine,
-    /// What stands in the row so far, in ascending order of place and apart. More may be added at its end.
+    /// The row so far, in ascending order and without overlaps. Things may be added at its end.
     pub row: Vec<Thing>,
     /// Changes of the tool's command so far. The first is not a swing.
     pub commands: usize,
-    /// As far as it is decided: it ends now.
+    /// The motion that is decided so far. It ends now.
     motion: Motion,
     /// The cycle at which the motion began.
     start_cycle: u64,
-    /// The speed that the machine has, or comes to.
+    /// The current speed, or the one that the machine changes to.
     speed_mm_s: f64,
-    /// Counts of a clean encoder, net, since the beginning.
+    /// Net counts of a clean encoder since the beginning.
     ticks: i64,
     beams: Vec<Sensor>,
-    /// The pulses that changed the tool's command, and what the servo makes of them.
+    /// The pulses that changed the tool's command.
     pulses: Vec<Pulse>,
     stroke: Stroke,
     faults: Faults,
 }
 
 impl Rolling {
-    /// The machine stands at a place in front of, or in, a row.
+    /// A standing machine before or in a row.
     pub fn new(machine: Machine, row: Vec<Thing>, start_mm: f64, start_cycle: u64) -> Self {
         let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Thing::blocks_mm).collect()));
         let beam = |pin, behind_mm: f64| {
@@ -73,7 +73,8 @@ impl Rolling {
         }
     }
 
-    /// Rolls on until a cycle, which is not before the one rolled to last, and gives what happens at the pins on the way.
+    /// Rolls on until a cycle, and returns the pin changes on the way. The cycle must not be before that of the last
+    /// call.
     pub fn roll_until(&mut self, cycle: u64) -> Vec<PinChange> {
         let during_s = self.now_s()..time_at_s(self.start_cycle, cycle);
         let speed_mm_s = self.speed_mm_s;
@@ -98,17 +99,17 @@ impl Rolling {
         changes
     }
 
-    /// From now on comes to a speed, and rolls on at that; negative backwards.
+    /// Changes to a speed, negative backwards, and rolls on at it.
     pub fn roll_at(&mut self, speed_mm_s: f64) {
         self.speed_mm_s = speed_mm_s;
     }
 
-    /// From now on loses this share of the wheel's way, below 1.
+    /// From now on the wheel loses this share of its distance, below 1.
     pub fn slip_by(&mut self, share: f64) {
         self.change(|motion| motion.slipping(share));
     }
 
-    /// From now on these faults are there, and no others. [`levels`](Self::levels) says what becomes of the pins.
+    /// Sets the faults from now on. [`levels`](Self::levels) returns the changed pins.
     pub fn have_faults(&mut self, faults: Faults) {
         self.faults = faults;
     }
@@ -122,7 +123,8 @@ impl Rolling {
         encoder.into_iter().filter(|_| !self.faults.encoder_dead).chain(beams).collect()
     }
 
-    /// The servo hears a pulse, behind its falling edge: whether it asks for another angle than the one before it.
+    /// Passes a pulse to the servo, after its falling edge. Returns true if it asks for another angle than the pulse
+    /// before it.
     pub fn hear(&mut self, pulse: Pulse) -> bool {
         let last = self.pulses.last().copied();
         let servo = &self.machine.servo;
@@ -166,7 +168,7 @@ impl Rolling {
         self.ticks
     }
 
-    /// How far the machine rolls now while the encoder counts one.
+    /// Distance of the machine for one count of the encoder, now.
     pub fn ground_mm_a_tick(&self) -> f64 {
         self.machine.tick_mm() * self.motion.ground_mm_a_wheel_mm()
     }
@@ -178,23 +180,23 @@ impl Rolling {
             .any(|thing| thing.blocks_mm().iter().any(|leaf| leaf.contains(&place_mm)))
     }
 
-    /// How it rolled from a time on, as a motion of its own, the pulses that the servo took for commands, and the cycle at which that
-    /// motion begins.
+    /// The motion from a time on, the pulses that the servo took as commands, and the cycle at which that motion
+    /// begins.
     pub fn since(&self, time_s: f64) -> (Motion, &[Pulse], u64) {
         (self.motion.since(time_s), &self.pulses, cycle_at(self.start_cycle, time_s))
     }
 
-    /// When the machine's place first passed a place forward, from a time on.
+    /// The first time, from a time on, at which the machine passes a position forward.
     pub fn passed_s(&self, place_mm: f64, from_s: f64) -> Option<f64> {
         let mut passings = self.motion.passings(place_mm);
         passings.find(|passing| passing.forward && passing.time_s >= from_s).map(|passing| passing.time_s)
     }
 
-    /// Forgets how it rolled before a time, and the commands that were carried out by then.
+    /// Forgets the motion before a time, and the commands that were completed by then.
     pub fn forget(&mut self, time_s: f64) {
         self.motion.forget(time_s);
         let is_over = |pulse: &Pulse| time_at_s(self.start_cycle, pulse.fall) + self.machine.servo.slowest_s() < time_s;
-        // The tool rests where the last one of them told it.
+        // The last of them is kept: it is the tool's current angle.
         let over = self.pulses.partition_point(is_over).saturating_sub(1);
         self.pulses.drain(..over);
     }
@@ -204,7 +206,7 @@ impl Rolling {
     }
 }
 
-/// What of a row stands on some ground.
+/// The things of a row on this ground.
 fn within<'a>(row: &'a [Thing], ground_mm: &Range<f64>) -> impl Iterator<Item = &'a Thing> {
     let first = row.partition_point(|thing| thing.span_mm().end < ground_mm.start);
     let behind = row.partition_point(|thing| thing.span_mm().start <= ground_mm.end);
@@ -219,7 +221,7 @@ mod tests {
 
     const START_CYCLE: u64 = 1_000_000;
 
-    /// What a machine does on the way: from a time on it comes to a speed, and its wheel slips.
+    /// The changes on the way: from a time on, a speed and a slip.
     fn way() -> impl Strategy<Value = Vec<(f64, f64, f64)>> {
         prop::collection::vec((0.05..1.5, -500.0..1200.0, -0.05..0.2), 1..6)
     }
@@ -244,7 +246,7 @@ mod tests {
                     changes.extend(rolling.roll_until(cycle));
                 }
             }
-            // What a sensor has not reported by now it does later.
+            // The sensor reports its pending changes later.
             let whole = machine.pin_changes(&Row::new(row).unwrap(), &motion, START_CYCLE);
             let whole: Vec<PinChange> = whole.into_iter().filter(|change| change.cycle <= cycle).collect();
             prop_assert_eq!(changes.len(), whole.len());

@@ -1,12 +1,12 @@
-//! What stands in a crop row, as the beam sees it: crop plants and tall weeds, each with its place along the row and its
-//! width at the beam's height.
+//! The content of a crop row, as the beam sees it: crop plants and tall weeds, each with its position along the row and
+//! its width at the beam's height.
 //!
-//! A [`Row`] comes from a list, from a CSV file of measured plants or, with [`Planting`](crate::planting::Planting), from a
-//! seed. Things in a row stand apart: where canopies close up, the beam sees one object, and so does the row. Weeds that
-//! are too short for the beam are not in it: they are the ground that the tool works. What flies past the beam without
-//! standing anywhere (clods, insects, dust) may be added ([`Row::with_dust`]).
+//! A [`Row`] comes from a list, from a CSV file of measured plants, or from a seed
+//! ([`Planting`](crate::planting::Planting)). Things in a row do not overlap: canopies that touch are one detection of
+//! the beam, and one thing of the row. Weeds below the beam are not in the row: they are part of the ground that the
+//! tool works. Dust, clods and insects that break the beam may be added ([`Row::with_dust`]).
 //!
-//! All places are millimetres along the ground, from an origin of the row's own.
+//! All positions are millimetres along the ground, from an origin of the row's own.
 
 use crate::ground::union;
 use files::CsvTable;
@@ -20,16 +20,16 @@ use thiserror::Error;
 
 pub use files::FileError;
 
-/// Widest thing that a row takes. Wider than any crop plant that is weeded between.
+/// The widest thing in a row: wider than any crop plant with intra-row weeding.
 pub const MAX_WIDTH_MM: f64 = 1000.0;
 
-/// Widest canopy of a single plant: what is wider along the row is no wider than this across it.
+/// The widest canopy of a single plant. A thing that is longer along the row is no wider than this across it.
 const MAX_CANOPY_MM: f64 = 400.0;
 
 /// Farthest from the origin that a thing stands, 10 km: farther than any row goes.
 pub const MAX_POSITION_MM: f64 = 1e7;
 
-/// Longest row, 6 km. What simulates one keeps every edge of the encoder on the way.
+/// The longest row, 6 km. A simulation stores every edge of the encoder.
 pub const MAX_LENGTH_MM: f64 = 6e6;
 
 /// What a thing in the row is.
@@ -71,12 +71,12 @@ pub struct Thing {
     pub position_mm: f64,
     /// Its width at the beam's height: for a crop plant the canopy's.
     pub width_mm: f64,
-    /// Its width across the row. What has grown together is no wider across than its widest.
+    /// Its width across the row. For joined canopies it is that of the widest.
     pub across_mm: f64,
     /// What it is.
     pub kind: Kind,
-    /// Where within its width leaves break the beam, as places along the row in ascending order. Empty for a thing
-    /// without gaps.
+    /// The parts of its width where leaves break the beam, as positions along the row in ascending order. Empty for a
+    /// thing without gaps.
     pub leaves: Vec<Range<f64>>,
 }
 
@@ -117,13 +117,13 @@ impl Thing {
         Ok(())
     }
 
-    /// Whether a row that begins with `first` is still one if it goes up to this.
+    /// Whether a row from `first` to this thing is short enough.
     fn check_length(&self, first: &Thing) -> Result<(), Problem> {
         let length_mm = self.position_mm - first.position_mm;
         if length_mm <= MAX_LENGTH_MM { Ok(()) } else { Err(Problem::Length(length_mm)) }
     }
 
-    /// Whether it comes after `before`, and stands apart from it.
+    /// Whether it comes after `before`, without an overlap.
     fn check_after(&self, before: &Thing) -> Result<(), Problem> {
         if before.span_mm().end < self.span_mm().start {
             Ok(())
@@ -141,13 +141,13 @@ impl Thing {
 /// What is wrong with a thing or a row, and what would be right.
 #[derive(Debug, Error, PartialEq)]
 pub enum Problem {
-    /// The place is not a number, or farther off than rows go.
+    /// The position is not a number, or out of range.
     #[error("position_mm is {0}: it has to be from -{MAX_POSITION_MM} to {MAX_POSITION_MM}, millimetres along the row")]
     Position(f64),
-    /// The width is none.
+    /// The width is out of range.
     #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
     Width(f64),
-    /// Two things share ground.
+    /// Two things overlap.
     #[error(
         "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
          each has to end before the next begins (what has grown together is one line)"
@@ -186,7 +186,7 @@ const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 pub struct Row {
     things: Vec<Thing>,
     dust_mm: Vec<Range<f64>>,
-    /// Where its ends are known.
+    /// Its ends, if they are known.
     ground_mm: Option<Range<f64>>,
 }
 
@@ -194,7 +194,7 @@ impl Row {
     /// A row of things, in any order.
     ///
     /// # Errors
-    /// Where there are none, one is malformed, or two overlap.
+    /// If there are none, one is malformed, or two overlap.
     pub fn new(mut things: Vec<Thing>) -> Result<Self, Problem> {
         if things.is_empty() {
             return Err(Problem::Empty);
@@ -206,7 +206,7 @@ impl Row {
         Ok(Self { things, dust_mm: Vec::new(), ground_mm: None })
     }
 
-    /// The same row, which begins and ends where this ground does.
+    /// The same row, with the ends of this ground.
     pub fn on_ground(self, ground_mm: Range<f64>) -> Self {
         Self { ground_mm: Some(ground_mm), ..self }
     }
@@ -221,7 +221,7 @@ impl Row {
         union(self.things.iter().flat_map(Thing::blocks_mm).chain(self.dust_mm.iter().cloned()).collect())
     }
 
-    /// What stands in the first `length_mm` of the row's ground; none where nothing does.
+    /// The things in the first `length_mm` of the row's ground. `None` if there are none.
     pub fn beginning(&self, length_mm: f64) -> Option<Self> {
         let end_mm = self.span_mm().start + length_mm;
         let things: Vec<Thing> = self.things.iter().filter(|thing| thing.span_mm().end < end_mm).cloned().collect();
@@ -252,9 +252,9 @@ impl Row {
         self.things.iter().filter(|thing| thing.kind == Kind::Weed)
     }
 
-    /// The stretch of ground that counts as the row. Where its ends were not given: half a mean spacing beyond the
-    /// outermost plants, so that every plant has a spacing's length of its own, and in any case everything that stands
-    /// in it.
+    /// The stretch of ground that counts as the row. If its ends were not given, it reaches half a mean spacing beyond
+    /// the outermost plants, so that every plant has the length of a spacing. It always includes every thing of the
+    /// row.
     pub fn span_mm(&self) -> Range<f64> {
         if let Some(ground_mm) = &self.ground_mm {
             return ground_mm.clone();
@@ -272,8 +272,8 @@ impl Row {
         around.start.min(first.span_mm().start)..around.end.max(last.span_mm().end)
     }
 
-    /// The row that stands in the text of a CSV file with the columns `position_mm,width_mm,kind`, in any order of columns and lines.
-    /// `kind` is `plant` or `weed`; lines that begin with `#` are comments.
+    /// Parses the text of a CSV file with the columns `position_mm,width_mm,kind`, in any order of columns and lines.
+    /// `kind` is `plant` or `weed`. Lines that begin with `#` are comments.
     ///
     /// # Errors
     /// Names the file, the line and what would be right.
@@ -299,10 +299,11 @@ impl Row {
         Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new(), ground_mm: None })
     }
 
-    /// Writes the row as a CSV table that [`Row::parse_csv`] reads. Gaps within a ragged canopy, dust and the row's ends are not kept.
+    /// Writes the row as a CSV table that [`Row::parse_csv`] reads. Gaps within a ragged canopy, dust and the row's
+    /// ends are lost.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// The errors of the writer.
     pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
         let mut writer = csv::Writer::from_writer(to);
         for thing in &self.things {

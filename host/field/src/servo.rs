@@ -1,15 +1,14 @@
 //! The servo that swings the tool: from the pulses on its line to its angle at any time.
 //!
-//! A servo knows a pulse's width at the pulse's falling edge. From there it takes a dead time until it begins to move
-//! (electronics, gears, slack), and then it turns at a constant rate until it has the angle asked for. A command that
-//! comes during a stroke takes the same dead time; then the servo turns from wherever it is. Widths between the two ends
-//! ask for angles between them.
+//! A servo measures a pulse's width at the pulse's falling edge. Then it waits a dead time (electronics, gears, slack),
+//! and turns at a constant rate to the commanded angle. A command during a stroke takes the same dead time. The servo
+//! then turns from its current angle. Widths between the two ends command angles between them.
 //!
-//! A degree is always as much of a pulse: a shorter stroke is told by a shorter pulse, and takes as much less time. The soil
-//! slows the servo down by its torque-speed line: full speed without load, none at the torque at which it stalls.
+//! A degree is always the same pulse width: a shorter stroke has a shorter pulse, and takes less time in proportion.
+//! The soil slows the servo down by its torque-speed line: full speed without load, none at the stall torque.
 //!
-//! Widths that are no servo's are ignored. There is no overshoot and no acceleration here: dead and travel time stand for
-//! them. Where dead time and load scatter, each command has its own, by chance.
+//! Widths out of range are ignored. There is no overshoot and no acceleration: dead time and travel time stand for
+//! them. If dead time and load scatter, each command has its own random values.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,37 +20,37 @@ use uno::{CYCLES_PER_SECOND, Pulse};
 pub struct Servo {
     /// Pulse width for the tool in the row, at 0 degrees.
     pub in_us: f64,
-    /// Pulse width for the tool out of the row: [`US_A_DEGREE`] for each degree that it is from the other.
+    /// Pulse width for the tool out of the row: it differs from `in_us` by [`US_A_DEGREE`] for each degree.
     pub out_us: f64,
     /// Time from a pulse's falling edge until the servo moves.
     pub dead_time_ms: f64,
     /// Time in which it then turns by [`OUT_DEGREES`] without load.
     pub travel_ms: f64,
-    /// What dead time and travel may be off by.
+    /// The scatter of dead time and travel.
     pub scatter: Scatter,
 }
 
-/// How much a servo's swings differ from each other.
+/// How much the swings of a servo differ from each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scatter {
     /// The dead time lies within this of its mean, evenly spread.
     pub dead_time_ms: f64,
-    /// The soil's load, as a share of the torque at which the servo stalls, lies between 0 and this, evenly spread.
+    /// The soil's load, as a share of the stall torque, lies between 0 and this, evenly distributed.
     pub load: f64,
-    /// Which of all the possible sequences of swings.
+    /// Selects the random sequence of swings.
     pub seed: u64,
 }
 
 /// Angle of the tool that is fully out of the row, as the paper has it.
 pub const OUT_DEGREES: f64 = 45.0;
 
-/// What a degree takes of a pulse: 1500 us and 2000 us are the two ends of the paper's stroke.
+/// Pulse width for a degree: 1500 us and 2000 us are the two ends of the paper's stroke.
 pub const US_A_DEGREE: f64 = 500.0 / OUT_DEGREES;
 
-/// However much a servo is loaded, it still crawls at a twentieth of its speed.
+/// Under the highest load the servo still turns at a twentieth of its speed.
 const GREATEST_LOAD: f64 = 0.95;
 
-/// How many times as long a travel takes under a load, which is a share of the torque at which the servo stalls.
+/// The factor on the travel time under a load, which is a share of the stall torque.
 pub fn slowed(load: f64) -> f64 {
     1.0 / (1.0 - load.clamp(0.0, GREATEST_LOAD))
 }
@@ -59,7 +58,7 @@ pub fn slowed(load: f64) -> f64 {
 /// Pulse widths that differ by less than this ask for the same angle: the dead band of a digital servo.
 const DEAD_BAND_US: f64 = 2.0;
 
-/// Widths that a servo takes for a command. It ignores whatever else comes along its line, and so does this one.
+/// Pulse widths that a servo accepts as a command. It ignores all other pulses on its line, and so does this model.
 pub const WIDTHS_US: RangeInclusive<f64> = 400.0..=2600.0;
 
 /// A change of the angle asked for.
@@ -67,7 +66,7 @@ pub const WIDTHS_US: RangeInclusive<f64> = 400.0..=2600.0;
 pub struct Command {
     /// When the first pulse of this width began, in cycles since power-up: the command at the pin.
     pub rise_cycle: u64,
-    /// When that pulse ended, and the servo knew.
+    /// When that pulse ended: the servo knows its width.
     pub fall_cycle: u64,
     /// The angle asked for; 0 is in the row.
     pub degrees: f64,
@@ -90,26 +89,26 @@ impl Default for Servo {
 }
 
 impl Servo {
-    /// The whole stroke: the angle of a tool that is told to be out of the row.
+    /// The whole stroke: the angle of a tool that is commanded out of the row.
     pub fn stroke_degrees(&self) -> f64 {
         (self.out_us - self.in_us).abs() / US_A_DEGREE
     }
 
-    /// The longest that the whole stroke takes, dead time and all.
+    /// The longest time of the whole stroke, dead time included.
     pub fn slowest_s(&self) -> f64 {
         let Scatter { dead_time_ms, load, .. } = self.scatter;
         let travel_ms = self.travel_ms * self.stroke_degrees() / OUT_DEGREES * slowed(load);
         (self.dead_time_ms + dead_time_ms + travel_ms) / 1000.0
     }
 
-    /// The angle that a pulse asks for: outwards is whichever way the pulse for out lies.
+    /// The angle that a pulse commands. The pulse for out defines the positive direction.
     fn degrees(&self, pulse: Pulse) -> f64 {
         let outwards = if self.out_us < self.in_us { -1.0 } else { 1.0 };
         (pulse.width_us() - self.in_us) * outwards / US_A_DEGREE
     }
 
-    /// The pulses that asked for another angle than the one before them; the first pulse is the first command. Pulses
-    /// outside of [`WIDTHS_US`] are passed over.
+    /// The pulses that commanded another angle than the one before them. The first pulse is the first command. Pulses
+    /// outside of [`WIDTHS_US`] are ignored.
     pub fn commands(&self, pulses: &[Pulse]) -> Vec<Command> {
         let mut commands = Vec::new();
         let mut width_us = f64::NEG_INFINITY;
@@ -124,7 +123,7 @@ impl Servo {
         commands
     }
 
-    /// The servo's movement under these commands. Before the first it rests at the angle that the first asks for: the
+    /// The servo's movement under these commands. Before the first it rests at the angle of the first command: the
     /// firmware starts with the tool out, and so does the machine.
     ///
     /// `start_cycle` is the cycle at which the movement's time is 0.
@@ -140,7 +139,7 @@ impl Servo {
             let travel_ms = self.travel_ms * slowed(rng.random_range(0.0..=1.0) * load);
             let begin = Corner { time_s: heard_s + (self.dead_time_ms + late_ms) / 1000.0, degrees: 0.0 };
             let begin = Corner { degrees: angle(&corners, begin.time_s, target_degrees), ..begin };
-            // A corner that the stroke had planned beyond this moment is not reached any more.
+            // The new command cancels the corners after this time.
             corners.retain(|corner| corner.time_s < begin.time_s);
             corners.push(begin);
             target_degrees = command.degrees;
@@ -160,7 +159,7 @@ struct Corner {
     degrees: f64,
 }
 
-/// The angle at a time: between corners on the straight line, behind the last one at rest.
+/// The angle at a time: on the straight line between corners, and at rest after the last one.
 fn angle(corners: &[Corner], time_s: f64, end_degrees: f64) -> f64 {
     let next = corners.partition_point(|corner| corner.time_s <= time_s);
     match (next.checked_sub(1).map(|last| corners[last]), corners.get(next)) {
@@ -186,7 +185,7 @@ impl Stroke {
         angle(&self.corners, time_s, self.end_degrees)
     }
 
-    /// The times at which the servo begins or ends to turn. Between two of them the angle follows a straight line.
+    /// The times at which the servo begins or ends to turn. Between them the angle is a straight line.
     pub fn turns_s(&self) -> impl Iterator<Item = f64> {
         self.corners.iter().map(|corner| corner.time_s).filter(|time_s| time_s.is_finite())
     }

@@ -1,29 +1,28 @@
-//! What a beam sees of what stands in the row: who is tall enough for it, how wide each is at its height, and which leaves
+//! What a beam sees of a row: which canopies and weeds are tall enough, their width at its height, and which leaves
 //! cover enough of it.
 //!
-//! A canopy is an ellipse from the ground to its top, widest half way up. A beam lower or higher than that sees it narrower,
-//! one above its top not at all. That plants are ellipses is assumed.
+//! A canopy is an ellipse from the ground to its top, widest half way up. A lower or higher beam sees it narrower, and
+//! a beam above its top does not see it. The ellipse is an assumption.
 //!
-//! A beam has a diameter: its sensor reports it broken while more than half of it is covered. So what is narrower than half
-//! of it is not seen, nor are gaps as narrow, while the ends of whatever is wider stay where they are.
+//! A beam has a diameter. Its sensor reports it broken while more than half of it is covered. So it does not see
+//! objects or gaps that are narrower than half its diameter. The edges of wider objects stay where they are.
 
 use crate::ground::union;
 use std::ops::Range;
 
-/// The width of a canopy at the beam's height, of one that is `widest_mm` at its widest and so high; none where the beam
-/// passes above it.
+/// The width, at the beam's height, of a canopy of this height and greatest width. `None` if the beam passes above it.
 pub fn width_at(beam_height_mm: f64, height_mm: f64, widest_mm: f64) -> Option<f64> {
     let from_middle = 2.0 * beam_height_mm / height_mm - 1.0;
     (beam_height_mm < height_mm).then(|| widest_mm * (1.0 - from_middle * from_middle).max(0.0).sqrt())
 }
 
-/// The stretches over which more than half of a beam of this diameter is covered, of a [`union`] of what covers it.
+/// The stretches over which more than half of a beam of this diameter is covered. `blocks_mm` is a [`union`].
 pub fn half_covered(blocks_mm: Vec<Range<f64>>, beam_mm: f64) -> Vec<Range<f64>> {
     if beam_mm <= 0.0 {
         return blocks_mm;
     }
     let half_mm = beam_mm / 2.0;
-    // How much is covered follows straight lines between the places at which either edge of the beam passes an end.
+    // Between the positions at which an edge of the beam passes an end, the covered part follows straight lines.
     let mut places: Vec<f64> = blocks_mm
         .iter()
         .flat_map(|block| [block.start - half_mm, block.start + half_mm, block.end - half_mm, block.end + half_mm])
@@ -72,7 +71,7 @@ mod tests {
     #[test]
     fn a_beam_is_broken_while_more_than_half_of_it_is_covered() {
         assert_eq!(half_covered(vec![0.0..3.0], 0.0), [0.0..3.0]);
-        // Wide things keep their ends, what is narrower than half of the beam is not seen.
+        // Wide things keep their ends. Things narrower than half of the beam are not seen.
         assert_eq!(half_covered(vec![0.0..100.0], 6.0), [0.0..100.0]);
         assert_eq!(half_covered(vec![0.0..2.5], 6.0), []);
         // A gap narrower than half of it is not seen either; a wider one is.

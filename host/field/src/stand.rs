@@ -1,12 +1,12 @@
-//! A crop stand: the plants and weeds of a row, as they grow from a seed under some conditions.
+//! A crop stand: the plants and weeds of a row, grown from a seed under some conditions.
 //!
-//! It is seen twice. The beam sees a [`Row`]: canopies and weeds that are tall enough for it, as wide as they are at its height
-//! ([`crate::sight`]), of which those that touch have grown together, and dust. The tools meet stems with a protected zone round
-//! each, not quite in the middle of their canopies, and weeds everywhere ([`crate::tool_path`]). A stem of the next row may be
-//! met as well, by a tool that swings aside that far.
+//! It has two views. The beam sees a [`Row`]: dust, and canopies and weeds that are tall enough for it, as wide as they
+//! are at its height ([`crate::sight`]). Those that touch have grown together. The tools meet weeds everywhere, and
+//! stems with a protected zone round each ([`crate::tool_path`]). A stem is not exactly in the middle of its canopy. A
+//! tool that swings aside far enough may also meet a stem of the next row.
 //!
-//! Places are millimetres along the row, and across it from its line, left above 0. What grows does not depend on the
-//! machine, nor on what is done there.
+//! Positions are millimetres along the row, and across it from its line, positive to the left. The stand does not
+//! depend on the machine or on its work.
 
 use crate::conditions::Conditions;
 use crate::ground::union;
@@ -32,7 +32,7 @@ pub struct Stem {
     pub is_seen: bool,
 }
 
-/// A weed, of whatever height.
+/// A weed of any height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weed {
     /// Its place along the row.
@@ -41,10 +41,10 @@ pub struct Weed {
     pub across_mm: f64,
 }
 
-/// A row that has grown.
+/// A stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stand {
-    /// What the beam sees.
+    /// The row as the beam sees it.
     pub row: Row,
     /// The crop plants, in ascending order of place.
     pub stems: Vec<Stem>,
@@ -52,30 +52,30 @@ pub struct Stand {
     pub neighbours: Vec<Stem>,
     /// The weeds, those that are tall included.
     pub weeds: Vec<Weed>,
-    /// The ground, across the whole width, on which somebody counts the weeds: the row's part of the plot's square metres.
+    /// The ground, across the whole width, on which weeds are counted: the row's part of the plot's square metres.
     pub counted_mm: Range<f64>,
     /// The row's ground.
     pub span_mm: Range<f64>,
 }
 
-/// How far a double plant's stem stands behind the first one's.
+/// Distance of a double plant's stem behind the first one's.
 const DOUBLE_MM: Range<f64> = 20.0..80.0;
 
-/// Ground over which dust breaks the beam.
+/// Lengths of dust, over which it breaks the beam.
 const DUST_MM: Range<f64> = 0.5..4.0;
 
-/// Leads the beam over bare ground before the first plant and behind the last one.
+/// Bare ground before the first plant and behind the last one.
 const HEADLAND_MM: f64 = 1000.0;
 
 impl Stand {
-    /// The stand that grows with plants `spacing_mm` apart.
+    /// Grows a stand with plants `spacing_mm` apart.
     ///
     /// # Errors
-    /// Where canopies grow together to something that is no row, or the row is shorter than the spacing.
+    /// If joined canopies exceed the limits of a row, or the row is shorter than the spacing.
     pub fn grow(conditions: &Conditions, spacing_mm: f64, rng: &mut impl Rng) -> Result<Self, Problem> {
         let Conditions { plot, crop, weeds, sensors, machine, .. } = conditions;
         let span_mm = 0.0..plot.row_m * 1000.0;
-        // Each has random numbers of its own, so that a parameter of one leaves the others as they are.
+        // Each has its own random numbers, so that a parameter of one does not change the others.
         let [mut leaf_rng, mut weed_rng, mut dust_rng] = [(); 3].map(|()| ChaCha8Rng::from_rng(rng));
         let of_stream = |stream| {
             let mut rng = leaf_rng.clone();
@@ -84,7 +84,7 @@ impl Stand {
         };
         let [mut height_rng, mut stem_rng, mut size_rng, mut next_rng] = [1, 2, 3, 4].map(of_stream);
         let [mut sown_rng, mut sown_next_rng] = [5, 6].map(of_stream);
-        // The distance between two places has the deviation of both.
+        // The distance between two plants has the deviation of both positions.
         let sown = |rng: &mut ChaCha8Rng, at_mm: f64| match Normal::new(at_mm, crop.spacing_sd_mm / SQRT_2) {
             Ok(normal) if crop.spacing_sd_mm > 0.0 => normal.sample(rng).clamp(span_mm.start, span_mm.end),
             _ => at_mm,
@@ -94,7 +94,7 @@ impl Stand {
         let places = (span_mm.end / spacing_mm).floor() as u32;
         for place in 0..places {
             let at_mm = sown(&mut sown_rng, (f64::from(place) + 0.5) * spacing_mm);
-            // One stands in any case: a row without a plant is none.
+            // A row has at least one plant.
             let is_missing = chance(rng, crop.missing_percent) && (place + 1 < places || !stems.is_empty());
             let plants = if is_missing { 0 } else { 1 + usize::from(chance(rng, crop.double_percent)) };
             let mut along_mm = at_mm + scatter(rng, crop.spacing_scatter_mm);
@@ -124,7 +124,7 @@ impl Stand {
                 across_mm: weed_rng.random_range(-half_mm..half_mm),
             })
             .collect();
-        // One that stands in the row, and is tall enough, breaks the beam.
+        // A weed in the row that is tall enough breaks the beam.
         for weed in grown.iter().filter(|weed| weed.across_mm.abs() < machine.sweep_from_mm) {
             let height_mm = about(&mut size_rng, weeds.height_mm, weeds.height_factor);
             let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
@@ -146,7 +146,7 @@ impl Stand {
             .collect();
         stems.sort_by(|a, b| a.along_mm.total_cmp(&b.along_mm));
         let row = Row::new(grown_together(things))?.with_dust(dust_mm).on_ground(span_mm.clone());
-        // The next row is sown or planted by itself: its places are the same, its chance is not.
+        // The next row is planted separately: it has the same planting positions, and its own random numbers.
         let next_to = |place: u32| {
             let at_mm = sown(&mut sown_next_rng, (f64::from(place) + 0.5) * spacing_mm)
                 + scatter(&mut next_rng, crop.spacing_scatter_mm);
@@ -161,12 +161,12 @@ impl Stand {
     }
 }
 
-/// A size whose logarithm is spread normally about that of its median; the factor is its standard deviation's.
+/// A random size with a log-normal distribution: its median, and the factor of its standard deviation.
 fn about(rng: &mut impl Rng, median: f64, factor: f64) -> f64 {
     LogNormal::new(median.ln(), factor.ln()).map_or(median, |sizes| sizes.sample(rng))
 }
 
-/// A weed as the beam sees it; none where the beam passes above it. A weed that is wider than the widest canopy is several.
+/// A weed as the beam sees it. `None` if the beam passes above it. A weed wider than the widest canopy becomes several.
 fn weed_seen(along_mm: f64, beam_height_mm: f64, height_mm: f64, widest_mm: f64) -> Option<Thing> {
     let width_mm = width_at(beam_height_mm, height_mm, widest_mm.min(MAX_WEED_MM))?;
     Some(Thing::weed(along_mm, width_mm.max(MIN_WEED_MM)))
@@ -179,18 +179,18 @@ const MIN_WEED_MM: f64 = 1.0;
 /// No scatter makes a canopy narrower.
 const MIN_CANOPY_MM: f64 = 10.0;
 
-/// Whether something happens that happens in so many of a hundred cases.
+/// True with a probability of `percent`.
 fn chance(rng: &mut impl Rng, percent: f64) -> bool {
     rng.random_bool((percent / 100.0).clamp(0.0, 1.0))
 }
 
-/// How many of something there are where `mean` are to be expected.
+/// A random count with this mean.
 fn count(rng: &mut impl Rng, mean: f64) -> usize {
     // A mean of 0 has no distribution, but a result.
     Poisson::new(mean).map_or(0, |poisson| poisson.sample(rng) as usize)
 }
 
-/// The things as the beam sees them: those that touch are one, and a plant if any of them is.
+/// The things as the beam sees them. Those that touch are joined, and the result is a plant if any of them is.
 fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
     things.sort_by(|a, b| a.span_mm().start.total_cmp(&b.span_mm().start));
     let mut together: Vec<Thing> = Vec::with_capacity(things.len());
@@ -219,7 +219,7 @@ fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
 mod tests {
     use super::*;
 
-    /// What the presets say of themselves, with plants 20 and 25 cm apart.
+    /// The standard deviations in the presets' comments, with plants 20 and 25 cm apart.
     const MAIZE_SD_MM: [f64; 2] = [73.0, 88.0];
     const MAIZE_UNEVEN_SD_MM: [f64; 2] = [114.0, 128.0];
 
@@ -249,7 +249,7 @@ mod tests {
         let mut conditions = Conditions::preset("direct-sown").unwrap().unwrap();
         conditions.set("plot.row_m", 1000.0).unwrap();
         let stand = grow(&conditions, 3);
-        // 2000 places less 12 %, a tenth of which are double; three standard deviations are about 60.
+        // 2000 planting positions less 12 %; a tenth of them are double. Three standard deviations are about 60.
         let expected = 2000.0 * 0.88 * 1.1;
         assert!((stand.stems.len() as f64 - expected).abs() < 60.0, "{}", stand.stems.len());
     }

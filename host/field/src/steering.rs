@@ -1,19 +1,20 @@
-//! How the machine strays from the row's line, across it: a wandering between limits.
+//! The machine's deviation across the row's line: a random motion between limits.
 //!
-//! Where the machine is across the row follows straight lines between places a metre or two apart, each by chance. It strays as
-//! a whole, tool and sweeps together: an angle to the row is not in it. What the beam sees does not change.
+//! The deviation follows straight lines between random values at positions a metre or two apart. The machine strays as
+//! a whole, tool and sweeps together, without an angle to the row. It does not change what the beam sees.
 
 use crate::planting::scatter;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 
-/// From one place at which the machine is steered to the next.
+/// Distance between two corrections of the steering.
 const LEG_MM: Range<f64> = 1000.0..2000.0;
 
-/// Where the machine is across the row, at each place along it.
+/// The machine's position across the row, at each position along it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Steering {
-    /// Places, and how far from the line there, left above 0. None for a machine that stays on the line.
+    /// Positions, and the deviation from the line there, positive to the left. Empty for a machine that stays on the
+    /// line.
     knots: Vec<(f64, f64)>,
     within_mm: f64,
 }
@@ -33,7 +34,7 @@ impl Steering {
         Self { knots, within_mm }
     }
 
-    /// How far from the row's line the machine's middle is where its tool works this ground.
+    /// Deviation of the machine's middle from the row's line, when its tool works this ground.
     pub fn across_mm(&self, place_mm: f64) -> f64 {
         let next = self.knots.partition_point(|(knot_mm, _)| *knot_mm <= place_mm);
         match (next.checked_sub(1).map(|last| self.knots[last]), self.knots.get(next)) {

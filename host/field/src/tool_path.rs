@@ -1,17 +1,18 @@
-//! Damage and weeding as geometry: what the tools pass through, seen from above.
+//! Damage and weeding as geometry: the ground that the tools pass through, seen from above.
 //!
-//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. It is `tool_width` wide,
-//! across the row; along the row it is taken for a line. (An arm that lies along the row also carries the tool along it, by 10 mm where it
-//! leaves a stem's zone: that is left out.) A plant is *damaged* where the tool passes through the protected zone round its stem.
-//! A weed is *removed* where the tool passes it, or one of the sweeps, which run between the rows without ever swinging and keep
-//! off the zones, so far as the machine keeps its line: where it strays, they cut plants as well. So does a tool that swings
-//! aside as far as the next row. Each is counted by itself. Between the tool in the row and the nearest sweep a strip may be left
-//! that nobody weeds ([`unweeded_strip_mm`]).
+//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. The tool is
+//! `tool_width` wide across the row, and is treated as a line along it. (An arm that lies along the row also carries
+//! the tool along it, by 10 mm where it leaves a stem zone. The model leaves that out.) A plant is *damaged* if the
+//! tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
+//! sweeps run between the rows, do not swing, and stay clear of the zones while the machine keeps its line. If the
+//! machine strays, they cut plants as well. So does a tool that swings as far as the next row. Each kind of damage is
+//! counted by itself. A strip that no tool weeds may remain between the tool in the row and the nearest sweep
+//! ([`unweeded_strip_mm`]).
 //!
-//! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: what becomes of them
-//! is the controller's doing. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the paper's
-//! square metre: most of them fall to the sweeps, whatever the controller does. *Counted* are those of them that stand on the
-//! ground on which somebody counts.
+//! Weeding efficiency is counted twice (Eq. 22). *In the row* are the weeds between the sweeps on either side: they
+//! depend on the controller. *In the whole plot* are all weeds between the middles of two gaps between rows, as in the
+//! paper's square metre. Most of them fall to the sweeps, under any controller. *Counted* are those that stand on the
+//! ground where weeds are counted.
 
 use crate::conditions::Mechanism;
 use crate::machine::Machine;
@@ -23,13 +24,13 @@ use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Range};
 use uno::Pulse;
 
-/// A sweep that is in a zone by less than this touches it.
+/// A sweep that enters a zone by less than this only touches it.
 const TOUCH_MM: f64 = 1e-6;
 
-/// Time between two looks at where the tool is in a protected zone: at 2.5 km/h it moves by a millimetre or so.
+/// Time between two checks of the tool in a protected zone: at 2.5 km/h the machine moves about a millimetre.
 const LOOK_S: f64 = 0.000_5;
 
-/// Weeds, counted: there are some ten a plant, and many plants in a study.
+/// Counts of weeds. `u64`, because there are about ten a plant, and many plants in a study.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WeedCount {
     /// Before weeding.
@@ -39,7 +40,7 @@ pub struct WeedCount {
 }
 
 impl WeedCount {
-    /// Weeding efficiency (Eq. 22), in percent; none where no weed stood.
+    /// Weeding efficiency (Eq. 22), in percent. `None` if there was no weed.
     pub fn efficiency_percent(self) -> Option<f64> {
         (self.before > 0).then(|| 100.0 * (self.before - self.after) as f64 / self.before as f64)
     }
@@ -52,18 +53,18 @@ impl AddAssign for WeedCount {
     }
 }
 
-/// What the tools did to a stand.
+/// The effect of the tools on a stand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Effect {
     /// Crop plants.
     pub plants: u32,
     /// Crop plants through whose protected zone the tool passed.
     pub damaged: u32,
-    /// Those of them that the beam cannot see: lower than it, bent, eaten, or planted late.
+    /// Damaged plants that the beam cannot see: too low, bent, eaten, or planted late.
     pub unseen: u32,
     /// Crop plants through whose protected zone a sweep passed, but not the tool.
     pub swept: u32,
-    /// Crop plants of the next row through whose protected zone the tool passed that swung aside.
+    /// Crop plants of the next row whose protected zone the tool entered while it was out.
     pub neighbours: u32,
     /// Weeds in the row.
     pub in_row: WeedCount,
@@ -74,7 +75,7 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// Plants that somebody would find injured, whatever injured them.
+    /// Plants that an inspection would find injured, from any cause.
     pub fn injured(&self) -> u32 {
         (self.damaged + self.swept + self.neighbours).min(self.plants)
     }
@@ -93,7 +94,7 @@ impl AddAssign for Effect {
     }
 }
 
-/// The tools of a machine on its way.
+/// The tools of a machine, with its motion.
 struct Tools<'a> {
     machine: &'a Machine,
     mechanism: &'a Mechanism,
@@ -102,12 +103,12 @@ struct Tools<'a> {
     stroke: Stroke,
 }
 
-/// Width, on each side of the row, of the ground between the tool in the row and the nearest sweep: nobody weeds it.
+/// Width of the strip, on each side of the row, between the tool in the row and the nearest sweep. No tool weeds it.
 pub fn unweeded_strip_mm(machine: &Machine, mechanism: &Mechanism) -> f64 {
     if mechanism.sweeps_a_side == 0 { 0.0 } else { (mechanism.sweep_from_mm - machine.tool_width_mm / 2.0).max(0.0) }
 }
 
-/// What a machine did to a stand with these servo pulses. The motion began at `start_cycle`.
+/// The effect of a machine with these servo pulses on a stand. The motion began at `start_cycle`.
 pub fn effect(
     stand: &Stand,
     machine: &Machine,
@@ -143,7 +144,7 @@ pub fn effect(
 }
 
 impl Tools<'_> {
-    /// Where a place across the row is from the machine's middle, at a place along it.
+    /// Distance of a position from the machine's middle, across the row.
     fn across_mm(&self, place_mm: f64, across_mm: f64) -> f64 {
         across_mm - self.steering.across_mm(place_mm)
     }
@@ -164,7 +165,7 @@ impl Tools<'_> {
             let beside_mm = protected_mm * f64::from(step) / f64::from(steps);
             let chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
             let across_mm = self.across_mm(along_mm + beside_mm, across_mm).abs();
-            // What only touches does not cut: sweeps may run along the zones.
+            // Touching is no cut: sweeps may run along the zones.
             across_mm + chord_mm > sweep_from_mm + TOUCH_MM && across_mm - chord_mm < to_mm - TOUCH_MM
         })
     }
@@ -190,14 +191,15 @@ impl Tools<'_> {
         };
         self.motion.times_within_s(&(zone.start + x_mm..zone.end + x_mm)).into_iter().any(|times| {
             let looks = ((times.end - times.start) / LOOK_S).ceil() as u32;
-            // Between two turns of the servo the tool is nowhere beyond where it is at them: often that is clear of the zone.
+            // Between two ends of the servo's turning, the tool stays between its positions at them. Often that is
+            // clear of the zone.
             self.between_turns_s(&times).any(|stretch| {
                 let [from, to] = [stretch.start, stretch.end].map(|time_s| self.covered_mm(time_s));
                 let near_mm = protected_mm + self.steering.within_mm();
                 let comes_near =
                     from.start.min(to.start) < across_mm + near_mm && across_mm - near_mm < from.end.max(to.end);
                 let look_at = |time_s: f64| (time_s - times.start) / LOOK_S;
-                // Not at the very ends, where the zone is a point.
+                // Not at the very ends: there the zone is a point.
                 let first = (look_at(stretch.start).floor() as u32).max(1);
                 let behind = (look_at(stretch.end).ceil() as u32 + 1).min(looks);
                 comes_near && (first..behind).any(|look| enters(times.start + f64::from(look) * LOOK_S))
@@ -298,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_weeds_the_strip_between_tool_and_sweeps() {
+    fn no_tool_weeds_the_strip_between_tool_and_sweeps() {
         let mechanism = Mechanism::default();
         assert_eq!(unweeded_strip_mm(&Machine::default(), &mechanism), 22.5);
         let wide = Machine { tool_width_mm: 100.0, ..Machine::default() };
@@ -318,8 +320,8 @@ mod tests {
 
     #[test]
     fn a_plant_is_damaged_from_the_place_on_at_which_the_tool_no_longer_gets_past_its_zone() {
-        // The tool's edge passes the zone's 40 mm at 11.1 degrees: 62 + 30 ms after the command, 92 mm farther. There the zone
-        // is a point, and a little later it is wider than the tool is aside.
+        // The tool's edge leaves the zone's 40 mm at 11.1 degrees: 62 + 30 ms after the command, and 92 mm farther.
+        // There the zone is a point. A little later the zone is wider than the tool is aside.
         let last_good = (0..200).map(f64::from).take_while(|&mm| effect_of(800.0 + mm, 1400.0).damaged == 0).count();
         assert!((75..=95).contains(&last_good), "{last_good} mm");
     }

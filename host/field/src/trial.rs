@@ -1,8 +1,8 @@
-//! A trial: everything that decides how a row is weeded, but for who weeds it.
+//! A trial: all inputs of weeding a row, except the controller.
 //!
-//! The machine's motion does not depend on the firmware, so that a trial is told in full before anything runs: row, machine,
-//! motion, and what the firmware is set to. Who weeds it is for others to say: the [native run](crate::native), its
-//! [`baselines`](crate::baselines), or the real firmware, which is not here.
+//! The machine's motion does not depend on the firmware. So a trial is complete before it runs: row, machine, motion,
+//! and the firmware's settings. The controller is the [native run](crate::native), one of its
+//! [`baselines`](crate::baselines), or the real firmware, which is in another crate.
 
 use crate::machine::Machine;
 use crate::motion::Motion;
@@ -23,7 +23,7 @@ pub enum Start {
     Switch,
 }
 
-/// Everything that makes a trial.
+/// The inputs of a trial.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// What stands in the row.
@@ -32,18 +32,18 @@ pub struct Trial {
     pub machine: Machine,
     /// How it rolls.
     pub motion: Motion,
-    /// Margin and leads that the firmware is set to.
+    /// The firmware's margin and leads.
     pub timing: Timing,
     /// How the firmware is put to work.
     pub start: Start,
-    /// What else the firmware is told, after the settings that follow from machine and timing.
+    /// Further settings, applied after those that follow from machine and timing.
     pub settings: Vec<(Setting, u16)>,
-    /// What the firmware is taught beside its built-in examples.
+    /// Examples that are taught in addition to the built-in ones.
     pub examples: Vec<Example<{ features::COUNT }>>,
 }
 
-/// Distance that the machine rolls ahead of the row, so that it has its speed and the tool is in the row when the row
-/// begins; and the time in which it has to swing in, which adds to it at speed.
+/// Distance that the machine rolls ahead of the row, to reach its speed and have the tool in the row. The time of the
+/// swing in adds to it at speed.
 const RUN_UP_MM: f64 = 200.0;
 const SWING_IN_S: f64 = 0.6;
 
@@ -56,15 +56,15 @@ const BRAKING_MM_S2: f64 = 3000.0;
 /// Distance that the tool rolls on behind the row.
 const RUN_OUT_MM: f64 = 100.0;
 
-/// The highest top speed that the firmware takes, 10.8 km/h. A machine is set to a quarter more than it drives, as far as its
-/// beam stands ahead for that.
+/// The firmware's greatest top speed, 10.8 km/h. A machine is set to a quarter more than its speed, if the distance
+/// from beam to tool allows it.
 const TOP_SPEED_MM_S: f64 = 3000.0;
 
-/// The lowest that it takes: nothing contradicts it.
+/// The firmware's least top speed. No setting contradicts it.
 const SLOWEST_TOP_SPEED_MM_S: f64 = 100.0;
 
 impl Trial {
-    /// The whole row at one speed, from standstill far enough ahead until the tool has passed its end.
+    /// A trial of the whole row at one speed, from a standstill ahead of it until the tool has passed its end.
     pub fn at_speed(row: Row, machine: Machine, timing: Timing, speed_mm_s: f64) -> Self {
         let span = row.span_mm();
         let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
@@ -74,17 +74,17 @@ impl Trial {
             speed_mm_s,
             span.end + machine.beam_to_tool_mm + RUN_OUT_MM,
         );
-        // No machine stops dead, and one that did would look like one whose encoder has failed.
+        // A real machine does not stop at once. The firmware would take that for a failed encoder.
         let motion = motion.change_speed(0.0, BRAKING_MM_S2);
         Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new(), examples: Vec::new() }
     }
 
-    /// The settings that the firmware gets, in an order in which machine and timing do not contradict each other on the way.
+    /// The firmware's settings, in an order without contradictions on the way.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
         let Timing { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
         let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
-        // As the firmware counts: the lead, an eighth of it, and what the sensor may take.
+        // The firmware's own calculation: the lead, an eighth of it, and the sensor's response.
         let notice_s = f64::from(lead_out_ms) * 1.125e-3 + 0.002;
         let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
         let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S);

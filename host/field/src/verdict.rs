@@ -1,16 +1,16 @@
-//! What the tool did to the row: from the servo's pulses to a verdict on each plant.
+//! The verdict on each plant: from the servo's pulses to the tool's effect on the row.
 //!
-//! Pulses become commands and the tool's angle over time ([`crate::servo`]); with the machine's motion that is an angle
-//! over the ground. A plant is damaged when the tool was anything but fully out at any time over its canopy, or where the
-//! stroke is too short for the canopy, which is taken to be as wide across the row as along it; its margin
-//! is cut when the tool was clear of the canopy by less than the margin and [`MARGIN_TOLERANCE_MM`]. With a stem zone, the tool
-//! is over it while its edge is nearer to the row's line than half of the zone. Both are strict: for
-//! most of its stroke the tool is beside the row's line already, and a canopy is as wide as the beam saw it only at the
-//! height of the beam.
+//! Pulses become commands and the tool's angle over time ([`crate::servo`]). With the machine's motion this becomes an
+//! angle over the ground. A plant is damaged if the tool was not fully out at any time over its canopy. It is also
+//! damaged if the stroke is too short for the canopy, which is taken to be as wide across the row as along it. Its
+//! margin is cut if the tool's distance from the canopy was less than the margin by more than [`MARGIN_TOLERANCE_MM`].
+//! With a stem zone, the tool is over it while its edge is nearer to the row's line than half of the zone. Both rules
+//! are strict. For most of its stroke the tool is already beside the row's line. A canopy has the width that the beam
+//! saw only at the beam's height.
 //!
-//! A swing is also held against the place where it should have been commanded. Ideal are the true ends of the canopy, the
-//! margin, the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing out and one in share
-//! its two commands: the first plant has the one, the last the other.
+//! A swing is also compared with its ideal position. The ideal follows from the true ends of the canopy, the margin,
+//! the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing share its two commands:
+//! the first plant has the command out, the last one has the command back.
 
 use crate::ground::{share_of, union};
 use crate::machine::{Machine, time_at_s};
@@ -27,31 +27,31 @@ pub const MARGIN_TOLERANCE_MM: f64 = 10.0;
 /// Margin and leads, as the firmware's settings have them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// Ground kept free on both sides of a canopy.
+    /// Margin on both sides of a canopy.
     pub margin_mm: u32,
-    /// Time by which the command to leave the row comes ahead.
+    /// Lead of the command to leave the row.
     pub lead_out_ms: u32,
-    /// Time by which the command to come back comes ahead.
+    /// Lead of the command to come back.
     pub lead_in_ms: u32,
-    /// The zone that is kept of a single plant, where its leaves may be worked under; 0 for all of its canopy.
+    /// The zone that is kept for a single plant, if the tool may work under its leaves. 0 keeps its whole canopy.
     pub stem_zone_mm: u32,
 }
 
 impl Default for Timing {
-    /// For the servo of [`Machine::default`], which nothing loads: the firmware's own default is for one in the soil.
+    /// For the unloaded servo of [`Machine::default`]. The firmware's own default is for a servo in the soil.
     fn default() -> Self {
         Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40, stem_zone_mm: 0 }
     }
 }
 
 impl Timing {
-    /// The paper's schedule: swings are commanded where they should be done (Eq. 1 to 3).
+    /// The paper's schedule, without leads (Eq. 1 to 3).
     pub fn as_in_the_paper() -> Self {
         Self { lead_out_ms: 0, lead_in_ms: 0, ..Self::default() }
     }
 
-    /// What the tool has to keep off of a plant, less the margin: its canopy, or with a zone as much of that as the firmware keeps of a
-    /// plant that the beam has seen whole.
+    /// The ground that the tool must not enter for a plant, without the margin: its canopy. With a stem zone it is the
+    /// part that the firmware keeps of a plant seen whole.
     fn kept_mm(&self, plant: &Thing) -> Range<f64> {
         let (span, zone_mm) = (plant.span_mm(), f64::from(self.stem_zone_mm));
         let trim_mm = ((span.end - span.start - zone_mm) / 2.0).clamp(0.0, 3.0 / 16.0 * zone_mm);
@@ -64,7 +64,7 @@ impl Timing {
     }
 }
 
-/// How a plant fared.
+/// The result for a plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The tool kept away from it by the margin.
@@ -92,30 +92,30 @@ pub struct PlantOutcome {
     pub plant: Thing,
     /// What the tool had to keep off: its canopy, or the zone round its stem.
     pub kept_mm: Range<f64>,
-    /// From the place where the tool was fully out to the leading end of that; negative inside it. `None` where
-    /// the tool was out from the beginning.
+    /// Distance from the position where the tool was fully out to the leading end of `kept_mm`; negative inside it.
+    /// `None` if the tool was out from the beginning.
     pub clearance_before_mm: Option<f64>,
-    /// From its trailing end to the place where the tool began to come back; negative inside the canopy. `None`
-    /// where it stayed out to the end.
+    /// Distance from its trailing end to the position where the tool began to come back; negative inside it. `None` if
+    /// it stayed out to the end.
     pub clearance_behind_mm: Option<f64>,
     /// How often the tool was swung out over it.
     pub swings: usize,
-    /// Counts by which the command to swing out for this plant came late (early: negative). `None` where the plant had no
+    /// How late the command to swing out for this plant was, in ticks; negative if early. `None` if the plant had no
     /// such command of its own.
     pub out_error_ticks: Option<f64>,
-    /// Counts by which the command to come back behind this plant came late (early: negative). `None` as above.
+    /// How late the command to come back behind this plant was, in ticks; negative if early. `None` as above.
     pub in_error_ticks: Option<f64>,
     /// The verdict.
     pub verdict: Verdict,
 }
 
 impl PlantOutcome {
-    /// Where along the row the tool was fully out before the plant.
+    /// The position along the row at which the tool was fully out before the plant.
     pub fn clear_mm(&self) -> Option<f64> {
         self.clearance_before_mm.map(|clearance| self.kept_mm.start - clearance)
     }
 
-    /// Where along the row the tool began to come back behind the plant.
+    /// The position along the row at which the tool began to come back behind the plant.
     pub fn back_mm(&self) -> Option<f64> {
         self.clearance_behind_mm.map(|clearance| self.kept_mm.end + clearance)
     }
@@ -137,15 +137,15 @@ pub struct Judgement {
     pub plants: Vec<PlantOutcome>,
     /// Every tall weed, in the order of the row.
     pub weeds: Vec<WeedOutcome>,
-    /// Windows: the ground that the tool was to leave alone, each canopy with its margins.
+    /// Keep-out zones: each canopy with its margins.
     pub windows_mm: Vec<Range<f64>>,
     /// Ground over which the tool was fully out.
     pub clear_mm: Vec<Range<f64>>,
     /// Ground over which the tool worked the row's line.
     pub weeded_mm: Vec<Range<f64>>,
-    /// The tool's angle over the ground below it: places and degrees between which straight lines run.
+    /// The tool's angle over the ground below it: positions and degrees, with straight lines between them.
     pub path: Vec<(f64, f64)>,
-    /// Swings out that passed no plant, the first way into the row left out.
+    /// Swings out that passed no plant, without the first swing into the row.
     pub idle_swings: usize,
     /// Share of the row's length that was weeded, from 0 to 1.
     pub weeded_share: f64,
@@ -159,7 +159,7 @@ impl Judgement {
         self.plants.iter().filter(|plant| plant.verdict == verdict).count()
     }
 
-    /// Every swing's error in counts, late above 0.
+    /// The error of each swing in ticks, positive if late.
     pub fn swing_errors_ticks(&self) -> Vec<f64> {
         self.plants.iter().flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks]).flatten().collect()
     }
@@ -167,9 +167,9 @@ impl Judgement {
 
 /// The largest share of the row's length that this machine can weed at this motion without cutting a margin.
 ///
-/// Around each plant a length `U = w + 2 m + k v (T_out + T_in)` is left: canopy, both margins, and what the machine rolls
-/// while the tool swings and does not work the row's line. `T` is the servo's travel; its dead time costs nothing where it
-/// is led. The inter-row tools beside the row have no part in this figure.
+/// Around each plant a length `U = w + 2 m + k v (T_out + T_in)` is left: the canopy, both margins, and the distance
+/// travelled while the tool swings and does not work the row's line. `T` is the servo's travel. Its dead time costs
+/// nothing with the right leads. The inter-row tools are not part of this figure.
 pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Timing) -> f64 {
     let swing_s = machine.idle_share_of_stroke() * machine.stroke_s();
     let margin_mm = f64::from(timing.margin_mm);
@@ -255,9 +255,9 @@ pub fn judge(
 
 /// The time from a command out of the row to the next one into it.
 struct Swing {
-    /// `None` for the tool that was out at power-up.
+    /// `None` if the tool was out at power-up.
     out_s: Option<f64>,
-    /// `None` for the tool that is still out at the end.
+    /// `None` if the tool is still out at the end.
     in_s: Option<f64>,
     during_s: Range<f64>,
 }
@@ -290,7 +290,7 @@ impl Swing {
     }
 }
 
-/// Where swings should have been commanded.
+/// The ideal positions of swings.
 struct SwingError<'a> {
     machine: &'a Machine,
     motion: &'a Motion,
@@ -308,7 +308,7 @@ impl SwingError<'_> {
         self.ticks(time_s, window_mm, self.timing.lead_in_ms)
     }
 
-    /// Counts by which a command came behind its ideal place. There is one only while the machine rolls forward.
+    /// How late a command was against its ideal position, in ticks. `None` unless the machine rolls forward.
     fn ticks(&self, time_s: f64, window_mm: f64, lead_ms: u32) -> Option<f64> {
         let speed_mm_s = self.motion.speed_mm_s(time_s);
         let ideal_mm = window_mm + self.machine.beam_to_tool_mm - speed_mm_s * f64::from(lead_ms) / 1000.0;
@@ -319,8 +319,8 @@ impl SwingError<'_> {
 /// Clearances and verdict of a plant, given the ground over which the tool was not fully out.
 fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
     let span = timing.kept_mm(plant);
-    // What was done before the plant and what was done behind it part in the canopy's middle, or where a swing ended or
-    // began that reached beyond the middle.
+    // The canopy's middle divides the swing before the plant from the one behind it. If a swing began or ended beyond
+    // the middle, its end divides them.
     let across = closed.iter().find(|ground| ground.contains(&plant.position_mm));
     let parting_mm = match across {
         Some(ground) if ground.end < span.end => ground.end,
@@ -335,7 +335,7 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing
     let clearance_behind_mm =
         closed.iter().find(|ground| ground.end > parting_mm).map(|ground| ground.start.max(span.start) - span.end);
     let narrowest_mm = [clearance_before_mm, clearance_behind_mm].into_iter().flatten().fold(f64::INFINITY, f64::min);
-    // A stroke that ends within the canopy is no way out of it.
+    // A stroke that ends within the canopy does not clear it.
     let verdict = if narrowest_mm < 0.0 || machine.room_mm() < timing.kept_across_mm(plant) / 2.0 {
         Verdict::Damaged
     } else if narrowest_mm < f64::from(timing.margin_mm) - MARGIN_TOLERANCE_MM {
@@ -401,8 +401,8 @@ mod tests {
         Motion::steady(-500.0, 1000.0, mm_s(2.5), 3000.0)
     }
 
-    /// Frames 20 ms apart that restart where the width changes: out at power-up, in at the first place (of the machine),
-    /// out at the second, and so on.
+    /// Frames 20 ms apart. A frame restarts where the width changes: out at power-up, in at the first position of the
+    /// machine, out at the second, and so on.
     fn pulses(motion: &Motion, changes_mm: &[f64]) -> Vec<Pulse> {
         let times_s = changes_mm.iter().map(|&mm| motion.passings(mm).next().unwrap().time_s);
         let mut edges = vec![0];
@@ -446,7 +446,7 @@ mod tests {
             // The servo knows the command only at the end of the pulse, 2 ms and 1.4 mm after its beginning.
             let before_mm = plant.clearance_before_mm.unwrap();
             assert!((before_mm - 48.6).abs() < 0.2, "{before_mm} mm before");
-            // Led by 40 of 60 ms of dead time.
+            // The lead is 40 ms, of 60 ms of dead time.
             let behind_mm = plant.clearance_behind_mm.unwrap();
             assert!((behind_mm - 64.9).abs() < 0.2, "{behind_mm} mm behind");
         }

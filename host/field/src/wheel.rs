@@ -1,10 +1,10 @@
-//! The ground wheel of a machine that is rolled tick by tick, with slip that changes.
+//! The ground wheel of a machine that is rolled tick by tick, with varying slip.
 //!
-//! Over known ground the wheel turns as it did when it first came there. With another slip the ground would move under the count, and
-//! no beam can tell that.
+//! Over known ground the wheel turns as far as it did the first time. With another slip the ground would move under the
+//! count, and no beam can detect that.
 
-/// The greatest slip, as a share of the ground, over which a machine is held to its margin: three times what it makes over the distance
-/// from beam to tool is within the margin, for what was measured before a change and what is right behind it.
+/// The greatest slip, as a share of the ground, for which a machine must keep its margin. Three times its error over
+/// the distance from beam to tool fits into the margin: for values measured before a change of slip and used after it.
 pub fn most_slip(margin_mm: f64, beam_to_tool_mm: f64) -> f64 {
     0.3 * margin_mm / beam_to_tool_mm
 }
@@ -15,7 +15,7 @@ pub struct Wheel {
     /// How far it turns for a tick of new ground.
     pub turns_a_tick: f64,
     ticks: f64,
-    /// What it has turned for each tick of ground that it has come to.
+    /// How far it has turned for each tick of ground so far.
     turned: Vec<f64>,
 }
 
@@ -31,7 +31,7 @@ impl Wheel {
         self.ticks.floor() as i64
     }
 
-    /// Rolls by a tick of ground, on from `ground` or back from it; the counts of a perfect encoder.
+    /// Rolls by a tick of ground, forward or back from `ground`. Returns the counts of a perfect encoder.
     pub fn roll(&mut self, ground: i64, forward: bool) -> i64 {
         let tick = usize::try_from(if forward { ground } else { ground - 1 });
         while tick.is_ok_and(|tick| self.turned.len() <= tick) {

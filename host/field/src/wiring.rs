@@ -1,8 +1,9 @@
-//! The wiring: which contact of the Uno goes where, as the one table behind the manual's; its diagram, docs/wiring.svg, is held to it.
+//! The wiring: the connections of the Uno's contacts. The manual's table is made from this one, and a test compares its
+//! diagram, docs/wiring.svg.
 //!
-//! The firmware's own pins stand in its peripherals' files; the constants here say the same for the simulated machine, which the
-//! firmware is tested on, so that a pin that is wrong here fails there. Supply and ground are no contacts of the table: the
-//! diagram shows them.
+//! The firmware's own pins are in its peripherals' files. The constants here repeat them for the simulated machine. The
+//! firmware's tests run on that machine, so they fail if a pin here is wrong. Supply and ground are not in the table:
+//! the diagram shows them.
 
 use std::fmt::Write;
 use uno::{Pin, Wire};
@@ -31,8 +32,8 @@ pub const SERVO: Pin = Pin::D9;
 /// Status LED, an output.
 pub const LED: Pin = Pin::D13;
 
-/// What is wired to the pins, in the order of the board's numbering. At rest the wheel is at a step where both channels are low, the
-/// beam is clear, the switches are open on their pull-ups, and the outputs are not driven yet.
+/// The wires of the pins, in the order of the board's numbering. At rest both channels of the encoder are low and the
+/// beam is clear. The switches are open on their pull-ups, and the outputs are not driven yet.
 pub const WIRES: [Wire; 8] = [
     Wire { pin: ENCODER_A, name: "encoder_a", high_at_rest: false },
     Wire { pin: ENCODER_B, name: "encoder_b", high_at_rest: false },
@@ -44,7 +45,7 @@ pub const WIRES: [Wire; 8] = [
     Wire { pin: LED, name: "led", high_at_rest: false },
 ];
 
-/// What one contact of the Uno, or a pair of them, is wired to.
+/// A connection of one contact of the Uno, or of a pair of them.
 #[derive(Clone, Copy, Debug)]
 pub struct Connection {
     /// The Uno's side.
@@ -62,7 +63,7 @@ pub struct Connection {
 pub enum Contact {
     /// A pin that the weeder reads or drives.
     Pin(Pin),
-    /// D0 and D1, the serial line, which is at the Uno's USB plug too.
+    /// D0 and D1, the serial line, which is also at the Uno's USB plug.
     Serial,
 }
 
@@ -79,7 +80,7 @@ impl Contact {
 /// A resistor to 5 V.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PullUp {
-    /// Of 4.7 k, to be soldered: the chip's own of 20 to 50 k is too weak for a long cable in a noisy place.
+    /// 4.7 k, to be soldered. The chip's own of 20 to 50 k is too weak for a long cable in a noisy place.
     External,
     /// The chip's own.
     Internal,

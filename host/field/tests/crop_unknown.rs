@@ -1,8 +1,8 @@
-//! How often the alarm `crop_unknown` is right: the decisions, compiled for the host, weed simulated rows.
+//! The accuracy of the alarm `crop_unknown`: the decisions, compiled for the PC, weed simulated rows.
 //!
-//! Weeds in a gap of a stand are no crop of stalks, and a crop of stalks that the examples do not know is stopped at its eighth plant at
-//! the latest. `WEEDER_ROWS=10000 cargo test --release -p field --test crop_unknown -- --nocapture` tries more rows, and tells the
-//! rates.
+//! Weeds in a gap of a stand must not raise the alarm. An unknown crop of stalks must raise it at its eighth plant at
+//! the latest. `WEEDER_ROWS=10000 cargo test --release -p field --test crop_unknown -- --nocapture` tries more rows,
+//! and prints the rates.
 
 use control::alarm::Alarm;
 use control::ground::examples::EXAMPLES;
@@ -21,14 +21,14 @@ use field::trial::{Start, Trial};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Rows of each field, where nothing asks for more.
+/// Default number of rows of each field.
 const ROWS: u64 = 300;
 
 fn rows() -> u64 {
     std::env::var("WEEDER_ROWS").map_or(ROWS, |rows| rows.parse().expect("a number of rows"))
 }
 
-/// Weeds a row of a field; the alarm that ended it, and how many plants had come to the beam by then.
+/// Weeds a row of a field. Returns the alarm that ended it, and how many plants had reached the beam by then.
 fn weed(preset: &str, number: u64, spacing_mm: f64, speed_km_h: f64) -> (Option<Alarm>, usize) {
     let conditions = Conditions::preset(preset).expect("it is a preset").expect("it can be read");
     let chance = |of: u64| {
@@ -77,7 +77,7 @@ fn weed(preset: &str, number: u64, spacing_mm: f64, speed_km_h: f64) -> (Option<
     (alarm.map(|(alarm, _)| alarm), plants)
 }
 
-/// At most one row in so many of a field ends in the alarm.
+/// At most one row in so many may end in the alarm.
 #[track_caller]
 fn assert_rare(preset: &str, rows_an_alarm: u64) {
     let ends = |&row: &u64| {

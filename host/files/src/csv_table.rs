@@ -1,7 +1,7 @@
-//! Reading CSV tables that people made, with errors that name the file, the line, and what would be right.
+//! Reads CSV tables that people made, with errors that name the file, the line, and what would be right.
 //!
-//! The columns may come in any order, with others among them; lines that begin with `#` are comments. Lines may end as
-//! any system or serial monitor ends them. What the values mean is for the reader of each table to say.
+//! The columns may be in any order, with other columns between. Lines that begin with `#` are comments. Line ends may
+//! be those of any system or serial monitor. The caller interprets the values.
 
 use super::FileError;
 use csv::StringRecord;
@@ -17,17 +17,17 @@ pub struct CsvTable {
 }
 
 impl CsvTable {
-    /// Reads a file as [`parse`](Self::parse) does its text.
+    /// Reads a file as [`parse`](Self::parse) parses its text.
     ///
     /// # Errors
-    /// As [`parse`](Self::parse), and where the file cannot be read.
+    /// As [`parse`](Self::parse), and if the file cannot be read.
     pub fn read(path: &Path, columns: &[&str]) -> Result<Self, FileError> {
         Self::parse(path, bytes(path)?, columns)
     }
 
-    /// The table in a file's text, which has to have these columns and at least one line below its header.
+    /// Parses a file's text. The table must have these columns and at least one line below its header.
     ///
-    /// A last line `ok` is passed over: the firmware's console ends its answers by one, and tables are pasted from there.
+    /// A last line `ok` is ignored: the firmware's console ends its answers with it, and tables are pasted from there.
     ///
     /// # Errors
     /// Names the file, the line and what would be right.
@@ -35,7 +35,7 @@ impl CsvTable {
         let at = |line: u64, problem: String| FileError::Line { path: path.into(), line, problem };
         let text = String::from_utf8(text)
             .map_err(|_| at(1, "this is not text: a table is a CSV file in UTF-8".to_owned()))?;
-        // The reader counts line feeds, so that each line has to have just one.
+        // The reader counts line feeds, so each line must have exactly one.
         let text = text.replace("\r\n", "\n").replace('\r', "\n");
         let text = text.trim_end();
         let text = text.strip_suffix("\nok").unwrap_or(text).to_owned() + "\n";
@@ -47,7 +47,7 @@ impl CsvTable {
         if let Some(line) = opened(&text, 0, &header) {
             return Err(at(line, UNCLOSED.to_owned()));
         }
-        // The reader stands at the line behind the one that it has read; a record's own position may be a comment's.
+        // The reader is at the line after the record. A record's own position may be a comment's.
         let header_line = reader.position().line() - 1;
         if let Some(missing) = columns.iter().find(|&column| !header.iter().any(|name| name == *column)) {
             let semicolons = header.iter().any(|name| name.contains(';'));
@@ -91,10 +91,10 @@ impl CsvTable {
     }
 }
 
-/// What is wrong with a field that goes on for several lines: it has swallowed those.
+/// The error for a field over several lines: it contains the lines after an open quotation mark.
 const UNCLOSED: &str = "a quotation mark is opened and not closed: a field ends on its own line";
 
-/// The line behind another on which a quotation mark is opened that this record has not closed there.
+/// The line after `before` on which this record opens a quotation mark that is not closed on the same line.
 fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
     let goes_on = record.iter().any(|field| field.contains('\n'));
     let mut behind = (1..).zip(text.lines()).skip(before as usize);
@@ -105,7 +105,7 @@ fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
 /// What stands in a file.
 ///
 /// # Errors
-/// Where it cannot be read.
+/// If it cannot be read.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     fs::read(path).map_err(|source| FileError::unread(path, source))
 }
@@ -124,7 +124,7 @@ impl Line<'_> {
         self.number
     }
 
-    /// The text in a column; empty where the table has no such column.
+    /// The text in a column; empty if the table has no such column.
     pub fn text(&self, column: &str) -> &str {
         let place = self.table.header.iter().position(|name| name == column);
         place.and_then(|place| self.record.get(place)).unwrap_or_default()
@@ -133,7 +133,7 @@ impl Line<'_> {
     /// The value in a column. `right` says what it has to be.
     ///
     /// # Errors
-    /// Where the text is none.
+    /// If the text is none.
     pub fn value<T: FromStr>(&self, column: &str, right: &str) -> Result<T, FileError> {
         let text = self.text(column);
         text.parse().map_err(|_| self.error(format!("{column} is `{text}`: it has to be {right}")))
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
     use std::error::Error;
 
-    /// The values of the column `place_mm` with their lines, or what reading a file with this text says.
+    /// The values of the column `place_mm` with their lines, or the error for a file with this text.
     fn read(text: &str) -> Result<Vec<(u64, i16)>, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("table.csv");

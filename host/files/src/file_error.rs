@@ -1,7 +1,7 @@
-//! Why a file that people wrote cannot be used: the file itself, or a line of it, with what would be right.
+//! The error for a file that people wrote: the file, or a line of it, and what would be right.
 //!
-//! Each reader says what is wrong with a line in words of its own. This only says where, and has it in a line: what is quoted may hold
-//! anything.
+//! The caller describes the problem. This module adds the place, and keeps the message in one line, because quoted text
+//! may contain any characters.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub enum FileError {
         path: PathBuf,
         /// The line, counted from 1.
         line: u64,
-        /// What is wrong with it, and what would be right.
+        /// The problem, and what would be right.
         problem: String,
     },
 }
@@ -43,15 +43,15 @@ impl FileError {
         Self::File { path: path.into(), done: "written", source }
     }
 
-    /// Something is wrong in the line in which this byte of the file's text stands.
+    /// An error in the line with this byte of the file's text.
     pub fn at_byte(path: &Path, text: &str, byte: usize, problem: impl Into<String>) -> Self {
         let ends = text.bytes().take(byte).filter(|&byte| byte == b'\n').count();
         Self::Line { path: path.into(), line: 1 + ends as u64, problem: problem.into() }
     }
 }
 
-/// What a file or a machine says, to be quoted in a message: its control characters are written out, ends of lines among them, so
-/// that it stays in its line and gives a terminal no orders.
+/// Quotes the text of a file or a machine for a message. Control characters and line ends are escaped, so that it stays
+/// in its line and cannot control a terminal.
 pub fn in_a_line(text: &str) -> String {
     let shown = |character: char| match character {
         control if control.is_control() => control.escape_default().to_string(),

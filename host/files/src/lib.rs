@@ -1,8 +1,8 @@
-//! What several of the host's crates need of files: CSV tables that people made, and files that are written whole.
+//! Shared file handling of the host's crates: CSV tables that people made, and files that are written completely or not
+//! at all.
 //!
-//! [`csv_table`] reads a table and names file, line and column where something is wrong; what the values mean is for the reader
-//! of each table to say. [`FileError`] is how any file that people write is refused. [`whole_file`] writes a file whole or not at
-//! all. It knows nothing of weeding.
+//! [`csv_table`] reads a table. Its errors name file, line and column. The caller interprets the values. [`FileError`]
+//! is the error for any file that people write. [`whole_file`] writes files. This crate is independent of weeding.
 
 pub mod csv_table;
 mod file_error;

@@ -1,8 +1,8 @@
-//! Files that are written whole or not at all: what goes wrong half-way leaves what was there before.
+//! Writes a file completely or not at all: after an error the old file is still there.
 //!
-//! The text goes to a temporary file in the same folder, which then takes the name; behind a link it is the file to which that
-//! leads. What is no file, such as `/dev/null` or a pipe, is written as it is. It does not make folders. The temporary name is
-//! nobody's business, and in no error.
+//! The text goes to a temporary file in the same folder, which is then renamed. If the path is a link, its target is
+//! replaced. Paths that are no files, such as `/dev/null` or a pipe, are written directly. Folders are not made. Error
+//! messages name the path, not the temporary file.
 
 use std::borrow::Cow;
 use std::fs::OpenOptions;
@@ -13,7 +13,7 @@ use tempfile::{Builder, NamedTempFile};
 /// Writes a file, or replaces one.
 ///
 /// # Errors
-/// Those of the system, and of `contents`; the file is then as it was before.
+/// The errors of the system and of `contents`. The old file is then unchanged.
 pub fn write<E: From<io::Error>>(path: &Path, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), E> {
     let path = target(path);
     if is_device(&path) {
@@ -30,47 +30,47 @@ pub fn write<E: From<io::Error>>(path: &Path, contents: impl FnOnce(&mut dyn Wri
     Ok(())
 }
 
-/// Whether a file could be written now. Nothing is left behind.
+/// Checks that a file can be written now. Leaves no file behind.
 ///
 /// # Errors
-/// Those of the system where it could not.
+/// The errors of the system.
 pub fn check(path: &Path) -> io::Result<()> {
     let path = target(path);
     if path.is_dir() {
         Err(ErrorKind::IsADirectory.into())
     } else if is_device(&path) {
-        // A pipe would be opened for its reader; what is wrong with it shows when it is written.
+        // Opening a pipe would disturb its reader. Its errors show when it is written.
         Ok(())
     } else {
         temporary(&path).map(drop)
     }
 }
 
-/// Whether a file could be made in this folder now, of any name. Nothing is left behind.
+/// Checks that a new file can be made in this folder now. Leaves no file behind.
 ///
 /// # Errors
-/// Those of the system where none could.
+/// The errors of the system.
 pub fn check_folder(folder: &Path) -> io::Result<()> {
-    // The probe's own name is drawn at random: it meets nothing that is there.
+    // The probe's name is random, so it does not hit an existing file.
     temporary_in(folder).map(drop)
 }
 
-/// The file itself, where a link leads to one.
+/// The file itself, if the path is a link to one.
 fn target(path: &Path) -> Cow<'_, Path> {
     path.canonicalize().map_or(Cow::Borrowed(path), Cow::Owned)
 }
 
-/// Whether something is there that is no file, and that no file may take the place of.
+/// Whether the path exists and is no file. Such a path must not be replaced.
 fn is_device(path: &Path) -> bool {
     path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir())
 }
 
-/// A file in the same folder that is gone again unless it takes the name.
+/// A file in the same folder, which is deleted again unless it is renamed.
 fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     temporary_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
-/// A file in a folder that is gone again unless it takes a name.
+/// A file in a folder, which is deleted again unless it is renamed.
 fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     #[cfg_attr(not(unix), expect(unused_mut, reason = "only the permissions change it"))]
     let mut builder = Builder::new();
@@ -80,7 +80,7 @@ fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder).map_err(without_name)
 }
 
-/// What the system said, without the temporary name that the library adds.
+/// The system's error, without the temporary name that the library adds.
 fn without_name(error: io::Error) -> io::Error {
     let said = error.to_string();
     match said.split_once(" at path ") {

@@ -1,30 +1,29 @@
-//! Where beam and tool stand beside the receiver's antenna, and how late its lines come: what a record says of it, and
-//! what the user.
+//! The offsets of beam and tool from the receiver's antenna, and the delay of its lines: from a log, or from the user.
 
 use crate::track::Offset;
 use link::Values;
 use std::fmt;
 
-/// Where beam and tool stand beside the antenna, and what else is to be known of the receiver. Millimetres are to the
-/// front and to the right; below 0 they are to the back and to the left.
+/// The offsets of beam and tool from the antenna, and further values of the receiver. Millimetres are positive to the
+/// front and to the right, and negative to the back and to the left.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Antenna {
-    /// How far the beam stands ahead of the antenna.
+    /// Distance of the beam ahead of the antenna.
     pub beam_ahead_mm: f64,
-    /// How far it stands to the right of it: where it crosses the row.
+    /// Distance to the right of it, where the beam crosses the row.
     pub beam_right_mm: f64,
-    /// How far the tool stands ahead of the antenna; none where it is behind the beam as the machine's settings say.
+    /// Distance of the tool ahead of the antenna. `None` if it follows from the machine's settings.
     pub tool_ahead_mm: Option<f64>,
-    /// How far it stands to the right of it; none where it is as far as the beam.
+    /// Distance of the tool to the right of it. `None` if it equals the beam's.
     pub tool_right_mm: Option<f64>,
     /// From the moment of a fix until its first line has come, at the least.
     pub delay_ms: f64,
-    /// The standard deviation of a fix; none where it is to be what is usual for the fix's quality.
+    /// The standard deviation of a fix. `None` for the usual one of the fix's quality.
     pub error_mm: Option<f64>,
 }
 
 impl Antenna {
-    /// Reads what a record says; none where it says something else.
+    /// Parses a log's line. `None` if it is another line.
     pub fn parse(line: &str) -> Option<Self> {
         let values = Values(line);
         let number = |key| values.number::<f64>(key).filter(|value| value.is_finite());
@@ -38,7 +37,7 @@ impl Antenna {
         })
     }
 
-    /// The standard deviation of a fix in metres, where it is known.
+    /// The standard deviation of a fix in metres, if it is known.
     pub fn error_m(&self) -> Option<f64> {
         self.error_mm.map(|error_mm| error_mm / 1000.0)
     }
@@ -48,7 +47,7 @@ impl Antenna {
         Offset { ahead_m: self.beam_ahead_mm / 1000.0, right_m: self.beam_right_mm / 1000.0 }
     }
 
-    /// Where the tool is, on a machine whose tool is so far behind its beam.
+    /// The tool's offset, on a machine with this distance from beam to tool.
     pub fn tool(&self, beam_to_tool_mm: f64) -> Offset {
         Offset {
             ahead_m: self.tool_ahead_mm.unwrap_or(self.beam_ahead_mm - beam_to_tool_mm) / 1000.0,

@@ -1,17 +1,16 @@
-//! A record read as a job: what the machine met and did, each with its distance, its place and its time.
+//! Reads a log as a job: the machine's detections and actions, each with its distance, position and time.
 //!
-//! [`Job::read`] goes through a log's lines in their order. From one start of the Uno to the next, or to where its
-//! wheel is set anew, or the log was opened again, is a stretch: the wheel's distance goes on within one alone. In each
-//! the fixes get the distance at which they were taken, by the statuses around them, and what was told gets its place
-//! by [`Track`].
+//! [`Job::read`] reads the log's lines in order and divides them into stretches. A new stretch begins when the Uno
+//! restarts, when the wheel's settings change, and when the log is opened again. Distances are comparable only within a
+//! stretch. Each fix gets the distance at which it was taken, from the statuses around it. Each event gets its position
+//! from [`Track`].
 //!
-//! - A plant or weed is the middle of what the beam saw of it, and stands where the beam was. So is ground that was
-//!   guarded.
-//! - Swings and alarms are where the tool was when they were told; a swing is the command, which the tool follows by
-//!   its lead.
-//! - Ground is weeded where the machine is at work and the tool is told to be in the row, not weeded where it is told
-//!   to be out. Ground is passed once: rolling back over it, and over it again, adds nothing.
-//! - A label is what the last detection was, where the machine took it.
+//! - A plant or weed is the middle of its detection, at the beam's position. So is guarded ground.
+//! - A swing or an alarm has the tool's position at the time of its event. A swing is the command: the tool follows
+//!   after the lead.
+//! - Ground is weeded if the machine is at work and the tool is commanded into the row. It is not weeded if the tool is
+//!   commanded out. Ground counts once: passing it again after rolling back adds nothing.
+//! - A label is the class that the operator gave the last detection, if the machine accepted it.
 
 use crate::antenna::Antenna;
 use crate::plane::Place;
@@ -24,19 +23,19 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Time at either end of a stretch for which the machine is taken to have stood, in ms: a fix in it is where the
-/// stretch begins or ends.
+/// Time before and after a stretch in which the machine is assumed to have stood, in ms. A fix in this time belongs to
+/// the stretch's beginning or end.
 const STANDING_MS: f64 = 1000.0;
 
-/// The longest way between two statuses in ticks, some hundred metres.
+/// The longest distance between two statuses in ticks, some hundred metres.
 pub(crate) const LONGEST_WAY: u32 = 1_000_000;
 
-/// What is asked of a record beside what stands in it.
+/// The parameters of reading a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wanted {
-    /// Where beam and tool are, in place of what the record says.
+    /// The offsets of beam and tool, instead of the log's.
     pub antenna: Option<Antenna>,
-    /// The longest way between two fixes over which places are interpolated, in metres.
+    /// The longest distance between two fixes for interpolation, in metres.
     pub longest_outage_m: f64,
 }
 
@@ -51,18 +50,18 @@ impl Default for Wanted {
 pub enum What {
     /// A detection that the beam has seen.
     Object {
-        /// What it was taken for.
+        /// Its class.
         class: Class,
         /// Votes for that.
         votes: u8,
     },
-    /// Ground that is kept free, because a plant was due.
+    /// Guarded ground, because a plant was expected.
     Guarded,
-    /// What somebody said that the last detection was.
+    /// The label of the last detection.
     Label(Class),
-    /// The tool was told to swing out of the row.
+    /// The tool was commanded out of the row.
     SwingOut,
-    /// The tool was told to swing into the row.
+    /// The tool was commanded into the row.
     SwingIn,
     /// A fault was latched.
     Alarm,
@@ -94,55 +93,55 @@ pub struct Thing {
     pub line: u64,
     /// As it stands there.
     pub text: String,
-    /// When it was recorded, by the record's clock.
+    /// Its time, by the log's clock.
     pub time_ms: u64,
-    /// Metres by the wheel since the stretch began.
+    /// Distance by the wheel since the stretch began, in metres.
     pub way_m: f64,
-    /// Its width along the row in mm; 0 for what has none.
+    /// Its width along the row in mm; 0 if it has none.
     pub width_mm: f64,
     /// Where it is.
     pub found: Result<Found, Missing>,
 }
 
-/// What the machine did with some ground.
+/// The machine's work on some ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Did {
-    /// It was at work, and the tool was to be in the row.
+    /// At work, with the tool commanded into the row.
     Weeded,
-    /// It was at work, and the tool was to be out.
+    /// At work, with the tool commanded out.
     Spared,
-    /// It was not at work.
+    /// Not at work.
     Rolled,
 }
 
 /// Ground that was passed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ground {
-    /// What was done with it.
+    /// The work.
     pub did: Did,
-    /// Metres by the wheel since the stretch began.
+    /// Distances by the wheel since the stretch began, in metres.
     pub way_m: Range<f64>,
     /// When, by the record's clock.
     pub time_ms: Range<u64>,
-    /// Where the tool went, a line for each part that has places. Empty where nothing was done.
+    /// The tool's path, a line for each part that has positions. Empty if the machine was not at work.
     pub lines: Vec<Vec<Place>>,
 }
 
-/// A part of a record over which the wheel's distance goes on.
+/// A part of a log with continuous wheel distance.
 #[derive(Clone, Debug, Default)]
 pub struct Stretch {
-    /// What happened, in the record's order.
+    /// The events, in the log's order.
     pub things: Vec<Thing>,
     /// The ground that was passed.
     pub ground: Vec<Ground>,
-    /// When it began and ended, by the record's clock.
+    /// Its beginning and end, by the log's clock.
     pub time_ms: Range<u64>,
 }
 
 /// A fix that has jumped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jump {
-    /// Where it says that the antenna is.
+    /// The antenna's position by the receiver.
     pub place: Place,
     /// Metres from the last fix that is used.
     pub far_m: f64,
@@ -157,16 +156,16 @@ pub struct Jump {
 pub struct Job {
     /// Its parts.
     pub stretches: Vec<Stretch>,
-    /// What was counted of the receiver.
+    /// The counts of the receiver.
     pub counts: Counts,
     /// Fixes that have jumped.
     pub jumps: Vec<Jump>,
     /// How often the receiver was lost, by the record.
     pub unplugged: u64,
-    /// Milliseconds from 1970 to the midnight from which [`Found::utc_ms`] counts; none where the receiver told no
+    /// The midnight from which [`Found::utc_ms`] counts, in milliseconds since 1970. `None` if the receiver sent no
     /// date.
     pub midnight_ms: Option<i64>,
-    /// Where beam and tool were taken to be.
+    /// The offsets of beam and tool that were used.
     pub antenna: Antenna,
 }
 
@@ -174,14 +173,14 @@ pub struct Job {
 #[derive(Default)]
 struct Reading {
     settings: Option<Settings>,
-    /// When the wheel was where: milliseconds of the record, ticks since the stretch began.
+    /// The wheel's positions: milliseconds of the log, and ticks since the stretch began.
     wheel: Vec<(f64, i64)>,
     last_position: Option<i32>,
     last_status: Option<Status>,
     fixes: Vec<Fix>,
     things: Vec<Thing>,
     ground: Vec<Passed>,
-    /// Commands that wait for their answers: the line, its time, and what was typed.
+    /// Commands without an answer so far: the line, its time, and the text.
     unanswered: VecDeque<(u64, u64, String)>,
     time_ms: Option<Range<u64>>,
 }
@@ -249,7 +248,7 @@ impl Job {
                     if let Some(settings) = reading.answer(&entry.text) {
                         job.heard(receiver.end(), &mut reading, entry);
                         receiver.wheel_lost();
-                        // What waits for its answer still does, and the machine is where it was.
+                        // Unanswered commands stay, and so does the machine's position.
                         let unanswered = std::mem::take(&mut reading.unanswered);
                         let last_status = reading.last_status.take();
                         job.close(&mut reading, wanted, Some(settings));
@@ -283,7 +282,7 @@ impl Job {
         }
     }
 
-    /// A stretch ends; another begins with these settings.
+    /// Ends a stretch and begins another one with these settings.
     fn close(&mut self, reading: &mut Reading, wanted: &Wanted, settings: Option<Settings>) {
         let read = std::mem::replace(reading, Reading { settings, ..Reading::default() });
         if read.wheel.is_empty() {
@@ -293,7 +292,7 @@ impl Job {
         let metres = move |ticks: f64| ticks * tick_m;
         let mut fixes: Vec<(f64, Fix)> =
             read.fixes.iter().filter_map(|fix| Some((metres(read.ticks_at(fix.time_ms)?), *fix))).collect();
-        // Where its least delay is known better, a later one may come out as an earlier.
+        // When a shorter delay is found, a later fix may get an earlier time.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
         let track = Track::through(&fixes, self.antenna.error_m(), wanted.longest_outage_m);
         let find = |way_m: f64, recorded_ms: u64, offset: Offset| match &track {
@@ -328,10 +327,10 @@ impl Job {
     }
 }
 
-/// Metres between two places of a line.
+/// Distance between two positions of a line, in metres.
 const LINE_STEP_M: f64 = 0.5;
 
-/// The lines along this way, as far as there are places.
+/// The lines along this distance, wherever there are positions.
 fn lines(way_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Vec<Vec<Place>> {
     let mut lines: Vec<Vec<Place>> = vec![Vec::new()];
     let steps = ((way_m.end - way_m.start) / LINE_STEP_M).ceil().max(1.0);
@@ -343,7 +342,7 @@ fn lines(way_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Ve
             _ => {}
         }
     }
-    // A place alone is no line.
+    // A single position is no line.
     lines.retain(|line| line.len() > 1);
     lines
 }
@@ -359,7 +358,7 @@ impl Reading {
 
     fn set(&mut self, line: &str) {
         if let (Some((setting, value)), Some(settings)) = (shown(line), &mut self.settings) {
-            // A log of another version may have another range: then the default is as good.
+            // A log of another version may have another range. Then the default is used.
             let _ = settings.set(setting, value);
         }
     }
@@ -369,18 +368,18 @@ impl Reading {
         range.end = time_ms;
     }
 
-    /// Ticks since the stretch began, of a position near the last one.
+    /// Ticks since the stretch began, for a position near the last one.
     fn ticks(&self, position: i32) -> Option<i64> {
         let (&(_, ticks), last) = (self.wheel.last()?, self.last_position?);
         Some(ticks + i64::from(position.wrapping_sub(last)))
     }
 
-    /// Whether no wheel has rolled so far since the last status: the log has lost what was between.
+    /// Whether the distance since the last status is impossible: the log has a gap.
     fn is_far(&self, status: &Status) -> bool {
         self.last_position.is_some_and(|last| status.position.wrapping_sub(last).unsigned_abs() > LONGEST_WAY)
     }
 
-    /// Where the wheel was at a time; none where that is outside of the stretch.
+    /// The wheel's ticks at a time. `None` outside of the stretch.
     fn ticks_at(&self, time_ms: f64) -> Option<f64> {
         let next = self.wheel.partition_point(|&(at_ms, _)| at_ms < time_ms);
         let before = next.checked_sub(1).map(|place| self.wheel[place]);
@@ -405,7 +404,7 @@ impl Reading {
             Some(passed) => {
                 passed.ticks.end = passed.ticks.end.max(ticks);
                 passed.time_ms.end = time_ms;
-                // A swing is told with its own place.
+                // A swing has its own position.
                 let is_at_work = |did: Did| did != Did::Rolled;
                 if is_at_work(passed.did) != is_at_work(did) {
                     self.turn_to(did, ticks, time_ms);
@@ -415,13 +414,13 @@ impl Reading {
         self.last_status = Some(status);
     }
 
-    /// From here on something else is done with the ground.
+    /// From these ticks on the ground gets another kind of work.
     fn turn_to(&mut self, did: Did, ticks: i64, time_ms: u64) {
         let Some(passed) = self.ground.last_mut() else { return };
         if passed.did == did {
             return;
         }
-        // A swing is told somewhat later than it is commanded, and behind a status that has the machine farther on.
+        // A swing is reported somewhat later than it is commanded, and perhaps after a status with a farther position.
         let ticks = ticks.max(passed.ticks.start);
         passed.ticks.end = ticks;
         passed.time_ms.end = time_ms;
@@ -472,7 +471,7 @@ impl Reading {
         });
     }
 
-    /// A line of an answer; the settings of a stretch that begins with it, where it changes the wheel.
+    /// Takes a line of an answer. If it changes the wheel, returns the settings of the new stretch.
     fn answer(&mut self, line: &str) -> Option<Settings> {
         let before = self.tick_mm();
         match ConsoleLine::parse(line) {
@@ -488,7 +487,7 @@ impl Reading {
             ConsoleLine::Refused(_) => {
                 self.unanswered.pop_front();
             }
-            // What `get` and `calibrate` show.
+            // The output of `get` and `calibrate`.
             ConsoleLine::Setting(_) => self.set(line),
             _ => {}
         }
@@ -512,12 +511,12 @@ pub(crate) fn tick_mm(settings: &Settings) -> f64 {
     }
 }
 
-/// Where a record says that beam and tool are, the last time that it does.
+/// The last offsets of beam and tool in a log.
 pub fn antenna_of(log: &[Entry]) -> Option<Antenna> {
     log.iter().rev().find(|entry| entry.kind == Kind::Antenna).and_then(|entry| Antenna::parse(&entry.text))
 }
 
-/// What a machine of this status does with the ground.
+/// The work of a machine with this status.
 fn did(status: &Status) -> Did {
     match (status.mode, status.tool_out) {
         (Mode::Work, false) => Did::Weeded,
@@ -526,7 +525,7 @@ fn did(status: &Status) -> Did {
     }
 }
 
-/// Whether a place was interpolated over an outage.
+/// Whether a position was interpolated over an outage.
 pub fn is_interpolated(thing: &Thing) -> bool {
     thing.found.is_ok_and(|found| found.basis == Basis::Interpolated)
 }

@@ -1,12 +1,12 @@
-//! Where on the ground things are: a satellite receiver's lines, the antenna's track along the wheel's distance, and a
-//! map of a job.
+//! Positions on the ground: a satellite receiver's lines, the antenna's track along the wheel's distance, and a map of
+//! a job.
 //!
-//! - [`sentence`] reads a line of NMEA 0183, [`receiver`] makes fixes and marks of them, and [`track`] finds what
-//!   happened between fixes by the wheel's distance. [`plane`] knows the earth's shape.
-//! - [`recorder`] makes a record's lines of what the receiver says. [`job`] reads a record, and [`summary`] counts it.
-//!   [`map`] is it as GeoJSON, [`picture`] as a drawing.
+//! - [`sentence`] parses a line of NMEA 0183. [`receiver`] makes fixes and marks from sentences. [`track`] finds
+//!   positions between fixes by the wheel's distance. [`plane`] has the earth's shape.
+//! - [`recorder`] makes a log's lines from the receiver's output. [`job`] reads a log, and [`summary`] counts it.
+//!   [`map`] exports it as GeoJSON, and [`picture`] draws it.
 //!
-//! It opens no file and no port: a log's lines are given to it. It compiles for a browser as [`link`] does.
+//! It opens no file and no port: the caller passes a log's lines. Like [`link`], it compiles for a browser.
 
 pub mod antenna;
 pub mod job;

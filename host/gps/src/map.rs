@@ -1,8 +1,8 @@
-//! A job as GeoJSON (RFC 7946), for QGIS and whatever else draws maps.
+//! A job as GeoJSON (RFC 7946), for QGIS and other map programs.
 //!
-//! It is one FeatureCollection: a point for each plant, weed, swing, alarm, label and jump of the receiver, and a line
-//! for each piece of ground weeded or not. What has no place stands there without a geometry, and with the reason. The
-//! crate `geojson` writes it.
+//! It is one FeatureCollection. A plant, weed, swing, alarm, label or jump of the receiver is a point. A piece of
+//! ground, weeded or not, is a line. An object without a position has no geometry, and gives the reason. The crate
+//! `geojson` writes the file.
 
 use crate::job::{Did, Ground, Job, Thing, What};
 use crate::plane::Place;
@@ -10,7 +10,7 @@ use crate::track::Basis;
 use chrono::DateTime;
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue, Position};
 
-/// Decimal places of a degree: a ninth is 0.1 mm.
+/// Decimal places of a degree: the ninth is 0.1 mm.
 const DEGREE_DIGITS: i32 = 9;
 
 /// The map of some jobs, each with its record's name.
@@ -100,7 +100,7 @@ fn ground(ground: &Ground) -> Option<Feature> {
     (length_m > 0.0).then_some(feature)
 }
 
-/// A line, cut where it crosses the 180th meridian: RFC 7946, 3.1.9.
+/// A line, cut at the 180th meridian: RFC 7946, 3.1.9.
 fn cut(line: &[Place]) -> Vec<Vec<Position>> {
     let mut parts = vec![Vec::new()];
     let mut last: Option<Place> = None;
@@ -120,7 +120,7 @@ fn cut(line: &[Place]) -> Vec<Vec<Position>> {
     parts
 }
 
-/// Longitude before latitude, as the format has it.
+/// Longitude before latitude, as in GeoJSON.
 fn position(place: Place) -> Position {
     Position::from([rounded(place.longitude, DEGREE_DIGITS), rounded(place.latitude, DEGREE_DIGITS)])
 }
@@ -130,7 +130,7 @@ fn rounded(value: f64, digits: i32) -> f64 {
     (value * factor).round() / factor
 }
 
-/// A time in the form of ISO 8601, which QGIS takes for one; none for a date that is none.
+/// A time in the form of ISO 8601, which QGIS accepts. `None` for an invalid date.
 fn utc(time_ms: i64) -> Option<String> {
     let time = DateTime::from_timestamp_millis(time_ms)?;
     Some(time.to_rfc3339_opts(chrono::SecondsFormat::Millis, true))

@@ -1,7 +1,7 @@
-//! A job as a drawing: the ground weeded and not weeded, plants, weeds and alarms from above, north at the top.
+//! A job as a drawing: weeded and unweeded ground, plants, weeds and alarms from above, north at the top.
 //!
-//! Points that lie less than a pixel apart are drawn once. What has no place is not drawn; the legend says how much
-//! that is.
+//! Points less than a pixel apart are drawn once. Objects without a position are not drawn; the legend has their
+//! number.
 
 use crate::job::{Did, Job, What};
 use crate::plane::{Metres, Place, Plane};
@@ -26,11 +26,12 @@ const LEAST_M: f64 = 5.0;
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Words {
-    /// What the colours mean: ground weeded and not weeded, a plant, one that is unknown, a tall weed, a label, an alarm.
+    /// The legend of the colours: ground weeded and not weeded, a plant, one that is unknown, a tall weed, a label, an
+    /// alarm.
     pub legend: [String; 7],
-    /// What stands in front of how much has no place.
+    /// The text before the number of objects without a position.
     pub without_place: String,
-    /// What stands behind the scale's metres.
+    /// The text after the scale's metres.
     pub north: String,
 }
 
@@ -42,7 +43,7 @@ impl Default for Words {
     }
 }
 
-/// The colour and the size of what is drawn as a point.
+/// The colour and the size of a point.
 fn mark(what: What) -> Option<(&'static str, f64)> {
     match what {
         What::Object { class: Class::Plant, .. } => Some((PLANT, 2.5)),
@@ -54,7 +55,7 @@ fn mark(what: What) -> Option<(&'static str, f64)> {
     }
 }
 
-/// Draws some jobs; none where nothing of them has a place.
+/// Draws some jobs. `None` if nothing in them has a position.
 pub fn draw(jobs: &[&Job]) -> Option<Document> {
     draw_with(jobs, &Words::default())
 }

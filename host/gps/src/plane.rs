@@ -1,12 +1,12 @@
-//! Places on the earth, and a flat field around one of them.
+//! Positions on the earth, and a flat coordinate system around one of them.
 //!
-//! A [`Plane`] gives each place by its metres to the east and to the north of an origin: the length and the azimuth of
-//! the geodesic from there, on the ellipsoid of WGS84. Within 10 km of the origin distances are true to a part in a
-//! million, over a pole and over the 180th meridian too. The geodesics are geographiclib's.
+//! A [`Plane`] converts each position to metres east and north of an origin: the length and the azimuth of the geodesic
+//! from there, on the ellipsoid of WGS84. Within 10 km of the origin distances are true to a part in a million, also
+//! over a pole and over the 180th meridian. The geodesics are geographiclib's.
 
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 
-/// A place on the earth, on the ellipsoid of WGS84.
+/// A position on the earth, on the ellipsoid of WGS84.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Degrees to the north, -90 to 90.
@@ -16,19 +16,19 @@ pub struct Place {
 }
 
 impl Place {
-    /// A place; none where these are no coordinates.
+    /// A position. `None` if these are no coordinates.
     pub fn new(latitude: f64, longitude: f64) -> Option<Self> {
         let is_one = (-90.0..=90.0).contains(&latitude) && (-180.0..=180.0).contains(&longitude);
         is_one.then_some(Self { latitude, longitude })
     }
 
-    /// Metres from here to another place.
+    /// Metres from here to another position.
     pub fn distance_m(self, other: Self) -> f64 {
         Geodesic::wgs84().inverse(self.latitude, self.longitude, other.latitude, other.longitude)
     }
 }
 
-/// Metres on a [`Plane`], or the difference of two such.
+/// Metres on a [`Plane`], or the difference of two such positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Metres {
     /// To the east.
@@ -48,7 +48,7 @@ impl Metres {
         self.plus(other.times(-1.0))
     }
 
-    /// So many times as far.
+    /// The vector times a factor.
     pub fn times(self, factor: f64) -> Self {
         Self { east: self.east * factor, north: self.north * factor }
     }
@@ -72,12 +72,12 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// The one around this place.
+    /// The plane around this position.
     pub fn around(origin: Place) -> Self {
         Self { earth: Geodesic::wgs84(), origin }
     }
 
-    /// Where on the plane a place is.
+    /// The coordinates of a position.
     pub fn metres(&self, place: Place) -> Metres {
         let Place { latitude, longitude } = self.origin;
         let (length, azimuth, _, _): (f64, f64, f64, f64) =
@@ -86,7 +86,7 @@ impl Plane {
         Metres { east, north }.times(length)
     }
 
-    /// Which place is there on the plane.
+    /// The position at these coordinates.
     pub fn place(&self, metres: Metres) -> Place {
         let azimuth = metres.east.atan2(metres.north).to_degrees();
         let (latitude, longitude) =

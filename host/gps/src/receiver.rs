@@ -1,18 +1,18 @@
-//! A receiver, heard line by line: its fixes by the record's clock, and what is wrong with them.
+//! A satellite receiver, read line by line: its fixes on the log's clock, and its faults.
 //!
-//! [`Receiver::take`] is given each line with the time at which it came, and [`Receiver::rolled`] how far the wheel has
-//! rolled. Both while a record is written, which has the marks, and when it is read: the same lines give the same fixes
-//! and marks.
+//! [`Receiver::take`] gets each line with the time at which it came, and [`Receiver::rolled`] gets the wheel's
+//! distance. Both are called while a log is written, to add marks, and when it is read. The same lines give the same
+//! fixes and marks.
 //!
-//! - **Moments.** RMC and GGA of the same time are one fix, which is told when the next moment begins, or by
-//!   [`Receiver::end`]. A date counts for the days before and behind it; a time that jumps back by half a day or more
-//!   is past midnight.
-//! - **When.** A line comes some time after the moment that it tells of, and more or less so by turns: others go before
-//!   it on the wire, and the computer is busy. The least delay of the last ten or twenty seconds is taken for that of
-//!   all, and less it cannot be; what is left of it is the antenna's setting `delay_ms`.
-//! - **Jumps.** A fix that is farther from the last one than the wheel has rolled, and than both errors explain, is
-//!   none. Where such agree with each other for [`AGREEING_MS`], those before may have been the wrong ones: the track
-//!   begins anew with the first.
+//! - **Moments.** RMC and GGA of the same time are one fix. It is returned when the next moment begins, or by
+//!   [`Receiver::end`]. A date also counts for the days before and after it. A time that jumps back by half a day or
+//!   more is past midnight.
+//! - **Time.** A line comes some time after its moment. The delay varies, because other lines go first on the wire and
+//!   the PC is busy. The receiver uses the shortest delay of the last ten or twenty seconds, since the real delay
+//!   cannot be longer. The antenna's setting `delay_ms` covers the rest.
+//! - **Jumps.** A fix is dropped if it is farther from the last fix than the wheel's distance and both errors explain.
+//!   If dropped fixes agree with each other for [`AGREEING_MS`], the earlier fixes may have been wrong. The track then
+//!   starts again with the first of them.
 
 use crate::plane::Place;
 use crate::sentence::{DAY_MS, Line, Quality, Report};
@@ -21,22 +21,24 @@ use std::fmt;
 /// Fixes that have jumped are believed once they have agreed with each other for so long, in ms.
 pub const AGREEING_MS: f64 = 10_000.0;
 
-/// And so many they have to be.
+/// And the number of fixes that must agree.
 const AGREEING: usize = 5;
 
-/// How many standard deviations two fixes may be off before they have jumped: with noise alone, one in ten million has.
+/// The distance of two fixes, in standard deviations, that counts as a jump. Noise alone exceeds it in one case of ten
+/// million.
 const DEVIATIONS: f64 = 8.0;
 
-/// How far off two fixes of the best receiver may be for other reasons, such as the antenna's swaying, in metres.
+/// Further distance of two fixes of the best receiver, such as by the antenna's swaying, in metres.
 const SWAY_M: f64 = 0.25;
 
-/// How much farther the machine may come than the wheel has rolled: one that skids.
+/// Greatest ratio of the machine's distance to the wheel's: the machine may skid.
 const SKIDDING: f64 = 1.1;
 
-/// The least delay is sought among the lines of this time and the one before, in ms of the record.
+/// The least delay is searched among the lines of this time and the one before, in ms of the log.
 const DELAYS_MS: f64 = 10_000.0;
 
-/// By how much a delay may differ from the least: a receiver whose time jumps by more has only now found the right one.
+/// The greatest difference of a delay from the least. If a receiver's time jumps by more, it has only now found the
+/// right time.
 const LONGEST_DELAY_MS: f64 = 30_000.0;
 
 /// A fix.
@@ -44,26 +46,26 @@ const LONGEST_DELAY_MS: f64 = 30_000.0;
 pub struct Fix {
     /// By the record's clock, in milliseconds, less the receiver's own delay.
     pub time_ms: f64,
-    /// Milliseconds UTC since some midnight, see [`Receiver::midnight_ms`].
+    /// Milliseconds UTC since a midnight, see [`Receiver::midnight_ms`].
     pub utc_ms: i64,
     /// Where the antenna was.
     pub place: Place,
     /// How good it is.
     pub quality: Quality,
-    /// Which track it belongs to: where fixes have jumped for good, a new one begins.
+    /// The number of its track. Fixes that have jumped for good begin a new one.
     pub track: u32,
 }
 
-/// Something that is wrong with what a receiver says, or no longer.
+/// A fault in the receiver's output, or the end of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mark {
-    /// There is a fix now, and there was none before.
+    /// There is a fix again.
     Found(Quality),
     /// There is no fix any more.
     Lost,
     /// A fix that has jumped, and is not used.
     Jumped {
-        /// Where it says that the antenna is.
+        /// The antenna's position by the receiver.
         place: Place,
         /// By the record's clock.
         time_ms: f64,
@@ -72,7 +74,7 @@ pub enum Mark {
         /// Metres that the wheel has rolled since.
         rolled_m: f64,
     },
-    /// The fixes stay where they have jumped to, and are used from there on.
+    /// The fixes stay at their new position, and are used from there on.
     Stayed,
 }
 
@@ -89,16 +91,16 @@ impl fmt::Display for Mark {
     }
 }
 
-/// What a line has brought.
+/// The results of a line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heard {
-    /// Fixes that are sure to be complete. Several come where they had jumped and are believed after all.
+    /// Complete fixes. Several come if earlier fixes had jumped and are accepted after all.
     pub fixes: Vec<Fix>,
-    /// What is to be marked.
+    /// The marks.
     pub marks: Vec<Mark>,
 }
 
-/// What was counted of a receiver.
+/// The counts of a receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Fixes that are used.
@@ -111,7 +113,7 @@ pub struct Counts {
     pub damaged: u64,
 }
 
-/// A moment of which something was told.
+/// A moment, and the values received for it.
 #[derive(Clone, Copy, Debug)]
 struct Moment {
     arrived_ms: f64,
@@ -121,11 +123,11 @@ struct Moment {
     quality: Option<Quality>,
     /// The wheel when the first line came.
     wheel: Option<Wheel>,
-    /// Whether it is over, and what comes late of it is not used.
+    /// Whether it is over. Later lines of it are not used.
     is_over: bool,
 }
 
-/// How the wheel was when it was heard of: by the record's clock.
+/// The last report of the wheel, by the log's clock.
 #[derive(Clone, Copy, Debug)]
 struct Wheel {
     time_ms: f64,
@@ -143,7 +145,7 @@ struct Rolled {
 /// A receiver.
 #[derive(Clone, Debug, Default)]
 pub struct Receiver {
-    /// The fix's standard deviation, where the user knows it.
+    /// The fix's standard deviation, if the user knows it.
     error_m: Option<f64>,
     counts: Counts,
     moment: Option<Moment>,
@@ -151,8 +153,8 @@ pub struct Receiver {
     days: i64,
     /// Days from 1970 to the first line's.
     first_day: Option<i64>,
-    /// The least of what the record's clock is ahead of UTC, in this stretch of time and the one before, and when this
-    /// one began.
+    /// The least difference of the log's clock ahead of UTC, in this period and the one before, and the start of this
+    /// one.
     ahead_ms: [Option<f64>; 2],
     delays_since_ms: f64,
     has_fix: Option<bool>,
@@ -164,29 +166,29 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// One that has said nothing. The error is the standard deviation of a fix to the east and to the north, in metres;
-    /// where none is known, that which is usual for the quality that it tells.
+    /// A receiver without output so far. The error is the standard deviation of a fix to the east and to the north, in
+    /// metres. If it is `None`, the usual one of the reported quality is used.
     pub fn new(error_m: Option<f64>) -> Self {
         Self { error_m, ..Self::default() }
     }
 
-    /// What was counted so far.
+    /// The counts so far.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Milliseconds from the first of January 1970 to the midnight from which the fixes' [`Fix::utc_ms`] counts; none
-    /// where no line had a date.
+    /// The midnight from which the fixes' [`Fix::utc_ms`] counts, in milliseconds since the first of January 1970.
+    /// `None` if no line had a date.
     pub fn midnight_ms(&self) -> Option<i64> {
         Some(self.first_day? * DAY_MS)
     }
 
-    /// The wheel has rolled so far in all, by the record's clock, and rolls on at this speed, in mm/s.
+    /// Reports the wheel's total distance at a time of the log's clock, and its speed in mm/s.
     pub fn rolled(&mut self, time_ms: f64, rolled_m: f64, speed_mm_s: f64) {
         self.wheel = Some(Wheel { time_ms, rolled_m, speed_mm_s });
     }
 
-    /// Nobody knows how far the wheel rolls between this and what is heard of it next: the Uno has begun anew.
+    /// The Uno has restarted: the distance until the next status is unknown.
     pub fn wheel_lost(&mut self) {
         self.wheel = None;
         if let Some(moment) = &mut self.moment {
@@ -196,7 +198,7 @@ impl Receiver {
         self.jumped.clear();
     }
 
-    /// A line, without its end, that came at this time of the record's clock.
+    /// Takes a line, without its end, that came at this time of the log's clock.
     pub fn take(&mut self, time_ms: f64, line: &str) -> Heard {
         match Line::parse(line) {
             Line::Report(report) => self.report(time_ms, report),
@@ -208,14 +210,14 @@ impl Receiver {
         }
     }
 
-    /// Nothing more comes: the last moment's fix is complete.
+    /// The end of the log: the last moment's fix is complete.
     pub fn end(&mut self) -> Heard {
         let mut heard = Heard::default();
         self.complete(&mut heard);
         heard
     }
 
-    /// The receiver is gone, or says nothing.
+    /// The receiver is gone or silent.
     pub fn silent(&mut self) -> Heard {
         let mut heard = self.end();
         self.no_fix(&mut heard);
@@ -224,7 +226,7 @@ impl Receiver {
 
     fn report(&mut self, arrived_ms: f64, report: Report) -> Heard {
         let Some(time_ms) = report.time_ms else {
-            // One that has not seen a satellite yet knows no time.
+            // A receiver without a satellite so far has no time.
             return self.silent();
         };
         let mut heard = Heard::default();
@@ -234,7 +236,7 @@ impl Receiver {
                 self.add(report);
                 return heard;
             }
-            // Past midnight forward, or back over it by a receiver that has only now found the time.
+            // Past midnight forward, or back over it for a receiver that has only now found the time.
             self.days += i64::from(time_ms < before_ms - DAY_MS / 2) - i64::from(time_ms > before_ms + DAY_MS / 2);
         }
         self.complete(&mut heard);
@@ -246,7 +248,7 @@ impl Receiver {
         heard
     }
 
-    /// Adds what a sentence tells to its moment.
+    /// Adds the values of a sentence to its moment.
     fn add(&mut self, report: Report) {
         if let Some(day) = report.day {
             self.first_day = Some(day - self.days);
@@ -265,7 +267,7 @@ impl Receiver {
         }
     }
 
-    /// The moment that was under way is over.
+    /// Ends the pending moment.
     fn complete(&mut self, heard: &mut Heard) {
         let Some(moment) = self.moment.as_mut().filter(|moment| !moment.is_over) else { return };
         moment.is_over = true;
@@ -299,11 +301,11 @@ impl Receiver {
         self.ahead_ms.into_iter().flatten().fold(ahead_ms, f64::min)
     }
 
-    /// Holds a fix against the last one, and against the wheel.
+    /// Compares a fix with the last one, and with the wheel.
     fn judge(&mut self, fix: Fix, wheel: Option<Wheel>, heard: &mut Heard) {
         let rolled_m = wheel.map_or(0.0, |wheel| {
-            // It is heard of ten times a second; a line that came far too late tells of a place that is not known any
-            // more here.
+            // The wheel is reported ten times a second. A line that came much too late has a position that is no longer
+            // known here.
             let since_s = ((fix.time_ms - wheel.time_ms) / 1000.0).clamp(-1.0, 1.0);
             wheel.rolled_m + wheel.speed_mm_s / 1000.0 * since_s
         });
@@ -313,8 +315,8 @@ impl Receiver {
             self.accept(here, heard);
             return;
         };
-        // As the wheel rolls on, the machine could have come to where the fixes have jumped: but they agree with each
-        // other.
+        // As the wheel rolls on, the machine could have reached the position of the jumped fixes. But these agree with
+        // each other.
         let agrees = self.jumped.last().is_some_and(|jumped| self.follows(jumped, &here));
         if !agrees && self.follows(&last, &here) {
             self.jumped.clear();
@@ -340,7 +342,7 @@ impl Receiver {
         }
     }
 
-    /// Whether the machine can have come from one fix to the other.
+    /// Whether the machine can have travelled from one fix to the other.
     fn follows(&self, from: &Rolled, to: &Rolled) -> bool {
         let error_m = |rolled: &Rolled| self.error_m.unwrap_or_else(|| rolled.fix.quality.usual_error_m());
         let room_m = SWAY_M + DEVIATIONS * error_m(from).max(error_m(to));
@@ -369,7 +371,7 @@ mod tests {
     }
 
     fn angle(degrees: f64, digits: usize, sides: [&str; 2]) -> String {
-        // Whole ten millionths of a minute, so that none is sixty.
+        // Whole ten millionths of a minute, so that no result is sixty minutes.
         let units = (degrees.abs() * 60e7).round() as u64;
         let (whole, minutes) = (units / 600_000_000, (units % 600_000_000) as f64 / 1e7);
         format!("{whole:0digits$}{minutes:010.7},{}", sides[usize::from(degrees < 0.0)])
@@ -392,8 +394,8 @@ mod tests {
         sentence(&format!("GPRMC,{},A,{},1.0,90.0,{date},,,A", clock(utc_ms), coordinates(place)))
     }
 
-    /// A receiver that rolls half a metre a second to the east of a place, told of once a second from a time of the day
-    /// on.
+    /// A receiver that rolls half a metre a second to the east of a position. It sends a fix once a second from a time
+    /// of day on.
     fn rolling(
         from: Place,
         start_ms: i64,
@@ -464,7 +466,7 @@ mod tests {
             let (heard, receiver) = rolling(FIELD, 0, 30, hurt);
             let fixes = fixes(&heard);
             let hurt: std::collections::BTreeSet<i64> = seconds.iter().copied().collect();
-            // A letter of the checksum that has become a small one is the same, and one line of a moment is enough.
+            // A lower-case letter in the checksum is also valid, and one line of a moment is enough.
             prop_assert!(fixes.len() >= 30 - hurt.len());
             prop_assert!(receiver.counts().damaged <= 2 * hurt.len() as u64);
             prop_assert!((60..=60 + hurt.len() as u64).contains(&(fixes.len() as u64 * 2 + receiver.counts().damaged)));

@@ -1,9 +1,9 @@
-//! What a record has of a receiver, while it is written: its lines, and what is noticed of them.
+//! The receiver's part of a log while it is written: its lines, and marks for its faults.
 //!
-//! [`Recorder::take`] makes lines of the log out of bytes as they come. Sentences that tell of place or time stand
-//! there as they came, and so does every line that came damaged; other sentences are left out. Marks are those that a
-//! reader of the record finds anew. It knows no port: who has one tells by [`Recorder::found`] and [`Recorder::lost`]
-//! when it comes and goes.
+//! [`Recorder::take`] makes lines of the log from received bytes. Sentences with a position or time are logged
+//! unchanged, and so is every damaged line. Other sentences are left out. A reader of the log can derive the same marks
+//! again. The recorder opens no port: the caller reports a connected or lost port by [`Recorder::found`] and
+//! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
 use crate::job::{LONGEST_WAY, tick_mm};
@@ -13,25 +13,25 @@ use link::LineReader;
 use link::log::Kind;
 use link::session::Happening;
 
-/// A receiver that says nothing for so long is lost, in ms. None has less than a line in five seconds.
+/// A receiver that is silent for this long is lost, in ms. Every receiver sends a line within five seconds.
 const SILENCE_MS: u64 = 5_000;
 
-/// So many lines that came damaged, and none that did not, are no accident.
+/// This number of damaged lines, without a good one between, is a fault.
 const DAMAGED_IN_A_ROW: u32 = 20;
 
-/// Lines of the log: what they are, and what stands there.
+/// Lines of the log: their kind and text.
 pub type Lines = Vec<(Kind, String)>;
 
-/// What a record has of a receiver.
+/// The receiver's part of a log.
 #[derive(Debug, Default)]
 pub struct Recorder {
     receiver: Receiver,
     lines: LineReader,
-    /// Whether nothing has ended yet since the port was opened, in the middle of a line.
+    /// Whether no line has ended yet since the port was opened, in the middle of a line.
     is_first: bool,
-    /// When something came for the last time; none where that it does not was told.
+    /// Time of the last input. `None` if its silence was reported.
     heard_ms: Option<u64>,
-    /// Lines that came damaged since one that did not.
+    /// Damaged lines since the last good one.
     damaged: u32,
     tick_m: f64,
     /// The encoder's count, and ticks since the Uno began.
@@ -39,7 +39,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// One that has heard nothing, and the first line of the record: where the antenna is.
+    /// A recorder before any input, and the first line of the log: the antenna's offsets.
     pub fn new(antenna: &Antenna) -> (Self, Lines) {
         let recorder = Self { receiver: Receiver::new(antenna.error_m()), ..Self::default() };
         (recorder, vec![(Kind::Antenna, antenna.to_string())])
@@ -90,7 +90,7 @@ impl Recorder {
         lines
     }
 
-    /// These bytes have come, or none have.
+    /// Takes received bytes, or none.
     pub fn take(&mut self, time_ms: u64, bytes: &[u8]) -> Lines {
         self.lines.take(bytes);
         let mut lines = Lines::new();
@@ -98,7 +98,7 @@ impl Recorder {
             self.heard_ms = Some(time_ms);
             let is_first = std::mem::take(&mut self.is_first);
             let parsed = Line::parse(&line);
-            // The port was opened in the middle of it.
+            // The port was opened in the middle of this line.
             if parsed == Line::Damaged && is_first && !line.starts_with('$') {
                 continue;
             }
@@ -122,7 +122,7 @@ impl Recorder {
         lines
     }
 
-    /// What was counted so far.
+    /// The counts so far.
     pub fn counts(&self) -> crate::receiver::Counts {
         self.receiver.counts()
     }

@@ -1,8 +1,8 @@
-//! A line of a receiver: NMEA 0183, by the crate `nmea`.
+//! Parses a line of a receiver: NMEA 0183, by the crate `nmea`.
 //!
-//! Place, date and quality come from the sentences RMC and GGA, of whichever satellites. Others are passed over. A line
-//! counts as damaged where it has not the form of a sentence, or its checksum is missing or another: what such a line
-//! says is not asked. A sentence with the right checksum whose fields make no sense says that there is no fix.
+//! Position, date and quality come from the sentences RMC and GGA, of any satellites. Other sentences are ignored. A
+//! line is damaged if it does not have the form of a sentence, or if its checksum is missing or wrong. The content of a
+//! damaged line is not used. A sentence with the right checksum and invalid fields means that there is no fix.
 
 use crate::plane::Place;
 use chrono::{Datelike, Timelike};
@@ -18,9 +18,9 @@ pub const DAY_MS: i64 = 86_400_000;
 pub enum Quality {
     /// From the satellites alone.
     Satellites,
-    /// Corrected by signals from a satellite, as those of SBAS, or from a station.
+    /// Corrected by signals from a satellite, such as those of SBAS, or from a station.
     Differential,
-    /// By the carrier's phase, whose whole waves are not counted for sure yet.
+    /// By the carrier's phase, before the number of whole waves is certain.
     FloatRtk,
     /// By the carrier's phase.
     Rtk,
@@ -37,8 +37,7 @@ impl Quality {
         }
     }
 
-    /// The standard deviation of a fix to the east and to the north, in metres, that such receivers have under an open
-    /// sky.
+    /// The usual standard deviation of a fix to the east and to the north under an open sky, in metres.
     pub fn usual_error_m(self) -> f64 {
         match self {
             Self::Satellites => 1.5,
@@ -55,32 +54,32 @@ impl fmt::Display for Quality {
     }
 }
 
-/// What a sentence tells of one moment.
+/// The values of a sentence for one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
-    /// Milliseconds since midnight, UTC; none where the receiver does not know.
+    /// Milliseconds since midnight, UTC. `None` if the receiver does not know.
     pub time_ms: Option<i64>,
-    /// Days since the first of January 1970; none where this sentence has no date.
+    /// Days since the first of January 1970. `None` if this sentence has no date.
     pub day: Option<i64>,
-    /// The place; none where there is no fix.
+    /// The position. `None` if there is no fix.
     pub place: Option<Place>,
-    /// How good it is; none where this sentence does not say.
+    /// Its quality. `None` if this sentence does not have it.
     pub quality: Option<Quality>,
 }
 
 /// What a line is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Line {
-    /// A sentence that tells of place or time.
+    /// A sentence with a position or time.
     Report(Report),
     /// Another sentence.
     Other,
-    /// No sentence, or one that came damaged.
+    /// No sentence, or a damaged one.
     Damaged,
 }
 
 impl Line {
-    /// Reads a line, without its end.
+    /// Parses a line, without its end.
     pub fn parse(line: &str) -> Self {
         let line = line.trim();
         if !has_right_checksum(line) {
@@ -92,7 +91,7 @@ impl Line {
         }
         Self::Report(match nmea::parse_str(line) {
             Ok(ParseResult::RMC(said)) => {
-                // By NMEA 2.3 and later; before, the status alone says whether there is a fix.
+                // By NMEA 2.3 and later. Before, only the status says whether there is a fix.
                 let of_mode = said.faa_mode.map(|mode| quality(mode.into()));
                 let is_valid = said.status_of_fix != RmcStatusOfFix::Invalid && of_mode != Some(None);
                 Report {
@@ -128,7 +127,7 @@ fn place(latitude: Option<f64>, longitude: Option<f64>) -> Option<Place> {
     Place::new(latitude?, longitude?)
 }
 
-/// The quality of a fix by satellites; none where it is no such.
+/// The quality of a fix by satellites. `None` for other fixes.
 fn quality(fix: FixType) -> Option<Quality> {
     match fix {
         FixType::Gps | FixType::Pps => Some(Quality::Satellites),
@@ -139,8 +138,8 @@ fn quality(fix: FixType) -> Option<Quality> {
     }
 }
 
-/// Whether a line is `$`, a text and behind `*` the exclusive or of its bytes. `nmea` says so only of sentences that it
-/// knows.
+/// Whether a line is `$`, a text, and after `*` the exclusive or of the text's bytes. `nmea` checks this only for
+/// sentences that it knows.
 fn has_right_checksum(line: &str) -> bool {
     let parts = line.strip_prefix('$').and_then(|line| line.split_once('*'));
     let Some((text, checksum)) = parts.filter(|(_, checksum)| checksum.len() == 2) else { return false };
@@ -213,7 +212,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_sentence_of_which_a_character_is_another_or_that_is_cut_is_damaged(
+        fn a_sentence_with_a_changed_character_or_without_its_end_is_damaged(
             which in 0..2_usize, at in 0..200_usize, by in 1..127_u8, cut in any::<bool>(),
         ) {
             let whole = sentence([GGA, RMC][which]);
@@ -225,7 +224,7 @@ mod tests {
                 bytes[at] ^= by & 0x7F;
                 String::from_utf8(bytes).expect("it stays ASCII")
             };
-            // Letters of the checksum may be small ones.
+            // Letters of the checksum may be in lower case.
             prop_assume!(!line.eq_ignore_ascii_case(&whole));
             prop_assert_eq!(Line::parse(&line), Line::Damaged, "{}", line);
         }

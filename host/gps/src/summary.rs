@@ -1,33 +1,33 @@
-//! A job in numbers: the stand, the ground, the time, and how many places there are.
+//! A job in numbers: the stand, the ground, the time, and how many positions there are.
 //!
-//! Spacings are those between plants that follow each other on ground over which the machine was at work all the time,
-//! so that a headland is no gap in the stand: the work switch tells where the row ends. Where a spacing is longer than
-//! one and a half of the usual one, plants are missing in it. What was unknown was kept, and counts as a plant.
+//! A spacing is the distance between two neighbouring plants if the machine was at work all the way between. So a
+//! headland is no gap in the stand: the work switch marks the row end. If a spacing is longer than one and a half of
+//! the usual one, plants are missing in it. Unknown detections count as plants.
 
 use crate::job::{Did, Job, Thing, What, is_interpolated};
 use link::Class;
 use serde::Serialize;
 
-/// A spacing in which plants are missing is longer than so many usual ones.
+/// A spacing with missing plants is longer than this number of usual ones.
 const GAP: f64 = 1.5;
 
-/// What is asked of the count.
+/// The parameters of the summary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stand {
     /// From row to row, in mm.
     pub row_spacing_mm: f64,
-    /// From plant to plant, in mm; none where it is the median of those found.
+    /// Spacing in mm. `None` uses the median of those found.
     pub spacing_mm: Option<f64>,
 }
 
 /// A job in numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// Plants, with those that were unknown and kept.
+    /// Plants, including unknown detections.
     pub plants: u64,
     /// Of them unknown.
     pub unknown: u64,
-    /// Mean distance between plants that follow each other with none missing between, in mm.
+    /// Mean distance between neighbouring plants without a missing one between, in mm.
     pub spacing_mean_mm: Option<f64>,
     /// Its standard deviation.
     pub spacing_scatter_mm: Option<f64>,
@@ -39,7 +39,7 @@ pub struct Summary {
     pub swings: u64,
     /// Alarms.
     pub alarms: u64,
-    /// What somebody has labelled.
+    /// Number of labels.
     pub labels: u64,
     /// Ground of the row over which the machine was at work, in metres.
     pub worked_m: f64,
@@ -53,9 +53,9 @@ pub struct Summary {
     pub work_h: f64,
     /// Hours of the record.
     pub record_h: f64,
-    /// Things with a place between two fixes that follow each other.
+    /// Objects with a position between two successive fixes.
     pub measured: u64,
-    /// Things with a place over an outage.
+    /// Objects with a position over an outage.
     pub interpolated: u64,
     /// Things without a place.
     pub without_place: u64,
@@ -145,13 +145,13 @@ fn hours(time_ms: u64) -> f64 {
     time_ms as f64 / 3_600_000.0
 }
 
-/// The distances between plants that follow each other, in mm, where the machine was at work from one to the other.
+/// The distances between neighbouring plants, in mm, if the machine was at work from one to the other.
 fn spacings_mm(job: &Job) -> Vec<f64> {
     let mut spacings = Vec::new();
     for stretch in &job.stretches {
         let is_plant = |thing: &&Thing| matches!(thing.what, What::Object { class: Class::Plant | Class::Unknown, .. });
         let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.way_m).collect();
-        // Both are told by where the wheel was.
+        // Both are known by the wheel's distance.
         let rests: Vec<_> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
         for pair in plants.windows(2) {
             let is_between = |way_m: f64| (pair[0]..pair[1]).contains(&way_m);

@@ -1,17 +1,16 @@
-//! The antenna's track along the wheel's distance, and the places of what happened on it.
+//! The antenna's track along the wheel's distance, and the positions of objects on it.
 //!
-//! A thing happened where the wheel had rolled some distance, and stands some way ahead of the antenna and to the right
-//! of it.
+//! An object has a distance of the wheel, and an offset from the antenna, ahead and to the right.
 //!
-//! - **The antenna's place** there lies between two fixes, at the wheel's share of the way. The machine may have rolled
-//!   over the same distance several times: the last time counts before the thing was recorded. What is fixed several times
-//!   while the wheel stands is fixed at the mean.
-//! - **The heading** is that of the straight line that fits so many fixes around there, by least squares over the
-//!   wheel's distance, that its error is [`HEADING_ERROR`]; [`LONGEST_CHORD_M`] are fitted at the most. It is the
-//!   machine's, not its motion's: a machine that rolls back keeps it.
-//! - **Outages.** Two fixes follow each other where no more than one and a half of the receiver's intervals lie
-//!   between. Else the machine is taken to have gone straight between them, by the wheel's distance, if that is not
-//!   longer than is allowed.
+//! - **The antenna's position** at that distance lies between two fixes, at the wheel's share of the distance. The
+//!   machine may have rolled over the same distance several times: the last time before the object was recorded counts.
+//!   Several fixes of a standing wheel are averaged.
+//! - **The heading** is the direction of a straight line, fitted by least squares over the wheel's distance. It uses as
+//!   many fixes around the position as its error needs to fall to [`HEADING_ERROR`], but at most [`LONGEST_CHORD_M`].
+//!   It is the heading of the machine, not of its motion: a machine that rolls back keeps it.
+//! - **Outages.** Two fixes are successive if at most one and a half of the receiver's intervals lie between them.
+//!   Otherwise the machine is assumed to have travelled straight between them, by the wheel's distance, up to the
+//!   longest allowed distance.
 
 use crate::plane::{Metres, Place, Plane};
 use crate::receiver::Fix;
@@ -19,35 +18,36 @@ use crate::receiver::Fix;
 /// The heading's error that is aimed at, in radians: 20 mm for a metre from the antenna.
 pub const HEADING_ERROR: f64 = 0.02;
 
-/// The longest way over which a heading is sought, in metres. Rows are straighter than that is long.
+/// The longest distance for a heading, in metres. Rows are straight over that length.
 pub const LONGEST_CHORD_M: f64 = 30.0;
 
-/// A heading with a greater error is none, in radians.
+/// A heading with a greater error is not used, in radians.
 const NO_HEADING: f64 = 0.5;
 
-/// Fixes that follow each other are not farther apart than so many of the receiver's intervals.
+/// Successive fixes are at most this number of the receiver's intervals apart.
 const INTERVALS: f64 = 1.5;
 
-/// How far behind the farthest place a machine rolls back and forth, in metres: what was recorded is sought so far back.
+/// How far a machine rolls back and forth behind its farthest position, in metres. Recorded objects are searched back
+/// to there.
 const ROLLED_BACK_M: f64 = 50.0;
 
-/// How much later than it was recorded something may have happened, in ms: the record has a status, a fix and an event
-/// each with a delay of its own.
+/// How much later than its record an event may have happened, in ms: status, fix and event each have their own delay in
+/// the log.
 const RECORDED_EARLY_MS: f64 = 1000.0;
 
-/// The wheel stands while it rolls less, in metres.
+/// The wheel stands while it rolls less than this, in metres.
 const STANDING_M: f64 = 0.005;
 
-/// Where something stands beside the antenna.
+/// An offset from the antenna.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Offset {
-    /// Metres ahead of the antenna; below 0 behind it.
+    /// Metres ahead of the antenna; negative behind it.
     pub ahead_m: f64,
-    /// Metres to the right of it, seen forward; below 0 to the left.
+    /// Metres to the right of it, seen forward; negative to the left.
     pub right_m: f64,
 }
 
-/// How a place was found.
+/// How a position was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
     /// Between two fixes that follow each other.
@@ -56,18 +56,18 @@ pub enum Basis {
     Interpolated,
 }
 
-/// Why there is no place.
+/// Why there is no position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// There is no fix from before.
+    /// There is no earlier fix.
     NoFixBefore,
-    /// There is no fix from behind.
+    /// There is no later fix.
     NoFixBehind,
-    /// The way between both fixes is longer than is allowed.
+    /// The distance between both fixes is longer than allowed.
     OutageTooLong,
     /// The fixes have jumped between, for good.
     Jumped,
-    /// The fixes around do not tell how the machine was headed.
+    /// The fixes around do not give the machine's heading.
     NoHeading,
 }
 
@@ -84,20 +84,20 @@ impl Missing {
     }
 }
 
-/// A place that was found.
+/// A position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// The place.
     pub place: Place,
     /// How it was found.
     pub basis: Basis,
-    /// The standard deviation, in metres, that the fixes' own has it have. What an outage adds is not in it.
+    /// Its standard deviation in metres, from that of the fixes. The error of an outage is not included.
     pub error_m: f64,
-    /// Milliseconds UTC as the fixes have them, when the antenna was there.
+    /// The time when the antenna was there, in milliseconds UTC as in the fixes.
     pub utc_ms: i64,
 }
 
-/// A fix on the way.
+/// A fix on the track.
 #[derive(Clone, Copy, Debug)]
 struct Station {
     time_ms: f64,
@@ -106,9 +106,9 @@ struct Station {
     at: Metres,
     error_m: f64,
     track: u32,
-    /// Fixes that it is the mean of.
+    /// Number of fixes in its mean.
     fixes: f64,
-    /// When the last of them was.
+    /// Time of the last of them.
     until_ms: f64,
 }
 
@@ -122,8 +122,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// The track through these fixes, in order of time, each with how far the wheel had rolled, in metres; none where
-    /// there is no fix. The error is the standard deviation of a fix, where that is known.
+    /// The track through these fixes in order of time, each with the wheel's distance in metres. `None` without a fix.
+    /// The error is the standard deviation of a fix, if that is known.
     pub fn through(fixes: &[(f64, Fix)], error_m: Option<f64>, longest_outage_m: f64) -> Option<Self> {
         let plane = Plane::around(fixes.first()?.1.place);
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
@@ -160,11 +160,11 @@ impl Track {
         Some(Self { plane, stations, interval_ms, longest_outage_m })
     }
 
-    /// The place of something that stands so beside the antenna, where the wheel had rolled so far, and that was recorded
-    /// at that time of the record's clock.
+    /// The position of an object with this offset from the antenna, at this distance of the wheel. It was recorded at
+    /// this time of the log's clock.
     ///
     /// # Errors
-    /// Why it has none.
+    /// Why it has no position.
     pub fn find(&self, way_m: f64, recorded_ms: f64, offset: Offset) -> Result<Found, Missing> {
         let first = self.passed(way_m, recorded_ms)?;
         let (from, to) = (&self.stations[first], &self.stations[first + 1]);
@@ -191,8 +191,8 @@ impl Track {
         Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms: utc_ms.round() as i64 })
     }
 
-    /// The first of the two fixes between which the wheel rolled over this distance for the last time before something
-    /// was recorded.
+    /// The first of the two fixes between which the wheel passed this distance for the last time before the object was
+    /// recorded.
     fn passed(&self, way_m: f64, recorded_ms: f64) -> Result<usize, Missing> {
         let before = self.stations.partition_point(|station| station.time_ms <= recorded_ms + RECORDED_EARLY_MS);
         for first in (0..before).rev() {
@@ -206,12 +206,12 @@ impl Track {
                 break;
             }
         }
-        // It was recorded before the next fix, or in front of all.
+        // It was recorded before the next fix, or before all fixes.
         let farthest = self.stations[..before].iter().map(|station| station.way_m).fold(f64::NEG_INFINITY, f64::max);
         Err(if way_m > farthest && before > 0 { Missing::NoFixBehind } else { Missing::NoFixBefore })
     }
 
-    /// Whether one fix follows the other without an outage.
+    /// Whether two fixes are successive, without an outage.
     fn follow(&self, from: &Station, to: &Station) -> bool {
         to.time_ms - from.until_ms <= INTERVALS * self.interval_ms
     }
@@ -265,7 +265,7 @@ mod tests {
 
     const FIELD: Place = Place { latitude: -33.4, longitude: -179.999_99 };
 
-    /// Fixes once a second, at half a metre a second, of a machine whose antenna is there after so many metres.
+    /// Fixes once a second, at half a metre a second. `at` returns the antenna's position after a distance in metres.
     fn driven(ways_m: impl IntoIterator<Item = f64>, at: impl Fn(f64) -> Metres) -> Vec<(f64, Fix)> {
         let plane = Plane::around(FIELD);
         let fix = |(second, way_m): (usize, f64)| {
@@ -287,7 +287,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn on_a_straight_row_a_place_is_where_it_is_whatever_the_direction_and_the_offset(
+        fn on_a_straight_row_positions_are_right_for_every_direction_and_offset(
             direction in 0.0..std::f64::consts::TAU, way_m in 0.1..29.4_f64, ahead_m in -3.0..3.0_f64, right_m in -3.0..3.0_f64,
         ) {
             let forward = Metres { east: direction.sin(), north: direction.cos() };
@@ -336,7 +336,7 @@ mod tests {
 
     #[test]
     fn a_machine_that_rolls_back_keeps_its_heading_and_the_last_pass_counts() {
-        // Four metres on, two back along its way, and on along another, a metre to the north.
+        // Four metres forward, two back on the same line, and forward on another line, a metre to the north.
         let ways = (0..=8).chain((4..8).rev()).chain(5..=12).map(|step| 0.5 * f64::from(step));
         let mut fixes = driven(ways, |way_m| Metres { east: way_m, north: 0.0 });
         let plane = Plane::around(FIELD);

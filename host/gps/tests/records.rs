@@ -1,4 +1,4 @@
-//! Records read as jobs, and their maps: a machine that rolls along a row, with a receiver's lines between those of the machine.
+//! Logs as jobs, and their maps: a machine that rolls along a row, with a receiver's lines between the machine's.
 
 use geojson::{FeatureCollection, GeometryValue};
 use gps::job::{Did, Thing, What};
@@ -15,7 +15,7 @@ const TICKS_A_MM: f64 = 2.0;
 /// The machine rolls so fast, in mm/s.
 const SPEED: f64 = 500.0;
 
-/// Where the antenna is when the machine sets off, near the 180th meridian.
+/// The antenna's first position, near the 180th meridian.
 const FROM: Place = Place { latitude: -16.8, longitude: 179.999_9 };
 
 fn sentence(text: &str) -> String {
@@ -32,8 +32,8 @@ fn gga(time_ms: u64, place: Place) -> String {
     sentence(&format!("GPGGA,{time},{place},4,12,0.7,10.0,M,0.0,M,,"))
 }
 
-/// A record of a machine that rolls 30 m to the east, at work from 5 m on to 25 m, with a plant every half metre. What the receiver
-/// says each second may be changed, and is told from 2 s on.
+/// The log of a machine that rolls 30 m to the east. It is at work from 5 m to 25 m, with a plant every half metre.
+/// `change` can change the receiver's line of each second, from 2 s on.
 fn record(change: impl Fn(u64, String) -> Vec<(Kind, String)>) -> Vec<Entry> {
     let plane = Plane::around(FROM);
     let mut lines = vec![
@@ -60,7 +60,7 @@ fn record(change: impl Fn(u64, String) -> Vec<(Kind, String)>) -> Vec<Entry> {
         let status = format!("state={mode} tool={tool} pos={position} speed_mm_s=500 windows=0 unseen_mm=0");
         lines.push((time_ms, Kind::Status, status));
         if is_at_work && way_mm % 500.0 == 250.0 {
-            // The canopy is 100 mm wide, and ended here; the hold has both margins.
+            // The canopy is 100 mm wide, and ended here. The hold includes both margins.
             let leading = position - 200;
             let plant = format!("plant pos={leading} votes=3 spacing=1000 delay=600 hold=400 actuation=1000");
             lines.push((time_ms + 1, Kind::Event, plant));
@@ -74,7 +74,7 @@ fn whole() -> Vec<Entry> {
     record(|_, line| vec![(Kind::Gps, line)])
 }
 
-/// Puts these lines into the middle of a record, told at one moment.
+/// Inserts these lines into the middle of a log, at one moment.
 fn insert(log: &mut Vec<Entry>, lines: Vec<(Kind, &str)>) {
     let middle = log.len() / 2;
     let time_ms = log[middle].time_ms;
@@ -98,7 +98,8 @@ fn a_plant_is_the_middle_of_its_canopy_and_stands_where_the_beam_was() {
     let plants: Vec<_> = job.things().filter(is_object).collect();
     assert_eq!(plants.len(), PLANTS);
     for (number, plant) in plants.iter().enumerate() {
-        // The leading edge was 100 mm before, the middle is 50 mm behind that, and the beam a metre ahead of the antenna.
+        // The leading edge was 100 mm before, the middle is 50 mm behind that, and the beam is a metre ahead of the
+        // antenna.
         let way_m = 5.2 + 0.5 * number as f64;
         assert!((plant.way_m - way_m).abs() < 1e-9 && plant.width_mm == 100.0, "{plant:?}");
         let at = plane.metres(plant.found.expect("it has a place").place);
@@ -115,7 +116,7 @@ fn a_summary_counts_the_stand_and_the_ground() {
     assert!((summary.worked_m - 20.0).abs() < 1e-6 && (summary.weeded_m - 12.0).abs() < 0.1, "{summary:?}");
     assert!((summary.area_ha - 0.001).abs() < 1e-9 && (summary.work_h - 40.0 / 3600.0).abs() < 1e-4, "{summary:?}");
     assert_eq!(summary.spacing_mean_mm.map(f64::round), Some(500.0));
-    // Three have not come up, two of them side by side.
+    // Three are missing, two of them side by side.
     let plants: Vec<u64> =
         log.iter().filter(|entry| entry.text.starts_with("plant")).map(|entry| entry.number).collect();
     log.retain(|entry| ![plants[7], plants[20], plants[21]].contains(&entry.number));
@@ -126,7 +127,7 @@ fn a_summary_counts_the_stand_and_the_ground() {
 
 #[test]
 fn the_map_is_one_collection_with_a_geometry_or_the_reason_why_there_is_none() {
-    // Without a fix from 20 to 30 s, 5 m, and none at the end.
+    // No fix from 20 to 30 s, which is 5 m, and none at the end.
     let lost = |second: u64, line: String| {
         if (20..30).contains(&second) || second > 45 { vec![] } else { vec![(Kind::Gps, line)] }
     };
@@ -146,7 +147,7 @@ fn the_map_is_one_collection_with_a_geometry_or_the_reason_why_there_is_none() {
         assert_eq!((plant.geometry.is_none(), plant.contains_property("error_m")), (why, !why));
         assert!(plant.property("record").is_some_and(|record| record == "field.csv"));
     }
-    // None of the lines crosses the 180th meridian: RFC 7946 has them cut there.
+    // No line crosses the 180th meridian: RFC 7946 requires a cut there.
     let (mut ends, mut length) = ([0, 0], 0.0);
     for feature in of_kind("weeded").into_iter().chain(of_kind("not_weeded")) {
         length += feature.property("length_m").and_then(serde_json::Value::as_f64).expect("a number");
@@ -176,7 +177,7 @@ fn the_drawing_has_a_circle_for_each_plant_and_none_without_a_place() {
 }
 
 #[test]
-fn a_log_that_was_opened_again_and_an_uno_that_was_reset_begin_the_way_anew() {
+fn a_log_that_was_opened_again_and_an_uno_that_was_reset_restart_the_distance() {
     let job = Job::read(&[whole(), whole()].concat(), &Wanted::default());
     assert_eq!(job.things().filter(|thing| thing.found.is_ok()).count(), 2 * (PLANTS + SWINGS));
     assert_eq!(job.stretches.len(), 2);
@@ -190,13 +191,13 @@ fn a_log_that_was_opened_again_and_an_uno_that_was_reset_begin_the_way_anew() {
     insert(&mut log, reset);
     let job = Job::read(&log, &Wanted::default());
     assert_eq!((job.stretches.len(), job.things().count()), (2, PLANTS + SWINGS));
-    // What was between the last fix before it and the first behind it has no place.
+    // Objects between the last fix before it and the first after it have no position.
     let missing = job.things().filter(|thing| thing.found.is_err()).count();
     assert!((1..=8).contains(&missing), "{missing}");
 }
 
 #[test]
-fn a_wheel_that_is_set_anew_begins_a_stretch_of_its_own() {
+fn a_change_of_the_wheel_begins_a_new_stretch() {
     let mut log = whole();
     let set = vec![
         (Kind::Command, "set ticks_per_m 1000"),
@@ -255,7 +256,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_happens_to_the_receivers_lines_nothing_of_the_machine_is_lost(
+    fn faults_in_the_receivers_lines_lose_no_line_of_the_machine(
         hurt in prop::collection::vec((2..60_u64, 0..100_usize, any::<u8>(), 0..4_u8), 0..40),
     ) {
         let change = |second: u64, line: String| {

@@ -1,14 +1,14 @@
-//! What to do about an alarm or a warning, in a few words for the operator: as docs/faults.md has it, which a test holds to this.
+//! Short advice to the operator for each alarm and warning. A test compares it with docs/faults.md.
 
 use control::alarm::{Alarm, Warning};
 
-/// What an alarm is called everywhere: the digits that the LED blinks and its name, `3-1 too_fast`.
+/// An alarm's name as used everywhere: the digits that the LED blinks, and the word, such as `3-1 too_fast`.
 pub fn name(alarm: Alarm) -> String {
     let (first, second) = alarm.code();
     format!("{first}-{second} {}", alarm.text())
 }
 
-/// What to look at when an alarm is latched, and before it is cleared.
+/// What to check after an alarm, before it is cleared.
 pub fn alarm(alarm: Alarm) -> &'static str {
     match alarm {
         Alarm::BeamBlocked => "clear the beam, align it, or raise `max_width_mm`",

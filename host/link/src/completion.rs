@@ -1,9 +1,9 @@
-//! Completion of a command as it is typed, from the firmware's own words and its table of settings.
+//! Completes a half-typed command from the firmware's own words and its table of settings.
 
 use super::settings::{Setting, name};
 use control::say::command::Word;
 
-/// All lines that a begun line can become by completing its last word, in the order of the firmware's tables.
+/// All lines that complete the last word of `line`, in the order of the firmware's tables.
 pub fn complete(line: &str) -> Vec<String> {
     let (before, begun) = line.rsplit_once(' ').map_or(("", line), |(before, begun)| (before, begun));
     let words: Vec<&str> = before.split_whitespace().collect();
@@ -34,7 +34,7 @@ fn owned(words: &[&str]) -> Vec<String> {
     words.iter().map(|&word| word.to_owned()).collect()
 }
 
-/// The longest beginning that all lines share.
+/// The longest prefix that all lines share.
 pub fn common(lines: &[String]) -> &str {
     let Some(first) = lines.first() else { return "" };
     let shared = |other: &String| first.bytes().zip(other.bytes()).take_while(|(one, other)| one == other).count();

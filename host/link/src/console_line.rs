@@ -1,8 +1,8 @@
-//! What any line of the console is: the greeting, an end of an answer, a line of an answer, or something told unasked.
+//! Parses any line of the console: the greeting, the end of an answer, a line of an answer, or an event.
 //!
-//! Keys and words behind those that are known here are passed over, so that a newer firmware may say more; a line that lacks
-//! one of its parts is [`ConsoleLine::Other`]. Nothing here knows which command a line answers. Where a setting's name, range and unit
-//! stand in the line, they are taken from there and not from this version's table.
+//! Unknown keys and words at the end are ignored, so that a newer firmware may add more. A line that lacks a required
+//! part is [`ConsoleLine::Other`]. This module does not know which command a line answers. A setting's name, range and
+//! unit are read from the line, not from this version's table.
 
 use super::{EventLine, Status};
 use control::ground::class::Class;
@@ -15,18 +15,18 @@ pub enum ConsoleLine {
     Greeting {
         /// The firmware's version.
         version: String,
-        /// Why it started, in its word.
+        /// The reset cause, in the firmware's word.
         cause: String,
     },
     /// The answer to `version`.
     Version(String),
-    /// The end of an answer: what was asked is done.
+    /// The end of an answer: the command succeeded.
     Done,
-    /// The end of an answer: what was wrong, and what would be right.
+    /// The end of an answer: the error, and what would be right.
     Refused(String),
     /// The first line of the answer to `status`.
     Status(Status),
-    /// A line of the answer to `get`, or the one to `calibrate MM`, which shows what was measured.
+    /// A line of the answer to `get`, or the measured value in the answer to `calibrate MM`.
     Setting(SettingValue),
     /// A line of the answer to `help`.
     Help {
@@ -37,22 +37,22 @@ pub enum ConsoleLine {
     },
     /// A line of the answer to `examples`.
     Example {
-        /// Whether it was taught, and is not a built-in one.
+        /// True for a taught example, false for a built-in one.
         from_field: bool,
         /// Its number, of its kind.
         number: u16,
-        /// What it is an example of.
+        /// Its class.
         label: Class,
         /// Its features, on the scale of the firmware's own examples.
         features: [u8; COUNT],
     },
-    /// What the machine tells by itself.
+    /// An event.
     Event(EventLine),
     /// Something else.
     Other,
 }
 
-/// A setting as `get` shows it. A switched one is 0 or 1.
+/// A setting as `get` shows it. A switch is 0 or 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SettingValue {
     /// Its name.
@@ -61,21 +61,21 @@ pub struct SettingValue {
     pub value: u16,
     /// Its unit; empty for a count.
     pub unit: String,
-    /// The least and the greatest value; none for a switched one.
+    /// The least and the greatest value. `None` for a switch.
     pub range: Option<(u16, u16)>,
     /// Its value on a new machine.
     pub default: u16,
-    /// The saved value; none where none are saved.
+    /// The saved value, if there is one.
     pub saved: Option<u16>,
 }
 
-/// What the firmware's name begins with, in its greeting and its version.
+/// The prefix of the firmware's greeting and version.
 const NAME: &str = "weeder ";
 
 impl ConsoleLine {
     /// Reads a line.
     pub fn parse(line: &str) -> Self {
-        // Before all others, as it may stand behind the beginning of any of them.
+        // This check is first, because a greeting may come after the beginning of any other line.
         if let Some(greeting) = greeting(line) {
             return greeting;
         }
@@ -98,7 +98,7 @@ impl ConsoleLine {
     }
 }
 
-/// `weeder VERSION, reset by CAUSE`, behind whatever line the reset has cut.
+/// Parses `weeder VERSION, reset by CAUSE`, also behind a line that the reset has cut.
 fn greeting(line: &str) -> Option<ConsoleLine> {
     let (before, behind) = line.split_once(", reset by ")?;
     let version = before.get(before.rfind(NAME)? + NAME.len()..)?;
@@ -106,7 +106,7 @@ fn greeting(line: &str) -> Option<ConsoleLine> {
     is_version(version).then(|| ConsoleLine::Greeting { version: version.to_owned(), cause: cause.to_owned() })
 }
 
-/// `weeder VERSION`, where a version may have its commit behind it.
+/// Parses `weeder VERSION`. A version may be followed by its commit.
 fn version(line: &str) -> Option<ConsoleLine> {
     line.strip_prefix(NAME)
         .filter(|version| is_version(version))
@@ -134,7 +134,7 @@ fn example(line: &str) -> Option<ConsoleLine> {
     Some(ConsoleLine::Example { from_field, number, label, features })
 }
 
-/// `NAME and what it takes - what it is`.
+/// Parses `NAME and arguments - description`.
 fn help(line: &str) -> Option<ConsoleLine> {
     let (usage, help) = line.split_once(" - ")?;
     let name = usage.split(' ').next().filter(|name| is_name(name))?;
@@ -142,8 +142,8 @@ fn help(line: &str) -> Option<ConsoleLine> {
 }
 
 impl SettingValue {
-    /// `NAME=VALUE UNIT from LEAST to GREATEST, default VALUE, saved VALUE`. A count has no unit, a switched setting has `on or off`
-    /// in the range's place, and nothing stands behind the default where the saved value is the one in use.
+    /// Parses `NAME=VALUE UNIT from LEAST to GREATEST, default VALUE, saved VALUE`. A count has no unit. A switch has
+    /// `on or off` in place of the range. The saved value is missing if it equals the current one.
     fn parse(line: &str) -> Option<Self> {
         let mut parts = line.split(", ");
         let (name, rest) = parts.next()?.split_once('=')?;

@@ -1,4 +1,4 @@
-//! Why there is no link, or no good answer, and what to do.
+//! The errors of a link: what went wrong, and what to do.
 
 use control::say::command::LINE_LENGTH;
 use std::io;
@@ -25,7 +25,7 @@ pub enum LinkError {
         "the board with the serial number {0} is not plugged in: plug it in, or name the row's board again with `weeder rows name`"
     )]
     Unplugged(String),
-    /// Several boards say that they are the row's.
+    /// Several boards match the row.
     #[error(
         "{} are both of the serial number {number}: name the rows again with `weeder rows name`, which then knows them by their ports",
         .ports.join(" and ")
@@ -39,7 +39,7 @@ pub enum LinkError {
     /// There is no such port.
     #[error("there is no port {0}: plug the Uno in, or leave --port out to have it found")]
     Absent(String),
-    /// Somebody else has the port.
+    /// Another program has the port open.
     #[error("{0} is in use: close the serial monitor, or the other program that has it open")]
     Busy(String),
     /// The user may not open the port.
@@ -68,10 +68,10 @@ pub enum LinkError {
     Silent {
         /// The command.
         command: String,
-        /// The end of what came.
+        /// The end of the received text.
         received: String,
     },
-    /// What comes is not text.
+    /// The received bytes are not text.
     #[error(
         "what comes from the port is no text: see that nothing else is wired to D0 and D1, and flash the Uno again"
     )]
@@ -79,7 +79,7 @@ pub enum LinkError {
     /// Something else answers.
     #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]
     NotTheWeeder(String),
-    /// The firmware started anew while it was asked.
+    /// The firmware restarted before it had answered.
     #[error("the Uno was reset while it was asked `{0}`: see to its supply, then try again")]
     Restarted(String),
     /// The firmware refused.
@@ -95,7 +95,7 @@ pub enum LinkError {
     NoCommand(String),
 }
 
-/// What other ports there are, for the message that none is an Uno's.
+/// The other ports, for the message that none of them is an Uno's.
 fn others(ports: &[String]) -> String {
     if ports.is_empty() { String::new() } else { format!(" (there is {})", ports.join(", ")) }
 }

@@ -1,7 +1,7 @@
-//! What a line of the firmware means: an event, or the status.
+//! Parses lines of the firmware as an event or the status.
 //!
-//! Lines are `name key=value key=value`. Keys that are not known here are passed over, so that a newer firmware may say
-//! more; a line that lacks one of its keys, or has a value that is none, is no such line.
+//! Lines are `name key=value key=value`. Unknown keys are ignored, so that a newer firmware may add more. A line that
+//! lacks a key, or has an invalid value, does not match.
 
 use control::alarm::{Alarm, Warning};
 use control::ground::class::Class;
@@ -17,7 +17,7 @@ pub struct EventDescription {
     pub name: &'static str,
     /// What happened.
     pub meaning: &'static str,
-    /// What its line begins with; nothing where a value stands first.
+    /// The beginning of its line. Empty if a value comes first.
     pub beginning: &'static str,
     /// The values in its line, in their order.
     pub values: &'static [ValueDescription],
@@ -26,11 +26,11 @@ pub struct EventDescription {
 /// A value in the line of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ValueDescription {
-    /// What stands before `=`; nothing for the line's first word.
+    /// The text before `=`. Empty for the line's first word.
     pub key: &'static str,
-    /// How it is written, as the table of events calls it.
+    /// The kind of its value, by its name in the table of events.
     pub kind: &'static str,
-    /// The field of [`EventLine`] that it is read into, and that one's type; none where another value says the same.
+    /// The field of [`EventLine`] for this value, and its type. `None` if another value has the same content.
     pub field: Option<(&'static str, &'static str)>,
     /// What it tells.
     pub meaning: &'static str,
@@ -40,7 +40,7 @@ macro_rules! event_lines {
     ($($Event:ident $meaning:literal, $pattern:pat => $beginning:literal {
         $($key:literal = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
     } $($tail:literal)?)*) => {
-        /// Something that the machine told by itself, as [`Event`] was written.
+        /// An event that the machine reported, as [`Event`] was written.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum EventLine {
             $(
@@ -70,7 +70,7 @@ macro_rules! event_lines {
         }),*];
 
         impl EventLine {
-            /// Reads a line of the table of events; none where it is not one.
+            /// Parses a line by the table of events. `None` if it matches no event.
             fn of_table(line: &str) -> Option<Self> {
                 $(
                     let read = |values: Values<'_>| {
@@ -84,7 +84,7 @@ macro_rules! event_lines {
                 None
             }
 
-            /// The name of the event in [`EVENTS`], and the fields as JSON would have them, by their names; none for a plotter's points.
+            /// The event's name in [`EVENTS`], and its fields by name for JSON. `None` for plotter data.
             pub fn fields(&self) -> Option<(&'static str, Vec<(&'static str, Field)>)> {
                 match *self {
                     $(Self::$Event { $($($field,)?)* } => {
@@ -140,7 +140,7 @@ fields! {
     Warning: warning => Self::Word(warning.text().to_string());
 }
 
-/// What the machine is doing, without the reason for an alarm.
+/// The machine's state, without the reason for an alarm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     /// The tool stays out.
@@ -163,7 +163,7 @@ impl From<State> for Mode {
 }
 
 impl Mode {
-    /// As the console calls it.
+    /// Its name on the console.
     pub fn name(self) -> &'static str {
         match self {
             Self::Hold => "hold",
@@ -184,19 +184,20 @@ pub struct Status {
     pub mode: Mode,
     /// The latched alarm.
     pub alarm: Option<Alarm>,
-    /// Whether the tool is to be out of the row.
+    /// Whether the tool is commanded out of the row.
     pub tool_out: bool,
-    /// Why, where the machine works.
+    /// The reason for the tool's command, if the machine works.
     pub reason: Option<String>,
     /// The encoder's count.
     pub position: i32,
     /// Speed over the ground, negative backwards.
     pub speed_mm_s: i32,
-    /// Windows at the tool or ahead of it.
+    /// Keep-out zones at the tool or ahead of it.
     pub windows: u32,
-    /// How far the machine has to roll until ground that the beam has seen reaches the tool.
+    /// Distance until ground that the beam has seen reaches the tool.
     pub unseen_mm: i32,
-    /// The wheel's slip in thousandths, above 0 where it turns farther than the machine rolls; none where nothing has told it.
+    /// The wheel's slip in thousandths, positive if the wheel turns farther than the machine rolls. `None` if it was
+    /// not measured.
     pub slip_permille: Option<i32>,
 }
 
@@ -204,7 +205,7 @@ pub struct Status {
 pub struct Values<'a>(pub &'a str);
 
 impl<'a> Values<'a> {
-    /// The text of a key; none where the line does not have it. Without a key it is the first word.
+    /// The text of a key. `None` if the line lacks it. An empty key is the first word.
     pub fn text(&self, key: &str) -> Option<&'a str> {
         if key.is_empty() {
             return self.0.split(' ').next();
@@ -212,25 +213,25 @@ impl<'a> Values<'a> {
         self.0.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
     }
 
-    /// As [`text`](Self::text), as a number; none where it is not one.
+    /// As [`text`](Self::text), parsed as a number. `None` if it is no number.
     pub fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
         self.text(key)?.parse().ok()
     }
 
-    /// The name of the alarm in a status line; a log of 0.1 has it behind another key.
+    /// The name of the alarm in a status line. Logs of version 0.1 have it under another key.
     pub fn alarm(&self) -> Option<&'a str> {
         self.text("name").or_else(|| self.text("alarm"))
     }
 }
 
 impl EventLine {
-    /// Reads an event's line; none where it is not one.
+    /// Parses an event's line. `None` if it is no event.
     pub fn parse(line: &str) -> Option<Self> {
         if is_plot(line) { Some(Self::Plot) } else { Self::of_table(line) }
     }
 }
 
-/// What stands behind the beginning of an event's line; none where the line begins otherwise.
+/// The rest of an event's line after its beginning. `None` if the line begins otherwise.
 fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
     let rest = line.strip_prefix(beginning)?;
     let is_whole = beginning.is_empty() || rest.is_empty() || rest.starts_with([' ', ',']);
@@ -275,13 +276,13 @@ mod kind {
         Warning::find(word.as_bytes())
     }
 
-    /// The one that is called so.
+    /// The value with this name.
     fn named<T: Copy, const N: usize>(word: &str, all: [T; N], name: fn(T) -> Text) -> Option<T> {
         all.into_iter().find(|&one| name(one).to_string() == word)
     }
 }
 
-/// Whether a line is points of curves, `label:value,label:value`, or one as Teleplot wants it.
+/// Whether a line is plotter data: `label:value,label:value`, or Teleplot's format.
 fn is_plot(line: &str) -> bool {
     let point = |point: &str| {
         point.split_once(':').is_some_and(|(label, value)| !label.is_empty() && value.parse::<i32>().is_ok())
@@ -290,7 +291,7 @@ fn is_plot(line: &str) -> bool {
 }
 
 impl Status {
-    /// Reads a status line; none where it is not one.
+    /// Parses a status line. `None` if it is no status.
     pub fn parse(line: &str) -> Option<Self> {
         let values = Values(line);
         Some(Self {
@@ -365,7 +366,7 @@ mod tests {
             let read = EventLine::parse(&line);
             assert_eq!(read, Some(EventLine::from(&event)), "{line}");
             let (name, fields) = read.and_then(|read| read.fields()).expect("it has a name");
-            // The description says what the line is.
+            // The description must match the line.
             let described = EVENTS.iter().find(|described| described.name == name).expect("it is described");
             let keys: Vec<&str> =
                 line.split([' ', ',']).filter_map(|word| word.split_once('=')).map(|(key, _)| key).collect();
@@ -397,7 +398,7 @@ mod tests {
             ("swing tool=out pos=12", EventLine::Swing { out: true, position: 12 }),
             ("state is=alarm", EventLine::State { mode: Mode::Alarm }),
             ("alarm code=3-1 name=too_fast pos=1", EventLine::Alarm { alarm: Alarm::TooFast, position: 1 }),
-            // As a log of 0.1 has it.
+            // In the format of version 0.1.
             ("alarm name=too_fast code=31 pos=1", EventLine::Alarm { alarm: Alarm::TooFast, position: 1 }),
             ("calibrated by=eye, as seen", EventLine::CalibratedByEye {}),
             ("calibrated by=none, the end switch did not follow", EventLine::NotCalibrated {}),
@@ -454,7 +455,7 @@ mod tests {
             unseen_mm: 400,
             slip_permille: None,
         };
-        // As it is, and as a log of 0.1 has it.
+        // In the present format, and in that of version 0.1.
         for alarm in ["code=1-1 name=beam_blocked", "alarm=beam_blocked"] {
             assert_eq!(Status::parse(&format!("state=alarm {alarm} {rest}")).as_ref(), Some(&expected));
         }

@@ -1,8 +1,8 @@
-//! The examples that a machine was taught in the field, all at once: reading them, and teaching them to another.
+//! The taught examples of a machine: reads them all, and teaches them to another machine.
 //!
-//! The firmware lists an example as bytes, on the scale of its built-in table; [`features_of`] gives the millimetres back, and
-//! [`example_of`] the bytes. Both mean something only where this program has the firmware's table, so the built-in examples
-//! that the firmware lists are compared first. Nothing is sent where not all of it can be taught.
+//! The firmware lists an example as bytes, on the scale of its built-in table. [`features_of`] converts them to
+//! millimetres, and [`example_of`] converts back. Both are valid only if this program and the firmware have the same
+//! table. So the firmware's built-in examples are compared first. Nothing is sent unless everything can be taught.
 
 use super::{Class, ConsoleLine, Link, LinkError, Mode, settings};
 use control::ground::class::{Classifier, label};
@@ -39,7 +39,7 @@ pub enum ExamplesError {
         /// Its number.
         number: u16,
     },
-    /// The machine is at work, where it is not taught.
+    /// The machine is at work: teaching needs HOLD.
     #[error("the machine is at work, where it is not taught: hold it first, by its switch or `hold`; nothing was sent")]
     AtWork,
     /// They do not find room.
@@ -53,7 +53,7 @@ pub enum ExamplesError {
         /// Places that are free.
         free: usize,
     },
-    /// The machine does not list what it was taught.
+    /// The machine cannot list its taught examples.
     #[error(
         "{missing} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so"
     )]
@@ -63,7 +63,7 @@ pub enum ExamplesError {
     },
 }
 
-/// What was done to a machine's examples.
+/// The changes to a machine's examples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pushed {
     /// Examples that it was taught.
@@ -72,17 +72,17 @@ pub struct Pushed {
     pub forgotten: usize,
 }
 
-/// What stands in the columns of the answer to `examples`.
+/// The heading of the columns in the answer to `examples`.
 pub const HEAD: &str = "source number class, and five features of 0 to 255: speed spacing delay hold actuation";
 
-/// Puts [`HEAD`] before each list of examples: the firmware has no flash for it.
+/// Puts [`HEAD`] before each list of examples. The firmware has no flash left for it.
 #[derive(Clone, Debug, Default)]
 pub struct Heading {
     is_in_list: bool,
 }
 
 impl Heading {
-    /// What belongs before this line of an answer.
+    /// The heading, if it belongs before this line of an answer.
     pub fn before(&mut self, line: &str) -> Option<&'static str> {
         let is_example = matches!(ConsoleLine::parse(line), ConsoleLine::Example { .. });
         let begins = is_example && !self.is_in_list;
@@ -94,7 +94,7 @@ impl Heading {
 /// Reads the examples that the machine was taught, with their numbers.
 ///
 /// # Errors
-/// Where the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
+/// If the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
 pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
     for line in link.ask("examples")? {
@@ -111,10 +111,11 @@ pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
     if built_in == EXAMPLES { Ok(taught) } else { Err(ExamplesError::OtherTable) }
 }
 
-/// Has the machine know these examples, and with `replace` no others; those that it has already are not taught again.
+/// Teaches the machine these examples. With `replace` it first forgets all others. Known examples are not taught again.
 ///
 /// # Errors
-/// As said, [`ExamplesError::AtWork`] and [`ExamplesError::NoRoom`] before anything is sent, and [`ExamplesError::NotTaken`].
+/// [`ExamplesError::AtWork`] and [`ExamplesError::NoRoom`] before anything is sent; [`ExamplesError::NotTaken`]; and
+/// errors of the link.
 pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed, ExamplesError> {
     let before = read(link)?;
     let (known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
@@ -137,7 +138,8 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
         link.ask(&format!("forget {number}"))?;
     }
     for example in &new {
-        // Where somebody has left features behind, these are too many: that is refused, and the next time begins anew.
+        // Features from an earlier command may be left in the buffer. Then these are too many, and the firmware refuses
+        // them and clears the buffer. The second try starts with an empty buffer.
         teach(link, example).or_else(|_| teach(link, example))?;
     }
     let after = read(link)?;
@@ -164,14 +166,14 @@ fn set<'a>(examples: impl IntoIterator<Item = &'a Taught>) -> HashSet<Taught> {
     examples.into_iter().copied().collect()
 }
 
-/// An object as an example, as the firmware teaches itself one by `label`.
+/// Converts a detection to an example, as the firmware's `label` does.
 pub fn example_of(features: &Features, label: u8) -> Taught {
     Example::new(SCALE.quantise(&features.values()), label)
 }
 
-/// What an example is told by in millimetres and millimetres a second: for each feature the middle of the values that have its
-/// byte, and the nearest of them where they have no end. Its bytes are the example's again. Nothing where a byte has no value: no
-/// object gives such an example.
+/// The features of an example in millimetres and millimetres a second. Each feature is the middle of the values that
+/// have its byte; for an open-ended range it is the nearest value. Converting back gives the same bytes. `None` if no
+/// value has one of the bytes: no detection gives such an example.
 pub fn features_of(example: &Taught) -> Option<Features> {
     let mut values = [0; COUNT];
     for (feature, value) in values.iter_mut().enumerate() {
@@ -181,7 +183,7 @@ pub fn features_of(example: &Taught) -> Option<Features> {
     Some(Features { speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm })
 }
 
-/// For each feature, the value that stands for a byte.
+/// For each feature, the value that represents a byte.
 static VALUES: LazyLock<[HashMap<u8, i16>; COUNT]> = LazyLock::new(|| {
     std::array::from_fn(|feature| {
         let mut spans: HashMap<u8, (i16, i16)> = HashMap::new();
@@ -198,8 +200,8 @@ static VALUES: LazyLock<[HashMap<u8, i16>; COUNT]> = LazyLock::new(|| {
     })
 });
 
-/// What the built-in examples are sure that an example is, where it is labelled otherwise: the machine refuses such a label unless it
-/// is forced.
+/// The class that the built-in examples clearly give, if it differs from the label. The machine refuses such a label
+/// unless it is forced.
 pub fn contradiction(example: &Taught) -> Option<Class> {
     let built_in = Nearest::new(EXAMPLES, Volatile::new()).built_in_class(&features_of(example)?);
     let other = if example.label == label::PLANT { Class::Weed } else { Class::Plant };
@@ -211,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_bytes_of_whatever_an_object_may_measure_come_back_from_the_millimetres() {
+    fn the_bytes_of_every_detection_come_back_from_its_millimetres() {
         for value in i16::MIN..=i16::MAX {
             let example = Example::new(SCALE.quantise(&[value.into(); COUNT]), label::WEED);
             let features = features_of(&example).expect("it is an object's");

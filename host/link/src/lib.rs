@@ -1,16 +1,17 @@
-//! The console from the other end of the wire: what the weeder's firmware says and takes over its serial line.
+//! The PC's end of the console: reads and writes the firmware's serial line.
 //!
-//! [`Link::open`] opens an Uno's port, real or virtual, waits out the reset that opening a real one causes, and makes sure
-//! that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer; [`Link::next_line`] hears
-//! what the machine says by itself, and a [`session`] does both for as long as one likes. [`ConsoleLine`] is what a line means, and
-//! [`settings`] and [`settings_file`] move all settings at once, [`examples`] all that was taught.
+//! [`Link::open`] opens the port of a real or virtual Uno. It waits for the reset that opening a real port causes, and
+//! checks that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer.
+//! [`Link::next_line`] returns the lines that the machine sends by itself. A [`session`] does both, and runs until the
+//! caller ends it. [`ConsoleLine`] is a parsed line. [`settings`] and [`settings_file`] transfer all settings, and
+//! [`examples`] transfers all taught examples.
 //!
-//! Whatever comes from the port is suspect: noise, lines without an end, a firmware that is not the weeder's. What is kept
-//! of it is bounded, characters that could move a terminal's cursor are taken out, and no wait is endless.
+//! Input from the port is not trusted: it may be noise, lines without an end, or another firmware. Buffers are bounded,
+//! control characters are removed, and every wait has a timeout.
 //!
-//! A link does not reconnect: one whose port is gone says so, and the session opens another. [`rows`] has several
-//! sessions at once, and [`row_names`] knows which board is which row's. Nothing here knows what stands in a row, or a
-//! simulator. In a browser there is no serial port, and all but that compiles for it.
+//! A link does not reconnect. If its port is gone, it returns an error, and the session opens a new link. [`rows`] runs
+//! several sessions at once. [`row_names`] maps boards to rows. This crate knows no plants and no simulator. All except
+//! the serial port also compiles for a browser.
 
 pub mod advice;
 pub mod completion;
@@ -47,26 +48,25 @@ use std::time::{Duration, Instant};
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
 
-/// Reads in which nothing came, after which an answer is given up: two seconds.
+/// Silent reads after which the link gives up an answer: two seconds.
 const SILENT_READS: usize = 100;
 
-/// Longest time that an answer may take although something keeps coming. The longest good one, all examples, takes less than
-/// a second.
+/// Longest time of an answer while lines keep coming. The longest valid answer, all examples, takes less than a second.
 const ANSWER_TIME: Duration = Duration::from_secs(10);
 
-/// Bytes in which an answer has to end, six times what the longest one takes.
+/// Greatest length of an answer in bytes: six times the longest valid one.
 const ANSWER_BYTES: usize = 40_000;
 
-/// Silent reads in which the greeting has to come after a reset: the longest wait of an old bootloader, and some patience.
+/// Silent reads until the greeting must come after a reset: the longest wait of an old bootloader, and a reserve.
 const BOOT_READS: usize = 150;
 
 /// Times that the version is asked for again.
 const RETRIES: usize = 2;
 
-/// A line of bytes, both ways.
+/// A connection that carries bytes both ways.
 ///
-/// A read waits at most some hundredths of a second, and then fails by [`io::ErrorKind::TimedOut`]. A read of no bytes, and every
-/// other error, says that the port is gone.
+/// A read waits some hundredths of a second at most, and then fails with [`io::ErrorKind::TimedOut`]. A read of zero
+/// bytes, and any other error, means that the port is gone.
 pub trait Port: Read + Write {}
 
 impl<T: Read + Write + ?Sized> Port for T {}
@@ -82,7 +82,7 @@ enum Received {
 pub struct Link {
     port: Box<dyn Port>,
     lines: LineReader,
-    /// Lines that came before an answer and belong to none.
+    /// Lines that came before an answer and do not belong to it.
     events: VecDeque<String>,
     version: String,
 }
@@ -91,7 +91,7 @@ impl Link {
     /// Opens a port by its name, or that of the only Uno, and makes sure that the weeder's firmware answers.
     ///
     /// # Errors
-    /// Where the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
+    /// If the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
         let (port, resets) = match port {
@@ -104,16 +104,16 @@ impl Link {
     /// A link over a port that is open already; `resets` says whether opening it has reset the Uno.
     ///
     /// # Errors
-    /// Where the port is gone, or something else than the weeder's firmware is at its other end.
+    /// If the port is gone, or something else than the weeder's firmware is at its other end.
     pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
         let mut link =
             Self { port: Box::new(port), lines: LineReader::new(), events: VecDeque::new(), version: String::new() };
         link.wait_for_greeting(if resets { BOOT_READS } else { 0 })?;
-        // Whatever was typed before ends here, and its answer is nobody's.
+        // Ends a line that was typed before. Its answer is ignored.
         link.type_line("")?;
         link.wait_until_quiet()?;
         let mut answer = link.ask("version");
-        // The Uno may be starting right now, which no modem line has told.
+        // The Uno may be starting right now for another reason than this opening.
         for _ in 0..RETRIES {
             if !matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
                 break;
@@ -138,7 +138,7 @@ impl Link {
     /// Types a command and returns the lines of its answer, the `ok` left out.
     ///
     /// # Errors
-    /// Where it is no command, the firmware refuses, or no whole answer comes.
+    /// If it is no command, the firmware refuses, or no whole answer comes.
     pub fn ask(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
         self.send(command)?;
         let deadline = Instant::now() + ANSWER_TIME;
@@ -162,7 +162,7 @@ impl Link {
                     return Err(LinkError::Refused { command: command.to_owned(), answer: line });
                 }
                 ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
-                // Events come before an answer, and never within it.
+                // An event can come before an answer, never within it.
                 ConsoleLine::Event(_) if answer.is_empty() => self.events.push_back(line),
                 _ => answer.push(line),
             }
@@ -180,7 +180,7 @@ impl Link {
     /// Types a command and does not wait for its answer, which comes by [`next_line`](Self::next_line).
     ///
     /// # Errors
-    /// Where it is no command, or the port is gone.
+    /// If it is no command, or the port is gone.
     pub fn send(&mut self, command: &str) -> Result<(), LinkError> {
         if !is_command(command) {
             return Err(LinkError::NoCommand(command.to_owned()));
@@ -191,7 +191,7 @@ impl Link {
     /// The next line that the machine says; none where no line was complete within a fiftieth of a second.
     ///
     /// # Errors
-    /// Where the port is gone.
+    /// If the port is gone.
     pub fn next_line(&mut self) -> Result<Option<String>, LinkError> {
         if let Some(line) = self.events.pop_front() {
             return Ok(Some(line));
@@ -210,7 +210,7 @@ impl Link {
         self.port.flush().map_err(gone)
     }
 
-    /// A line that is there already, or one read.
+    /// Returns a buffered line, or reads one.
     fn hear(&mut self) -> Result<Received, LinkError> {
         if let Some(line) = self.lines.next_line() {
             return Ok(Received::Line(line));
@@ -238,7 +238,7 @@ impl Link {
         Ok(())
     }
 
-    /// Drops what comes until nothing comes any more, or for a second if it does not end.
+    /// Discards input until the line is silent, for a second at most.
     fn wait_until_quiet(&mut self) -> Result<(), LinkError> {
         let deadline = Instant::now() + Duration::from_secs(1);
         let mut quiet_reads = 0;
@@ -249,17 +249,17 @@ impl Link {
     }
 }
 
-/// Whether this can be typed into the console: one line of printable ASCII, and not too long.
+/// Whether this text can be typed into the console: one line of printable ASCII, and short enough.
 pub fn is_command(line: &str) -> bool {
     line.len() <= COMMAND_LENGTH && line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
 }
 
-/// Whether a line is the one by which the firmware says that it has started.
+/// Whether a line is the firmware's greeting after a start.
 pub fn is_greeting(line: &str) -> bool {
     matches!(ConsoleLine::parse(line), ConsoleLine::Greeting { .. })
 }
 
-/// Whether a read ended without a byte, but may be repeated.
+/// Whether a read ended without a byte and can be repeated.
 fn is_nothing(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }

@@ -1,14 +1,14 @@
-//! Bytes to lines, whatever the bytes are.
+//! Splits bytes into lines. Any bytes are accepted.
 //!
-//! A line ends with CR, LF or both, or where it has more characters than any that the firmware writes. Every byte that is
-//! not printable ASCII becomes [`STRANGE`], so that noise can be shown, and cannot move a terminal's cursor.
+//! A line ends with CR, LF or both, or when it is longer than any line of the firmware. Every byte that is not
+//! printable ASCII becomes [`STRANGE`]. So noise can be shown, and cannot move a terminal's cursor.
 
 use std::collections::VecDeque;
 
-/// Stands for a byte that is no printable character.
+/// Replaces a byte that is no printable character.
 pub(super) const STRANGE: char = '\u{FFFD}';
 
-/// Characters after which a line ends by itself: the firmware's own have less than 128.
+/// The longest line in characters. The firmware's own lines are shorter than 128.
 const LIMIT: usize = 256;
 
 /// Lines that wait to be taken; when more come the oldest go.
@@ -40,7 +40,7 @@ impl LineReader {
         }
     }
 
-    /// The oldest line that is complete and was not taken yet, without its end. Empty lines say nothing.
+    /// The oldest complete line that was not taken yet, without its line end. Empty lines are dropped.
     pub fn next_line(&mut self) -> Option<String> {
         self.complete.pop_front()
     }

@@ -1,10 +1,9 @@
-//! The log of a session: what happened, a line each, as a CSV file that can be read anywhere and replayed.
+//! The log of a session: one line for each input and output, as a CSV file for any program and for the replay.
 //!
-//! The columns are `time_ms` since the log was opened, `kind` and `line`. A line stands as the firmware wrote it. What the
-//! machine was when it connected, its settings and its examples, stands there too, so that a log can be replayed by itself; and what a
-//! satellite receiver has said, whose lines' kinds begin with `gps`.
-//! Each line is written out before the next is waited for: what is in the file when power goes stays whole but for its
-//! last line.
+//! The columns are `time_ms` since the log was opened, `kind` and `line`. `line` is the firmware's own text. The log
+//! also holds the machine's version, settings and examples at each connection, so that it can be replayed by itself. It
+//! holds the output of a satellite receiver as lines whose kind begins with `gps`. Each line is written before the next
+//! is read. So a power failure damages at most the last line.
 
 use super::session::Happening;
 use super::settings::{Setting, name};
@@ -15,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use thiserror::Error;
 
-/// What kind of line stands in a log.
+/// The kind of a line in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The Uno is there; the version.
@@ -28,13 +27,13 @@ pub enum Kind {
     Example,
     /// Its status.
     Status,
-    /// What it told by itself.
+    /// An event.
     Event,
     /// What was typed.
     Command,
     /// What it answered.
     Answer,
-    /// Where beam and tool stand beside a satellite receiver's antenna.
+    /// Positions of beam and tool relative to a satellite receiver's antenna.
     Antenna,
     /// The receiver's port is there; which.
     GpsFound,
@@ -44,7 +43,7 @@ pub enum Kind {
     Gps,
     /// A line of the receiver that came damaged.
     GpsDamaged,
-    /// What was noticed of the receiver's fixes.
+    /// A fault in the receiver's fixes.
     GpsMark,
 }
 
@@ -66,7 +65,7 @@ impl Kind {
         Self::GpsMark,
     ];
 
-    /// As it stands in the file.
+    /// Its name in the file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Connected => "connected",
@@ -86,7 +85,7 @@ impl Kind {
         }
     }
 
-    /// Whether such a line tells the operator of a receiver that it comes, goes or is wrong.
+    /// Whether the operator sees such a line: the receiver was connected, was lost, or has a fault.
     pub fn is_for_the_operator(self) -> bool {
         matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
     }
@@ -110,7 +109,7 @@ pub enum LogError {
         /// What the system says.
         source: io::Error,
     },
-    /// The file is something else.
+    /// The file is no log.
     #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
 }
@@ -129,7 +128,7 @@ impl LogWriter {
     /// Opens a log; one that is there is gone on with.
     ///
     /// # Errors
-    /// Where the file cannot be written, or is something else.
+    /// If the file cannot be written, or is something else.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let failed = |source| LogError::File { path: path.into(), source };
         let mut file =
@@ -139,7 +138,7 @@ impl LogWriter {
         if !bytes.is_empty() && !bytes.starts_with(HEADER.as_bytes()) {
             return Err(LogError::NoLog(path.into()));
         }
-        // A last line that power has cut off would spoil the next.
+        // Removes a last line that a power failure has cut off. It would damage the next line.
         let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
@@ -159,7 +158,7 @@ impl LogWriter {
     /// Writes down what happened.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write(&mut self, happening: &Happening) -> Result<(), LogError> {
         self.write_at(self.now_ms(), happening)
     }
@@ -167,7 +166,7 @@ impl LogWriter {
     /// Writes down what happened at a time that another clock tells.
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
         match happening {
             Happening::Connected { version, settings, examples } => {
@@ -191,24 +190,24 @@ impl LogWriter {
     /// Writes lines of some kinds at a time, of what is no [`Happening`].
     ///
     /// # Errors
-    /// Where the file cannot be written.
+    /// If the file cannot be written.
     pub fn lines_at(&mut self, time_ms: u64, lines: &[(Kind, String)]) -> Result<(), LogError> {
         lines.iter().try_for_each(|(kind, line)| self.line(time_ms, *kind, line))
     }
 
-    /// Lines in the file, the header left out.
+    /// Lines in the file, without the header.
     pub fn lines(&self) -> u64 {
         self.found + self.added
     }
 
-    /// Those of them that were written since it was opened.
+    /// Lines that were written since the file was opened.
     pub fn added(&self) -> u64 {
         self.added
     }
 
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         self.added += 1;
-        // A table's line is one, whatever the system says of a port that is gone.
+        // A record is one line of the table, even if the system's message about a lost port has several.
         self.record([time_ms.to_string().as_str(), kind.name(), &in_a_line(line)])
     }
 
@@ -223,7 +222,7 @@ impl LogWriter {
 pub struct Entry {
     /// The line in the file, counted from 1.
     pub number: u64,
-    /// The host's time since the log was opened.
+    /// The PC's time since the log was opened.
     pub time_ms: u64,
     /// What kind of line it is.
     pub kind: Kind,
@@ -258,13 +257,13 @@ pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
         .collect()
 }
 
-/// Reads a log in pieces, so that its text need not be held as a whole.
+/// Reads a log in pieces, so that the whole text is not in memory.
 pub struct Pieces {
     path: PathBuf,
-    /// All up to the header's end, below which each piece is read.
+    /// The text up to the header's end. Each piece is parsed below it.
     head: String,
     has_header: bool,
-    /// The beginning of a line whose end has not come.
+    /// The beginning of an incomplete line.
     cut: Vec<u8>,
     /// Lines that were read.
     lines: u64,
@@ -272,21 +271,21 @@ pub struct Pieces {
 }
 
 impl Pieces {
-    /// A log of which nothing is read yet. The path is for errors.
+    /// A log before its first line. The path is for error messages.
     pub fn new(path: &Path) -> Self {
         Self { path: path.into(), head: String::new(), has_header: false, cut: Vec::new(), lines: 0, is_empty: true }
     }
 
-    /// The lines that end in the next bytes of the log, without those that are not wanted.
+    /// Parses the lines that end in the next bytes of the log, without the unwanted ones.
     ///
     /// # Errors
-    /// As [`read`], but for a log without lines.
+    /// As [`read`], except for a log without lines.
     pub fn take(&mut self, bytes: &[u8], is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
         let end = |bytes: &[u8]| bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
         let whole = end(bytes);
         self.cut.extend_from_slice(&bytes[..whole]);
         let mut text = if whole == 0 { Vec::new() } else { std::mem::take(&mut self.cut) };
-        // The next line tells whether a quotation mark is not closed in the last.
+        // The last line is complete only when the next one shows that no quotation mark is open.
         let last = end(&text[..text.len().saturating_sub(1)]);
         if text[last..].iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
             self.cut = text.split_off(last);
@@ -295,14 +294,14 @@ impl Pieces {
         self.lines(text, is_wanted)
     }
 
-    /// The last line, where no line feed ends it.
+    /// Parses the last line, if no line feed ends it.
     ///
     /// # Errors
     /// As [`read`].
     pub fn end(mut self, is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
         let last = std::mem::take(&mut self.cut);
         let entries = self.lines(last, is_wanted)?;
-        // Without a line, it says what is missing.
+        // For an empty log this returns the error for a missing header.
         if self.is_empty { parse(&self.path, self.head.into_bytes()) } else { Ok(entries) }
     }
 
@@ -316,7 +315,7 @@ impl Pieces {
         for line in text.split_inclusive('\n') {
             self.lines += 1;
             let is_told = line != "\n" && !line.starts_with('#');
-            // A comment stands in the place of what is not read, so that lines keep their numbers.
+            // A comment replaces each skipped line, so that line numbers stay right.
             if !self.has_header {
                 self.head.push_str(if is_told { line } else { "#\n" });
                 self.has_header = is_told;

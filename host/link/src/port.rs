@@ -1,6 +1,7 @@
-//! The serial ports of this computer: the search for the Uno's, and how one is opened.
+//! The serial ports of this computer: finds and opens the Uno's port.
 //!
-//! What else a link can be over is a [`Port`](crate::Port) too. This module is left out where there is no serial port: in a browser.
+//! A link may also use any other [`Port`](crate::Port). This module is not compiled for a browser, which has no serial
+//! port.
 
 use super::error::LinkError;
 use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
@@ -13,7 +14,7 @@ const BAUD: u32 = 115_200;
 /// Longest time that a read waits for a byte.
 const READ_MS: u64 = 20;
 
-/// Longest time that a write waits for room, and a read where it has to.
+/// Longest wait of a write for room, and of a read.
 const PATIENCE: Duration = Duration::from_millis(READ_MS);
 
 /// USB vendors and products of the Uno, and of the converters on boards that are built like it.
@@ -33,7 +34,7 @@ const UNOS: [(u16, u16); 10] = [
 /// The only Uno's port among those of this machine.
 ///
 /// # Errors
-/// Where there is none, or several.
+/// If there is none, or several.
 pub fn find_uno() -> Result<String, LinkError> {
     only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
 }
@@ -41,7 +42,7 @@ pub fn find_uno() -> Result<String, LinkError> {
 /// The ports of all Unos.
 ///
 /// # Errors
-/// Where the ports cannot be listed.
+/// If the ports cannot be listed.
 pub fn find_unos() -> Result<Vec<String>, LinkError> {
     Ok(unos(&serialport::available_ports().map_err(LinkError::NoList)?))
 }
@@ -54,7 +55,7 @@ fn unos(ports: &[SerialPortInfo]) -> Vec<String> {
 /// The only Uno's port among these.
 ///
 /// # Errors
-/// Where there is none, or several.
+/// If there is none, or several.
 fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
     let unos = unos(ports);
     match unos.as_slice() {
@@ -64,7 +65,7 @@ fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
     }
 }
 
-/// Whether an Uno is at this port, or a board built like it, by its USB vendor and product.
+/// Whether the port belongs to an Uno or a compatible board, by its USB vendor and product.
 pub(super) fn is_uno(port: &SerialPortInfo) -> bool {
     match &port.port_type {
         SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
@@ -75,20 +76,20 @@ pub(super) fn is_uno(port: &SerialPortInfo) -> bool {
 /// Opens a port by its name and closes it again.
 ///
 /// # Errors
-/// Where it is absent, in use, forbidden, or no serial port; each says what to do.
+/// If it is absent, in use, forbidden, or no serial port; each says what to do.
 pub fn try_port(name: &str) -> Result<(), LinkError> {
     open(name).map(drop)
 }
 
-/// Opens a port by its name, and says whether that has reset the Uno.
+/// Opens a port by its name. Also returns whether this has reset the Uno.
 pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError> {
     let mut port = serialport::new(name, BAUD).timeout(PATIENCE).open().map_err(|error| explain(name, error))?;
-    // The line that pulls an Uno's reset; a pseudo-terminal has none.
+    // This modem line resets an Uno. A pseudo terminal has none.
     let resets = port.write_data_terminal_ready(true).is_ok();
     Ok((port, resets))
 }
 
-/// Opens the port of an Uno with another firmware than the weeder's, such as the tester's.
+/// Opens the port of an Uno with other firmware than the weeder's, such as the tester's.
 ///
 /// # Errors
 /// As [`try_port`].
@@ -99,7 +100,7 @@ pub fn open_other(name: &str) -> Result<Box<dyn crate::Port>, LinkError> {
 /// Opens the port of something that only talks, such as a satellite receiver, at so many bits in a second.
 ///
 /// # Errors
-/// Where it is absent, in use, forbidden, or no serial port.
+/// If it is absent, in use, forbidden, or no serial port.
 pub fn listen(name: &str, baud: u32) -> Result<Box<dyn Read + Send>, LinkError> {
     let port = serialport::new(name, baud).timeout(Duration::from_millis(1)).open();
     Ok(Box::new(port.map_err(|error| explain(name, error))?))
@@ -112,7 +113,7 @@ fn explain(name: &str, error: serialport::Error) -> LinkError {
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Forbidden(name),
         ErrorKind::Io(io::ErrorKind::ResourceBusy) => LinkError::Busy(name),
         ErrorKind::Io(io::ErrorKind::NotFound) => LinkError::Absent(name),
-        // A port that is there and yet no device is one that somebody else has locked.
+        // The port exists but is no device: another program has locked it.
         ErrorKind::NoDevice if std::fs::exists(&name).unwrap_or(false) => LinkError::Busy(name),
         ErrorKind::NoDevice => LinkError::Absent(name),
         _ => LinkError::NotOpened { port: name, source: error },

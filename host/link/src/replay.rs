@@ -1,25 +1,28 @@
-//! A log replayed: the firmware's own decisions on the host, given what the log says that the machine met.
+//! Replays a log: the firmware's decisions, repeated on the PC from the inputs in the log.
 //!
-//! A log holds where the beam broke and cleared, place and speed ten times a second, the settings, the examples and what was
-//! typed. From these [`replay`] rebuilds the machine's way and the beam's edges, tick by tick, has
-//! [`control::weeder::Controller`] decide anew, and compares what it tells with what the log tells: each detection with its
-//! class and votes, each swing with its place, each alarm.
+//! A log holds the positions where the beam broke and cleared, position and speed ten times a second, the settings, the
+//! examples, and the typed commands. From these [`replay`] rebuilds the machine's motion and the beam's edges, tick by
+//! tick. [`control::weeder::Controller`] decides on them again. The replay compares its events with the log's: each
+//! detection with its class and votes, each swing with its position, and each alarm.
 //!
-//! # How near it is
+//! # Accuracy
 //!
-//! - A detection's edges are right to [`DETECTION_TICKS`]. A swing leads by the speed, and the log has that only now and then: it may
-//!   differ by [`SWING_TICKS`], and by [`SWING_MS`] of the machine's way, which at 2.5 km/h is another 17 mm. Whether the ground between
-//!   two windows is long enough to come into the row rests on the speed too. So all is replayed at three paces, as even, as slow and
-//!   as fast as the log allows, and a swing differs where none of them has it like the log.
-//! - A detection's vote rests on the speed class, which the line does not tell: it is the same where one of the classes that the machine
-//!   may have been in gives it. What was seen before the log began is believed.
-//! - Where the state changed is not in the log. The swing that follows says it, and is not judged by its place. Without one the tool was
-//!   out already, and the statuses around it say enough. The time at which a command was typed does not: a busy host is late.
-//! - An alarm that encoder, beam, end switch or stack gave rests on what the log does not hold. It is raised where the log has it.
-//! - Where a log begins with ground already seen, what the tool did there is not judged.
-//! - A command that the firmware refused is left out, as it did nothing there.
-//! - A replay ends where the bench was used (`servo`, `calibrate`, `test`), examples were forgotten, or a second beam was set. A log of
-//!   a machine that has one already is not replayed.
+//! - A detection's edges are right to [`DETECTION_TICKS`]. The lead of a swing depends on the speed, which the log
+//!   holds ten times a second. So a swing may differ by [`SWING_TICKS`], and by the distance that the machine travels
+//!   in [`SWING_MS`]: 17 mm at 2.5 km/h. The speed also decides whether the gap between two zones is long enough to
+//!   swing in. So the log is replayed at three paces: even, and as slow and as fast as the log allows. A swing differs
+//!   only if no pace reproduces it.
+//! - The votes of a detection depend on the speed class, which the line does not tell. Votes agree if any possible
+//!   speed class gives them. Detections from before the start of the log are taken as logged.
+//! - The log does not hold the position of a change of state. The next swing shows the change, and its position is not
+//!   compared. Without a swing the tool was already out, and the statuses before and after the change suffice. The time
+//!   of a typed command is not exact: a busy PC records it late.
+//! - An alarm from the encoder, the beam, the end switch or the stack depends on inputs that the log lacks. The replay
+//!   raises it at its logged position.
+//! - If a log begins on ground that was already seen, the tool's swings there are not compared.
+//! - A refused command is left out, because it had no effect.
+//! - A replay ends at a bench command (`servo`, `calibrate`, `test`), where examples were forgotten, or where a second
+//!   beam was set. A log of a machine with a second beam is not replayed.
 
 mod classifier;
 mod compare;
@@ -41,12 +44,12 @@ use files::in_a_line;
 /// Replays a log.
 ///
 /// # Errors
-/// Where it holds no machine, or a line says what cannot be.
+/// If it holds no machine, or a line says what cannot be.
 pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
     replay_with(log, |_| {})
 }
 
-/// As [`replay`], and tells how far it is, from 0 to 1, a hundred times at most.
+/// As [`replay`]. Calls `tell` with the progress, from 0 to 1, a hundred times at most.
 ///
 /// # Errors
 /// As [`replay`].
@@ -71,7 +74,7 @@ pub fn replay_with(log: &[Entry], tell: impl FnMut(f64)) -> Result<Replayed, Rep
 
 /// How far a replay is.
 struct Progress<Tell> {
-    /// Lines replayed, of so many at all paces.
+    /// Replayed lines, of the total at all paces.
     done: usize,
     all: usize,
     tell: Tell,
@@ -88,17 +91,17 @@ impl<Tell: FnMut(f64)> Progress<Tell> {
     }
 }
 
-/// What came of a stretch at one pace.
+/// The result of a stretch at one pace.
 struct Played {
     logged: Vec<Heard>,
     replayed: Vec<Heard>,
-    /// What was left out, and why.
+    /// Notes on skipped parts, with the reasons.
     notes: Vec<String>,
     /// The last place.
     end: i32,
 }
 
-/// Replays a stretch, and adds what comes of it.
+/// Replays a stretch and adds its result.
 fn replay_stretch(
     stretch: &Stretch,
     replayed: &mut Replayed,
@@ -122,7 +125,7 @@ fn replay_stretch(
         played.push(play(stretch, pace, progress)?);
     }
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
-    // What the log says is the same at every pace.
+    // The logged values are the same at every pace.
     let Played { logged, notes, end, .. } = &played[0];
     let bounds = Bounds { first: stretch.first.position, judged_from, end: *end };
     compare(logged, &heard, &bounds, replayed);
@@ -130,7 +133,7 @@ fn replay_stretch(
     Ok(())
 }
 
-/// Has the decisions made anew at a pace.
+/// Replays a stretch at one pace.
 fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>) -> Result<Played, ReplayError> {
     let mut player = Player::new(stretch, pace);
     let mut logged: Vec<Heard> = Vec::new();
@@ -165,7 +168,7 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
             }
             Happened::Command { is_refused: true, .. } => {}
             Happened::Command { line, .. } => {
-                // The line that tells of the new state comes nearer to where it was taken.
+                // The status that shows the new state must come nearer to the command.
                 if stretch.is_told_by_state(place) {
                     starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
                     continue;
@@ -190,8 +193,8 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
 mod tests {
     use super::*;
 
-    /// The log of a machine that rolls at half a metre a second over bare ground. At each of the statuses, ten a second, something
-    /// is typed and answered, or told.
+    /// The log of a machine that rolls at half a metre a second over bare ground. At each status, ten times a second,
+    /// `happens` adds typed lines, answers or events.
     fn log(statuses: u64, happens: impl Fn(u64) -> Vec<(Kind, &'static str)>) -> Vec<Entry> {
         let mut lines = vec![(0, Kind::Connected, "0.2.0".to_owned())];
         for status in 0..statuses {
@@ -213,7 +216,7 @@ mod tests {
         let replayed = replay(&never).unwrap();
         assert_eq!((replayed.difference, replayed.swings), (None, 0));
 
-        // The same start where it was taken has the tool come into the row.
+        // If the same start was accepted, the tool swings into the row.
         let taken = log(20, |status| if status == 2 { start("ok") } else { Vec::new() });
         let difference = replay(&taken).unwrap().difference.expect("the log has no swing");
         assert!(difference.replayed.contains("swing tool=in"), "{difference}");
@@ -239,7 +242,7 @@ mod tests {
 
     #[test]
     fn answers_belong_to_commands_in_their_order() {
-        // `hold` does not wait for the answer before it.
+        // `hold` does not wait for the previous answer.
         let log = log(20, |status| match status {
             2 => vec![(Kind::Command, "set margin_mm 9999"), (Kind::Command, "start")],
             3 => vec![(Kind::Answer, "error: margin_mm takes a whole number from 0 to 200"), (Kind::Answer, "ok")],

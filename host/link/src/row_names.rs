@@ -1,10 +1,10 @@
-//! The names of a machine's rows, and which board each of them has: a small TOML file with a line a row.
+//! The names of a machine's rows, and the board of each row: a small TOML file with one line a row.
 //!
-//! A board is known by its USB serial number, at whichever port the system puts it after it was plugged in anew. Boards without one, and
-//! boards of which several have the same, are known by their port: on Linux by udev's link for the place where they are plugged in,
-//! where there is one. A virtual Uno is known by its path. The file keeps its comments and its order, which is that of the rows.
+//! A board is known by its USB serial number, at any port. Some boards have no serial number, or share one. They are
+//! known by their port: on Linux by udev's link for the USB socket, if there is one. A virtual Uno is known by its
+//! path. Changes preserve the file's comments and its order. The order of lines is the order of rows.
 //!
-//! Nothing here opens a port but [`Board::open`], and nothing but [`Names::write`] changes the file.
+//! Only [`Board::open`] opens a port. Only [`Names::write`] changes the file.
 
 use super::port::{is_uno, open};
 use super::{Link, LinkError, find_uno};
@@ -16,20 +16,20 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml_edit::{DocumentMut, InlineTable, Item, TomlError, Value};
 
-/// Characters that a row's name has at the most: it stands before its machine on a phone.
+/// Longest name of a row, in characters. A phone shows it before the machine.
 pub const NAME_LENGTH: usize = 24;
 
-/// What addresses every row, and is no row's name.
+/// The name that addresses all rows. No row may have it.
 pub const ALL: &str = "all";
 
-/// Where Linux keeps links to ports by the place where they are plugged in.
+/// Linux keeps links to ports here, by USB socket.
 const BY_PLACE: &str = "/dev/serial/by-path";
 
 /// The keys of the file.
 const SERIAL_NUMBER: &str = "serial_number";
 const PORT: &str = "port";
 
-/// What stands at the head of a new file.
+/// The head of a new file.
 const HEAD: &str = "\
 # The rows of a machine, in their order: `weeder rows` lists and names them.
 # A row is known by its board's USB serial number, or by the port at which the board is.
@@ -40,16 +40,16 @@ const HEAD: &str = "\
 pub enum Board {
     /// The only Uno at this computer.
     Only,
-    /// The one of this USB serial number.
+    /// The board with this USB serial number.
     SerialNumber(String),
-    /// The one at this port.
+    /// The board at this port.
     Port(String),
 }
 
 /// A row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// What the operator calls it.
+    /// The operator's name for it.
     pub name: String,
     /// Its board.
     pub board: Board,
@@ -58,7 +58,7 @@ pub struct Row {
 /// An Uno that is plugged in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plugged {
-    /// The port at which it is now.
+    /// Its present port.
     pub port: String,
     /// How it is known.
     pub board: Board,
@@ -67,7 +67,7 @@ pub struct Plugged {
 /// Why the rows' names cannot be had.
 #[derive(Debug, Error)]
 pub enum NamesError {
-    /// The file itself, or a line of it.
+    /// An error of the file, or of a line in it.
     #[error(transparent)]
     File(#[from] FileError),
     /// A name that no row can have.
@@ -75,7 +75,7 @@ pub enum NamesError {
     Name {
         /// The name.
         name: String,
-        /// What is wrong with it, and what would be right.
+        /// The problem, and what would be right.
         problem: String,
     },
     /// There is no such row.
@@ -97,10 +97,10 @@ impl Board {
     /// The board at a port: whether it has a serial number of its own, the system's list tells.
     ///
     /// # Errors
-    /// Where there is no such port.
+    /// If there is no such port.
     pub fn at(port: &str) -> Result<Self, LinkError> {
         let path = Path::new(port);
-        // What a link leads to now is what the list has.
+        // The list of ports has the link's present target.
         let now = fs::canonicalize(path).map_or(port.to_owned(), |path| path.to_string_lossy().into_owned());
         let ports = serialport::available_ports().map_err(LinkError::NoList)?;
         let listed = ports.iter().find(|listed| listed.port_name == port || listed.port_name == now);
@@ -109,7 +109,7 @@ impl Board {
             // A link of the user's own is meant to lead elsewhere some day.
             Some(listed) if listed.port_name == port => Ok(of(listed, &ports, Path::new(BY_PLACE))),
             None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
-            // From wherever the next command is typed.
+            // An absolute path is valid in any folder.
             _ => Ok(Self::Port(std::path::absolute(path).map_or(port.to_owned(), |path| path.display().to_string()))),
         }
     }
@@ -117,7 +117,7 @@ impl Board {
     /// Opens a link to it, at whichever port it is now.
     ///
     /// # Errors
-    /// Where it is not plugged in, or as [`Link::open`].
+    /// If it is not plugged in, or as [`Link::open`].
     pub fn open(&self) -> Result<Link, LinkError> {
         let (port, resets) = open(&self.port()?)?;
         Link::over(port, resets)
@@ -126,7 +126,7 @@ impl Board {
     /// The port at which it is now.
     ///
     /// # Errors
-    /// Where it is not plugged in, or cannot be told from another.
+    /// If it is not plugged in, or cannot be told from another.
     pub fn port(&self) -> Result<String, LinkError> {
         match self {
             Self::Only => find_uno(),
@@ -147,7 +147,7 @@ fn numbered(number: &str, ports: &[SerialPortInfo]) -> Result<String, LinkError>
     }
 }
 
-/// The serial number of the board at a port, where it has one.
+/// The serial number of the board at a port, if it has one.
 fn serial_number(port: &SerialPortInfo) -> Option<&str> {
     match &port.port_type {
         SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().map(str::trim).filter(|number| !number.is_empty()),
@@ -155,7 +155,7 @@ fn serial_number(port: &SerialPortInfo) -> Option<&str> {
     }
 }
 
-/// How the board at a port is known: links by place are looked for in this folder.
+/// How to identify the board at a port. `by_place` is the folder with links by socket.
 fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board {
     if let Some(number) = serial_number(port)
         && numbered(number, ports).is_ok()
@@ -165,7 +165,7 @@ fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board
     let links = fs::read_dir(by_place).into_iter().flatten().flatten().map(|entry| entry.path());
     let leads_there =
         |link: &PathBuf| fs::canonicalize(link).is_ok_and(|path| path.to_str() == Some(port.port_name.as_str()));
-    // udev makes two of a place, of which the shorter one has been there for longer.
+    // udev makes two links for a socket. The shorter one is the older form.
     let place = links.filter(leads_there).min_by_key(|link| link.as_os_str().len());
     Board::Port(place.map_or_else(|| port.port_name.clone(), |link| link.display().to_string()))
 }
@@ -173,7 +173,7 @@ fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board
 /// The Unos at this computer's USB ports.
 ///
 /// # Errors
-/// Where the system has no list of its ports.
+/// If the system has no list of its ports.
 pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
     let ports = serialport::available_ports().map_err(LinkError::NoList)?;
     let board = |port: &SerialPortInfo| of(port, &ports, Path::new(BY_PLACE));
@@ -181,7 +181,8 @@ pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
     Ok(unos.map(|port| Plugged { port: port.port_name.clone(), board: board(port) }).collect())
 }
 
-/// What keeps a word from being a row's name, with what would be right: it becomes a file's name, and stands before a colon.
+/// Why a word cannot be a row's name, and what would be right. The name becomes part of a file name, and stands before
+/// a colon.
 pub fn wrong_with(name: &str) -> Option<String> {
     let length = name.chars().count();
     if length == 0 || length > NAME_LENGTH {
@@ -198,7 +199,7 @@ pub fn wrong_with(name: &str) -> Option<String> {
     (name == ALL).then(|| format!("`{ALL}` means every row"))
 }
 
-/// The rows' names, as they stand in their file.
+/// The rows' names, in the order of their file.
 #[derive(Clone, Debug)]
 pub struct Names {
     path: PathBuf,
@@ -209,7 +210,7 @@ pub struct Names {
 }
 
 impl Names {
-    /// Reads a file; where there is none, no row is named yet.
+    /// Reads a file. If there is none, no row has a name yet.
     ///
     /// # Errors
     /// Names the file, the line, and what would be right.
@@ -241,7 +242,7 @@ impl Names {
     /// Calls a board so. Another name that it had is dropped, and so is another board that had the name; the row keeps its place.
     ///
     /// # Errors
-    /// Where it cannot be a row's name.
+    /// If it cannot be a row's name.
     pub fn name(&mut self, name: &str, board: Board) -> Result<(), NamesError> {
         let refused = |problem| NamesError::Name { name: name.to_owned(), problem };
         if let Some(problem) = wrong_with(name) {
@@ -273,7 +274,7 @@ impl Names {
     /// Forgets a row.
     ///
     /// # Errors
-    /// Where there is none of this name.
+    /// If there is none of this name.
     pub fn forget(&mut self, name: &str) -> Result<(), NamesError> {
         if self.document.remove(name).is_none() {
             let known: Vec<&str> = self.rows.iter().map(|row| row.name.as_str()).collect();
@@ -287,7 +288,7 @@ impl Names {
     /// Writes the file, and makes its folder where there is none.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self) -> Result<(), NamesError> {
         let text = format!("{}{}", self.head, self.document);
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -371,7 +372,7 @@ mod tests {
         for number in [None, Some("0001"), Some(" ")] {
             let ports = [usb(&first, number), usb(&second, number)];
             assert_eq!(of(&ports[0], &ports, &places), by_place);
-            assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "nobody knows its place");
+            assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "it has no link for a socket");
         }
         let twins = [usb(&first, Some("0001")), usb(&second, Some("0001"))];
         let error = numbered("0001", &twins).unwrap_err().to_string();

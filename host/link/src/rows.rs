@@ -1,10 +1,11 @@
-//! Several rows at once: a [`Session`] for each, in a thread of its own, so that none waits for another.
+//! Several rows at once. Each has a [`Session`] in its own thread, so that no row waits for another.
 //!
-//! [`Rows::open`] opens them all at the same time. [`Rows::command`] and [`Rows::hold`] ask something of one of them, [`Rows::next`] tells
-//! what any of them says. A row that is lost is tried again by itself, and what was to be typed to it is told as not typed. Only a `hold`
-//! waits for it: it is the first thing that is typed to a row that is back.
+//! [`Rows::open`] opens all rows at the same time. [`Rows::command`] and [`Rows::hold`] send a command to one row.
+//! [`Rows::next`] returns the next event of any row. A lost row is opened again automatically, and its waiting commands
+//! are reported as not typed. Only a `hold` is kept: it is the first line that is typed when the row is back.
 //!
-//! [`Hold`] follows a HOLD to all of them: who has obeyed, and how long the last one took. It knows no clock but what it is told.
+//! [`Hold`] follows a HOLD to all rows: which rows have obeyed, and how long the last one took. It has no clock: events
+//! carry their times.
 
 use super::session::{Happening, Session};
 use super::settings::SettingsError;
@@ -14,13 +15,13 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A way to a link, tried again whenever it is lost.
+/// Opens a link. Called again each time that the link is lost.
 pub type Opener = Box<dyn FnMut() -> Result<Link, LinkError> + Send>;
 
 /// What one row says.
 #[derive(Debug)]
 pub struct Heard {
-    /// Which row, by its place among those that were opened.
+    /// The row's number, in the order of opening.
     pub row: usize,
     /// When.
     pub at: Instant,
@@ -31,13 +32,13 @@ pub struct Heard {
 /// Something of one row.
 #[derive(Debug)]
 pub enum What {
-    /// It happened in its session.
+    /// An event of its session.
     Happened(Happening),
-    /// A command of ours is answered to its end.
+    /// A command was answered.
     Answered {
         /// The command.
         command: String,
-        /// The line that begins with `error:`, where the firmware refused.
+        /// The line that begins with `error:`, if the firmware refused.
         refusal: Option<String>,
     },
     /// A command of ours is not typed, and why.
@@ -49,7 +50,7 @@ pub enum What {
     },
 }
 
-/// What is asked of a row's thread.
+/// An order to a row's thread.
 enum Order {
     Type(String),
     Hold,
@@ -62,8 +63,8 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Opens all of them at the same time, and waits until each was tried once: why those are not there that are not. They are tried
-    /// again, and heard of as lost.
+    /// Opens all rows at the same time, and waits until each was tried once. Returns for each row why it is missing.
+    /// Missing rows are tried again, and reported as lost.
     pub fn open(openers: Vec<Opener>) -> (Self, Vec<Option<SettingsError>>) {
         let (sender, heard) = mpsc::channel();
         let (orders, firsts): (Vec<_>, Vec<_>) = openers
@@ -79,14 +80,14 @@ impl Rows {
                     if let Some(why) = &missing {
                         talk.tell(What::Happened(Happening::Lost(why.to_string())));
                     }
-                    // Nobody waits any more where nobody hears.
+                    // The receiver is gone if the caller no longer waits.
                     let _ = tried.send(missing);
                     talk.run(session, &ordered);
                 });
                 (orders, first)
             })
             .unzip();
-        // A thread that died has told why itself.
+        // A thread that panicked has printed why.
         let missing = firsts.into_iter().map(|first| first.recv().ok().flatten()).collect();
         (Self { orders, heard }, missing)
     }
@@ -96,24 +97,24 @@ impl Rows {
         self.orders.len()
     }
 
-    /// Types a command to a row as soon as those before it have been answered.
+    /// Types a command to a row after its previous commands have been answered.
     pub fn command(&self, row: usize, command: &str) {
         self.order(row, Order::Type(command.to_owned()));
     }
 
-    /// Has a row hold, before all that waits, which is dropped.
+    /// Holds a row before all waiting commands, and drops these.
     pub fn hold(&self, row: usize) {
         self.order(row, Order::Hold);
     }
 
     fn order(&self, row: usize, order: Order) {
         if let Some(orders) = self.orders.get(row) {
-            // A thread that died has told why itself.
+            // A thread that panicked has printed why.
             let _ = orders.send(order);
         }
     }
 
-    /// What is heard next, if it comes within this time.
+    /// The next event, if it comes within this time.
     pub fn next(&self, patience: Duration) -> Option<Heard> {
         match self.heard.recv_timeout(patience) {
             Ok(heard) => Some(heard),
@@ -126,14 +127,14 @@ impl Rows {
     }
 }
 
-/// What has become of a `hold` that was ordered.
+/// The state of an ordered `hold`.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owed {
-    /// It was answered, or there was none.
+    /// It was answered, or none was ordered.
     Nothing,
     /// The session has it.
     Answer,
-    /// It is to be typed once the row is there.
+    /// It will be typed when the row is back.
     Typing,
 }
 
@@ -141,20 +142,20 @@ enum Owed {
 struct Talk {
     row: usize,
     heard: Sender<Heard>,
-    /// What was typed and is not answered.
+    /// Typed lines without an answer.
     typed: VecDeque<String>,
     hold: Owed,
 }
 
 impl Talk {
-    /// Goes on until nobody orders or hears any more.
+    /// Runs until all senders of orders and all receivers of events are gone.
     fn run(mut self, mut session: Session, orders: &Receiver<Order>) {
         loop {
             loop {
                 match orders.try_recv() {
                     Ok(Order::Hold) => self.hold = Owed::Typing,
                     Ok(Order::Type(command)) => {
-                        // In the order in which they came: what comes behind a `hold` is not dropped by it.
+                        // In the order of arrival: a `hold` does not drop commands that came after it.
                         self.hold_where_owed(&mut session);
                         self.type_or_tell(&mut session, command);
                     }
@@ -190,7 +191,7 @@ impl Talk {
         }
     }
 
-    /// Passes on what happened; whether anybody hears it.
+    /// Passes on an event. Returns false if the receiver is gone.
     fn take(&mut self, happening: Happening) -> bool {
         let mut answered = None;
         match &happening {
@@ -224,7 +225,7 @@ impl Talk {
     }
 }
 
-/// How far a row has come with a HOLD to all.
+/// The state of one row in a HOLD to all.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Held {
     Waiting,
@@ -233,7 +234,7 @@ enum Held {
     NotThere,
 }
 
-/// A HOLD to all rows. A row obeys when its firmware has answered `ok`: its servo has its order then.
+/// A HOLD to all rows. A row has obeyed when its firmware has answered `ok`: the servo has its command then.
 #[derive(Clone, Debug)]
 pub struct Hold {
     since: Instant,
@@ -241,13 +242,13 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// One that is asked for now, of rows of which these are there.
+    /// A hold that is requested at `since`. `are_there` says for each row whether it is connected.
     pub fn new(since: Instant, are_there: impl IntoIterator<Item = bool>) -> Self {
         let held = |is_there| if is_there { Held::Waiting } else { Held::NotThere };
         Self { since, rows: are_there.into_iter().map(held).collect() }
     }
 
-    /// Takes what a row says.
+    /// Updates the state from a row's event.
     pub fn take(&mut self, heard: &Heard) {
         let Some(held) = self.rows.get_mut(heard.row) else { return };
         match &heard.what {
@@ -263,7 +264,7 @@ impl Hold {
         }
     }
 
-    /// Whether nobody is waited for any more.
+    /// True if no row is left to answer.
     pub fn is_over(&self) -> bool {
         !self.rows.contains(&Held::Waiting)
     }
@@ -273,12 +274,12 @@ impl Hold {
         self.rows.iter().all(|held| matches!(held, Held::Obeyed(_)))
     }
 
-    /// The time until the last of those that have obeyed did.
+    /// The time until the last row obeyed, of those that have.
     pub fn time(&self) -> Option<Duration> {
         self.rows.iter().filter_map(|held| if let Held::Obeyed(time) = held { Some(*time) } else { None }).max()
     }
 
-    /// How it stands, in a line: how many have obeyed and after what time, then who has not.
+    /// A summary in one line: how many rows have obeyed and after what time, then which rows have not.
     pub fn summary(&self, names: &[String]) -> String {
         let of = |is_so: fn(&Held) -> bool| -> Vec<&str> {
             let rows = self.rows.iter().zip(names).filter(|(held, _)| is_so(held));

@@ -1,14 +1,14 @@
-//! Setting a machine up: the steps of the manual's page, what is to be measured next, and how small the margin may be.
+//! Setting up a machine: the steps of the manual's page, the next measurement, and the least margin.
 //!
-//! [`SetUp`] listens to a session, or reads the lines of one. It counts what was measured and tells the next [`Step`]: to measure once
-//! more, to set the lead that was worst, or how small the margin may be and what it then covers. It begins with the first `calibrate`
-//! and asks for nothing before: a machine that is set up is left alone. It sets nothing itself.
+//! [`SetUp`] reads the lines of a session, live or afterwards. It counts the measurements and returns the next
+//! [`Step`]: to measure once more, to set the worst measured lead, or to set the least margin. It begins with the first
+//! `calibrate`, so it asks for nothing on a machine that is already set up. It sets nothing itself.
 //!
-//! The margin is a sum: the slip's scatter over the distance from where the plant was last seen to the tool, what is rolled in the
-//! servo's scatter at the paper's fastest speed, and the firmware's own worst; half of it beside a stem's zone. The margin covers only what
-//! was measured: where
-//! something is missing there is no sum, and the default margin stays. A few measurements do not show the worst, so that each
-//! scatter has a least value. What was timed over another stroke than the present one does not count.
+//! The margin is a sum of three parts. The first is the scatter of slip over the distance from the last detection of
+//! the plant to the tool. The second is the distance travelled in the servo's scatter, at the paper's fastest speed.
+//! The third is the firmware's own worst error. Beside a stem zone half of the sum is enough. The margin covers only
+//! measured values: if one is missing there is no sum, and the default margin stays. A few measurements do not show the
+//! worst case, so each scatter has a least value. Times that were measured over another stroke do not count.
 
 mod steps;
 
@@ -20,66 +20,68 @@ use super::settings::shown;
 use control::settings::{Setting, Settings};
 use std::{collections::VecDeque, fmt};
 
-/// Times that the servo is to be timed, with three swings each, and that the wheel is to be measured.
+/// Required timings of the servo, each with three swings out and three in, and measurements of the wheel.
 const TIMINGS: usize = 2;
 const STRETCHES: usize = SetUp::STRETCHES;
 
-/// Plants that tell how much the slip scatters where a second beam measures it; the newest of them count.
+/// The newest plants that count for the scatter of slip, as measured by a second beam.
 const PLANTS: usize = 12;
 
-/// What the servo scatters by at the least. By eye: two frames of a phone's slow motion, and as much of the servo. By an end switch: six
-/// swings leave up to 12 ms of the default servo's slowest unseen, and the pulse on the line adds 2.
+/// The servo's least scatter, in milliseconds. By eye it is two frames of a phone's slow motion, and as much for the
+/// servo. By an end switch, six swings miss up to 12 ms of the default servo's slowest swing, and the pulse on the
+/// line adds 2.
 const SERVO_MS: u16 = 15;
 
-/// What a wheel's slip scatters by at the least within some metres, as a share: stretches of 10 m level it out. As assumed for the
-/// simulated field (`ground.slip_scatter_percent`).
+/// The least scatter of a wheel's slip within some metres, as a share. Stretches of 10 m average it out. Assumed as for
+/// the simulated field (`ground.slip_scatter_percent`).
 const SLIP: f64 = 0.03;
 
 /// The paper's fastest speed, 2.5 km/h.
 const SPEED_M_S: f64 = 2.5 / 3.6;
 
-/// The firmware's own worst swing, in millimetres: what `weeder bench-uno` measures, rounded up.
+/// The firmware's own worst error of a swing, in millimetres: measured by `weeder bench-uno`, rounded up.
 const FIRMWARE_MM: f64 = 5.0;
 
 /// Share of the worst sum that a margin beside a stem's zone covers.
 const STEM_SHARE: f64 = 0.5;
 
-/// What is to be done next.
+/// The next step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Time the servo; so many times it has been.
+    /// Time the servo. It has been timed this many times.
     TimeServo(usize),
-    /// A lead is not the worst of those that were measured, which is this one.
+    /// Set a lead to the worst measured value, which is this one.
     SetLead(Setting, u16),
-    /// Measure the wheel; so many times it has been.
+    /// Measure the wheel. It has been measured this many times.
     MeasureWheel(usize),
-    /// Drive on with the second beam; so many plants have told the slip.
+    /// Drive on with the second beam. This many plants have measured the slip.
     PassPlants(usize),
-    /// The margin may be, or has to be, this one.
+    /// The margin can, or must, be changed to this one.
     SetMargin(Margin),
     /// The margin is right.
     Ready(Margin),
 }
 
-/// What a margin pays for, each in millimetres.
+/// The parts of a margin, each in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margin {
     /// The slip's scatter.
     pub slip_mm: f64,
     /// The servo's.
     pub servo_mm: f64,
-    /// Whether it is added to a zone round the stem, not to the whole canopy.
+    /// Whether it is added to a stem zone, not to the whole canopy.
     pub keeps_stems: bool,
     /// The margin in use.
     pub in_use_mm: u16,
 }
 
 impl Margin {
-    /// The least margin that pays for all of it, in whole millimetres; for half of it beside a stem's zone.
+    /// The least sufficient margin, in whole millimetres: the sum, or half of it beside a stem zone.
     ///
-    /// The sum is the worst of all three at once. Beside a canopy it is needed: a canopy is then never reached. The tool may enter half
-    /// of it beside a stem's zone, because it meets leaves there. A plant is damaged only where the other half is used up and its stem
-    /// stands off the middle on that very side; trials of the field `set-up` hold this.
+    /// The sum is the worst case of all three parts at once. Beside a canopy it is needed, so that the tool never
+    /// reaches a canopy. Beside a stem zone the tool may use up half of it, because it meets leaves there. A plant is
+    /// damaged only if the other half is used up as well and its stem stands off the middle on that side. Trials of the
+    /// field `set-up` confirm this.
     pub fn least_mm(&self) -> u16 {
         let sum_mm = self.slip_mm + self.servo_mm + FIRMWARE_MM;
         let share = if self.keeps_stems { STEM_SHARE } else { 1.0 };
@@ -88,7 +90,7 @@ impl Margin {
 }
 
 impl Step {
-    /// What it is, in two or three words.
+    /// Its name, in two or three words.
     fn name(&self) -> &'static str {
         match self {
             Self::TimeServo(_) => "time the servo",
@@ -131,13 +133,13 @@ impl fmt::Display for Margin {
 /// The servo, timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Timing {
-    /// The leads in milliseconds, out and in; none where the operator has looked.
+    /// The leads in milliseconds, out and in. `None` if the operator judges them by eye.
     leads: Option<(u16, u16)>,
-    /// The pulses between which it swung.
+    /// The pulse widths of the stroke.
     pulses: (u16, u16),
 }
 
-/// What was measured of a machine, as a session has told it.
+/// The measurements of a machine in a session.
 #[derive(Clone, Debug)]
 pub struct SetUp {
     /// Whether the line that is being answered measures the wheel.
@@ -169,22 +171,22 @@ fn pulses(settings: &Settings) -> (u16, u16) {
 }
 
 impl SetUp {
-    /// Times that the wheel is to be measured.
+    /// Required measurements of the wheel. Few stretches do not show the slip.
     pub const STRETCHES: usize = 3;
 
-    /// Times that it has been.
+    /// Measurements of the wheel so far.
     pub fn stretches(&self) -> usize {
         self.ticks_per_m.len()
     }
 
-    /// What these lines of a session tell: `> ` stands before what was typed.
+    /// Reads the lines of a session. Typed lines begin with `> `.
     pub fn of_lines<'a>(lines: impl IntoIterator<Item = &'a str>) -> Self {
         let mut set_up = Self::default();
         lines.into_iter().for_each(|line| set_up.take_line(line));
         set_up
     }
 
-    /// Listens to a line of a session: `> ` stands before what was typed.
+    /// Reads a line of a session. Typed lines begin with `> `.
     pub fn take_line(&mut self, line: &str) {
         match (line.strip_prefix("> "), EventLine::parse(line)) {
             (Some(typed), _) => self.take_command(typed),
@@ -257,7 +259,7 @@ impl SetUp {
         self.timings.iter().copied().filter(|timing| timing.pulses == pulses(settings)).collect()
     }
 
-    /// What is missing until the margin can be lowered, in the order in which it is best done.
+    /// The steps that are missing until the margin can be lowered, in the best order.
     pub fn missing(&self, settings: &Settings) -> Vec<Step> {
         let mut missing = Vec::new();
         let timings = self.timed(settings);
@@ -270,8 +272,8 @@ impl SetUp {
             missing.extend(longest.map(|worst| Step::SetLead(Setting::LeadOutMs, worst)));
             missing.extend(shortest.map(|worst| Step::SetLead(Setting::LeadInMs, worst)));
         }
-        // With a second beam too: until two plants have told the slip, the wheel alone counts. Where the machine has forgotten what was
-        // measured, that was of another wheel.
+        // Until two plants have measured the slip, only the wheel counts, also with a second beam. If the machine has
+        // no measured value, the measurements were of another wheel.
         let is_in_use = settings.get(Setting::TicksPerM) > 0;
         let stretches = if is_in_use { self.ticks_per_m.len() } else { 0 };
         if stretches < STRETCHES {
@@ -283,10 +285,10 @@ impl SetUp {
         missing
     }
 
-    /// What the margin has to cover.
+    /// The parts of the margin.
     ///
     /// # Errors
-    /// What is missing, where it was not all measured.
+    /// The missing steps, if not everything was measured.
     pub fn margin(&self, settings: &Settings) -> Result<Margin, Vec<Step>> {
         let missing = self.missing(settings);
         if !missing.is_empty() {
@@ -295,7 +297,8 @@ impl SetUp {
         let beam_to_tool_mm = f64::from(settings.get(Setting::BeamToToolMm));
         let second_beam_mm = f64::from(settings.get(Setting::SecondBeamMm));
         let slip_mm = if second_beam_mm > 0.0 {
-            // What is told is the median of three plants: the slip of one may be as far off it as the medians are from each other.
+            // The event has the median of three plants. The slip of one plant may be as far off it as the medians are
+            // from each other.
             let scatter = f64::from(range(self.slip_permille.iter().copied())) / 1000.0;
             scatter.max(SLIP) * (beam_to_tool_mm - second_beam_mm)
         } else {
@@ -311,7 +314,7 @@ impl SetUp {
         Ok(Margin { slip_mm, servo_mm, keeps_stems, in_use_mm: settings.get(Setting::MarginMm) })
     }
 
-    /// What is to be done next with these settings in use; nothing before the first thing was measured by `calibrate`.
+    /// The next step with these settings. `None` before the first `calibrate`.
     pub fn next(&self, settings: &Settings) -> Option<Step> {
         if self.timings.is_empty() && self.ticks_per_m.is_empty() {
             return None;
@@ -323,7 +326,7 @@ impl SetUp {
         })
     }
 
-    /// A warning where this session has set a margin that is less than what was measured covers.
+    /// A warning if this session has set a margin that does not cover the measured values.
     pub fn warning(&self, settings: &Settings) -> Option<String> {
         if !self.sets_margin {
             return None;
@@ -380,7 +383,7 @@ mod tests {
     ];
 
     #[test]
-    fn a_machine_of_which_nothing_was_measured_is_left_alone() {
+    fn a_machine_without_measurements_is_left_alone() {
         let set_up = SetUp::of_lines(["> get", MEASURED[1], "slip permille=12"]);
         assert_eq!(set_up.next(&Settings::new()), None);
     }
@@ -438,7 +441,7 @@ mod tests {
         let leads = [&leads[..], &[(Setting::TicksPerM, 1930)]].concat();
         lines.extend(["slip permille=40"; 5]);
         assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::PassPlants(5)));
-        // What was long ago does not count.
+        // Old values do not count.
         lines.extend(["slip permille=50", "slip permille=90"].repeat(PLANTS / 2));
         let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&leads));
         let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
@@ -466,7 +469,7 @@ mod tests {
     }
 
     #[test]
-    fn a_servo_that_somebody_has_looked_at_scatters_by_what_an_eye_can_tell() {
+    fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
         let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
         let failed = "calibrated by=none, the end switch did not follow";
         let mut lines = vec![by_eye, failed, by_eye];
@@ -511,7 +514,7 @@ mod tests {
         assert_eq!(in_part.warning(&with_margin(50)), None);
         let nothing = SetUp::of_lines(typed).warning(&with_margin(13)).expect("nothing was measured");
         assert_eq!(nothing, "margin_mm 13 is not measured: time the servo and measure the wheel first; 50 is safe");
-        // A machine that was set up before is left alone.
+        // A machine that was set up earlier gets no warning.
         assert_eq!(SetUp::of_lines(["> get"]).warning(&with_margin(13)), None);
     }
 

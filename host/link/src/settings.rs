@@ -1,7 +1,7 @@
-//! The machine's settings, all at once: reading them, and changing them without a step on the way that cannot be right.
+//! The machine's settings: reads all, and changes them without a contradiction on the way.
 //!
-//! Names, ranges and defaults are those of the firmware's own table ([`control::settings`]). The firmware refuses a value that
-//! contradicts the others, so the order in which values are sent matters; [`steps`] finds one.
+//! Names, ranges and defaults are those of the firmware's own table ([`control::settings`]). The firmware refuses a
+//! value that contradicts the others. So the order of changes matters, and [`steps`] finds one.
 
 use super::{Link, LinkError, Mode, Status};
 pub use control::settings::{Contradiction, Setting, Settings};
@@ -13,7 +13,7 @@ pub enum SettingsError {
     /// The console failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The firmware does not know a setting that this program knows, or gives no value that can be.
+    /// The firmware lacks a setting that this program has, or gives an impossible value.
     #[error(
         "the firmware gives no good value for {setting}: it is of another version, put this one on it by `weeder flash`"
     )]
@@ -27,7 +27,7 @@ pub enum SettingsError {
     /// The settings would contradict each other.
     #[error("{0}; nothing was sent")]
     Contradiction(String),
-    /// A setting has another value than it was set to.
+    /// A setting has another value than the one sent.
     #[error("{setting} was set to {wanted} and is {found}: try again, and see to the supply if it stays so")]
     NotTaken {
         /// The setting's name.
@@ -44,18 +44,18 @@ pub fn name(setting: Setting) -> String {
     setting.text().to_string()
 }
 
-/// What a setting is, for the operator.
+/// A setting's help for the operator.
 pub fn help(setting: Setting) -> String {
     setting.help().to_string()
 }
 
 /// A setting's unit; empty for a count.
 pub fn unit(setting: Setting) -> String {
-    // The console puts it behind a number, and its blank with it.
+    // The console writes the unit behind a number, with its blank.
     setting.unit().to_string().trim_start().to_owned()
 }
 
-/// What a setting may be, with its unit and default.
+/// A setting's range, with its unit and default.
 pub fn range(setting: Setting) -> String {
     let description = setting.description();
     if setting.is_switched() {
@@ -66,7 +66,7 @@ pub fn range(setting: Setting) -> String {
     format!("{} to {}{space}{unit}, default {}", description.least, description.greatest, description.default)
 }
 
-/// What contradicts what, and what would be right.
+/// Which settings contradict each other, and what would be right.
 pub fn explain(contradiction: Contradiction) -> String {
     match contradiction {
         Contradiction::PulsesEqual => {
@@ -92,7 +92,7 @@ pub fn explain(contradiction: Contradiction) -> String {
 /// Reads all settings in use.
 ///
 /// # Errors
-/// Where the console fails, or the firmware has other settings than this program.
+/// If the console fails, or the firmware has other settings than this program.
 pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
     shown_by(&link.ask("get")?)
 }
@@ -100,7 +100,7 @@ pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
 /// The settings that the answer to `get` shows.
 ///
 /// # Errors
-/// Where one of them is missing, or has a value that cannot be.
+/// If one of them is missing, or has a value that cannot be.
 pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
     let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
     let mut settings = Settings::new();
@@ -112,7 +112,7 @@ pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
     Ok(settings)
 }
 
-/// The setting that a line shows, as `name=value` with more behind it; none where it shows none.
+/// The setting in a line `name=value ...`. `None` if the line shows no setting.
 pub fn shown(line: &str) -> Option<(Setting, u16)> {
     let (name, rest) = line.split_once('=')?;
     let setting = Setting::find(name.as_bytes())?;
@@ -124,10 +124,10 @@ pub fn shown(line: &str) -> Option<(Setting, u16)> {
     Some((setting, value))
 }
 
-/// The values to send, one after the other, that lead from some settings to others with no contradiction on the way.
+/// The settings to send, in order, so that no intermediate state contradicts itself.
 ///
-/// Whatever makes room for others can always go first. Only the two pulses can be in each other's way, where they change
-/// places: one of them then goes by way of its neighbour.
+/// A change that widens the valid range of others can always go first. Only the two pulse widths can block each other,
+/// if they are exchanged. Then one of them first takes a neighbouring value.
 pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
     let mut now = from.clone();
     let mut steps = Vec::new();
@@ -150,7 +150,7 @@ pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
     }
 }
 
-/// Sets a value as the firmware does: it forgets what was measured of another wheel.
+/// Sets a value as the firmware does: a change of the wheel's settings deletes its measured value.
 fn take(settings: &mut Settings, setting: Setting, value: u16) {
     // Values of settings are in their ranges.
     let _ = settings.set(setting, value);
@@ -159,7 +159,7 @@ fn take(settings: &mut Settings, setting: Setting, value: u16) {
     }
 }
 
-/// The nearest pulse to the one that `setting` is to have, which none of both pulses has or is to have.
+/// A pulse width near the target of `setting` that differs from the present and target values of both pulses.
 fn beside(setting: Setting, now: &Settings, to: &Settings) -> u16 {
     let taken = [now, to].map(|settings| [settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs)]);
     let description = setting.description();
@@ -170,12 +170,12 @@ fn beside(setting: Setting, now: &Settings, to: &Settings) -> u16 {
         .unwrap_or(wanted)
 }
 
-/// Sets some settings, leaves the others as they are, and reads all back; `save` keeps them for good.
+/// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them.
 ///
-/// Nothing is sent where the result would contradict itself, or the machine is at work. Returns what was changed.
+/// Sends nothing if the result would contradict itself, or if the machine is at work. Returns the changed settings.
 ///
 /// # Errors
-/// As said, where the console fails, and where a value was not taken.
+/// These two cases; errors of the console; and a value that was not accepted.
 pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Vec<Setting>, SettingsError> {
     let before = read(link)?;
     let mut after = before.clone();
@@ -185,7 +185,7 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     let names = |wheel: Setting| wanted.iter().any(|&(setting, _)| setting == wheel);
     let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
     if Setting::all().any(is_another) && !names(Setting::TicksPerM) {
-        // Nobody has measured that wheel yet.
+        // The new wheel has no measured value yet.
         let _ = after.set(Setting::TicksPerM, 0);
     }
     if let Some(contradiction) = after.contradiction() {
@@ -210,7 +210,7 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     Ok(Setting::all().filter(|&setting| before.get(setting) != after.get(setting)).collect())
 }
 
-/// What the machine is doing.
+/// Asks for the machine's status.
 pub(super) fn status(link: &mut Link) -> Result<Status, LinkError> {
     let lines = link.ask("status")?;
     lines.iter().find_map(|line| Status::parse(line)).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")))
@@ -230,7 +230,7 @@ mod tests {
         settings
     }
 
-    /// Takes the steps as the firmware does, which refuses a contradiction where there was none.
+    /// Takes the steps as the firmware does. It refuses a step that causes a contradiction.
     #[track_caller]
     fn assert_leads(from: &Settings, to: &Settings) {
         let mut now = from.clone();

@@ -1,8 +1,8 @@
 //! Settings as a TOML file with comments, one key a setting.
 //!
-//! A file is written from the firmware's own table: help, range, unit and default stand above each value. A file that is there
-//! already keeps its comments and its order. What a file does not name is left alone. Everything in it is checked against
-//! the table, and the first thing that is wrong is said with its line and what would be right.
+//! A file is made from the firmware's own table: help, range, unit and default are above each value. Writing to an
+//! existing file preserves its comments and its order. Settings that a file does not name are not changed. Each value
+//! is checked against the table. The first error gives its line and what would be right.
 
 use super::settings::{Setting, Settings, help, name, range};
 use files::{FileError, whole_file};
@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 use toml_edit::{Decor, Document, DocumentMut, Item, Key, TomlError, Value};
 
-/// What stands at the head of a new file.
+/// The head of a new file.
 const HEAD: &str = "\
 # Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.
 # What is not named here is left as it is.
@@ -27,10 +27,10 @@ pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, FileError> {
     parse(path, &text(path)?)
 }
 
-/// Writes all settings into a file; one that is there keeps its comments, and has to be a settings file.
+/// Writes all settings into a file. An existing file keeps its comments, and must be a settings file.
 ///
 /// # Errors
-/// As [`read`], and where the file cannot be written.
+/// As [`read`], and if the file cannot be written.
 pub fn write(path: &Path, settings: &Settings) -> Result<(), FileError> {
     let old = if path.exists() { text(path)? } else { HEAD.to_owned() };
     let new = updated(path, &old, settings)?;
@@ -38,7 +38,7 @@ pub fn write(path: &Path, settings: &Settings) -> Result<(), FileError> {
     written.map_err(|source| FileError::unwritten(path, source))
 }
 
-/// A setting's value as it stands in TOML and JSON: a switched one is true or false.
+/// A switch as TOML and JSON write it: true or false. `None` for other settings.
 pub fn is_true(setting: Setting, value: u16) -> Option<bool> {
     setting.is_switched().then_some(value != 0)
 }
@@ -78,7 +78,7 @@ fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, FileError> {
     Ok(settings)
 }
 
-/// So many ticks in millimetres of the wheel that these settings give, what they leave out being as by default.
+/// Converts ticks to millimetres of the wheel in these settings. Missing settings have their defaults.
 fn merge_gap_mm(ticks: u16, settings: &[(Setting, u16)]) -> u16 {
     let mut all = Settings::new();
     for &(setting, value) in settings {
@@ -88,7 +88,7 @@ fn merge_gap_mm(ticks: u16, settings: &[(Setting, u16)]) -> u16 {
     millimetres.round().min(Setting::MergeGapMm.description().greatest.into()) as u16
 }
 
-/// What an item says for a setting, if it says something that is right.
+/// The value of an item for a setting, if it is valid.
 fn value(setting: Setting, item: &Item) -> Option<u16> {
     if setting.is_switched() {
         return item.as_bool().map(u16::from);
@@ -98,7 +98,7 @@ fn value(setting: Setting, item: &Item) -> Option<u16> {
     (description.least..=description.greatest).contains(&value).then_some(value)
 }
 
-/// What a setting has to be.
+/// The valid values of a setting.
 fn right(setting: Setting) -> String {
     let whole = if setting.is_switched() { "" } else { "a whole number, " };
     format!("{whole}{}", range(setting))
@@ -108,7 +108,7 @@ fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileEr
     parse(path, old)?;
     let mut document: DocumentMut =
         old.parse().map_err(|error: TomlError| FileError::at_byte(path, old, 0, error.message()))?;
-    // The comments of a file without a value are its end: new values would go before them.
+    // In a file without values the comments belong to its end, and new values would go before them.
     let head = if document.is_empty() {
         document = DocumentMut::new();
         old
@@ -116,7 +116,7 @@ fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileEr
         ""
     };
     if let Some((key, item)) = document.remove_entry(OLD_MERGE_GAP) {
-        // Its comments go with it.
+        // Moves its comments as well.
         document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(key.leaf_decor().clone()), item);
     }
     for setting in Setting::all() {
@@ -144,7 +144,7 @@ fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileEr
 mod tests {
     use super::*;
 
-    /// What a file with this text says, or what is wrong with it.
+    /// Parses a file's text. Returns the error's message otherwise.
     fn parsed(text: &str) -> Result<Vec<(Setting, u16)>, String> {
         parse(Path::new("machine.toml"), text).map_err(|error| error.to_string())
     }

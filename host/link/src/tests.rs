@@ -1,4 +1,4 @@
-//! A link at ports that answer by a script: good ones, silent ones, noisy ones.
+//! A link at ports that answer by a script: valid, silent and noisy ones.
 
 use super::*;
 use crate::examples::ExamplesError;
@@ -15,7 +15,7 @@ use control::weeder::Controller;
 use std::cell::RefCell;
 use std::io::{Read, Write};
 
-/// A port that answers each line by what `answer` says, and before the first one says `greeting`.
+/// A port that sends `greeting` before the first line, and answers each line by `answer`.
 struct Script<F> {
     to_read: VecDeque<u8>,
     typed: Vec<u8>,
@@ -53,7 +53,7 @@ fn script<F: FnMut(&str) -> Vec<u8>>(greeting: &str, answer: F) -> Script<F> {
     Script { to_read: greeting.bytes().collect(), typed: Vec::new(), answer }
 }
 
-/// A link to a firmware that answers `version` as it should, and everything else by `answer`.
+/// A link to a firmware that answers `version` correctly, and everything else by `answer`.
 fn link(answer: impl Fn(&str) -> Vec<u8> + 'static) -> Link {
     let answer = move |line: &str| match line {
         "" => Vec::new(),
@@ -157,7 +157,7 @@ fn a_port_that_goes_away_says_so() {
     assert_eq!(error.to_string(), "the port is gone: plug the Uno in again");
 }
 
-/// A link to the firmware's decisions in HOLD, with its built-in examples, after these lines were typed.
+/// A link to the firmware's decisions in HOLD, with its built-in examples, after these typed lines.
 fn link_to_machine(typed: &[&str]) -> Link {
     let startup = Startup {
         readings: Readings::new(Instant::new(0), Position::new(0)),
@@ -182,7 +182,7 @@ fn link_to_machine(typed: &[&str]) -> Link {
 }
 
 #[test]
-fn examples_are_taught_whatever_features_somebody_has_left_behind() {
+fn examples_are_taught_after_features_of_an_earlier_command() {
     let wanted = [examples::example_of(&Features::describe(278, 250, 20), label::PLANT)];
     for left in 0..=6 {
         let mut link = link_to_machine(&vec!["teach 7"; left]);

@@ -8,7 +8,7 @@ pub fn theoretical(speed: Velocity, working_width: Length) -> AreaRate {
     speed * working_width
 }
 
-/// Effective field capacity: Eq. 24 the other way round.
+/// Effective field capacity: Eq. 24 solved for it.
 pub fn effective(theoretical: AreaRate, field_efficiency: Ratio) -> AreaRate {
     theoretical * field_efficiency
 }

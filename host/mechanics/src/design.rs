@@ -1,13 +1,13 @@
-//! The whole design of a machine: every equation, each fed by those before it.
+//! The design of a machine: every equation, with the results of earlier ones as inputs.
 //!
-//! It calculates only. What the results mean is said in [`crate::sense`].
+//! [`crate::sense`] interprets the results.
 
 use crate::machine::{Handle, Machine, MachineError, Wheel};
 use crate::unit::AreaRate;
 use crate::{capacity, drive, handle, shank, tool, traction, wheel};
 use uom::si::f64::{Angle, AngularVelocity, Force, Length, Power, Pressure, Ratio, Torque, Velocity};
 
-/// What a machine has to be like, and what the given one bears.
+/// The required values of a machine, and the loads of the given one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Design {
     /// Weight of the machine.
@@ -36,7 +36,7 @@ pub struct Design {
     pub soil_force_at_depth: Force,
     /// Torque of the servo, above Eq. 10.
     pub servo_torque: Torque,
-    /// Width over which the soil between two rows may be broken, Eq. 11.
+    /// Width of broken soil allowed between two rows, Eq. 11.
     pub failure_zone: Length,
     /// Greatest width of a sweep, Eq. 12.
     pub sweep_width: Length,
@@ -56,7 +56,7 @@ pub struct Design {
     pub wheel_speed: AngularVelocity,
     /// Speed of rotation of the gear box's output shaft.
     pub gear_box_speed: AngularVelocity,
-    /// Turns of the gear box's output shaft for one of the wheels.
+    /// Turns of the gear box's output shaft for one turn of the wheels.
     pub chain_reduction: f64,
     /// Teeth of the sprocket on the wheels' shaft, before rounding.
     pub exact_driven_teeth: f64,
@@ -74,9 +74,9 @@ pub struct Design {
     pub chain_length: Length,
     /// Thickness of the wheel's rim.
     pub rim_thickness: Length,
-    /// Thickness that it needs at least, below Eq. 20.
+    /// Its least required thickness, below Eq. 20.
     pub least_rim_thickness: Length,
-    /// Torque on a wheel that gives all of the tractive force, below Eq. 20.
+    /// Torque on one wheel that gives the whole tractive force, below Eq. 20.
     pub wheel_torque: Torque,
     /// Shear stress in the rim, Eq. 20.
     pub shear_stress: Pressure,
@@ -90,14 +90,14 @@ pub struct Design {
     pub effective_capacity: AreaRate,
 }
 
-/// What a shank has to be like, and what the given one sees.
+/// The required values of a shank, and the load of the given one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShankDesign {
     /// Greatest bending moment, above Eq. 15.
     pub bending_moment: Torque,
     /// Least diameter, Eq. 15 and 16.
     pub diameter: Length,
-    /// Bending stress in the shank as it is.
+    /// Bending stress in the given shank.
     pub stress: Pressure,
 }
 
@@ -105,7 +105,7 @@ impl Design {
     /// Calculates the design of a machine.
     ///
     /// # Errors
-    /// Where a value of the machine is out of its range, or values do not go together.
+    /// If a value of the machine is out of its range, or values do not go together.
     pub fn of(machine: &Machine) -> Result<Self, MachineError> {
         machine.check()?;
         let Machine { weeder, soil, crop, inter_row, intra_row, engine, chain, .. } = machine;

@@ -8,12 +8,12 @@ pub fn wheel_speed(speed: Velocity, diameter: Length) -> AngularVelocity {
     (speed / (diameter / 2.0)).into()
 }
 
-/// Speed at which a wheel rolls, Eq. 17 the other way round.
+/// Speed at which a wheel rolls, Eq. 17 solved for it.
 pub fn ground_speed(wheel_speed: AngularVelocity, diameter: Length) -> Velocity {
     Frequency::from(wheel_speed) * (diameter / 2.0)
 }
 
-/// Turns of the gear box's output shaft for one of the wheel (below Eq. 17).
+/// Turns of the gear box's output shaft for one turn of the wheel (below Eq. 17).
 pub fn chain_reduction(engine_speed: AngularVelocity, gear_box_ratio: f64, wheel_speed: AngularVelocity) -> f64 {
     f64::from(engine_speed / gear_box_ratio / wheel_speed)
 }
@@ -23,7 +23,7 @@ pub fn driven_teeth(drive_teeth: u32, reduction: f64) -> f64 {
     f64::from(drive_teeth) * reduction
 }
 
-/// Distance of the two shafts: so many pitches, less what lets the chain sag (above Eq. 18).
+/// Distance of the two shafts: a number of pitches, less the length that lets the chain sag (above Eq. 18).
 pub fn centre_distance(pitch: Length, pitches: f64, sag: Length) -> Length {
     pitch * pitches - sag
 }

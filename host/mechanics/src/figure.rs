@@ -1,4 +1,4 @@
-//! A figure as people and programs read it: name, equation, number, unit, and a line of sense.
+//! A figure for people and programs: name, equation, number, unit, and a line of interpretation.
 
 use crate::unit::Unit;
 use serde::Serialize;
@@ -10,15 +10,15 @@ pub struct Figure {
     pub key: &'static str,
     /// Its name.
     pub name: &'static str,
-    /// Where it stands in the paper.
+    /// Its equation in the paper.
     pub equation: &'static str,
     /// Its value in `unit`.
     pub value: f64,
     /// Its unit; empty for plain numbers.
     pub unit: &'static str,
-    /// What it means for this machine.
+    /// Its meaning for this machine.
     pub sense: String,
-    /// Whether the machine should be changed for it.
+    /// Whether it asks for a change of the machine.
     pub concern: bool,
 }
 
@@ -28,7 +28,7 @@ pub fn digits(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Value with four significant digits, or more to give at least so many decimals.
+/// Value with four significant digits, or with more if `decimals` needs them.
 pub fn digits_beside(value: f64, decimals: usize) -> String {
     if decimals > significant_decimals(value) { format!("{value:.decimals$}") } else { digits(value) }
 }

@@ -1,7 +1,7 @@
-//! A machine from a TOML file, with errors that name the line and the key, and say what would be right.
+//! Reads a machine from a TOML file. Errors name the line and the key, and say what would be right.
 //!
-//! Every key may be left out; then it is as on the paper's machine. A key that nobody knows is an error, because it is
-//! most likely a slip in one that matters.
+//! Every key may be left out, and then has the value of the paper's machine. An unknown key is an error, because it is
+//! most likely a misspelt key.
 
 use crate::machine::{Input, Machine};
 use std::fmt::Write;
@@ -22,14 +22,14 @@ pub enum FileError {
         /// What the system says.
         source: io::Error,
     },
-    /// Something in it is wrong.
+    /// An error in the file.
     #[error("{}{}: {message}", path.display(), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
     Wrong {
         /// The file.
         path: PathBuf,
-        /// The line, from 1; none where the value that is wrong is not in the file.
+        /// The line, from 1. `None` if the wrong value is not in the file.
         line: Option<usize>,
-        /// What is wrong, and what would be right.
+        /// The problem, and what would be right.
         message: String,
     },
 }
@@ -37,13 +37,13 @@ pub enum FileError {
 /// Reads a machine and checks it.
 ///
 /// # Errors
-/// Where the file cannot be read, is no TOML, has unknown keys or units, or makes no machine that could be calculated.
+/// If the file cannot be read, is no TOML, has unknown keys or units, or makes no machine that could be calculated.
 pub fn read(path: &Path) -> Result<Machine, FileError> {
     let text = fs::read_to_string(path).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
     parse(&text).map_err(|Mistake { line, message }| FileError::Wrong { path: path.to_owned(), line, message })
 }
 
-/// What is wrong in a text, and where.
+/// The problem of a text, and its place.
 #[derive(Debug, PartialEq, Eq)]
 struct Mistake {
     line: Option<usize>,
@@ -61,12 +61,11 @@ fn parse(text: &str) -> Result<Machine, Mistake> {
     Ok(machine)
 }
 
-/// The mistake behind an error of the TOML reader, with the key in which it is made and what the paper's machine has
-/// there.
+/// Converts an error of the TOML reader, with the key of the error and that key's value on the paper's machine.
 fn unreadable(text: &str, error: &toml::de::Error) -> Mistake {
     let Some(span) = error.span() else { return Mistake { line: None, message: error.message().to_owned() } };
     let mut message = String::new();
-    // A section may span its entries, and others' too where its keys are scattered.
+    // A section may span its entries, and others' too if its keys are scattered.
     let around = entries(text).into_iter().filter(|entry| (entry.start..entry.end).contains(&span.start));
     let entry = around.min_by_key(|entry| entry.end - entry.start);
     if let Some(entry) = entry {
@@ -95,14 +94,14 @@ struct Entry {
 }
 
 impl Entry {
-    /// The input of that name, if there is one.
+    /// The input with that name, if there is one.
     fn input(&self) -> Option<Input> {
         let inputs = Machine::default().inputs();
         inputs.into_iter().find(|input| self.section == input.section && self.key.as_deref() == Some(input.key))
     }
 }
 
-/// All entries of a text, each section before its keys; none where it is no TOML.
+/// All entries of a text, each section before its keys. Empty if the text is no TOML.
 fn entries(text: &str) -> Vec<Entry> {
     let mut entries = Vec::new();
     let Ok(document) = DeTable::parse(text) else { return entries };

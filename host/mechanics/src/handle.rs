@@ -1,4 +1,4 @@
-//! The handle: its slope and length from the operator's elbow and place (Eq. 21).
+//! The handle: its slope and length from the operator's elbow and position (Eq. 21).
 
 use uom::si::f64::{Angle, Length};
 

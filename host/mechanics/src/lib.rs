@@ -1,13 +1,13 @@
-//! The design calculations of an intra-row weeder, for anyone's machine: what its engine, servo, shanks, chain, wheels
-//! and handle have to be like, and whether those that it has are enough.
+//! The design calculations of an intra-row weeder, for any machine: the required engine, servo, shanks, chain, wheels
+//! and handle, and whether the given ones suffice.
 //!
-//! The data's way: a [`machine::Machine`], the paper's or one from a [`mod@file`], is checked against its ranges and
-//! becomes a [`design::Design`] by the equations of [`traction`], [`tool`], [`shank`], [`drive`], [`mod@wheel`],
-//! [`handle`] and [`capacity`]; [`sense`] says what it means, and [`report`] shows it. [`paper`] holds the paper's
-//! printed figures beside ours. All quantities are those of `uom`, in f64.
+//! A [`machine::Machine`] is the paper's or comes from a [`mod@file`]. It is checked against its ranges. The equations
+//! of [`traction`], [`tool`], [`shank`], [`drive`], [`mod@wheel`], [`handle`] and [`capacity`] give its
+//! [`design::Design`]. [`sense`] interprets the design, and [`report`] prints it. [`paper`] compares the paper's
+//! printed figures with these results. All quantities are those of `uom`, in f64.
 //!
-//! The equations are the paper's, Eq. 4 to 21, 24 and 25. They are a first dimensioning: they know nothing of fatigue,
-//! of slopes, or of how the soil changes with speed.
+//! The equations are the paper's, Eq. 4 to 21, 24 and 25. They give first dimensions, without fatigue, slopes, or the
+//! effect of speed on the soil.
 //!
 //! ```
 //! use mechanics::{design::Design, machine::Machine, unit::{KG, NEWTON}};

@@ -1,7 +1,8 @@
-//! The machine: what its design calculations start from, with the range of each value and the paper's as default.
+//! The machine: the inputs of its design calculations, each with its range and the paper's value as default.
 //!
-//! One table below declares every input once: its section and key in a machine file, its kind, the paper's value, the
-//! range and what it is. The structures, their defaults, the check of the ranges and the commented file come from it.
+//! The table below declares every input once: its section and key in a machine file, its kind, the paper's value, the
+//! range and the meaning. The structures, their defaults, the check of the ranges and the commented file are made from
+//! it.
 
 use crate::figure::digits;
 use crate::unit::{
@@ -13,7 +14,7 @@ use std::fmt::Write;
 use thiserror::Error;
 use uom::si::f64::{Angle, AngularVelocity, Length, Mass, Power, Pressure, Ratio, Time, Torque, Velocity};
 
-/// One input of a machine, as it stands in a machine file.
+/// One input of a machine, as in a machine file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Input {
     /// Section of the file.
@@ -37,9 +38,10 @@ impl Input {
         Self { section, key: "", about: "", value: unit.value(quantity), unit: unit.name, least, most }
     }
 
-    /// The value as it is written in a machine file.
+    /// The value as written in a machine file.
     pub fn written(&self) -> String {
-        // Conversion into the unit leaves an error in the last digits. What is far out of its range has too many for a reader.
+        // The conversion of units leaves an error in the last digits. A value far out of range would show too many
+        // digits.
         let rounded = (self.value * 1e9).round() / 1e9;
         let value = if rounded.abs() < 1e9 { rounded.to_string() } else { format!("{:e}", self.value) };
         if self.unit.is_empty() { value } else { format!("\"{value} {}\"", self.unit) }
@@ -63,14 +65,14 @@ pub enum MachineError {
     /// A value is out of its range.
     #[error("{}.{} is {}: it has to be {}", .0.section, .0.key, .0.written().replace('"', ""), .0.range())]
     OutOfRange(Input),
-    /// The crop's protection zones and the soil that breaks beside a sweep take all of the row spacing.
+    /// The crop's protection zones and the broken soil beside a sweep take the whole row spacing.
     #[error(
         "crop.row_spacing leaves no room for a sweep: the protection zones leave {:.0} mm, and soil breaks over \
          {beside_mm:.0} mm beside a sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth",
         .failure_zone_mm.max(0.0)
     )]
     NoRoomForSweep {
-        /// Eq. 11; negative where the protection zones overlap.
+        /// Eq. 11; negative if the protection zones overlap.
         failure_zone_mm: f64,
         /// The second term of Eq. 12.
         beside_mm: f64,
@@ -87,7 +89,7 @@ pub enum MachineError {
         /// Outer diameter of the wheel.
         diameter_mm: f64,
     },
-    /// No sprocket makes the wheels turn as fast as they have to.
+    /// No sprocket gives the wheels their required speed.
     #[error(
         "engine.gear_box_ratio is {}: the driven sprocket would need {} teeth and can have 1 to {MOST_TEETH}; \
          at these speeds a ratio near {} makes it {USUAL_TEETH} teeth",
@@ -103,14 +105,14 @@ pub enum MachineError {
     },
 }
 
-/// Teeth of the largest sprocket that is taken for one.
+/// Teeth of the largest accepted sprocket.
 const MOST_TEETH: u32 = 1000;
 
 /// Teeth of a common driven sprocket.
 const USUAL_TEETH: u32 = 40;
 
 impl MachineError {
-    /// Section and key of the value that is to be changed first.
+    /// Section and key of the value to change first.
     pub fn place(&self) -> (&'static str, &'static str) {
         match self {
             Self::OutOfRange(input) => (input.section, input.key),
@@ -121,7 +123,7 @@ impl MachineError {
     }
 }
 
-/// Declares the sections of a machine file, their values, and what is made of them.
+/// Declares the sections of a machine file and their values, and makes the code for them.
 macro_rules! sections {
     ($($(#[doc = $title:literal])+ $section:ident: $name:ident {$(
         $(#[doc = $about:literal])+
@@ -162,7 +164,7 @@ macro_rules! sections {
             }
         }
 
-        /// What each section of the file is.
+        /// The title of each section of the file.
         const TITLES: &[(&str, &str)] = &[$((stringify!($section), concat!($($title),+))),+];
     };
 }
@@ -214,7 +216,7 @@ sections! {
         /// Diameter of a shank (Table 1, no. 9).
         shank_diameter: Length = 16.0, MM, 2.0 to 200.0;
     }
-    /// The tool in the row, of which there is one, and its servo.
+    /// The tool in the row and its servo. There is one of each.
     intra_row: IntraRow {
         /// Width of cut; Eq. 7 takes 50 mm, though the sweep of Table 1 has 55 mm.
         width: Length = 50.0, MM, 5.0 to 1000.0;
@@ -308,10 +310,10 @@ sections! {
 }
 
 impl Machine {
-    /// Checks every value against its range, and those that depend on each other.
+    /// Checks every value against its range, and values that depend on each other.
     ///
     /// # Errors
-    /// The first value that is out of its range, or what does not go together; it says what would be right.
+    /// The first value out of range, or the first contradiction, with what would be right.
     pub fn check(&self) -> Result<(), MachineError> {
         if let Some(input) = self.inputs().into_iter().find(|input| !input.is_in_range()) {
             return Err(MachineError::OutOfRange(input));

@@ -1,8 +1,8 @@
-//! The paper's printed figures beside what its equations give, with a verdict on each.
+//! The paper's printed figures beside the results of its equations, with a verdict on each.
 //!
-//! Each figure is calculated twice: from the inputs that the paper prints for it, its own earlier results among them,
-//! and all through, from the machine alone. So a slip is told from what merely follows from an earlier one.
-//! `weeder design --against-paper` shows them.
+//! Each figure is calculated twice: from the printed inputs, including earlier printed results, and from the machine
+//! alone. So an error can be distinguished from a consequence of an earlier error. `weeder design --against-paper`
+//! prints them.
 
 use crate::design::Design;
 use crate::figure::{digits, written};
@@ -21,9 +21,9 @@ use uom::si::f64::Ratio;
 pub enum Verdict {
     /// The equation gives it.
     Right,
-    /// It follows from an earlier figure that is wrong.
+    /// It follows from an earlier wrong figure.
     Follows,
-    /// The equation does not give it, even from the printed inputs.
+    /// The equation gives another value, even from the printed inputs.
     Wrong,
 }
 
@@ -32,34 +32,34 @@ pub enum Verdict {
 pub struct Comparison {
     /// Its name.
     pub name: &'static str,
-    /// Where it stands in the paper.
+    /// Its equation in the paper.
     pub equation: &'static str,
     /// Unit of all its values; empty for plain numbers.
     pub unit: &'static str,
-    /// As the paper prints it.
+    /// The printed value.
     pub printed: f64,
     /// Decimals that the paper prints.
     #[serde(skip)]
     pub decimals: usize,
-    /// What the equation gives for the inputs that the paper prints for it.
+    /// The result of the equation for the printed inputs.
     pub from_printed_inputs: f64,
-    /// What the equation gives when everything before it is calculated too.
+    /// The result if all earlier values are calculated too.
     pub calculated: f64,
-    /// The same for a machine of one's own.
+    /// The same for the user's own machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<f64>,
     /// Whether the printed figure is right.
     pub verdict: Verdict,
-    /// Why it is not, or what is worth knowing; may be empty.
+    /// The reason for a difference, or a note; may be empty.
     pub remark: String,
 }
 
-/// Share by which a printed figure may be off where intermediate results were rounded.
+/// Allowed relative deviation of a printed figure, if intermediate results were rounded.
 const ROUNDING: f64 = 0.005;
 
 impl Verdict {
-    /// Compares a figure with what the equation gives from the machine alone and from the printed inputs. A figure that
-    /// is right to half of its last digit is right, and so is one that is off by less than half a percent.
+    /// Compares a figure with the result of its equation, from the machine alone and from the printed inputs. A figure
+    /// is right if it is exact to half of its last digit, or off by less than half a percent.
     fn of(printed: f64, decimals: usize, calculated: f64, from_printed_inputs: f64) -> Self {
         let half_digit = 0.5 * 10_f64.powi(-(decimals as i32));
         let is = |value: f64| (printed - value).abs() <= half_digit.max(ROUNDING * value.abs());
@@ -78,8 +78,8 @@ struct Machines {
 }
 
 impl Machines {
-    /// One row. `printed` is the figure and its decimals, `from_printed_inputs` what its equation gives for the inputs
-    /// that the paper prints, and `calculated` finds it in a design.
+    /// One row. `printed` is the figure and its decimals. `from_printed_inputs` is the equation's result for the
+    /// printed inputs. `calculated` finds the result in a design.
     fn compare<Q>(
         &self,
         (name, equation): (&'static str, &'static str),
@@ -112,7 +112,7 @@ impl Machines {
 /// Compares the paper's figures with ours, and with those of a machine of one's own.
 ///
 /// # Errors
-/// Where the machine of one's own cannot be calculated.
+/// If the machine of one's own cannot be calculated.
 pub fn compare(own: Option<&Machine>) -> Result<Vec<Comparison>, MachineError> {
     let machines = Machines { paper: Design::of(&Machine::default())?, own: own.map(Design::of).transpose()? };
     let mut comparisons = traction(&machines);
@@ -124,7 +124,7 @@ pub fn compare(own: Option<&Machine>) -> Result<Vec<Comparison>, MachineError> {
     Ok(comparisons)
 }
 
-/// The tractive force as the paper prints it; much hangs on it.
+/// The printed tractive force. Many other figures depend on it.
 const PRINTED_TRACTIVE_FORCE_N: f64 = 1082.4;
 
 fn traction(machines: &Machines) -> Vec<Comparison> {

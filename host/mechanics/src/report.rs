@@ -15,7 +15,7 @@ impl Display for Verdict {
     }
 }
 
-/// Every figure with its equation and its sense, and a `!` where the machine should be changed.
+/// Every figure with its equation and its interpretation, and a `!` if the machine should be changed.
 pub fn design_table(figures: &[Figure]) -> Table {
     let mut table = table(&["quantity", "equation", "it gives", "unit", "", "which means"]);
     for figure in figures {
@@ -33,7 +33,7 @@ pub fn design_table(figures: &[Figure]) -> Table {
     table
 }
 
-/// The paper's figures beside ours, and beside those of a machine of one's own, if there is one.
+/// The paper's figures beside the calculated ones, and beside those of the user's own machine, if there is one.
 pub fn comparison_table(comparisons: &[Comparison]) -> Table {
     let own = comparisons.iter().any(|comparison| comparison.own.is_some());
     let mut header = vec!["quantity", "equation", "printed", "from the\nprinted inputs", "calculated\nall through"];

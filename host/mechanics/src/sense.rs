@@ -1,4 +1,4 @@
-//! What a design means for its machine: each figure with a line in plain words, worked out from its values.
+//! Interprets a design for its machine: each figure gets a line in plain words.
 
 use crate::design::{Design, ShankDesign};
 use crate::figure::{Figure, digits, written};
@@ -15,17 +15,17 @@ use uom::si::f64::{Force, Length, Ratio};
 /// Teeth of a good sprocket: fewer wear the chain out quickly, on more a worn chain climbs.
 const GOOD_TEETH: RangeInclusive<u32> = 9..=120;
 
-/// Share by which the speed may miss the wanted one before it is worth a word.
+/// Allowed relative deviation of the speed, before a warning.
 const SPEED_TOLERANCE: f64 = 0.05;
 
 /// Times the needed power from which an engine is too large.
 const ENGINE_EXCESS: f64 = 2.0;
 
-/// Wheel numerics up to which soil is soft or tilled; above these it is firm.
+/// The greatest wheel numerics of soft and of tilled soil. Above them it is firm.
 const SOFT_WHEEL_NUMERIC: f64 = 15.0;
 const TILLED_WHEEL_NUMERIC: f64 = 25.0;
 
-/// A line of sense, and whether it asks for a change.
+/// A line of interpretation, and whether it asks for a change.
 struct Sense {
     words: String,
     concern: bool,
@@ -59,8 +59,8 @@ fn percent(share: Ratio) -> String {
 }
 
 impl Design {
-    /// Every result with its equation and its sense, in the order of the paper. `machine` is the one that was
-    /// calculated.
+    /// Every result with its equation and its interpretation, in the order of the paper. `machine` is the calculated
+    /// machine.
     pub fn figures(&self, machine: &Machine) -> Vec<Figure> {
         let mut figures = self.traction(machine);
         figures.extend(self.tools(machine));

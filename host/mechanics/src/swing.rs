@@ -1,11 +1,13 @@
-//! The swing of the tool in the row: the smallest angle that clears the widest canopy, or the zone round a stem, the pulse for it, the time
-//! that it takes by the servo's torque-speed line, and the lead that follows. A shorter stroke takes less time, and leaves more ground
-//! weeded. Where the zone is kept, the settings for it follow as well: the zone is longer than the protected width by what a stem
-//! stands off the middle, and the margin pays for a wheel and a servo that nobody has measured yet.
+//! The swing of the tool in the row: its angle, pulse, time and lead.
 //!
-//! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the row's
-//! line. A servo turns at full speed without load, and falls in a straight line to nothing at the torque at which it stalls. What it
-//! has to turn against is the torque of the whole blade in the soil (above Eq. 10), which the paper sizes its servo by.
+//! The angle is the smallest that clears the widest canopy, or the zone round a stem. Its time follows from the servo's
+//! torque-speed line. A shorter stroke takes less time and leaves more ground weeded. With a stem zone, its settings
+//! follow as well. The zone is longer than the protected width, because a stem may stand off the middle. The margin
+//! covers a wheel and a servo that were not measured yet.
+//!
+//! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the
+//! row's line. A servo turns at full speed without load. Its speed falls in a straight line to zero at the stall
+//! torque. The load is the torque of the whole blade in the soil (above Eq. 10); the paper sizes its servo by it.
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
@@ -13,21 +15,22 @@ use serde::Serialize;
 use uom::si::f64::Torque;
 use uom::si::time::second;
 
-/// What a pulse and the gap behind it may add before a servo hears of a command, ms.
+/// The most that a pulse and the gap after it delay a command, ms.
 const PULSE_AND_GAP_MS: f64 = 6.0;
 
-/// Pulses are told in whole steps of this, us, rounded outwards.
+/// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
 
-/// What a margin pays for beside the servo, mm: 2 % of slip over the 400 mm from beam to tool, and the firmware's own worst swing.
+/// The parts of a margin besides the servo, mm: 2 % of slip over the 400 mm from beam to tool, and the firmware's own
+/// worst swing.
 const SLIP_AND_FIRMWARE_MM: f64 = 8.0 + 5.0;
 
-/// A swing, as it has to be.
+/// The required swing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Swing {
-    /// What is kept of a single plant along the row, mm; 0 for its canopy.
+    /// The zone of a single plant along the row, mm; 0 for its canopy.
     pub stem_zone_mm: u32,
-    /// The margin beside it until wheel and servo have been measured, mm.
+    /// The margin beside it before wheel and servo have been measured, mm.
     pub margin_mm: u32,
     /// Smallest angle at which the tool's edge has cleared the canopy or the protected width, degrees.
     pub angle_degrees: f64,
@@ -39,7 +42,7 @@ pub struct Swing {
     pub load: f64,
     /// Time for that angle without load, ms.
     pub unloaded_ms: f64,
-    /// Time for it against the soil, ms.
+    /// Its time against the soil, ms.
     pub loaded_ms: f64,
     /// Lead of the command to leave the row, ms.
     pub lead_out_ms: u32,
@@ -47,11 +50,11 @@ pub struct Swing {
     pub lead_in_ms: u32,
     /// Width on either side of the row that neither tool nor sweeps weed, mm.
     pub unweeded_strip_mm: f64,
-    /// Width of the tool that would fill it, mm.
+    /// Width of a tool that would fill it, mm.
     pub filling_tool_mm: f64,
 }
 
-/// Why a tool cannot swing as it has to.
+/// Why a tool cannot make the required swing.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoSwing {
     /// The arm is too short.
@@ -61,7 +64,7 @@ pub enum NoSwing {
     ShortArm {
         /// Its length.
         arm_mm: f64,
-        /// How far it has to bring the tool.
+        /// The required distance aside.
         aside_mm: f64,
     },
     /// The servo stalls.
@@ -78,7 +81,7 @@ impl Swing {
     /// The swing of a machine, whose servo turns against this torque.
     ///
     /// # Errors
-    /// Where the arm is too short or the servo too weak.
+    /// If the arm is too short or the servo too weak.
     pub fn of(machine: &Machine, torque: Torque) -> Result<Self, NoSwing> {
         Self::with_tool(machine, torque, MM.value(machine.intra_row.width))
     }
@@ -142,7 +145,7 @@ impl Swing {
         lines
     }
 
-    /// What it is, in sentences. `torque` is what it was calculated with.
+    /// Its description, in sentences. `torque` is the one used in the calculation.
     pub fn sentences(&self, machine: &Machine, torque: Torque) -> Vec<String> {
         let mut said = vec![
             format!(
@@ -177,7 +180,7 @@ impl Swing {
     }
 }
 
-/// Width of what the tool has to clear.
+/// Width of the zone that the tool must clear.
 fn kept_mm(machine: &Machine) -> f64 {
     let SwingInputs { protected, widest_canopy, .. } = machine.swing;
     let protected_mm = MM.value(protected);

@@ -16,24 +16,24 @@ pub fn servo_torque(soil_force: Force, shank_length: Length) -> Torque {
     (soil_force * shank_length).into()
 }
 
-/// Width over which the soil between two rows may be broken, Eq. 11.
+/// Width of broken soil allowed between two rows, Eq. 11.
 ///
-/// The protection zone is that of one side of a row; two of them lie between two rows.
+/// The protection zone is that of one side of a row. Between two rows there are two.
 pub fn failure_zone(row_spacing: Length, protection_zone: Length) -> Length {
     row_spacing - 2.0 * protection_zone
 }
 
-/// Width of a sweep, Eq. 12: soil breaks over more than the sweep's own width, by the angle of its internal friction.
+/// Width of a sweep, Eq. 12. Soil breaks over more than the sweep's own width, by its angle of internal friction.
 pub fn sweep_width(failure_zone: Length, depth: Length, internal_friction: Angle) -> Length {
     failure_zone - 2.0 * depth * internal_friction.tan()
 }
 
-/// Apex angle of a sweep: twice the angle of Eq. 13. Weeds slide along edges that are no blunter than this.
+/// Apex angle of a sweep: twice the angle of Eq. 13. Weeds slide along edges up to this angle.
 pub fn apex_angle(weed_friction: Angle) -> Angle {
     2.0 * (right_angle() - weed_friction)
 }
 
-/// The friction for which an apex angle is right: Eq. 13 the other way round.
+/// The friction that an apex angle suits: Eq. 13 solved for it.
 pub fn weed_friction_for(apex_angle: Angle) -> Angle {
     right_angle() - apex_angle / 2.0
 }
@@ -48,7 +48,7 @@ pub fn tools_that_fit(working_width: Length, sweep_width: Length) -> u32 {
     (f64::from(working_width / sweep_width) + 1e-9) as u32
 }
 
-/// Greatest draft of one tool, Eq. 14: that of the whole tractive force, shared by the tools.
+/// Greatest draft of one tool, Eq. 14: the whole tractive force, divided by the number of tools.
 pub fn tool_draft(tractive_force: Force, tools: u32) -> Force {
     tractive_force / f64::from(tools)
 }

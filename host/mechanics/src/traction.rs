@@ -1,9 +1,9 @@
-//! What it takes to pull the machine: rolling resistance, draft, acceleration, tractive force and power (Eq. 4 to 9).
+//! The pull on the machine: rolling resistance, draft, acceleration, tractive force and power (Eq. 4 to 9).
 
 use uom::si::acceleration::meter_per_second_squared;
 use uom::si::f64::{Acceleration, Force, Length, Mass, Power, Pressure, Ratio, Time, Velocity};
 
-/// Acceleration of free fall as the paper takes it.
+/// Acceleration of free fall, with the paper's value.
 fn gravity() -> Acceleration {
     Acceleration::new::<meter_per_second_squared>(9.81)
 }
@@ -57,6 +57,6 @@ pub fn engine_power(power: Power, transmission_efficiency: Ratio) -> Power {
     power / transmission_efficiency
 }
 
-/// Greatest share of its load that a tyre can pull with, however much it slips: the limit of the formula by Wismer and
-/// Luth, from which Eq. 5 is taken too.
+/// Greatest pull of a tyre as a share of its load, at any slip: the limit of the formula by Wismer and Luth. Eq. 5
+/// comes from the same formula.
 pub const TYRE_TRACTION_LIMIT: f64 = 0.75;

@@ -1,11 +1,11 @@
 //! Quantities as people write them: a number and a unit, such as `"400 mm"`.
 //!
-//! The quantities themselves are those of [`uom`], so that a force cannot be added to a length. A [`Unit`] ties a name
-//! to one of them, and [`Written`] lists the units that a kind of quantity may be written in. Numbers without a unit,
-//! such as a number of teeth, are read by the same way. It knows nothing of what a value is for: ranges are the
-//! machine's.
+//! The quantities are those of [`uom`], so a force cannot be added to a length. A [`Unit`] connects a name with one of
+//! them. [`Written`] lists the valid units of a kind of quantity. Numbers without a unit, such as a number of teeth,
+//! use the same code. The ranges of values are the machine's.
 //!
-//! Texts are read by hand because `uom` knows neither `kg cm` nor `ha/h`, and does not say which units would be right.
+//! The parser is written here because `uom` has neither `kg cm` nor `ha/h`, and does not list the valid units in its
+//! errors.
 
 use serde::Deserializer;
 use serde::de::Visitor;
@@ -24,7 +24,7 @@ pub type AreaRate = DiffusionCoefficient;
 /// A unit that a quantity may be written in.
 #[derive(Clone, Copy, Debug)]
 pub struct Unit<Q> {
-    /// As it is written behind the number; empty for plain numbers.
+    /// Its text behind the number; empty for plain numbers.
     pub name: &'static str,
     of: fn(f64) -> Q,
     value: fn(Q) -> f64,
@@ -46,7 +46,7 @@ impl<Q> Unit<Q> {
 pub trait Written: Copy + 'static {
     /// The kind, with its article.
     const KIND: &'static str;
-    /// The units that it may be written in; a single nameless one for plain numbers.
+    /// Its valid units; a single unit without a name for plain numbers.
     const UNITS: &'static [Unit<Self>];
 
     /// Whether it is a plain number.
@@ -55,7 +55,7 @@ pub trait Written: Copy + 'static {
     }
 }
 
-/// Declares units by the names of `uom`'s, and the quantities that are written in them.
+/// Declares units by the names of `uom`'s, and the quantities that use them.
 macro_rules! units {
     ($($quantity:ident, $kind:literal {$($(#[$doc:meta])* $constant:ident = $name:literal, $unit:path;)+})+) => {$(
         $($(#[$doc])* pub const $constant: Unit<$quantity> =
@@ -137,7 +137,7 @@ units! {
 pub const NEWTON_METRE: Unit<Torque> =
     Unit { name: "N m", of: Torque::new::<torque::newton_meter>, value: |torque| torque.get::<torque::newton_meter>() };
 
-/// The weight of a kilogram on an arm of a centimetre, in which makers of servos give their torque.
+/// The weight of a kilogram on an arm of a centimetre: the usual unit in data sheets of servos.
 pub const KG_CM: Unit<Torque> = Unit {
     name: "kg cm",
     of: |value| Torque::new::<torque::kilogram_force_meter>(value / 100.0),
@@ -199,7 +199,7 @@ impl WrittenError {
 /// Reads a number and a unit. Spaces between them, and spaces and dots within the unit, do not matter.
 ///
 /// # Errors
-/// Where there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
+/// If there is no number, or the unit is missing or of another kind of quantity; it says which units there are.
 pub fn parse<Q: Written>(text: &str) -> Result<Q, WrittenError> {
     let error = || WrittenError::new::<Q>(format_args!("\"{text}\""));
     let (number, name) = text.split_at(number_end(text));
@@ -208,7 +208,7 @@ pub fn parse<Q: Written>(text: &str) -> Result<Q, WrittenError> {
     unit.map(|unit| unit.of(number)).ok_or_else(error)
 }
 
-/// Where the number at the beginning of a text ends: an e belongs to it where an exponent follows.
+/// The end of the number at the beginning of a text. An e belongs to it if an exponent follows.
 fn number_end(text: &str) -> usize {
     let is_of_unit = |(_, c): &(usize, char)| c.is_alphabetic() || "%°".contains(*c);
     let mut units = text.char_indices().filter(is_of_unit);
@@ -227,7 +227,7 @@ fn closed_up(name: &str) -> String {
 /// Reads a quantity as a string with its unit, and a plain number as such; for serde's `deserialize_with`.
 ///
 /// # Errors
-/// Those of [`parse`].
+/// The errors of [`parse`].
 pub(crate) fn read<'de, Q: Written, D: Deserializer<'de>>(deserializer: D) -> Result<Q, D::Error> {
     deserializer.deserialize_any(WrittenVisitor(PhantomData))
 }
@@ -246,7 +246,7 @@ impl<Q: Written> Visitor<'_> for WrittenVisitor<Q> {
     }
 
     fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Q, E> {
-        // What comes out of a whole number's unit is another number than what went in, where that was not whole.
+        // The conversion of a whole number's unit truncates, so the result differs if the input was not whole.
         let plain = Q::UNITS.first().filter(|unit| unit.name.is_empty());
         let read = plain.map(|unit| (unit.of(number), unit)).filter(|(read, unit)| unit.value(*read) == number);
         read.map(|(read, _)| read).ok_or_else(|| E::custom(WrittenError::new::<Q>(number)))

@@ -1,4 +1,4 @@
-//! The driven wheel's rim, taken as a tube in torsion (Eq. 20 and the equations below it).
+//! The driven wheel's rim, calculated as a tube in torsion (Eq. 20 and the equations below it).
 
 use std::f64::consts::PI;
 use uom::si::f64::{Force, Length, Pressure, Torque};
@@ -8,21 +8,21 @@ pub fn thickness(outer_diameter: Length, inner_diameter: Length) -> Length {
     (outer_diameter - inner_diameter) / 2.0
 }
 
-/// Inner diameter of a rim: the thickness' equation the other way round.
+/// Inner diameter of a rim: the thickness' equation solved for it.
 pub fn inner_diameter(outer_diameter: Length, thickness: Length) -> Length {
     outer_diameter - 2.0 * thickness
 }
 
-/// Thickness at which a torque makes just a shear stress: Eq. 20 the other way round. A wheel that is too weak as a solid
-/// disc gets half of its diameter.
+/// Thickness at which a torque makes exactly this shear stress: Eq. 20 solved for it. If a wheel is too weak even as a
+/// solid disc, the result is half of its diameter.
 pub fn least_thickness(torque: Torque, outer_diameter: Length, shear_strength: Pressure) -> Length {
-    // Of the outer diameter to the fourth power, the share that the rim has to make up.
+    // The share of the outer diameter to the fourth power that the rim needs.
     let solid_stress = shear_stress(torque, outer_diameter, outer_diameter * 0.0);
     let hollow_share = 1.0 - f64::from(solid_stress / shear_strength);
     thickness(outer_diameter, outer_diameter * hollow_share.max(0.0).powf(0.25))
 }
 
-/// Torque on a wheel that gives all of the tractive force (below Eq. 20).
+/// Torque on a wheel that gives the whole tractive force (below Eq. 20).
 pub fn torque(tractive_force: Force, outer_diameter: Length) -> Torque {
     (tractive_force * outer_diameter / 2.0).into()
 }

@@ -1,4 +1,4 @@
-//! The paper's printed figures, what its equations give, and the verdict on each: a test for every row.
+//! The paper's printed figures, the results of its equations, and the verdict on each: a test for every row.
 
 use approx::assert_relative_eq;
 use mechanics::paper::{Comparison, Verdict, compare};
@@ -14,8 +14,8 @@ fn comparison(name: &str, unit: &str) -> Comparison {
     found.remove(0)
 }
 
-/// Asserts a row: as printed, from the printed inputs, calculated all through, and the verdict. Numbers are compared to
-/// the half of the last digit that they are given with.
+/// Asserts a row: the printed value, the result from printed inputs, the result from the machine alone, and the
+/// verdict. Numbers are compared to half of their last digit.
 #[track_caller]
 fn assert_row((name, unit): (&str, &str), printed: f64, from_printed_inputs: &str, calculated: &str, verdict: Verdict) {
     let row = comparison(name, unit);

@@ -1,4 +1,4 @@
-//! What holds for every machine within the ranges.
+//! Properties of every machine within the ranges.
 
 use approx::relative_eq;
 use mechanics::design::Design;
@@ -8,19 +8,19 @@ use mechanics::{drive, shank, tool, wheel};
 use proptest::prelude::*;
 use std::fmt::Write;
 
-/// A machine file with each value at such a share of its range.
+/// A machine file. Each value is at this share of its range.
 fn file(inputs: &[Input], shares: &[f64]) -> String {
     let mut file = String::new();
     for (input, share) in inputs.iter().zip(shares) {
         let value = input.least + share * (input.most - input.least);
-        // Plain numbers may be numbers of things.
+        // Plain numbers may be counts.
         let value = if input.unit.is_empty() { value.round() } else { value };
         writeln!(file, "{}.{} = {}", input.section, input.key, Input { value, ..*input }.written()).unwrap();
     }
     file
 }
 
-/// Any machine that can be built: some of what is within the ranges does not go together.
+/// Any machine without contradictions. Some values within the ranges contradict each other.
 fn any_machine() -> impl Strategy<Value = Machine> {
     let inputs = Machine::default().inputs();
     prop::collection::vec(0.0..=1.0, inputs.len())

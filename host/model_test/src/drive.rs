@@ -1,8 +1,9 @@
-//! A machine on a row that never ends, with the model beside it; every turn is checked.
+//! A machine on an endless row, compared with the model after every turn.
 //!
-//! The ground is counted in ticks of the encoder. What the machine is, the decisions alone or the firmware in an Uno, is behind the
-//! trait [`Machine`]. What can be seen only in the decisions is checked only there. This file has things happen and rolls the machine;
-//! `checks` holds what the tool does against the model, `console` types lines and follows what they change.
+//! The ground is counted in ticks of the encoder. The trait [`Machine`] hides whether the machine is the decisions
+//! alone or the firmware in an Uno. Facts that are visible only in the decisions are checked only there. This file
+//! executes steps and rolls the machine. `checks` compares the tool with the model, and `console` types lines and
+//! follows their effects.
 
 mod checks;
 mod console;
@@ -45,7 +46,7 @@ const TOO_MANY: u32 = 40;
 #[derive(Clone, Copy, Debug)]
 struct Place {
     tool: i64,
-    /// The same on the ground, whatever the wheel slips.
+    /// The same on the ground, independent of the wheel's slip.
     ground: i64,
     slowest: f64,
     fastest: f64,
@@ -239,7 +240,7 @@ impl<M: Machine> Drive<M> {
                 self.model.is_shifted = true;
                 let off = self.machine.spike(&mut self.world, ticks);
                 self.model.loosen(off);
-                // A spike is a speed of its own, to whoever divides by 10 ms.
+                // A spike looks like a speed of its own, because the speed is measured over 10 ms.
                 self.speeds.take(self.world.time_us, self.speed + f64::from(ticks) / 0.01);
                 self.turn()
             }),
@@ -395,7 +396,7 @@ impl<M: Machine> Drive<M> {
         let merge_gap = self.machine.settings().ticks(Setting::MergeGapMm).0.into();
         self.model.follow(self.here(), merge_gap, wheel.ticks(1000).0.into());
         self.model.keep_stems(self.ticks(Setting::StemZoneMm), self.ticks(Setting::SecondBeamMm));
-        // What is narrower than the settings have it is dust, of which nothing is said either.
+        // A detection below the minimum width is dust, and causes no event.
         let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
         self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
         self.had_second_beam |= self.ticks(Setting::SecondBeamMm) > 0;
@@ -571,7 +572,7 @@ impl<M: Machine> Drive<M> {
     }
 }
 
-/// In what steps the machine remembers the ground: for other ones it begins anew.
+/// The unit of the machine's positions on the ground. Another unit makes it forget the ground.
 fn scale(settings: &Settings) -> LengthScale {
     LengthScale::of(settings.wheel().ticks(1000))
 }

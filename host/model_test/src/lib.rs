@@ -1,12 +1,13 @@
-//! Random runs of a weeder on a row, judged by a model of the ground that is slow and obvious.
+//! Model-based tests: random runs of a weeder on a row, checked by a slow and simple model of the ground.
 //!
-//! [`run`] says what happens, [`drive`] has it happen to a [`Machine`](machine::Machine) and checks it after each turn, [`model`]
-//! knows what the beam has shown. [`go_all`] goes many runs and shrinks one that fails to a few steps, printed as what a
-//! person would type and roll. The machine is the decisions alone (`control/tests/against_the_model/`) or the firmware in the
-//! virtual Uno (`tests/end_to_end/random_walks.rs`). What is held is the same for both, as far as it can be seen from outside.
+//! [`run`] defines the steps of a run. [`drive`] executes them on a [`Machine`](machine::Machine) and checks it after
+//! each turn. [`model`] stores what the beam has seen. [`go_all`] executes many runs. It shrinks a failing run to a few
+//! steps, and prints them as lines to type and distances to roll. The machine is the decisions alone
+//! (`control/tests/against_the_model/`) or the firmware in the virtual Uno (`tests/end_to_end/random_walks.rs`). Both
+//! have the same checks, as far as they are visible from outside.
 //!
-//! The runs are the same each time, so that a change is judged by them and not by luck. `WEEDER_SEED` gives others, and
-//! `WEEDER_CASES` as many as asked for. [`is_thorough`] and [`cases`] are for every test that takes its time.
+//! The runs are the same each time, so that a result depends on the change and not on luck. `WEEDER_SEED` gives other
+//! runs, and `WEEDER_CASES` sets their number. [`is_thorough`] and [`cases`] are for every slow test.
 
 pub mod drive;
 pub mod machine;
@@ -74,12 +75,12 @@ pub fn go_all(extent: Extent, runs: &BoxedStrategy<Run>, go: impl Fn(&Run) -> Re
     assert!(asked.is_some() || turns >= cases(extent.least_turns), "{turns} turns");
 }
 
-/// Whether tests are to try all that they can: where the environment has `WEEDER_THOROUGH`, as in the gate. Else somebody waits for them.
+/// Whether slow tests run all their cases: `WEEDER_THOROUGH` is set, as in the gate.
 pub fn is_thorough() -> bool {
     env::var_os("WEEDER_THOROUGH").is_some()
 }
 
-/// How many of so many cases a test tries: all of them, or a fifth where somebody waits.
+/// The number of cases of a slow test: all of them, or a fifth unless [`is_thorough`].
 pub fn cases(all: u64) -> u64 {
     if is_thorough() { all } else { all.div_ceil(5) }
 }

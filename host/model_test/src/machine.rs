@@ -1,7 +1,7 @@
-//! What is driven along a row: something with a beam, an encoder, two switches, a console and a tool.
+//! The machine under test: it has a beam, an encoder, two switches, a console and a tool.
 //!
-//! The decisions alone can be looked into at any moment. The firmware in an Uno cannot: it shows its pins, and says something of itself
-//! when it is asked. So each side of the trait tells as much as it can see, and the drive checks what there is.
+//! A test can inspect the decisions at any moment. The firmware in an Uno shows only its pins, and its answers on the
+//! console. So each implementation of the trait returns the facts that it can see, and the drive checks those.
 
 use crate::run::Beginning;
 use control::{
@@ -81,7 +81,7 @@ pub trait Machine: Sized {
     /// The place that the machine takes itself to be at by a count: without the noise that it does not believe.
     fn place(&self, count: i64) -> i64;
 
-    /// What the machine's own counter shows at a count: a counter may begin anew when the machine wakes up.
+    /// The machine's own counter at a count. The counter may restart at 0 when the machine starts.
     fn own_count(&self, count: i64) -> i32;
 
     /// A turn of the loop, from one world to another; the place of what was read in it.
@@ -123,7 +123,7 @@ pub trait Machine: Sized {
     /// Whether the servo has the pulse that has the tool out.
     fn is_sent_out(&self) -> bool;
 
-    /// Puts bytes onto the wire: lines that end, of which `lines` are to be answered.
+    /// Sends bytes over the wire. They are complete lines, and `lines` are those that must be answered.
     fn put(&mut self, text: &str, lines: &[String]);
 
     /// The console's part of a turn.

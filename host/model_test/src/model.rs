@@ -1,17 +1,18 @@
-//! What the beam has shown of the ground, in the plainest form: whole numbers that never wrap, and a memory that never forgets.
+//! The ground as the beam has seen it, in the simplest form: whole numbers that never wrap, and a memory that never
+//! forgets.
 //!
-//! The ground is counted in the encoder's ticks. For each of them that the beam has come to, the model knows whether the
-//! beam was broken there when it first came, and two things only open such ground to the tool again: that it was taken for a
-//! weed while it was whole, and the operator's word. `start now` is that word. It counts for the ground of which `status` says
-//! that the machine does not know it, never seen or seen and forgotten, and for no other. An alarm opens nothing.
+//! The ground is counted in the encoder's ticks. For each tick that the beam has reached, the model knows whether the
+//! beam was broken there the first time. Only two things open such ground to the tool again: a complete detection that
+//! was classified as a weed, and the command `start now`. The command opens only ground that `status` reports as
+//! unknown, because it was never seen or was forgotten. An alarm opens nothing.
 //!
-//! With a stem's zone set, the tool may work under either end of what was seen in one: by what is beyond the zone, but by no more than
-//! a fifth of that, and by what a second beam may have that end elsewhere.
+//! With a stem zone, the tool may work at either end of a detection: beyond the zone, but by at most a fifth of that
+//! part. A second beam may see the end elsewhere, which adds to the limit.
 //!
-//! What the machine says that it guards is as closed as a canopy from then on, whoever may stand there.
+//! Guarded ground is closed like a canopy from then on, with or without a plant.
 //!
-//! Where the encoder's count goes wrong, the row is shifted under it by what was lost or made up: the model then still holds
-//! what the beam has shown at each count, which is all that the machine can know.
+//! After an error of the encoder's count, the row is shifted by the lost or added ticks. The model still stores what
+//! the beam has seen at each count: the machine cannot know more.
 
 /// Ground over which the beam was broken without a break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +50,7 @@ pub struct Model {
     /// Zones round a stem, each with the frontier from which on it was set; and how far a second beam moves the end of one.
     stem_zones: Vec<(i64, i64)>,
     moved: i64,
-    /// A detection no longer than this may have been taken for a weed, and nobody has said so.
+    /// A detection up to this width may have been classified as a weed without an event.
     narrow: i64,
     /// What every place may be off by: the steps in which the machine remembers the ground, and the turn of the loop.
     slack: i64,
@@ -57,7 +58,7 @@ pub struct Model {
     grain_slack: i64,
     /// Whether the encoder's count has gone wrong.
     pub is_shifted: bool,
-    /// Whether the machine has been so near to the end of its memory that it may have begun anew, or not.
+    /// Whether the machine came so near to the end of its memory that it may have forgotten the ground.
     may_have_begun_anew: bool,
 }
 
@@ -85,8 +86,9 @@ impl Model {
         model
     }
 
-    /// The settings as of now, with the beam at a place: clear ground that belongs to a canopy, and a metre. Rolled back by more
-    /// than eight of them, the beam sees anew what it comes to; give or take five centimetres.
+    /// Applies the present settings, with the beam at a position: the clear ground that belongs to a canopy, and a
+    /// metre. After rolling back by more than eight metres, within five centimetres, the beam sees the ground again as
+    /// new.
     pub fn follow(&mut self, place: i64, merge_gap: i64, metre: i64) {
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
@@ -133,7 +135,7 @@ impl Model {
         self.narrow = self.narrow.max(ticks);
     }
 
-    /// What lies ahead of a place is seen anew.
+    /// The ground ahead of a position is seen again as new.
     pub fn begin_anew(&mut self, place: i64) {
         self.known_from = self.known_from.min(place);
         self.begin = self.begin.min(place);
@@ -211,7 +213,7 @@ impl Model {
         self.is_growing = true;
     }
 
-    /// The operator says that the tool may work from one place up to another, of which the machine knows nothing.
+    /// The operator opens the ground between two positions that the machine does not know.
     pub fn trust(&mut self, from: i64, to: i64) {
         self.known_from = self.known_from.min(from);
         let parts = |stretch: &Stretch| {

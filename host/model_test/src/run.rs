@@ -1,14 +1,14 @@
-//! Runs: a machine, a row, and what happens to the machine on it, one thing after the other, as a person would say it.
+//! Runs: a machine, a row, and the steps on it, one after the other, in an operator's terms.
 
 use control::{measure::reset::Cause, settings::SECOND_BEAM_LEAST_MM};
 use field::wheel::most_slip;
 use proptest::prelude::*;
 use std::fmt;
 
-/// What is as wide is no weed, whatever the wheel slips.
+/// A detection of this width is no weed, at any slip of the wheel.
 const PLANT_MM: u32 = 80;
 
-/// Ticks of the ground wheel in a millimetre, whatever the machine is told of it.
+/// Ticks of the ground wheel in a millimetre, independent of the settings.
 pub const TICKS_A_MM: f64 = 1.909_86;
 
 /// What has the watchdog reset a machine that stands in hold.
@@ -395,16 +395,16 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
             let set = Type(format!("set guard_spacing_mm {mm}"));
             vec![typed("events on"), set, typed("clear"), typed(start), roll, on]
         }),
-        // Single plants, of which the stem alone is kept.
+        // Single plants, kept only at their stems.
         2 => (40_u32..200, to_work(), forward(), forward()).prop_map(|(mm, start, roll, on)| {
             vec![typed("hold"), Type(format!("set stem_zone_mm {mm}")), typed("clear"), typed(start), roll, on]
         }),
-        // A second beam, by which the machine measures the wheel's slip from plant to plant.
+        // A second beam: the machine measures the wheel's slip from plant to plant.
         2 => (50_u32..350, to_work(), forward(), forward()).prop_map(|(mm, start, roll, on)| {
             vec![Type(format!("set second_beam_mm {mm}")), typed("clear"), typed(start), roll, on]
         }),
         6 => (to_work(), forward()).prop_map(|(start, roll)| vec![typed("clear"), typed(start), roll]),
-        // A fault in the midst of whatever there is, and on from where it was.
+        // A fault in any state. Afterwards the run continues from there.
         6 => (fault(), back(), to_work(), forward()).prop_map(|(fault, back, start, forward)| {
             vec![fault, back, typed("clear"), typed(start), forward]
         }),
@@ -500,7 +500,7 @@ pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
         .boxed()
 }
 
-/// Runs of a machine that was set up by somebody, works, and is rolled steadily, forward and back, so many times at the most.
+/// Runs of a machine that is set up and at work. It rolls steadily forward and back, `rolls` times at most.
 pub fn calm(rolls: usize) -> BoxedStrategy<Run> {
     let rolled = prop_oneof![5 => roll(60..1400, 500..5000), 1 => roll(-800..-60, 100..3000)];
     let steps = (prop::collection::vec(setting(), 0..5), prop::collection::vec(rolled, 1..rolls));

@@ -1,4 +1,4 @@
-//! The speeds of the last second, between which a measured one lies.
+//! The speeds of the last second. A measured speed must lie between them.
 
 use std::collections::VecDeque;
 

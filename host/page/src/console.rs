@@ -1,4 +1,4 @@
-//! The console for the page: what a line says, and in which order settings can be sent.
+//! The console for the page: the meaning of lines, and the order of changed settings.
 
 use control::say::names;
 use link::settings::{Setting, Settings, explain, name, steps};
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// What a line says, as `page/src/link/grammar.ts` has it.
+/// The meaning of a line, in the form of `page/src/link/grammar.ts`.
 pub fn read(line: &str) -> Value {
     match ConsoleLine::parse(line) {
         ConsoleLine::Greeting { version, cause } => json!({ "is": "greeting", "version": version, "cause": cause }),
@@ -25,7 +25,7 @@ pub fn read(line: &str) -> Value {
     }
 }
 
-/// An event: what it is, and its fields.
+/// An event: its name and its fields.
 fn read_event(event: &EventLine) -> Value {
     let Some((name, fields)) = event.fields() else { return json!({ "is": "plot" }) };
     let fields = fields.into_iter().map(|(field, value)| {
@@ -39,7 +39,7 @@ fn read_event(event: &EventLine) -> Value {
     Value::Object([("is".to_owned(), camel_case(name).into())].into_iter().chain(fields).collect())
 }
 
-/// A name in Rust, of a field or an enum's variant, as TypeScript has it.
+/// Converts a Rust name of a field or variant to TypeScript's form.
 fn camel_case(name: &str) -> String {
     let mut camel = String::new();
     let mut begins = false;
@@ -54,7 +54,7 @@ fn camel_case(name: &str) -> String {
     camel
 }
 
-/// The status; the alarm's name from the line, so that one which is new has it too.
+/// The status. The alarm's name comes from the line, so that a newer alarm has its name too.
 fn shown_status(status: &Status, line: &str) -> Value {
     let mut shown = json!({
         "mode": status.mode.name(),
@@ -89,8 +89,8 @@ fn shown_setting(setting: &SettingValue) -> Value {
     shown
 }
 
-/// The firmware of these sources: its version, with the commit where a release is built (`control/src/say/version.rs`), and its settings'
-/// names.
+/// The firmware of these sources: its version, and its settings' names. A release's version includes the commit
+/// (`control/src/say/version.rs`).
 pub fn firmware() -> Value {
     let number = env!("CARGO_PKG_VERSION");
     let version = match option_env!("WEEDER_COMMIT") {
@@ -100,7 +100,7 @@ pub fn firmware() -> Value {
     json!({ "version": version, "settings": Setting::all().map(name).collect::<Vec<_>>() })
 }
 
-/// All settings as they are, and some as they are to be, by their names.
+/// All present settings, and the ones to change, by name.
 #[derive(Deserialize)]
 pub struct Change {
     from: BTreeMap<String, u16>,
@@ -108,15 +108,15 @@ pub struct Change {
 }
 
 impl Change {
-    /// The values to send, `[name, value]` one after the other, with no contradiction on the way; or what contradicts what in the
-    /// end. Settings and values that this version does not know go last: the firmware may know them.
+    /// The values to send as `[name, value]`, in an order without contradictions on the way; or the contradiction of
+    /// the result. Settings and values that this version does not know come last: the firmware may know them.
     pub fn steps(&self) -> Value {
         let (from, _) = settings(Settings::new(), &self.from);
         let (to, unknown) = settings(from.clone(), &self.to);
         let mut to = to;
         let is_another = |setting: Setting| setting.is_of_the_wheel() && from.get(setting) != to.get(setting);
         if Setting::all().any(is_another) && !self.to.contains_key(&name(Setting::TicksPerM)) {
-            // Nobody has measured that wheel yet: the firmware forgets the measure by itself.
+            // The new wheel has no measured value yet: the firmware resets it by itself.
             let _ = to.set(Setting::TicksPerM, 0);
         }
         if let Some(contradiction) = to.contradiction() {
@@ -145,14 +145,14 @@ mod tests {
     use expect_test::expect_file;
     use link::{EVENTS, Mode, ValueDescription};
 
-    /// A comment, if there is something to say.
+    /// A comment, unless the text is empty.
     fn comment(indent: &str, meaning: &str) -> String {
         let mut letters = meaning.chars();
         let first = letters.next().map_or(String::new(), |first| first.to_uppercase().to_string());
         format!("{indent}/** {first}{}. */\n", letters.as_str())
     }
 
-    /// The type in TypeScript of what [`read`] makes of a field.
+    /// The TypeScript type of a field in the result of [`read`].
     fn type_of(rust: &str) -> &str {
         match rust {
             "i32" | "u16" | "u8" => "number",

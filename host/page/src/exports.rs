@@ -1,10 +1,10 @@
-//! The door of the WebAssembly module: one buffer, in which a question is put and its answer is found.
+//! The interface of the WebAssembly module: one buffer for questions and answers.
 //!
-//! `room` makes room for a question and says where, `answer` answers what stands there and says where the answer is, and `length`
-//! how long. `read` takes what stands there as the next bytes of a log instead. `table` and `table_length` say where a table of its
-//! picture is. `roll` and `hear` are the machine's that rolls, and `trial_table` and `trial_table_length` say where its tables are. Each
-//! place holds until the next call. While an answer takes long, the module calls `progress`, which the page gives.
-//! No binding generator has a part in it.
+//! `room` makes room for a question and returns its address. `answer` answers the question in the buffer and returns
+//! the answer's address, and `length` returns its length. `read` takes the buffer as the next bytes of a log instead.
+//! `table` and `table_length` return a table of the log's picture. `roll` and `hear` call the rolling machine, and
+//! `trial_table` and `trial_table_length` return its tables. Each address is valid until the next call. During a long
+//! answer the module calls `progress`, which the page provides. No binding generator is used.
 
 use std::cell::RefCell;
 
@@ -17,13 +17,14 @@ unsafe extern "C" {
     fn progress_is(share: f64);
 }
 
-/// Tells the page how far a long answer is, from 0 to 1.
+/// Reports the progress of a long answer to the page, from 0 to 1.
 pub fn progress(share: f64) {
-    // SAFETY: the page gives a function with this name, which takes one number and calls nothing of this module.
+    // SAFETY: the page provides a function with this name. It takes one number and calls nothing of this module.
     unsafe { progress_is(share) }
 }
 
-// SAFETY: these names are this module's alone: it is linked with nothing but Rust's own library, which exports none of them.
+// SAFETY: only this module has these names: it is linked with nothing but Rust's own library, which exports none of
+// them.
 #[unsafe(no_mangle)]
 extern "C" fn room(length: usize) -> *mut u8 {
     BUFFER.with_borrow_mut(|buffer| {

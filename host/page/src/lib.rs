@@ -1,10 +1,10 @@
-//! What the page asks of this project's Rust, so that nothing of it is written twice: what a line of the console means, in
-//! which order settings can be sent, how the machine of "Try it" rolls and what becomes of its plants, and what a log shows.
+//! The project's Rust for the page, so that no code is written twice: the meaning of a console line, the order of
+//! changed settings, the machine and plants of "Try it", and the content of a log.
 //!
-//! [`answer`] takes a question as JSON and gives its answer as JSON: `console`, `trial` and `record` say what they look like,
-//! and `page/src/link/`, `page/src/row/` and `page/src/record/` have their types. In a browser, where this is WebAssembly, both pass
-//! through one buffer (`exports`). Nothing is remembered from one question to the next, but for the log that is read and the machine
-//! that rolls.
+//! [`answer`] takes a question as JSON and returns its answer as JSON. `console`, `trial` and `record` define their
+//! forms, and `page/src/link/`, `page/src/row/` and `page/src/record/` have their types. In a browser, as WebAssembly,
+//! both pass through one buffer (`exports`). The only state between questions is the log that is being read, and the
+//! rolling machine.
 
 mod console;
 #[cfg(target_arch = "wasm32")]
@@ -21,41 +21,41 @@ pub use trial::{hear, roll, table as trial_table};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-/// What can be asked, as an object with one key.
+/// A question, as an object with one key.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 enum Question {
     /// What does this line of the console say?
     Read(String),
-    /// Which values lead from these settings to those?
+    /// Which values change these settings to those?
     Steps(console::Change),
-    /// What is to be done next to set this machine up?
+    /// What is the next step of setting up this machine?
     SetUp(set_up::Heard),
     /// Put this machine in front of this row.
     Begin(trial::Begun),
-    /// Have this become different on the way.
+    /// Change this on the way.
     Change(trial::Different),
-    /// What has become of the plants and tall weeds that the tool has left behind?
+    /// What is the result for the plants and tall weeds behind the tool?
     Judge(trial::Kept),
-    /// Begin a log: are all of its lines to be held?
+    /// Begin a log. True keeps all its lines.
     Log(bool),
     /// What does the log show?
     Picture,
-    /// What would the firmware of these sources have made of the log?
+    /// What would the firmware of these sources have decided?
     Replay,
-    /// Put the log on the map.
+    /// Add the log to the map.
     Job,
-    /// What is the map of the logs, in these words?
+    /// What is the map of the logs, with these texts?
     Map(gps::picture::Words),
-    /// Which firmware is it that this page was built with?
+    /// Which firmware was this page built with?
     Firmware,
 }
 
-/// Takes how far a long answer is, from 0 to 1: outside of a browser nothing shows it.
+/// Ignores the progress: only a browser shows it.
 #[cfg(not(target_arch = "wasm32"))]
 fn progress(_share: f64) {}
 
-/// Answers a question: `{"answer": ...}`, or `{"error": "..."}` where the question is none.
+/// Answers a question: `{"answer": ...}`, or `{"error": "..."}` if the question is invalid.
 pub fn answer(question: &[u8]) -> String {
     let answer =
         serde_json::from_slice(question).map_err(|error| error.to_string()).and_then(|question| match question {

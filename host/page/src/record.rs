@@ -1,10 +1,10 @@
-//! A log for the page: the row as the machine has told it, on the ground, and its replay.
+//! A log for the page: the row that the machine has reported, drawn on the ground, and its replay.
 //!
-//! A log is read in pieces, as a day of it is 100 MB: [`begin`], [`take`] for each piece, and then a question about it. [`picture`]
-//! needs no line twice, so that none is held for it. Its tables are read where they lie (`exports`).
+//! A day's log is 100 MB, so it is read in pieces: [`begin`], then [`take`] for each piece, and then a question about
+//! it. [`picture`] needs each line once, so no line is kept for it. The page reads its tables in place (`exports`).
 //!
-//! Distances are millimetres that the tool has rolled since the log began, by the wheel. A reset, or another machine, begins again a metre
-//! farther on. What the log tells without a place has that of the line before.
+//! Distances are millimetres of the tool's travel since the start of the log, by the wheel. After a reset, or for
+//! another machine, the ground continues one metre farther. An event without a position has that of the line before.
 
 use control::say::command::{self, Command};
 use gps::job::{Job, Wanted};
@@ -18,7 +18,7 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// Distance between two speeds that are kept, and the time for which a status is not read behind another.
+/// Distance between two stored speeds, and the time after a status in which others are skipped.
 const SPEED_MM: f64 = 250.0;
 const SPEED_MS: u64 = 300;
 
@@ -28,9 +28,9 @@ const APART_MM: f64 = 1000.0;
 /// How a machine's count becomes ground.
 struct Ground {
     settings: Settings,
-    /// The tool's place where the encoder counts 0; none before the first place of a stretch is known.
+    /// The tool's position at the encoder's 0. `None` before the first position of a stretch.
     zero_mm: Option<f64>,
-    /// The farthest place so far.
+    /// The farthest position so far.
     end_mm: f64,
 }
 
@@ -41,7 +41,7 @@ impl Ground {
         if per_metre > 0.0 { 1000.0 / per_metre } else { PI * value(Setting::WheelMm) / value(Setting::TicksPerRev) }
     }
 
-    /// Where the tool is at a count.
+    /// The tool's position at a count.
     fn tool_mm(&mut self, position: i32) -> f64 {
         let rolled_mm = f64::from(position) * self.tick_mm();
         let zero_mm = *self.zero_mm.get_or_insert(self.end_mm - rolled_mm);
@@ -50,19 +50,19 @@ impl Ground {
         tool_mm
     }
 
-    /// Where a count in the beam lies, as ground for the tool.
+    /// The ground in the beam at a count, as a position of the tool.
     fn beam_mm(&mut self, position: i32) -> f64 {
         self.tool_mm(position) + f64::from(self.settings.get(Setting::BeamToToolMm))
     }
 }
 
-/// Something that happened on the ground, which the tool was told of.
+/// An event on the ground that changes the tool.
 struct Change {
     mm: f64,
     out: bool,
 }
 
-/// What a log shows, as `page/src/record/picture.ts` has it.
+/// The picture of a log, in the form of `page/src/record/picture.ts`.
 struct Picture {
     ground: Ground,
     /// Changes of settings that are not answered yet, and other commands.
@@ -78,8 +78,9 @@ struct Picture {
     tables: [Vec<f64>; TABLES],
 }
 
-/// The tables of a picture: for each detection its class (0 plant, 1 weed, 2 unknown), its canopy's ends and its zone's ends in mm; for
-/// each speed its place in mm, time in ms, and mm/s; the ends of each stretch with the tool in the row, in mm.
+/// The tables of a picture. For each detection: its class (0 plant, 1 weed, 2 unknown), its canopy's ends and its
+/// zone's ends in mm. For each speed: its position in mm, time in ms, and mm/s. The ends of each stretch with the tool
+/// in the row, in mm.
 const TABLES: usize = 3;
 const OBJECTS: usize = 0;
 const SPEEDS: usize = 1;
@@ -113,7 +114,7 @@ impl Picture {
             }
             Kind::Setting => {
                 if let Some((setting, value)) = shown(&entry.text) {
-                    // What this version does not take stays as it is.
+                    // A value that this version does not accept is ignored.
                     let _ = self.ground.settings.set(setting, value);
                 }
             }
@@ -158,7 +159,7 @@ impl Picture {
         match *event {
             EventLine::Detection { class, position, delay, hold, .. } => {
                 let tick_mm = ground.tick_mm();
-                // The tool comes there after so many counts.
+                // The tool reaches the zone after this number of counts.
                 let zone_mm = ground.tool_mm(position.wrapping_add(delay));
                 let zone_end_mm = zone_mm + f64::from(hold) * tick_mm;
                 let from_mm = ground.beam_mm(position);
@@ -183,12 +184,12 @@ impl Picture {
             EventLine::Warning { .. } => {
                 self.alarms.push(trouble(Values(line).text("name").unwrap_or_default(), self.here_mm, true));
             }
-            // An alarm has the tool out, and a start may have it in: the swing says so.
+            // An alarm puts the tool out, and a start may let it in: the swing reports it.
             _ => {}
         }
     }
 
-    /// The ground on which the tool was in the row: between a swing in and the next one out, or an alarm.
+    /// Adds the ground on which the tool was in the row: from a swing in to the next swing out, or to an alarm.
     fn worked(&mut self) {
         self.changes.sort_by(|one, other| one.mm.total_cmp(&other.mm));
         let mut start_mm = None;
@@ -211,9 +212,9 @@ struct Log {
     pieces: Pieces,
     /// Why it is none.
     problem: Option<String>,
-    /// Whether all of its lines are held, for a replay, or else most of its statuses are left out.
+    /// Whether all lines are kept, for a replay. Otherwise most statuses are dropped.
     is_whole: bool,
-    /// When the last status was that is not left out.
+    /// Time of the last kept status.
     kept_ms: Option<u64>,
     entries: Vec<Entry>,
     picture: Picture,
@@ -230,7 +231,7 @@ impl Log {
         Self { pieces, problem: None, is_whole, kept_ms: None, entries: Vec::new(), picture: Picture::new() }
     }
 
-    /// Takes the next bytes; all that are left where there are none.
+    /// Takes the next bytes. `None` ends the log.
     fn take(&mut self, bytes: Option<&[u8]>) {
         if self.problem.is_some() {
             return;
@@ -249,14 +250,14 @@ impl Log {
     }
 }
 
-/// Whether a line is a status that comes soon behind another one. There are a million in a day.
+/// Whether a line is a status soon after a kept one. A day has a million of them.
 fn is_near_another(line: &str, kept_ms: &mut Option<u64>) -> bool {
     let Some((time_ms, rest)) = line.split_once(',') else { return false };
     if rest.starts_with("connected,") {
         *kept_ms = None;
     }
     let Some(time_ms) = time_ms.parse::<u64>().ok().filter(|_| rest.starts_with("status,")) else { return false };
-    // Where a log is gone on with, time begins again at 0.
+    // In a continued log the time restarts at 0.
     if kept_ms.is_some_and(|kept_ms| (kept_ms..kept_ms + SPEED_MS).contains(&time_ms)) {
         return true;
     }
@@ -264,7 +265,7 @@ fn is_near_another(line: &str, kept_ms: &mut Option<u64>) -> bool {
     false
 }
 
-/// Begins another log; a `whole` one can be replayed, and another one shown.
+/// Begins another log. With `is_whole` it can be replayed, otherwise only shown.
 pub fn begin(is_whole: bool) -> Value {
     LOG.set(Log::new(is_whole));
     Value::Null
@@ -275,7 +276,7 @@ pub fn take(bytes: &[u8]) {
     LOG.with_borrow_mut(|log| log.take(Some(bytes)));
 }
 
-/// What the log shows besides its tables, or why it is none: `{"problem": "..."}`.
+/// The picture without its tables, or the error: `{"problem": "..."}`.
 pub fn picture() -> Value {
     LOG.with_borrow_mut(|log| {
         log.take(None);
@@ -291,12 +292,12 @@ pub fn picture() -> Value {
     })
 }
 
-/// A table of the picture, as long as no other log begins; empty where it has none with this number.
+/// A table of the picture, valid until another log begins. Empty if there is no such table.
 pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
     LOG.with_borrow(|log| read(log.picture.tables.get(number).map_or(&[], Vec::as_slice)))
 }
 
-/// What the decisions of these sources make of the log: on how much both agree, and the first thing on which they do not.
+/// The replay of the log by the decisions of these sources: how much agrees, and the first difference.
 pub fn replayed(progress: impl FnMut(f64)) -> Value {
     let replayed = LOG.with_borrow_mut(|log| {
         log.take(None);
@@ -317,7 +318,7 @@ pub fn replayed(progress: impl FnMut(f64)) -> Value {
     }
 }
 
-/// Puts the log on the map; why it cannot be: `{"problem": "..."}`.
+/// Adds the log to the map, or returns the error: `{"problem": "..."}`.
 pub fn job() -> Value {
     LOG.with_borrow_mut(|log| {
         log.take(None);
@@ -330,7 +331,7 @@ pub fn job() -> Value {
     })
 }
 
-/// The map of all logs that were put on it, as SVG, and how many of their things stand there; no SVG where none has a place.
+/// The map of all added logs as SVG, and how many of their objects are on it. No SVG if none has a position.
 pub fn map(words: &Words) -> Value {
     let jobs = JOBS.take();
     let drawn = draw_with(&jobs.iter().collect::<Vec<_>>(), words);
@@ -360,7 +361,7 @@ mod tests {
 496,status,state=hold tool=out pos=5 speed_mm_s=0 windows=0 unseen_mm=400
 ";
 
-    /// What a log shows that is read in pieces of so many bytes.
+    /// The picture of a log that is read in pieces of this length.
     fn shown(text: &str, length: usize) -> Value {
         begin(false);
         text.as_bytes().chunks(length).for_each(take);

@@ -1,4 +1,4 @@
-//! Setting a machine up, for the page: the steps of the manual, what is to be measured next, and the margin.
+//! Setting up a machine, for the page: the steps of the manual, the next measurement, and the margin.
 
 use crate::console::settings;
 use link::set_up::{SetUp, Step, Task, steps};
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// What was typed and said in a session, and the settings as they are, by their names.
+/// The typed lines and the output of a session, and the present settings by name.
 #[derive(Deserialize)]
 pub struct Heard {
     lines: Vec<String>,
@@ -15,7 +15,7 @@ pub struct Heard {
 }
 
 impl Heard {
-    /// The steps, and what the session tells of them, as `page/src/panel/set_up.ts` has it.
+    /// The steps, and the results of the session, in the form of `page/src/panel/set_up.ts`.
     pub fn advice(&self) -> Value {
         let set_up = SetUp::of_lines(self.lines.iter().map(String::as_str));
         let (settings, _) = settings(Settings::new(), &self.settings);
@@ -35,7 +35,7 @@ impl Heard {
     }
 }
 
-/// What a task has of the simulated machine; empty for a measurement.
+/// The simulated machine's value for a task; empty for a measurement.
 fn task(task: &Task) -> String {
     match task {
         Task::Fit(part, value) => format!("{part} = {value}"),

@@ -1,8 +1,8 @@
-//! The machine and the row of "Try it", beside the virtual Uno that the page runs: [`field::rolling`], and of what the tool has left
-//! behind what [`field::verdict`] makes of it.
+//! The machine and the row of "Try it", for the page's virtual Uno: [`field::rolling`], with the verdicts of
+//! [`field::verdict`] on the ground behind the tool.
 //!
-//! There is one of them, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are no
-//! questions: what the page needs of them stands in tables of numbers ([`table`]).
+//! There is one trial, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are
+//! direct calls and no questions. Their results are in tables of numbers ([`table`]).
 
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
@@ -18,23 +18,23 @@ use uno::Pulse;
 
 /// Ground that lies sown ahead of the beam.
 const SOWN_AHEAD_MM: f64 = 2000.0;
-/// Ground behind a plant's margin at which it is judged: by then the tool could have begun to come back too early.
+/// Ground behind a plant's margin before it is judged: until then the tool could come back too early.
 const BEHIND_MM: f64 = 20.0;
-/// Before the next thing to be judged, this much ground is remembered: more than the tool needs to swing, at any speed.
+/// Ground in memory before the next thing to judge: more than the tool needs to swing, at any speed.
 const BEFORE_MM: f64 = 500.0;
-/// An arm within this angle of fully out is fully out: half a millimetre at the tool's end, and 1 us of a pulse, whose edges avr8js
-/// does not place more exactly (docs/simulators.md).
+/// An arm within this angle of fully out counts as fully out. It is half a millimetre at the tool's end, and 1 us of a
+/// pulse: avr8js does not time edges more exactly (docs/simulators.md).
 const CLEAR_WITHIN_DEGREES: f64 = 0.09;
 
-/// A machine in front of a row. What is not given is as on the machine straight from the box.
+/// A machine before a row. Missing values are those of the machine from the box.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Begun {
-    /// The Uno's cycle at which it stands there, with the beam at 0 mm.
+    /// The Uno's cycle at this moment, with the beam at 0 mm.
     cycle: u64,
-    /// What stands in the row.
+    /// The things in the row.
     things: Vec<Standing>,
-    /// How the row goes on behind that; it ends there without.
+    /// The parameters of the row's continuation. Without them the row ends.
     sowing: Option<Sown>,
     tool_width_mm: Option<f64>,
     second_beam_mm: Option<f64>,
@@ -55,31 +55,31 @@ struct Standing {
 struct Sown {
     seed: u64,
     spacing_mm: f64,
-    /// Share of the gaps in which a tall weed stands.
+    /// Share of the gaps with a tall weed.
     weed_share: f64,
-    /// Where the first plant stands.
+    /// The position of the first plant.
     first_mm: f64,
 }
 
-/// What becomes different from now on.
+/// A change from now on.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Different {
-    /// The speed that the machine comes to, in km/h; negative backwards.
+    /// The new speed in km/h; negative backwards.
     SpeedKmH(f64),
-    /// The share of the wheel's way that is lost, below 1.
+    /// The share of the wheel's distance that is lost, below 1.
     Slip(f64),
     /// Whether the first beam's wire is torn.
     BeamWireTorn(bool),
     /// Whether the encoder is dead.
     EncoderDead(bool),
-    /// The spacing of what is yet to be sown.
+    /// The spacing of plants that are sown from now on.
     SpacingMm(f64),
-    /// The share of its gaps in which a tall weed stands.
+    /// The share of their gaps with a tall weed.
     WeedShare(f64),
 }
 
-/// What the firmware is to keep free of a plant.
+/// The firmware's zone and margin of a plant.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Kept {
@@ -118,24 +118,25 @@ impl From<Verdict> for Fared {
     }
 }
 
-/// The machine with its row, and what of that is judged.
+/// The machine with its row and its verdicts.
 struct Trial {
     rolling: Rolling,
     sowing: Option<Sowing>,
     faults: Faults,
-    /// The first thing that is not judged, or is to be judged again.
+    /// The first thing without a verdict, or to be judged again.
     next: usize,
-    /// What is known of things, by their numbers in the row. Of a plant that is passed again the worse stands, of a weed the better.
+    /// The verdicts by number in the row. If the tool passes again, a plant keeps the worse verdict and a weed the
+    /// better one.
     fates: Vec<Option<Fate>>,
-    /// When what was written down of the way begins.
+    /// Start time of the recorded motion.
     from_s: f64,
     tables: [Vec<f64>; 3],
-    /// Things of the row that the page knows.
+    /// Number of things that were passed to the page.
     told: usize,
 }
 
-/// The tables, by their numbers: how the machine is now, what has happened at the pins (cycle, pin, level), and what was sown
-/// (0 for a plant and 1 for a weed, place, width).
+/// The tables, by number: the machine's state, the changes at the pins (cycle, pin, level), and the sown things (0 for
+/// a plant and 1 for a weed, position, width).
 const NOW: usize = 0;
 const CHANGES: usize = 1;
 const SOWN: usize = 2;
@@ -144,13 +145,13 @@ thread_local! {
     static TRIAL: RefCell<Option<Trial>> = const { RefCell::new(None) };
 }
 
-/// Does something with the trial, where one was begun.
+/// Runs `act` on the trial, if there is one.
 fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Option<Answer> {
     TRIAL.with_borrow_mut(|trial| trial.as_mut().map(act))
 }
 
 impl Begun {
-    /// Begins, in the place of what was there before. Gives the machine's dimensions, and the levels of its pins.
+    /// Begins a trial, and replaces an earlier one. Returns the machine's dimensions, and the levels of its pins.
     pub fn begin(self) -> Result<Value, String> {
         let servo = Servo::default();
         let servo = Servo {
@@ -200,7 +201,7 @@ impl Begun {
 }
 
 impl Different {
-    /// Makes it so. Gives the levels of the machine's pins.
+    /// Applies the change. Returns the levels of the machine's pins.
     pub fn take(self) -> Result<Value, String> {
         with(|trial| {
             let Trial { rolling, sowing, faults, .. } = trial;
@@ -221,7 +222,7 @@ impl Different {
 }
 
 impl Kept {
-    /// Judges what lies behind the tool by now, and is not judged: a list of numbers in the row, each with what became of it.
+    /// Judges the things behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
     pub fn judge(&self) -> Result<Value, String> {
         with(|trial| json!(trial.judge(self))).ok_or_else(not_begun)
     }
@@ -264,7 +265,7 @@ pub fn table<Answer>(number: usize, use_it: impl FnOnce(&[f64]) -> Answer) -> An
 }
 
 impl Trial {
-    /// Puts into its table how the machine is.
+    /// Writes the machine's state into its table.
     fn tell_now(&mut self) {
         let Self { rolling, tables, .. } = self;
         let machine = &rolling.machine;
@@ -286,7 +287,7 @@ impl Trial {
         ];
     }
 
-    /// Puts into its table what was sown since that was last told.
+    /// Writes the newly sown things into their table.
     fn tell_sown(&mut self) {
         let Self { rolling, tables, told, .. } = self;
         let kind = |kind: Kind| if kind == Kind::Plant { 0.0 } else { 1.0 };
@@ -337,7 +338,7 @@ impl Trial {
         judged
     }
 
-    /// Forgets what was before the tool came near the next thing to be judged.
+    /// Forgets the motion from before the tool came near the next thing to judge.
     fn forget(&mut self) {
         let tool_mm = self.rolling.tool_mm();
         let next_mm = self.rolling.row.get(self.next).map_or(tool_mm, |next| next.span_mm().start.min(tool_mm));
@@ -353,8 +354,8 @@ impl Trial {
 mod tests {
     use super::*;
 
-    /// The verdicts where the tool goes in and out at these places of the beam, at half a metre a second, with a plant at 1000 and a
-    /// weed at 1400 mm.
+    /// The verdicts for a tool that swings at these positions of the beam, at half a metre a second, with a plant at
+    /// 1000 and a weed at 1400 mm.
     fn judged(swings_mm: &[f64]) -> Value {
         let begun = json!({
             "cycle": 1_000_000,

@@ -1,14 +1,14 @@
-//! The door: which requests come in at all, before anybody asks what they want.
+//! The first check of a request: decides whether it is let in, before its path is read.
 //!
-//! A request has to name the address at which it came in as its host, exactly: a page of somebody else's whose name was made to
-//! lead here (DNS rebinding) names its own. What a page of another origin sends is refused, and so is whatever wants to do something
-//! and does not say where it comes from. Over the network, all but the form for the code is for those who are paired.
+//! The request's `Host` must be exactly an address of this server. A foreign page whose name was made to lead here (DNS
+//! rebinding) sends its own name. Requests from a page of another origin are refused. So are requests that want to
+//! change something and name no origin. Over the network, unpaired clients get only the form for the code.
 
 use super::rules::Reach;
 use std::net::Ipv4Addr;
 use thiserror::Error;
 
-/// Paths at which whoever is not paired yet finds the form for the code, and nothing else.
+/// Paths that are open to unpaired clients: the form for the code.
 const FORM: [&str; 4] = ["/", "/pair", "/pair.css", "/pair.js"];
 
 /// An address at which requests come in.
@@ -16,39 +16,39 @@ const FORM: [&str; 4] = ["/", "/pair", "/pair.css", "/pair.js"];
 pub struct Door {
     /// From where they come.
     pub reach: Reach,
-    /// Its names, as a request has to write them.
+    /// The valid values of a request's `Host`.
     names: Vec<String>,
 }
 
-/// What the door has to know of a request. A header that stands there twice is there with both of its values.
+/// The parts of a request that the door checks. A header that occurs twice has both of its values here.
 #[derive(Clone, Copy, Debug)]
 pub struct Knock<'a> {
-    /// Whether it only looks, as GET and HEAD do.
+    /// Whether it changes nothing: GET and HEAD.
     pub only_looks: bool,
-    /// Where it wants to go: a path.
+    /// Its path.
     pub path: &'a str,
-    /// Whether the target names a host as well, as one for a proxy does.
+    /// Whether its target also names a host, as in a request to a proxy.
     pub is_for_proxy: bool,
     /// `Host`.
     pub hosts: &'a [&'a [u8]],
     /// `Origin`.
     pub origins: &'a [&'a [u8]],
-    /// `Sec-Fetch-Site`: from where a page asks, where the browser says so.
+    /// `Sec-Fetch-Site`: the origin of the request, if the browser sends it.
     pub sites: &'a [&'a [u8]],
-    /// Whether its cookie is that of somebody who is paired.
+    /// Whether its cookie belongs to a paired browser.
     pub is_paired: bool,
 }
 
 /// Why a request does not come in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Denial {
-    /// It means somebody else.
+    /// Its `Host` is not an address of this server.
     #[error("this is not the address that `weeder serve` printed: type that one, with its number")]
     ForeignHost,
-    /// It comes from a page of somebody else's, or does not say from which.
+    /// It comes from a page of another origin, or names no origin.
     #[error("this request comes from another page: open the address that `weeder serve` printed")]
     ForeignOrigin,
-    /// It has shown no code.
+    /// It has no valid token.
     #[error("this phone is not paired: open the address that `weeder serve` printed, and type its code")]
     NotPaired,
 }
@@ -79,7 +79,7 @@ impl Door {
     /// Lets a request in.
     ///
     /// # Errors
-    /// Why it stays out.
+    /// The reason for refusing it.
     pub fn admit(&self, knock: &Knock) -> Result<(), Denial> {
         let is_name = |host: &[u8]| self.names.iter().any(|name| name.as_bytes() == host);
         let host = match knock.hosts {
@@ -87,12 +87,13 @@ impl Door {
             _ => return Err(Denial::ForeignHost),
         };
         match knock.origins {
-            // A browser leaves it out where a page looks at something of its own.
+            // A browser omits the origin when a page reads from its own server.
             [] if knock.only_looks => {}
             [origin] if origin.strip_prefix(b"http://") == Some(host) => {}
             _ => return Err(Denial::ForeignOrigin),
         }
-        // What a page of somebody else's puts into itself as a picture has no origin. A link to the front is followed all the same.
+        // A foreign page can embed a path of this server as a picture, and such a request has no origin. A link to the
+        // front page is followed all the same.
         let is_own = |site: &&[u8]| matches!(*site, b"same-origin" | b"none");
         if knock.path != "/" && !knock.sites.iter().all(is_own) {
             return Err(Denial::ForeignOrigin);
@@ -105,7 +106,7 @@ impl Door {
     }
 }
 
-/// The names of a host at a port: browsers leave out the port where it is http's own.
+/// The names of a host at a port. Browsers omit http's default port.
 fn named(host: &str, port: u16) -> Vec<String> {
     let with_port = format!("{host}:{port}");
     if port == 80 { vec![with_port, host.to_owned()] } else { vec![with_port] }
@@ -138,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn another_host_stays_out_everywhere_whatever_else_is_right() {
+    fn another_host_is_refused_everywhere_even_if_all_else_is_right() {
         let hosts: [&[&[u8]]; 9] = [
             &[],
             &[b""],
@@ -204,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_computer_itself_nobody_needs_a_code_but_its_own_name_and_origin() {
+    fn at_the_computer_itself_the_name_and_the_origin_suffice_without_a_code() {
         let door = Door::here(8866);
         for host in ["127.0.0.1:8866", "localhost:8866"] {
             let origin = format!("http://{host}");

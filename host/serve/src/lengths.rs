@@ -1,10 +1,11 @@
-//! Finds requests that give their body's length in two ways, `Content-Length` and `Transfer-Encoding`.
+//! Finds requests that give the length of their body twice, by `Content-Length` and by `Transfer-Encoding`.
 //!
-//! hyper drops the first of the two before anything else sees the request, so the lines are counted as they come in. A request with
-//! `Transfer-Encoding` is refused where more `Content-Length` lines have come than the requests have shown. Bytes that a client sends
-//! ahead count as well: a client that does not wait for its answer is refused with it, and none is let through.
+//! hyper drops the first of the two before any other code sees the request. So this module counts the lines as they are
+//! received. A request with `Transfer-Encoding` is refused if more `Content-Length` lines were received than the
+//! requests have shown. Bytes that a client sends ahead count as well. So a client that does not wait for its answer
+//! may be refused, but no bad request passes.
 //!
-//! RFC 9112, section 6.1: such a request may be an attempt to smuggle another one, and ought to be handled as an error.
+//! RFC 9112, section 6.1: such a request may be an attempt at request smuggling, and should be handled as an error.
 
 use std::io;
 use std::pin::Pin;
@@ -23,22 +24,23 @@ pub struct Lengths {
 }
 
 impl Lengths {
-    /// Whether a request gives its length in two ways. It shows so many `Content-Length` lines, and maybe a `Transfer-Encoding`.
+    /// Whether a request gives its length twice. `shown` is its number of `Content-Length` lines; `is_encoded` is true
+    /// if it has a `Transfer-Encoding`.
     pub fn are_two(&self, shown: usize, is_encoded: bool) -> bool {
         let shown = self.shown.fetch_add(shown, Ordering::Relaxed) + shown;
         is_encoded && shown != self.come.load(Ordering::Relaxed)
     }
 }
 
-/// Finds the lines in what comes.
+/// Finds the lines in received bytes.
 #[derive(Default)]
 struct Lines {
-    /// Bytes of the name that this line begins with; nothing where it begins otherwise.
+    /// Matched bytes of the name at the beginning of this line. `None` if the line has another beginning.
     matched: Option<usize>,
 }
 
 impl Lines {
-    /// The lines whose name is complete with these bytes.
+    /// The number of lines whose name is completed by these bytes.
     fn count(&mut self, bytes: &[u8]) -> usize {
         let mut lines = 0;
         for byte in bytes {
@@ -56,7 +58,7 @@ impl Lines {
     }
 }
 
-/// A stream whose lines are counted as they are read.
+/// A stream that counts these lines as they are read.
 pub struct Counted<S> {
     stream: S,
     lines: Lines,
@@ -64,7 +66,7 @@ pub struct Counted<S> {
 }
 
 impl<S> Counted<S> {
-    /// Counts what comes by a stream.
+    /// Counts the lines of a stream.
     pub fn new(stream: S, lengths: Arc<Lengths>) -> Self {
         Self { stream, lines: Lines::default(), lengths }
     }

@@ -1,11 +1,13 @@
-//! The page over http, from the computer that has the serial ports of one machine or several to a phone in the cab.
+//! Serves the page over http: from the computer with the serial ports of one or more machines to a phone in the cab.
 //!
-//! [`Server::open`] takes the addresses and starts the machines, [`Server::run`] serves until it is told to stop. What may be decided
-//! without a network is decided without one, in parts that know neither socket nor clock: [`door`] says which requests come in,
-//! [`pairing`] who may come in over the network, [`rules`] what may be typed from where. [`machine`] talks to one machine in a thread
-//! of its own, [`hub`] tells all pages what the machines say, and `routes` and this file are the shell round them.
+//! [`Server::open`] binds the addresses and starts the machines. [`Server::run`] serves until it is stopped. The
+//! decisions are in modules without sockets and clocks. [`door`] decides which requests come in. [`pairing`] decides
+//! which phones may use the network. [`rules`] decides which commands may be typed from where. [`machine`] talks to one
+//! machine in its own thread. [`hub`] sends the machines' output to all pages. `routes` and this file connect these
+//! modules to the network.
 //!
-//! It is for a network that one trusts to be read: http is not encrypted. It flashes nothing, and gives no file away but the page's own.
+//! http is not encrypted: use it only in a network in which others may read. The server flashes nothing, and serves no
+//! files except the page's own.
 
 pub mod door;
 pub mod hub;
@@ -48,41 +50,42 @@ use tokio_io_timeout::TimeoutStream;
 pub use self::machine::Tell;
 pub use link::rows::Opener;
 
-/// Time in which a request's head has to come, the time before it included.
+/// Time limit for a request's head, including the wait before it.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 
-/// Bytes of a request's head, and of an answer that waits for its reader, beside what the system keeps.
+/// Greatest size of a request's head, and of a buffered answer, in bytes, besides the system's buffer.
 const HEAD_BYTES: usize = 8 * 1024;
 
-/// Bytes that the system keeps for a reader, as it counts them.
+/// Size of the system's send buffer, as the system counts it.
 const UNREAD_BYTES: u32 = 16 * 1024;
 
-/// Time in which a reader has to take at least a byte of what waits for him.
+/// Time in which a client must read at least one byte of a waiting answer.
 const READER_TIME: Duration = Duration::from_secs(5);
 
-/// Connections that wait at a door until they are taken: a reader whose first packet is dropped sends it again after a second.
+/// Greatest number of connections that wait to be accepted. A client whose first packet is dropped sends it again only
+/// after a second.
 const BACKLOG: u32 = 1024;
 
-/// Time between two looks at whether to stop.
+/// Time between two checks whether to stop.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What is to be served, where.
+/// What to serve, and where.
 pub struct Setup {
-    /// The machines: a name, and the way to each.
+    /// The machines: a name, and a function that opens its link.
     pub machines: Vec<(String, Opener)>,
     /// The page.
     pub page: Page,
-    /// The TCP port; 0 takes one that is free.
+    /// The TCP port; 0 takes a free one.
     pub port: u16,
-    /// This computer's address in the network, if it is to be served there as well.
+    /// This computer's address in the network, to serve there as well.
     pub lan: Option<Ipv4Addr>,
     /// Whether paired phones may start the machines.
     pub may_start: bool,
-    /// Says something to the operator.
+    /// Prints a message for the operator.
     pub tell: Tell,
 }
 
-/// Why it is not served.
+/// The errors of starting the server.
 #[derive(Debug, Error)]
 pub enum ServeError {
     /// The computer is in no network.
@@ -92,12 +95,12 @@ pub enum ServeError {
     #[error("this computer has several addresses: choose the one of the phone's network, as in `--lan {}`, of {}",
         .0[0], .0.iter().map(Ipv4Addr::to_string).collect::<Vec<_>>().join(", "))]
     SeveralNetworks(Vec<Ipv4Addr>),
-    /// An address that stands for all, or for this computer alone by its usual name.
+    /// An address that means all networks, or only this computer.
     #[error(
         "{0} is no address for a phone to open: name this computer's own in the phone's network, or say --lan alone"
     )]
     NoAddress(Ipv4Addr),
-    /// Something else has the port.
+    /// Another program uses the port.
     #[error("port {} of {} is in use: end what has it, or choose another by --http-port", .0.port(), .0.ip())]
     InUse(SocketAddr),
     /// The address is another computer's.
@@ -129,7 +132,7 @@ impl Server {
     /// Takes the addresses, and starts to talk to the machines. A machine that is not there is waited for.
     ///
     /// # Errors
-    /// Where an address cannot be had.
+    /// If an address cannot be had.
     pub fn open(setup: Setup) -> Result<Self, ServeError> {
         let runtime = runtime::Builder::new_current_thread().enable_io().enable_time().build();
         let runtime = runtime.map_err(|error| ServeError::System("way to wait for sockets", error))?;
@@ -151,12 +154,12 @@ impl Server {
         Ok(Self { runtime, doors, routes, here, lan: lan.map(|address| (address, code)) })
     }
 
-    /// Where this computer itself opens the page.
+    /// The page's address on this computer.
     pub fn here(&self) -> SocketAddr {
         self.here
     }
 
-    /// Where a phone opens it, and the code that it needs.
+    /// The page's address for a phone, and the code for pairing.
     pub fn lan(&self) -> Option<(SocketAddr, &Code)> {
         self.lan.as_ref().map(|(address, code)| (*address, code))
     }
@@ -171,7 +174,7 @@ impl Server {
                 sleep(LOOK).await;
             }
         });
-        // Whoever listens is not waited for.
+        // Open connections are closed without waiting for their clients.
         self.runtime.shutdown_background();
     }
 }
@@ -179,7 +182,7 @@ impl Server {
 /// This computer's address in its network, where it is in one.
 ///
 /// # Errors
-/// Where it is in none, or in several.
+/// If it is in none, or in several.
 pub fn find_lan() -> Result<Ipv4Addr, ServeError> {
     let addresses = if_addrs::get_if_addrs().map_err(|error| ServeError::System("list of its addresses", error))?;
     only_lan(addresses.into_iter().filter_map(|interface| match interface.ip() {
@@ -189,7 +192,8 @@ pub fn find_lan() -> Result<Ipv4Addr, ServeError> {
 }
 
 fn only_lan(addresses: impl Iterator<Item = Ipv4Addr>) -> Result<Ipv4Addr, ServeError> {
-    // Others are seen from everywhere, or by nobody else; whoever wants one of them names it.
+    // Other addresses are visible from everywhere, or to this computer alone. The operator must name one of them
+    // explicitly.
     let mut networks: Vec<Ipv4Addr> =
         addresses.filter(|address| address.is_private() || address.is_link_local()).collect();
     networks.dedup();
@@ -219,15 +223,16 @@ fn listen(lan: Option<Ipv4Addr>, port: u16, may_start: bool) -> Result<Listening
     Ok(Listening { doors, here, lan: Some(bound) })
 }
 
-/// Listens at an address, and says which port that was.
+/// Listens at an address. Returns also the port.
 fn bind(address: Ipv4Addr, port: u16) -> Result<(TcpListener, SocketAddr), ServeError> {
     let asked = SocketAddr::from((address, port));
     let bind = || {
         let socket = TcpSocket::new_v4()?;
-        // As it is after the end of the one before, whose connections linger; on Windows it would share the port.
+        // The address may be reused while old connections of an earlier server linger. On Windows this option would
+        // share the port.
         #[cfg(unix)]
         socket.set_reuseaddr(true)?;
-        // Those that it accepts have the same.
+        // Accepted connections inherit it.
         socket.set_send_buffer_size(UNREAD_BYTES)?;
         socket.bind(asked)?;
         let listener = socket.listen(BACKLOG)?;
@@ -241,10 +246,11 @@ fn bind(address: Ipv4Addr, port: u16) -> Result<(TcpListener, SocketAddr), Serve
     })
 }
 
-/// Takes connections at a door. Each gets a place, and some other connection may lose its own by that.
+/// Accepts connections at a door. Each gets a place. If there is none, another connection loses its place.
 async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: Router) {
     loop {
-        // One that has gone again is no reason to stop; where there are no more files, some end.
+        // A connection that has closed again is no reason to stop. If the process is out of file handles, some
+        // connections end soon.
         let Ok((stream, peer)) = listener.accept().await else {
             sleep(LOOK).await;
             continue;
@@ -255,17 +261,17 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
             Visitor { address: peer.ip(), door: Arc::clone(&door), place: place.into(), lengths: Arc::clone(&lengths) };
         let routes = routes.clone().layer(Extension(visitor));
         tokio::spawn(async move {
-            // What is not served any more is closed.
+            // Closes the connection at its end, or when it loses its place.
             select(pin!(serve(stream, lengths, routes)), end).await;
         });
     }
 }
 
-/// Serves a connection to its end. Whoever sends too slowly or does not read is let go of.
+/// Serves a connection to its end. Closes it if the client sends too slowly or does not read.
 async fn serve(stream: TcpStream, lengths: Arc<Lengths>, routes: Router) {
-    // It is only slower where it fails.
+    // Without this option the connection is only slower.
     let _ = stream.set_nodelay(true);
-    // Without this, what the reader does not take has to fill the system's buffer before the time begins.
+    // Without this option the time limit begins only when the system's buffer is full.
     #[cfg(any(target_os = "linux", target_os = "android"))]
     let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(READER_TIME));
     let mut stream = TimeoutStream::new(Counted::new(stream, lengths));
@@ -275,7 +281,7 @@ async fn serve(stream: TcpStream, lengths: Arc<Lengths>, routes: Router) {
         .header_read_timeout(HEAD_TIME)
         .max_buf_size(HEAD_BYTES)
         .serve_connection(TokioIo::new(Box::pin(stream)), TowerToHyperService::new(routes));
-    // However it has ended, it has; the page comes again.
+    // Errors are ignored: the page connects again.
     let _ = connection.await;
 }
 

@@ -1,4 +1,5 @@
-//! The page's three files, as they lie in their folder or as a release has them in this program, and the form for the code, which is a part of this program.
+//! The page's three files, read from their folder or included in a release, and the form for the code, which is always
+//! included.
 
 use axum::body::Bytes;
 use std::fs;
@@ -6,11 +7,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// A file as it is given away.
+/// A file as it is served.
 pub struct File {
     /// Its media type.
     pub media: &'static str,
-    /// What is in it, which all who ask for it share.
+    /// Its content, shared by all answers.
     pub content: Bytes,
 }
 
@@ -43,7 +44,7 @@ impl Page {
     /// Reads the page's files.
     ///
     /// # Errors
-    /// Where one of them is not there.
+    /// If one of them is not there.
     pub fn read(folder: &Path) -> Result<Self, NoPage> {
         let read = |name: &str| {
             let path = folder.join(name);
@@ -52,7 +53,7 @@ impl Page {
         Ok(Self::of([read("index.html")?, read("page.css")?, read("page.js")?]))
     }
 
-    /// The page in this program: a release has one.
+    /// The included page. Only a release has one.
     pub fn inside() -> Option<Self> {
         INSIDE.map(|files| Self::of(files.map(Bytes::from_static)))
     }

@@ -1,14 +1,15 @@
-//! Pairing: a code that stands on the terminal, typed or scanned on a phone once, for a token that its browser shows from then on.
+//! Pairing: the operator types or scans the terminal's code on a phone once, and its browser then presents a token.
 //!
-//! Code and tokens come from outside, out of the system's randomness; so does the time. Both are compared in a time that
-//! says nothing of how much was right. After five wrong codes no code is taken for a minute, the right one included, whoever
-//! types it: an address is easily changed. The code has 40 bits, of which that leaves nobody more than a guess in a hundred million a day.
+//! The caller passes the code and the tokens, made from the system's random source, and the time. Comparison takes
+//! constant time, so its duration does not tell how much was right. After five wrong codes every code is refused for a
+//! minute, also the right one and from any address, because an address is easily changed. The code has 40 bits. At this
+//! rate an attacker guesses it with a chance of one in a hundred million a day.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
 
-/// Characters of a code: no I, L, O and U, which are taken for others.
+/// Characters of a code. I, L, O and U are left out, because they are easily misread.
 const ALPHABET: &[u8; 32] = b"0123456789ABCDEFGHJKMNPQRSTVWXYZ";
 
 /// Characters in a code.
@@ -17,16 +18,16 @@ pub const CODE_LENGTH: usize = 8;
 /// Bytes in a token.
 pub const TOKEN_LENGTH: usize = 32;
 
-/// Wrong codes after which none is taken for a while.
+/// Wrong codes after which codes are refused for some time.
 const TRIES: u32 = 5;
 
-/// For how long none is taken then.
+/// How long codes are then refused.
 const LOCKED_FOR: Duration = Duration::from_secs(60);
 
-/// Phones that are paired at the most; where another comes, the one that came first has to pair again.
+/// Greatest number of paired phones. A further one replaces the oldest, which must pair again.
 const PHONES: usize = 32;
 
-/// What a browser shows once it is paired.
+/// The secret that a paired browser presents.
 pub type Token = [u8; TOKEN_LENGTH];
 
 /// A pairing code.
@@ -36,22 +37,23 @@ pub struct Code([u8; CODE_LENGTH]);
 impl Code {
     /// The code of some random bytes.
     pub fn new(random: [u8; CODE_LENGTH]) -> Self {
-        // 32 characters: each of them is as likely as the others.
+        // There are 32 characters, so all are equally likely.
         Self(random.map(|byte| ALPHABET[usize::from(byte) % ALPHABET.len()]))
     }
 
-    /// The code as it is put into an address.
+    /// The code for an address.
     pub fn text(&self) -> String {
         self.0.iter().copied().map(char::from).collect()
     }
 
-    /// The code as it is read out and typed: K7QM-2F9X.
+    /// The code for reading and typing: K7QM-2F9X.
     pub fn spelled(&self) -> String {
         let text = self.text();
         format!("{}-{}", &text[..CODE_LENGTH / 2], &text[CODE_LENGTH / 2..])
     }
 
-    /// Whether this was typed: letters of either size, with blanks and dashes, and what is easily taken for another.
+    /// Whether the typed text is this code. It accepts upper and lower case, blanks, dashes, and characters that are
+    /// easily confused.
     fn is(&self, typed: &str) -> bool {
         let mut characters =
             typed.bytes().filter(|byte| !matches!(byte, b' ' | b'-')).map(|byte| match byte.to_ascii_uppercase() {
@@ -65,37 +67,37 @@ impl Code {
     }
 }
 
-/// What came of a try.
+/// The result of a try.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Try {
     /// It was the code.
     Right,
-    /// It was not, and so many wrong ones may follow before codes are locked out; none: they are now.
+    /// It was wrong. `left` more wrong codes are allowed; after 0 codes are refused for some time.
     Wrong {
         /// Tries that are left.
         left: u32,
     },
-    /// No code is taken for so long.
+    /// Codes are refused for this time.
     Locked(Duration),
 }
 
-/// Who is paired, and who tries to be.
+/// The paired phones, and the count of wrong codes.
 pub struct Pairing {
     code: Code,
     wrong: u32,
     locked_until: Option<Instant>,
-    /// Their numbers, which are not used again, and their tokens as a cookie has them.
+    /// Their numbers, which are never reused, and their tokens in the form of the cookie.
     paired: VecDeque<(u64, String)>,
     next: u64,
 }
 
 impl Pairing {
-    /// Nobody is paired yet.
+    /// No browser is paired yet.
     pub fn new(code: Code) -> Self {
         Self { code, wrong: 0, locked_until: None, paired: VecDeque::new(), next: 0 }
     }
 
-    /// Somebody types a code. Where it is right, he is to be given a [`token`](Self::pair).
+    /// Checks a typed code. If it is right, the caller gives the browser a [`token`](Self::pair).
     pub fn try_code(&mut self, typed: &str, now: Instant) -> Try {
         if let Some(until) = self.locked_until {
             if now < until {
@@ -114,7 +116,7 @@ impl Pairing {
         Try::Wrong { left: TRIES - self.wrong }
     }
 
-    /// Pairs whoever has this token from now on; returns how many are paired.
+    /// Pairs the browser with this token; returns the number of paired browsers.
     pub fn pair(&mut self, token: Token) -> usize {
         if self.paired.len() == PHONES {
             self.paired.pop_front();
@@ -126,14 +128,14 @@ impl Pairing {
 
     /// The number of the phone with this token, in 64 hexadecimal digits, if it is paired.
     pub fn phone(&self, shown: &str) -> Option<u64> {
-        // All are compared, to the end.
+        // All are compared to the end, so that the time reveals nothing.
         self.paired.iter().fold(None, |found, (number, token)| {
             if bool::from(token.as_bytes().ct_eq(shown.as_bytes())) { Some(*number) } else { found }
         })
     }
 }
 
-/// A token as a cookie has it.
+/// A token in the form of the cookie.
 pub fn hexadecimal(token: &Token) -> String {
     token.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -205,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn who_shows_a_token_is_paired_and_nobody_else() {
+    fn only_a_phone_with_a_token_is_paired() {
         let mut pairing = pairing();
         assert_eq!((pairing.phone(""), pairing.phone(&"0".repeat(64))), (None, None));
         assert_eq!((pairing.pair([1; TOKEN_LENGTH]), pairing.pair([2; TOKEN_LENGTH])), (1, 2));

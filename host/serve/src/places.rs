@@ -1,10 +1,10 @@
-//! How many connections a door has, so that HOLD always finds a place.
+//! Limits the connections of a door, so that HOLD always gets one.
 //!
-//! A connection is in one [`Stage`] at a time, and each stage has places of its own. New connections take none from the clients that
-//! are known, event streams take none from questions, and neither takes one from HOLD. No connection is refused: where a stage is
-//! full, the client with the most connections in it loses one. So a client with one connection keeps it.
+//! A connection is in one [`Stage`] at a time, and each stage has its own places. So new connections take no place from
+//! known clients, event streams take none from commands, and neither takes one from HOLD. No connection is refused. If
+//! a stage is full, the client with the most connections in it loses one. So a client with one connection keeps it.
 //!
-//! It is by hand because the limits of `tower` are of requests, and treat all clients alike.
+//! The limits of `tower` do not fit: they count requests, and treat all clients alike.
 
 use std::convert::Infallible;
 use std::net::IpAddr;
@@ -19,18 +19,18 @@ const PLACES: usize = 32;
 pub enum Stage {
     /// It has not sent a whole request of a known client: it is new, half open, or not paired.
     Opening,
-    /// It has: it waits for an answer, reads it, or is kept for the next request.
+    /// It waits for an answer, reads it, or stays open for the next request.
     Asking,
     /// It hears the events.
     Listening,
-    /// It has asked for HOLD.
+    /// It has requested HOLD.
     Holding,
 }
 
 /// The other end of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Client {
-    /// An address that has shown nothing yet.
+    /// An address that has not identified itself yet.
     Address(IpAddr),
     /// A paired phone, by its number.
     Phone(u64),
@@ -53,21 +53,21 @@ struct Taken {
     number: u64,
     client: Client,
     stage: Stage,
-    /// The connection ends when this is dropped.
+    /// Dropping this ends the connection.
     _end: Sender<Infallible>,
 }
 
-/// A place, which is free again when this is dropped.
+/// A place. It is free again when this is dropped.
 pub struct Place {
     number: u64,
     places: Places,
 }
 
-/// Completes, with an error, when a connection has lost its place.
+/// Completes, with an error, when a connection loses its place.
 pub type End = Receiver<Infallible>;
 
 impl Places {
-    /// A place for a new connection, and its end.
+    /// A place for a new connection, and the signal for its end.
     pub fn take(&self, address: IpAddr) -> (Place, End) {
         let (end, ended) = oneshot::channel();
         let mut table = self.table();
@@ -78,13 +78,13 @@ impl Places {
     }
 
     fn table(&self) -> MutexGuard<'_, Table> {
-        // Each change of it is whole.
+        // No panic can leave it half changed.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Table {
-    /// Adds a connection as the last of its stage. Where the stage is full, another one goes.
+    /// Adds a connection as the newest of its stage. If the stage is full, another one loses its place.
     fn enter(&mut self, new: Taken) {
         let stage = new.stage;
         let others: Vec<&Taken> = self.taken.iter().filter(|taken| taken.stage == stage).collect();
@@ -97,7 +97,7 @@ impl Table {
             let goes = match stage {
                 // A page that listens already stays with its machines.
                 Stage::Listening => those.next_back(),
-                // One that waits for its client is the oldest soon; one that is just answered is not.
+                // A connection that waits for its client soon becomes the oldest. One that was just answered is not.
                 Stage::Opening | Stage::Asking | Stage::Holding => those.next(),
             };
             if let Some(number) = goes.map(|taken| taken.number) {
@@ -114,7 +114,8 @@ impl Table {
 }
 
 impl Place {
-    /// The connection is of this client, and enters a stage as its last. One that has lost its place already stays out.
+    /// Assigns the connection to this client, as the newest of a stage. A connection that has lost its place does not
+    /// enter.
     pub fn enter(&self, stage: Stage, client: Client) {
         let mut table = self.places.table();
         if let Some(taken) = table.leave(self.number) {
@@ -190,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_phone_keeps_its_connection_whatever_another_opens() {
+    fn a_phone_keeps_its_connection_for_any_number_of_others() {
         for stage in [Stage::Asking, Stage::Listening, Stage::Holding] {
             let places = Places::default();
             let mut phone = take(&places, 1).enter(stage, Client::Phone(1));

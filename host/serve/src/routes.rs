@@ -1,16 +1,16 @@
-//! What is at which path. Who comes in is the [`door`](super::door)'s business, and what may be typed that of the
-//! [`rules`](super::rules): here they are only asked.
+//! The paths of the server. The [`door`](super::door) decides which requests come in, and the [`rules`](super::rules)
+//! decide which commands may be typed.
 //!
-//! | path | gives |
+//! | path | answer |
 //! | --- | --- |
-//! | `/` | the page, or the form for the code; `/page.css`, `/page.js`, `/pair.css`, `/pair.js` are theirs |
-//! | `POST /pair` | a cookie for the code that is in the body |
-//! | `/machines` | their names, and what may be typed from there, as JSON |
-//! | `/events` | what all machines are and say, as server-sent events |
-//! | `POST /machines/hold` | what came of a HOLD to all machines at once, and after what time the last one had obeyed, as JSON |
-//! | `POST /machines/N/command` | the answer to the line that is in the body, a line each |
+//! | `/` | the page, or the form for the code; `/page.css`, `/page.js`, `/pair.css`, `/pair.js` belong to them |
+//! | `POST /pair` | a cookie for the code in the body |
+//! | `/machines` | the machines' names, and the allowed commands, as JSON |
+//! | `/events` | the state and output of all machines, as server-sent events |
+//! | `POST /machines/hold` | the result of a HOLD to all machines at once, and the time until the last one had obeyed, as JSON |
+//! | `POST /machines/N/command` | the answer to the line in the body, line by line |
 //!
-//! There is no path to any other file, and none that flashes.
+//! No path leads to any other file, and no path flashes a board.
 
 use super::door::{Door, Knock};
 use super::hub::{Hub, Message};
@@ -47,20 +47,21 @@ use tokio::time::timeout;
 /// Bytes that a request's body has at the most: a command has 80.
 const BODY_BYTES: usize = 256;
 
-/// Time in which it has to come.
+/// Time limit for the body.
 const BODY_TIME: Duration = Duration::from_secs(5);
 
 /// Time in which a machine has answered, or is lost.
 const ANSWER_TIME: Duration = Duration::from_secs(30);
 
-/// Time after which a page hears that the computer is still there: it waits six times as long before it says that it is not.
+/// Time between heartbeats to a page. The page reports a lost computer after six times as long.
 const BEAT: Duration = Duration::from_millis(500);
 
-/// Nothing but this program's own, and no other page may put it into a frame. The page makes its worker and its maps itself (`blob:`).
+/// Only this program's own files, and no frame of another page. The page makes its worker and its maps itself
+/// (`blob:`).
 const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src blob:; style-src 'self'; \
     img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Cookies are shared by all ports of an address.
+/// All ports of an address share cookies.
 const COOKIE_NAME: &str = "weeder";
 
 /// What all requests share.
@@ -73,18 +74,18 @@ pub struct Served {
     pub hub: Arc<Hub>,
     /// Who is paired.
     pub pairing: Mutex<Pairing>,
-    /// Says something to the operator.
+    /// Prints a message for the operator.
     pub tell: Tell,
 }
 
 impl Served {
     fn pairing(&self) -> MutexGuard<'_, Pairing> {
-        // Each change of it is whole by itself.
+        // No panic can leave it half changed.
         self.pairing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Who is at the other end of a connection, and through which door he came.
+/// The client of a connection, and its door.
 #[derive(Clone)]
 pub struct Visitor {
     /// His address.
@@ -97,7 +98,7 @@ pub struct Visitor {
     pub lengths: Arc<Lengths>,
 }
 
-/// The client of a request that may see the page; none where it may not.
+/// The client of a request, if it may see the page.
 #[derive(Clone, Copy)]
 struct Known(Option<Client>);
 
@@ -127,14 +128,14 @@ pub fn routes(served: Arc<Served>) -> Router {
         .with_state(served)
 }
 
-/// Has the door let a request in, or says why it does not.
+/// Passes a request to the door. Returns an error page if the door refuses it.
 async fn admit(
     State(served): State<Arc<Served>>,
     Extension(visitor): Extension<Visitor>,
     request: Request,
     next: Next,
 ) -> Response {
-    // A client that sends many requests ahead lets the others go first.
+    // A client that sends many requests ahead must not block other clients.
     yield_now().await;
     let phone = cookies(request.headers()).find_map(|token| served.pairing().phone(token));
     let (hosts, origins) = (all(request.headers(), HOST), all(request.headers(), ORIGIN));
@@ -200,14 +201,14 @@ async fn front(State(served): State<Arc<Served>>, Extension(Known(known)): Exten
     if known.is_none() {
         return ([(CONTENT_TYPE, "text/html; charset=utf-8")], form::HTML).into_response();
     }
-    // By this the page knows that there is a machine at its other end.
+    // This tells the page that it is connected to a machine.
     match uri.query() {
         Some("served") => file(&served.page.html).into_response(),
         _ => (StatusCode::SEE_OTHER, [(LOCATION, "/?served#work")]).into_response(),
     }
 }
 
-/// Pairs whoever sends the code.
+/// Pairs the client if it sends the right code.
 async fn pair(
     State(served): State<Arc<Served>>,
     Extension(Visitor { address, door, .. }): Extension<Visitor>,
@@ -248,7 +249,7 @@ async fn pair(
     }
 }
 
-/// The machines' names, and what may be typed to them.
+/// The machines' names and the allowed commands.
 async fn machines(
     State(served): State<Arc<Served>>,
     Extension(Visitor { door, .. }): Extension<Visitor>,
@@ -262,7 +263,7 @@ async fn machines(
     ([(CONTENT_TYPE, "application/json")], said.to_string())
 }
 
-/// Types a line to a machine, where that may be, and gives its answer.
+/// Types a line to a machine, if this is allowed, and returns its answer.
 async fn command(
     State(served): State<Arc<Served>>,
     Extension(Visitor { door, place, .. }): Extension<Visitor>,
@@ -298,7 +299,8 @@ async fn command(
     }
 }
 
-/// Has all machines hold at once, which whoever comes in may: of each why it has not obeyed, or nothing, and the time of the last that has.
+/// Holds all machines at once. Every client that is let in may do this. Returns for each machine why it has not obeyed,
+/// or nothing, and the time of the last one that has.
 async fn hold_all(
     State(served): State<Arc<Served>>,
     Extension(Visitor { place, .. }): Extension<Visitor>,
@@ -325,7 +327,7 @@ async fn hold_all(
     ([(CONTENT_TYPE, "application/json")], said.to_string())
 }
 
-/// Why a machine has not obeyed a `hold`, of which this came.
+/// Returns why a machine has not obeyed a `hold`, from its result.
 fn why_not_held(typed: Option<Typed>) -> Option<String> {
     match typed {
         Some(Typed::Answered(lines)) => lines.last().filter(|line| line.starts_with("error:")).cloned(),
@@ -335,7 +337,7 @@ fn why_not_held(typed: Option<Typed>) -> Option<String> {
     }
 }
 
-/// A line that the machine never saw, in the words in which it refuses one itself.
+/// The answer to a line that was not typed, in the machine's own form of an error.
 fn refused(status: StatusCode, why: &str) -> Response {
     (status, plain(), format!("error: {why}\n")).into_response()
 }
@@ -344,7 +346,7 @@ fn plain() -> [(HeaderName, &'static str); 1] {
     [(CONTENT_TYPE, "text/plain; charset=utf-8")]
 }
 
-/// A request with all of its short body, or what is wrong with it.
+/// Reads a request with its short body. Otherwise returns the error.
 async fn whole(request: Request, lengths: &Lengths) -> Result<Request, Response> {
     let headers = request.headers();
     if lengths.are_two(headers.get_all(CONTENT_LENGTH).iter().count(), headers.contains_key(TRANSFER_ENCODING)) {
@@ -353,7 +355,7 @@ async fn whole(request: Request, lengths: &Lengths) -> Result<Request, Response>
     let (head, body) = request.into_parts();
     match timeout(BODY_TIME, to_bytes(body, BODY_BYTES)).await {
         Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
-        // Else it is too long.
+        // Any other error means that the body is too long.
         Ok(Err(error)) if is_malformed(&error) => {
             Err(refused(StatusCode::BAD_REQUEST, "the body is no chunks of HTTP, or ends too soon"))
         }
@@ -367,12 +369,12 @@ fn is_malformed(error: &(dyn Error + 'static)) -> bool {
     std::iter::successors(Some(error), |&error| error.source()).any(|error| error.is::<hyper::Error>())
 }
 
-/// A line that is none.
+/// The error for a body that is no line.
 fn no_line() -> Response {
     refused(StatusCode::BAD_REQUEST, &Forbidden::NoLine.to_string())
 }
 
-/// What all machines are and say, for as long as the page reads it.
+/// Streams the state and output of all machines while the page reads it.
 async fn events(
     State(served): State<Arc<Served>>,
     Extension(Visitor { place, .. }): Extension<Visitor>,
@@ -382,8 +384,8 @@ async fn events(
     Sse::new(heard(&served.hub).map(|message| Ok(Event::default().data(&*message))))
 }
 
-/// What a page hears: how all machines are, then what comes, and a beat where nothing does. To a page that is too far behind it is
-/// said at the end that it has missed something; it may listen anew.
+/// The messages to a page: the state of all machines, then changes, and a heartbeat while nothing changes. A page that
+/// falls too far behind gets a last message that says so. It may connect again.
 fn heard(hub: &Hub) -> impl Stream<Item = Message> + use<> {
     let (first, later) = hub.listen();
     let later = stream::unfold(Some(later), |later| async move {
@@ -405,7 +407,7 @@ mod tests {
     use tokio::runtime;
 
     #[test]
-    fn a_page_that_is_too_far_behind_is_told_so_at_the_end_and_may_listen_anew() {
+    fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {
         let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
         runtime.block_on(async {
             let hub = Hub::new(1);

@@ -1,31 +1,32 @@
-//! Who may type what. The lines are taken apart by the firmware's own parser (`control::say::command`), so that what is forbidden
-//! here is what the machine would do there.
+//! The rules that decide who may type which command. The firmware's own parser (`control::say::command`) reads the
+//! lines, so a line means here what it means on the machine.
 //!
-//! Whoever sits at the computer that has the port may type everything, as in `weeder monitor`. Over the network, what cannot put the
-//! tool into the row or change the machine may be typed by everybody who is paired; `start` and `clear` where the operator
-//! allowed it as he started `weeder serve`; all else by nobody. What this version does not know it does not pass on.
+//! The operator at the computer with the port may type everything, as in `weeder monitor`. Over the network, a paired
+//! client may type commands that neither put the tool into the row nor change the machine. It may type `start` and
+//! `clear` only if the operator allowed this when starting `weeder serve`. All other commands are refused over the
+//! network, and so are commands that this version does not know.
 
 use control::say::command::{Command, parse};
 use thiserror::Error;
 
-/// From where somebody types.
+/// The origin of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reach {
     /// From the computer that has the port.
     Here,
     /// From the network.
     Lan {
-        /// Whether the operator allowed it to start the machine.
+        /// Whether the operator allowed start over the network.
         may_start: bool,
     },
 }
 
-/// What is to be done with a line.
+/// How to handle a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Hold, before all that waits.
+    /// Hold, before all waiting commands.
     Hold,
-    /// Type it when what was typed before is answered.
+    /// Type it after the previous commands have been answered.
     Type,
 }
 
@@ -35,36 +36,36 @@ pub enum Forbidden {
     /// It is none.
     #[error("that is no command: it has to be one line of 1 to {} printable ASCII characters", link::COMMAND_LENGTH)]
     NoLine,
-    /// It is none that is known here.
+    /// The command is unknown.
     #[error("`weeder serve` does not know that command, and passes on only those that it knows: `help` lists them")]
     Unknown,
     /// The operator has not allowed it.
     #[error("this is not allowed from here: go to the machine, or have `weeder serve` started with --allow-start")]
     NoStart,
-    /// It puts the tool over ground that nobody has seen.
+    /// It moves the tool over ground that the beam has not seen.
     #[error(
         "this takes the tool over ground that the beam has not seen, and is never allowed over the network: go to the machine"
     )]
     Unseen,
-    /// It moves the tool by hand.
+    /// It drives the tool directly.
     #[error(
         "this moves the tool, and is never allowed over the network: go to the computer that has the machine's port"
     )]
     MovesTool,
-    /// It changes what the machine knows.
+    /// It changes the machine's settings or examples.
     #[error("this changes the machine, and is never allowed over the network: go to the computer that has its port")]
     ChangesMachine,
-    /// It changes what all others hear.
+    /// It changes the output for all other clients.
     #[error(
         "this changes what everybody hears, and is never allowed over the network: go to the computer that has the port"
     )]
     ChangesWire,
 }
 
-/// Whether a line may be typed from there, and how.
+/// Decides whether and how a line may be typed from there.
 ///
 /// # Errors
-/// Why it may not, and where it may.
+/// Why it is not allowed, and where it is.
 pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
     // The machine does not answer a line without a word.
     if !link::is_command(line) || line.trim().is_empty() {
@@ -75,7 +76,7 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
         return Ok(Order::Hold);
     }
     match (reach, command) {
-        // The machine says by itself what is wrong with it.
+        // The machine itself reports errors in the line.
         (Reach::Here, _) => Ok(Order::Type),
         (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),
         (Reach::Lan { may_start }, Ok(command)) => match why_not(command) {
@@ -86,7 +87,7 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
     }
 }
 
-/// Why a command may not be typed over the network, where nothing more is allowed; a new one has to be put here.
+/// Why a command is refused over the network. Every new command must be added here.
 fn why_not(command: Command) -> Option<Forbidden> {
     match command {
         Command::Help
@@ -99,7 +100,7 @@ fn why_not(command: Command) -> Option<Forbidden> {
         | Command::Examples
         | Command::Dump
         | Command::Version => None,
-        // A latched alarm is not cleared by somebody who has not seen what is wrong.
+        // A client that has not seen the fault must not clear a latched alarm.
         Command::Start { now: false } | Command::Clear => Some(Forbidden::NoStart),
         Command::Start { now: true } => Some(Forbidden::Unseen),
         Command::CalibrateServo
@@ -130,7 +131,7 @@ mod tests {
     const WATCHING: Reach = Reach::Lan { may_start: false };
     const STARTING: Reach = Reach::Lan { may_start: true };
 
-    /// Every command, by the rule of the manual's table that it is under.
+    /// Every command, under its rule in the manual's table.
     const HARMLESS: [&str; 11] =
         ["help", "help k", "status", "get", "get k", "events on", "examples", "dump", "version", "  status ", "get  k"];
     const STARTS: [&str; 4] = ["start", "clear", " start", "clear  "];
@@ -165,7 +166,7 @@ mod tests {
     ];
 
     #[test]
-    fn whoever_may_type_at_all_may_hold() {
+    fn every_client_that_may_type_may_hold() {
         for reach in [Reach::Here, WATCHING, STARTING] {
             for line in ["hold", " hold", "hold   "] {
                 assert_eq!(allow(line, reach), Ok(Order::Hold), "{line:?} from {reach:?}");
@@ -222,7 +223,7 @@ mod tests {
             .filter(|cells: &Vec<&str>| cells.len() == 4)
             .collect();
         assert_eq!(rows.first().map(|cells| &cells[1..]), Some(&["at the computer", "paired phone", "others"][..]));
-        // `start now` stands elsewhere than `start`.
+        // The manual lists `start now` in another row than `start`.
         let of = |line: &str| {
             let words = rows.iter().flat_map(|cells| words(cells[0]).map(move |word| (cells, word)));
             let own = words.filter(|(_, word)| format!("{line} ").starts_with(&format!("{word} ")));
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_none_or_two_is_passed_on_for_nobody() {
+    fn a_line_that_is_none_or_two_is_never_passed_on() {
         let long = "x".repeat(link::COMMAND_LENGTH + 1);
         for line in
             ["", "   ", "status\nstart", "status\rstart", "hold\u{8}\u{8}\u{8}\u{8}start", "\tstart", "grün", &long]

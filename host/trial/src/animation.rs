@@ -1,7 +1,7 @@
-//! An animation of a row being weeded, from above, as an SVG that plays by itself: no script, and no other program makes it.
+//! An animated picture of a row being weeded, seen from above: an SVG that plays without scripts or other programs.
 //!
-//! The machine rolls at its speed along the row that was simulated. The tool's angle over each place is the recorded one. Weeded ground
-//! darkens behind the tool, and the weeds that it cut disappear. The beam turns dark while something breaks it.
+//! The machine rolls at its speed along the simulated row. The tool's angle at each position is the recorded one.
+//! Weeded ground darkens behind the tool, and cut weeds disappear. The beam turns dark while it is broken.
 
 use drawing::{INK, LEFT_ALONE, MARK_SIZE, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG};
 use drawing::{Legend, document, line, paper, rectangle, swatch, tenth, words};
@@ -22,7 +22,7 @@ const HEIGHT: f64 = 256.0;
 const STRIP: f64 = 18.0;
 const BEAM: f64 = 84.0;
 
-/// Draws the row while a machine weeds it at this speed. It begins again at its end.
+/// Draws the row while a machine weeds it at this speed. The animation repeats.
 pub fn draw(row: &Row, machine: &Machine, judgement: &Judgement, speed_mm_s: f64) -> Document {
     let ground = row.span_mm();
     let length_mm = ground.end - ground.start;
@@ -82,7 +82,7 @@ pub fn draw(row: &Row, machine: &Machine, judgement: &Judgement, speed_mm_s: f64
         .add(rectangle(-5.0, ROW_Y - width / 2.0, 10.0, width, NOTE).set("rx", 2))
         .add(animate.transform("rotate", &angles));
 
-    // What breaks the beam stands ahead of the tool by their distance.
+    // The beam is ahead of the tool by this distance.
     let reach = pixels(machine.beam_to_tool_mm);
     let mut colours = vec![(0.0, LEFT_ALONE.to_owned())];
     for block in row.blocks_mm() {
@@ -127,7 +127,7 @@ impl Run {
             .set("repeatCount", "indefinite")
     }
 
-    /// The same for a part's place or turn.
+    /// The animation of a part's position or rotation.
     fn transform(&self, kind: &str, frames: &[(f64, String)]) -> AnimateTransform {
         let (times, values) = times_and_values(frames);
         AnimateTransform::new()

@@ -1,10 +1,10 @@
-//! What the firmware can take and what it costs, counted on the virtual Uno; the same sources give the same figures on
-//! every machine.
+//! The benchmark: the firmware's limits and costs, counted on the virtual Uno. The same sources give the same figures
+//! on every machine.
 //!
-//! Each file beside this one measures one subject: [`classifier()`] the classifier's cycles, [`weeding()`] the interrupts,
-//! the loop's turns and the memory while a row is weeded, [`encoder`] the highest rate without a lost count, [`servo`] the jitter of
-//! the pulses, [`swings`] how late the commands of many rows come to the pin. [`table`] shows them to people, beside
-//! those of others.
+//! Each module measures one subject. [`classifier()`] counts the classifier's cycles. [`weeding()`] measures
+//! interrupts, turns of the loop and memory while a row is weeded. [`encoder`] finds the highest rate without a lost
+//! count, [`servo`] the jitter of the pulses, and [`swings`] the timing errors of commands in many rows. [`table`]
+//! prints the results beside published figures.
 
 mod classifier;
 pub mod encoder;

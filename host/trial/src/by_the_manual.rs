@@ -1,8 +1,9 @@
-//! The simulated machine, set up as the manual has it.
+//! Sets up the simulated machine by the manual.
 //!
-//! [`Novice`] does the steps of the manual's page on the machine of some conditions: it fits parts, sets values, and measures what a
-//! user would. The servo is timed by the firmware's own code with an end switch, the wheel by its encoder over a stretch with the
-//! field's slip, and the slip by a second beam along a row. The margin is the one that [`link::set_up`] calculates of that, or stays.
+//! [`Novice`] follows the steps of the manual's page on the machine of some conditions: it fits parts, sets values, and
+//! measures. The firmware's own code times the servo by an end switch. The encoder measures the wheel over a stretch
+//! with the field's slip, and a second beam measures the slip along a row. [`link::set_up`] calculates the margin.
+//! Without its measurements the margin is not changed.
 
 use control::operate::calibration::{Outcome, SwingTimes, Swings};
 use control::settings::{Setting, Settings};
@@ -24,7 +25,7 @@ use uno::{CYCLES_PER_SECOND, Pulse};
 /// Why a step cannot be done.
 #[derive(Debug, Error)]
 pub enum ManualError {
-    /// The field does not know a part, or a value is out of its range.
+    /// The field does not know a part, or a value is out of range.
     #[error(transparent)]
     WrongValue(#[from] WrongValue),
     /// The row along which the slip is measured does not grow.
@@ -39,7 +40,7 @@ pub enum ManualError {
 const TIMINGS: u64 = 2;
 const STRETCHES: u64 = 3;
 
-/// Time between two of the swings by which the firmware times the servo, in milliseconds.
+/// Time between two swings of the firmware's measurement of the servo, in milliseconds.
 const SWING_MS: u32 = 1500;
 
 /// Speed at which stretches and rows are rolled along.
@@ -48,7 +49,7 @@ const SPEED_KM_H: f64 = 2.5;
 /// Spacing of the plants along which a second beam measures the slip.
 const SPACING_MM: f64 = 500.0;
 
-/// Distance over which the wheel's slip stays as it is.
+/// Distance over which the wheel's slip is constant.
 const LEG_MM: std::ops::Range<f64> = 1000.0..2000.0;
 
 /// A user who sets the simulated machine up, step by step.
@@ -57,12 +58,12 @@ pub struct Novice {
     /// The machine and its settings, and the field around it.
     pub conditions: Conditions,
     measured: SetUp,
-    /// Which of all the possible measurements.
+    /// Selects the random measurements.
     seed: u64,
 }
 
 impl Novice {
-    /// With a machine of which nothing was measured.
+    /// A machine before any measurement.
     pub fn new(conditions: Conditions, seed: u64) -> Self {
         Self { conditions, measured: SetUp::default(), seed }
     }
@@ -70,7 +71,7 @@ impl Novice {
     /// Does a step of the manual.
     ///
     /// # Errors
-    /// Where the simulated field does not know what the step is about.
+    /// If the simulated field does not know what the step is about.
     pub fn follow(&mut self, step: &ManualStep) -> Result<(), ManualError> {
         step.tasks.iter().try_for_each(|&task| self.follow_task(task))
     }
@@ -90,7 +91,7 @@ impl Novice {
                     self.set(Setting::LeadOutMs, out_ms)?;
                     self.set(Setting::LeadInMs, in_ms)?;
                 }
-                // As the monitor says it.
+                // The steps as the monitor shows them.
                 for step in self.measured.missing(&self.settings()) {
                     if let Step::SetLead(lead, worst_ms) = step {
                         self.set(lead, worst_ms)?;
@@ -126,7 +127,7 @@ impl Novice {
         let mut settings = Settings::new();
         for (setting, &value) in &self.conditions.settings {
             if let Some(setting) = Setting::find(setting.as_bytes()) {
-                // The conditions hold to the ranges.
+                // The conditions are within the ranges.
                 let _ = settings.set(setting, value);
             }
         }
@@ -139,12 +140,12 @@ impl Novice {
         rng
     }
 
-    /// The servo's times as the firmware measures them by an end switch, with the tool in the soil.
+    /// The servo's times, as the firmware measures them by an end switch, with the tool in the soil.
     fn time_servo(&self, timing: u64) -> Option<SwingTimes> {
         let servo = self.conditions.machine(self.chance(timing).random()).servo;
         let cycle = |milliseconds: u32| u64::from(milliseconds) * (CYCLES_PER_SECOND / 1000);
         let pulse = |rise: u64, width_us: f64| Pulse { rise, fall: rise + cycle(1) * width_us as u64 / 1000 };
-        // The tool is out before the first swing, which is one in.
+        // The tool is out before the first swing, so that swing leads in.
         let swings = (0..6).map(|swing| {
             let width_us = if swing % 2 == 0 { servo.in_us } else { servo.out_us };
             pulse(cycle(SWING_MS * (swing + 1)), width_us)
@@ -183,7 +184,7 @@ impl Novice {
         (ticks as f64 * 1000.0 / length_mm).round() as u16
     }
 
-    /// The slip that a second beam tells along a row, plant by plant; none without one.
+    /// The slip that a second beam measures along a row, plant by plant. `None` without a second beam.
     fn pass_plants(&self) -> Result<Vec<i16>, ManualError> {
         let conditions = &self.conditions;
         if conditions.machine.second_beam_mm == 0.0 {
@@ -219,7 +220,7 @@ mod tests {
     #[test]
     fn a_servo_is_timed_as_long_as_its_stroke_takes() {
         let novice = after([]);
-        // 50 to 80 ms of dead time, 120 to 144 ms for the stroke, 2 ms of pulse; the firmware adds up to 11.
+        // 50 to 80 ms of dead time, 120 to 144 ms for the stroke, 2 ms of pulse. The firmware adds up to 11 ms.
         for timing in 0..20 {
             let SwingTimes { out_ms, in_ms } = novice.time_servo(timing).expect("it follows");
             assert!((190..=237).contains(&out_ms) && (51..=93).contains(&in_ms), "{out_ms} {in_ms}");

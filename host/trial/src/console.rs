@@ -1,14 +1,14 @@
-//! The firmware's console, as a patient operator uses it: one command, then all of its answer.
+//! The firmware's console, as a patient operator uses it: one command, then its whole answer.
 //!
-//! The firmware answers a command by its lines and then exactly one `ok` or `error: ...` (the README's console chapter).
-//! [`link`] does the same over a serial port, by the host's clock and with every suspicion; here the clock is the virtual
-//! Uno's own, so that the same commands always come at the same cycles.
+//! The firmware answers a command by its lines and then exactly one `ok` or `error: ...` (the README's console
+//! chapter). [`link`] does the same over a serial port, by the PC's clock and without trust in its input. This module
+//! uses the virtual Uno's clock, so the same commands always come at the same cycles.
 
 use link::{LineReader, Values};
 use thiserror::Error;
 use uno::{Uno, UnoError};
 
-/// Longest time that an answer may take. `help` and `get` write some thousand characters in a tenth of a second.
+/// Longest time of an answer. `help` and `get` write some thousand characters in a tenth of a second.
 const TIMEOUT_MS: u64 = 1000;
 
 /// Why a command had no good answer.
@@ -33,7 +33,7 @@ pub enum ConsoleError {
         /// What came.
         received: String,
     },
-    /// A status line without a figure that it should have.
+    /// A status line lacks a figure.
     #[error("the firmware's status has no `{key}=`: {line:?}")]
     Status {
         /// The missing key.
@@ -51,7 +51,7 @@ const CHARACTER_CYCLES: u64 = 500;
 /// The Uno's clock runs until the answer is complete. What the firmware had sent before is dropped.
 ///
 /// # Errors
-/// Where the firmware refuses, goes silent or stops.
+/// If the firmware refuses, goes silent or stops.
 pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
     uno.received();
     uno.send(format!("{command}\n").as_bytes());
@@ -62,7 +62,7 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
         lines.take(received.as_bytes());
         while let Some(line) = lines.next_line() {
             if line == "ok" {
-                // The end of its line belongs to it, and what comes behind that is somebody else's.
+                // The line end belongs to the line. Bytes behind it are left for the next read.
                 while received.ends_with('\r') {
                     uno.run_until(uno.cycle() + CHARACTER_CYCLES)?;
                     received += &uno.received();
@@ -79,22 +79,22 @@ pub fn ask(uno: &mut Uno, command: &str) -> Result<Vec<String>, ConsoleError> {
     Err(ConsoleError::Silent { command: command.to_owned(), received: answer.join("\n") })
 }
 
-/// What the firmware says of itself on `status`.
+/// The firmware's answer to `status`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Status {
     /// `hold`, `work` or `alarm`.
     pub state: String,
-    /// Encoder counts, net, since power-up.
+    /// Net encoder counts since power-up.
     pub position_ticks: i64,
     /// Encoder counts that the firmware knows to have lost.
     pub lost_ticks: u64,
 }
 
 impl Status {
-    /// Asks for it.
+    /// Asks for the status.
     ///
     /// # Errors
-    /// As [`ask`], and where the answer lacks one of the figures.
+    /// As [`ask`], and if the answer lacks a figure.
     pub fn ask(uno: &mut Uno) -> Result<Self, ConsoleError> {
         Self::parse(&ask(uno, "status")?.join(" "))
     }

@@ -1,7 +1,7 @@
-//! The firmware built from this workspace.
+//! Builds the firmware of this workspace.
 //!
-//! [`build`] runs `cargo firmware` once a process, in a target directory of its own, so that a test or a trial always
-//! meets the sources as they stand. What the ELF holds is read by [`uno::elf`].
+//! [`build`] runs `cargo firmware` once a process, in its own target directory. So a test or a trial always uses the
+//! present sources. [`uno::elf`] reads the ELF.
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 use cargo_metadata::Message;
 
-/// A program for the chip: its package, which is its binary's name too, and the alias that builds it.
+/// A program for the chip: its package, which is also its binary's name, and the alias that builds it.
 struct Program {
     package: &'static str,
     alias: &'static str,
@@ -20,7 +20,7 @@ const FIRMWARE: Program = Program { package: "weeder-firmware", alias: "firmware
 const BENCH: Program = Program { package: "knn-bench", alias: "bench-firmware" };
 const TESTER: Program = Program { package: "tester-firmware", alias: "tester-firmware" };
 
-/// What an outer cargo, or a shell, may have set that would change how the firmware is compiled.
+/// Variables of an outer cargo or a shell that would change how the firmware is compiled.
 const FOREIGN_SETTINGS: [&str; 9] = [
     // Either of the flags replaces the target-cpu of .cargo/config.toml.
     "RUSTFLAGS",
@@ -29,12 +29,12 @@ const FOREIGN_SETTINGS: [&str; 9] = [
     "CARGO_BUILD_TARGET",
     // Compiled in parts, the handlers' assembly is not accepted.
     "CARGO_INCREMENTAL",
-    // `cargo clippy` sets it, and would check the firmware instead of compiling it.
+    // `cargo clippy` sets it. It would check the firmware instead of compiling it.
     "RUSTC_WORKSPACE_WRAPPER",
     "RUSTC",
     // The workspace's rust-toolchain.toml decides.
     "RUSTUP_TOOLCHAIN",
-    // A release's firmware says its commit: what is measured on another one is true of all.
+    // It puts a commit into a release's firmware. Measurements must not depend on that.
     "WEEDER_COMMIT",
 ];
 
@@ -50,7 +50,7 @@ pub enum BuildError {
     /// Cargo ran and failed.
     #[error("`cargo {0}` failed ({1}): its own messages stand above; where a tool is missing, run ./setup.sh")]
     Failed(&'static str, String),
-    /// Cargo was content, but no ELF came of it.
+    /// Cargo succeeded, but made no ELF.
     #[error("no ELF was made: the package `{0}` should have a binary of that name")]
     NoElf(&'static str),
 }
@@ -62,7 +62,7 @@ pub enum BuildError {
 ///
 /// # Errors
 ///
-/// Where cargo cannot be started, fails, or makes no ELF.
+/// If cargo cannot be started, fails, or makes no ELF.
 pub fn build() -> Result<PathBuf, BuildError> {
     static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
     BUILT.get_or_init(|| FIRMWARE.build()).clone()
@@ -78,7 +78,7 @@ pub fn build_bench() -> Result<PathBuf, BuildError> {
     BUILT.get_or_init(|| BENCH.build()).clone()
 }
 
-/// Builds the firmware of the tester, the Uno that checks another one, and returns the path of its ELF.
+/// Builds the firmware of the tester, the Uno that checks another one. Returns the path of its ELF.
 ///
 /// # Errors
 ///
@@ -128,7 +128,7 @@ pub fn workspace_root() -> &'static Path {
     this_crate.ancestors().nth(2).unwrap_or(this_crate)
 }
 
-/// A target directory of the firmware's own: an outer cargo keeps the usual one locked while it runs a test.
+/// A separate target directory for the firmware. An outer cargo locks the usual one while it runs a test.
 fn target_directory() -> PathBuf {
     let usual = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
     workspace_root().join(usual).join("firmware")

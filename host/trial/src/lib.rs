@@ -1,13 +1,15 @@
-//! The real firmware in the simulated field: its ELF on the virtual Uno, with a machine around it that rolls along a row.
+//! The real firmware in the simulated field: its ELF on the virtual Uno, in a machine that rolls along a row.
 //!
-//! - [`run()`] has the firmware, which [`firmware`] builds, weed the row of a [`Trial`]; [`report`], [`picture`] and [`animation`] show the [`Outcome`].
-//!   [`replay`] plays a recording to it instead of a row.
-//! - [`console`] talks to it as an operator would, and [`port`] makes it a port for the [`link`].
-//! - [`live`] runs it in real time, at a serial port that other programs open; a [`receiver`] on the machine is at another.
-//! - [`by_the_manual`] sets the simulated machine up as the manual has it, and measures what a user would.
-//! - [`soak`] has everything go wrong now and then, for hours; [`mod@bench`] counts cycles and bytes.
+//! - [`run()`] lets the firmware weed the row of a [`Trial`]; [`firmware`] builds it. [`report`], [`picture`] and
+//!   [`animation`] show the [`Outcome`]. [`replay`] plays a recording to the firmware instead of a row.
+//! - [`console`] operates it as an operator would, and [`port`] makes it a port for the [`link`].
+//! - [`live`] runs it in real time, at a serial port for other programs. A [`receiver`] on the machine has another
+//!   port.
+//! - [`by_the_manual`] sets up and measures the simulated machine by the manual.
+//! - [`soak`] runs it for hours with random faults. [`mod@bench`] counts cycles and bytes.
 //!
-//! What the machine does and what a verdict is stands in [`field`], how the chip works in [`uno`]. Many rows are not compared here.
+//! [`field`] simulates the machine and gives the verdicts, and [`uno`] simulates the chip. Experiments with many rows
+//! are in another crate.
 
 pub mod animation;
 pub mod bench;

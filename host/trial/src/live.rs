@@ -1,21 +1,22 @@
-//! The virtual Uno, live: in real time, at a pseudo terminal that any serial program opens, with a machine around it that rolls
-//! along a row again and again.
+//! The live virtual Uno: it runs in real time, at a pseudo terminal that any serial program opens. A simulated machine
+//! rolls along a row again and again.
 //!
-//! [`LiveUno::start`] powers it up, [`LiveUno::run`] lets it run until it is told to stop, and
-//! [`Live::run_in_background`] does so in a thread. [`rows`] has several, whose encoder is the same. Each millisecond
-//! of the chip's time, bytes are taken from and given to the terminal; then the host's clock is waited for. A host that
-//! is too slow makes the chip slower, never the time between two of its events wrong.
+//! [`LiveUno::start`] powers it up. [`LiveUno::run`] runs it until it is stopped, and [`Live::run_in_background`] does
+//! so in a thread. [`rows`] has several Unos that share one encoder. Each millisecond of the chip's time it exchanges
+//! bytes with the terminal, and then waits for the PC's clock. A slow PC makes the chip slower, but does not change the
+//! time between two of its events.
 //!
-//! - **Reset.** A program that opens the port of a real Uno resets it, by the modem line DTR. A pseudo terminal has no such
-//!   line; so the opening itself is what resets, unless [`Setup::keeps_running_when_opened`]. Then a bootloader waits for a
-//!   new firmware for a second or two, as on the desk.
-//! - **Baud rate.** The chip sends and receives at the pace of its UBRR. The terminal carries bytes at any rate, so that a
-//!   program's wrong one goes unnoticed. What no program has read is lost when the next one opens the port.
-//! - **The machine.** It stands, gains its speed ahead of the row, rolls past it and brakes behind it; after a few seconds it does
-//!   so again, forward, with the same row before it. The tool does what the firmware says and the row does not mind.
-//! - **The end switch.** It closes while the arm is fully out, as the machine's servo turns it by the pulses on its line.
-//! - **The receiver.** Where there is a satellite receiver on the machine, it has a pseudo terminal of its own.
-//! - **EEPROM.** It is read from a file at the start, where there is one, and written to it whenever it has changed.
+//! - **Reset.** A program that opens the port of a real Uno resets it through the modem line DTR. A pseudo terminal has
+//!   no such line. So the opening itself resets the Uno, unless [`Setup::keeps_running_when_opened`] is set. A
+//!   bootloader then waits a second or two for new firmware, as on a real board.
+//! - **Baud rate.** The chip sends and receives at the pace of its UBRR. The terminal carries bytes at any rate, so a
+//!   wrong rate in a program has no effect. Unread bytes are lost when the next program opens the port.
+//! - **The machine.** It stands, accelerates before the row, rolls past it and brakes behind it. After a few seconds it
+//!   repeats this, forward, with the same row ahead. The tool follows the firmware, and does not change the row.
+//! - **The end switch.** It closes while the arm is fully out. The machine's servo turns the arm by the pulses on its
+//!   line.
+//! - **The receiver.** A satellite receiver on the machine has its own pseudo terminal.
+//! - **EEPROM.** It is read from a file at the start, if there is one, and written to it after each change.
 
 use crate::receiver::{ReceiverSetup, SimulatedReceiver};
 use field::machine::{Machine, cycle_at, time_at_s};
@@ -42,20 +43,20 @@ pub mod rows;
 
 pub use background::{Background, Live};
 
-/// What is on the desk.
+/// The parts of the simulated set-up.
 #[derive(Clone, Debug, Default)]
 pub struct Setup {
-    /// The firmware's ELF; without one, and with a bootloader, the rest of the flash is erased.
+    /// The firmware's ELF. Without one, and with a bootloader, the rest of the flash is erased.
     pub elf: Option<PathBuf>,
     /// The bootloader; without one, a reset starts the firmware.
     pub bootloader: Option<Bootloader>,
-    /// The file that keeps the EEPROM; without one it is erased at the start and forgotten at the end.
+    /// The file with the EEPROM's content. Without one the EEPROM starts erased and is not saved.
     pub eeprom: Option<PathBuf>,
-    /// Where to make a symbolic link to the pseudo terminal.
+    /// Path of a symbolic link to the pseudo terminal.
     pub link: Option<PathBuf>,
-    /// The satellite receiver on the machine, and where to make a symbolic link to its pseudo terminal.
+    /// The satellite receiver on the machine, and the path of a symbolic link to its pseudo terminal.
     pub receiver: Option<(ReceiverSetup, Option<PathBuf>)>,
-    /// What the machine rolls along; without it, it stands.
+    /// The course of the machine. Without one, the machine stands.
     pub course: Option<Course>,
     /// Whether to run as fast as the host can, not in real time.
     pub fast: bool,
@@ -69,11 +70,11 @@ pub struct Course {
     row: Row,
     machine: Machine,
     speed_mm_s: f64,
-    /// The ground on which something stands, in this row or another of the machine.
+    /// The ground that has plants or weeds, in this row or another of the machine.
     span_mm: Range<f64>,
     /// Share of the wheel's distance that slip takes.
     slip: f64,
-    /// Time for which it stands before it rolls for the first time, in seconds.
+    /// Time of standing before the first run, in seconds.
     stands_first_s: u64,
 }
 
@@ -97,7 +98,7 @@ pub enum LiveError {
         /// The operating system's answer.
         source: io::Error,
     },
-    /// The EEPROM's file is another one.
+    /// The file is no EEPROM file.
     #[error("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")]
     NotEeprom {
         /// The file.
@@ -107,31 +108,33 @@ pub enum LiveError {
     },
 }
 
-/// Chip time between two looks at the terminal and at the host's clock.
+/// Chip time between two checks of the terminal and of the PC's clock.
 const SLICE_MS: u64 = 1;
 
-/// Slices between two looks at the EEPROM.
+/// Slices between two checks of the EEPROM.
 const EEPROM_SLICES: u64 = 100;
 
-/// Time that the host may be late by. What it is later by is given up: the chip would otherwise run too fast afterwards.
+/// Longest delay of the PC that is made up for. A longer delay is dropped: otherwise the chip would run too fast
+/// afterwards.
 const LATE_BY: Duration = Duration::from_millis(50);
 
-/// Bytes that may be on their way to the chip. More are left to the terminal, which makes the program wait.
+/// Greatest number of bytes on their way to the chip. Others stay in the terminal, so that the program waits.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
 
-/// Bytes from the chip that wait for a program to read; what is older is lost.
+/// Greatest number of unread bytes from the chip. Older bytes are lost.
 const MOST_BYTES_UNREAD: usize = 64 * 1024;
 
-/// Ground ahead of the row: more than a machine has from its beam to its tool, which the tool waits for before it begins.
+/// Ground ahead of the row. It is longer than the distance from beam to tool, over which the tool waits before it
+/// begins.
 const AHEAD_MM: f64 = 2500.0;
 
-/// Ground that the tool rolls on over behind the row.
+/// Ground that the tool travels behind the row.
 const BEHIND_MM: f64 = 500.0;
 
 /// How fast the machine gains its speed, and brakes.
 const ACCELERATION_MM_S2: f64 = 1000.0;
 
-/// Time for which the machine stands before and after it rolls along.
+/// Time of standing before and after each run.
 const STANDING_S: u64 = 3;
 
 /// Counts in a step of the encoder after which both channels are as they were.
@@ -143,7 +146,8 @@ impl Course {
         Self { span_mm: row.span_mm(), row, machine, speed_mm_s, slip: 0.0, stands_first_s: STANDING_S }
     }
 
-    /// A machine with several rows and one wheel: a course for each row, all of which roll along the same ground at the same time.
+    /// A machine with several rows and one wheel: one course for each row. All rows roll along the same ground at the
+    /// same time.
     pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64) -> Vec<Self> {
         let spans = || rows.iter().map(Row::span_mm);
         let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
@@ -159,7 +163,7 @@ impl Course {
         Self { slip, ..self }
     }
 
-    /// The same, which stands this long before it rolls for the first time: what needs a machine at rest has time for it.
+    /// The same course with a standing time before the first run, for actions that need a machine at rest.
     pub fn standing_first(self, stands_first_s: u64) -> Self {
         Self { stands_first_s, ..self }
     }
@@ -170,7 +174,7 @@ impl Course {
         motion.end_mm() - motion.start_mm()
     }
 
-    /// How the machine rolls along the row once. It ends with the encoder's channels as they were.
+    /// The motion along the row, once. At its end the encoder's channels are as at the start.
     fn motion(&self) -> Motion {
         let span = &self.span_mm;
         let start_mm = span.start - AHEAD_MM;
@@ -183,7 +187,7 @@ impl Course {
             .with_slip(|| self.slip)
     }
 
-    /// What the machine does to the pins, beginning at a cycle, the cycle at which it stands again, and how it rolls.
+    /// The pin changes of a run that begins at a cycle, the cycle at which the machine stands again, and the motion.
     fn roll_along(&self, start_cycle: u64) -> (Vec<PinChange>, u64, Motion) {
         let motion = self.motion();
         let end = cycle_at(start_cycle, motion.duration_s());
@@ -191,14 +195,14 @@ impl Course {
     }
 }
 
-/// How far the machine has rolled in all: so many millimetres before it set off the last time, when that was, and how it rolls since.
+/// The distance travelled: the total before the present run, the start time of that run, and its motion.
 struct Way {
     before_mm: f64,
     since: Option<(f64, Motion)>,
 }
 
 impl Way {
-    /// How far it had rolled at a time in seconds, in metres.
+    /// The distance travelled at a time, in metres.
     fn rolled_m(&self, time_s: f64) -> f64 {
         let since_mm = self.since.as_ref().map_or(0.0, |(set_off_s, motion)| {
             motion.position_mm((time_s - set_off_s).clamp(0.0, motion.duration_s())) - motion.start_mm()
@@ -223,9 +227,9 @@ impl Receiver {
         Ok(Self { simulated: SimulatedReceiver::new(setup), pty, unread: VecDeque::new() })
     }
 
-    /// Passes on what it has said by now.
+    /// Passes on the output up to this time.
     fn serve(&mut self, time_s: f64, way: &Way) -> Result<(), LiveError> {
-        // It talks whether or not anybody listens, and takes no commands.
+        // It sends at all times, and takes no commands.
         if self.pty.was_opened()? {
             self.unread.clear();
         }
@@ -235,7 +239,7 @@ impl Receiver {
     }
 }
 
-/// Gives a program what waits for it, as far as it has room, and forgets what is too much.
+/// Writes waiting bytes to the program, as far as there is room, and drops the oldest if there are too many.
 fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<(), LiveError> {
     let written = pty.write(unread.make_contiguous())?;
     unread.drain(..written);
@@ -244,19 +248,19 @@ fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<(), LiveError> {
     Ok(())
 }
 
-/// The arm that the servo swings, and the switch at its end.
+/// The arm that the servo swings, and its end switch.
 struct Arm {
     servo: Servo,
     clear_within_degrees: f64,
     /// When the pulse on the line began.
     rise: Option<u64>,
-    /// The pulses that asked for another angle than the one before.
+    /// The pulses that commanded another angle than the one before.
     pulses: Vec<Pulse>,
     stroke: Option<Stroke>,
     is_out: bool,
 }
 
-/// Swings that are remembered: enough for a day, after which their chances begin again.
+/// Swings in memory: enough for a day. After that their random values repeat.
 const SWINGS: usize = 10_000;
 
 impl Arm {
@@ -265,7 +269,7 @@ impl Arm {
         Self { servo, clear_within_degrees, rise: None, pulses: Vec::new(), stroke: None, is_out: false }
     }
 
-    /// Takes the changes of the pins; whether the arm is fully out at a cycle, where that is another answer than before.
+    /// Takes pin changes. Returns whether the arm is fully out at a cycle, if this has changed.
     fn turn(&mut self, changes: &[PinChange], cycle: u64) -> Option<bool> {
         for change in changes.iter().filter(|change| change.pin == wiring::SERVO) {
             match (change.high, self.rise.take()) {
@@ -275,7 +279,7 @@ impl Arm {
             }
         }
         let degrees = self.stroke.as_ref()?.degrees(time_at_s(0, cycle));
-        // The firmware may have another stroke than the machine is made for: out is where its pulse for that leads.
+        // The firmware's stroke may differ from the machine's. Fully out is the angle of the firmware's pulse.
         let out_degrees = self.servo.stroke_degrees().min(self.farthest_degrees());
         let is_out = degrees >= out_degrees - self.clear_within_degrees;
         let changes = is_out != self.is_out;
@@ -304,7 +308,7 @@ impl Arm {
 /// A virtual Uno at a pseudo terminal.
 pub struct LiveUno {
     uno: Uno,
-    /// Its terminal; none while its cable is pulled.
+    /// Its terminal. `None` while its cable is unplugged.
     pty: Option<Pty>,
     path: PathBuf,
     link: Option<PathBuf>,
@@ -319,7 +323,7 @@ pub struct LiveUno {
     unread: VecDeque<u8>,
     resets_when_opened: bool,
     fast: bool,
-    /// How long it has run, in slices.
+    /// Its run time, in slices.
     slices: u64,
 }
 
@@ -327,7 +331,7 @@ impl LiveUno {
     /// Powers it up. Its clock stands until it runs.
     ///
     /// # Errors
-    /// Where there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
+    /// If there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
     pub fn start(setup: Setup) -> Result<LiveUno, LiveError> {
         let eeprom = setup.eeprom.map(EepromFile::open).transpose()?;
         let content = eeprom.as_ref().map_or(&[][..], |file| &file.content);
@@ -362,7 +366,7 @@ impl LiveUno {
         &self.path
     }
 
-    /// The path under which programs open the receiver's port, where there is one.
+    /// The path of the receiver's port, if there is one.
     pub fn receiver_path(&self) -> Option<&Path> {
         self.receiver.as_ref().map(|receiver| receiver.pty.path())
     }
@@ -370,7 +374,7 @@ impl LiveUno {
     /// Runs until `stop` is set.
     ///
     /// # Errors
-    /// Where the firmware crashes or halts, or the terminal or the EEPROM's file fails.
+    /// If the firmware crashes or halts, or the terminal or the EEPROM's file fails.
     pub fn run(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
         let mut pace = (!self.fast).then(Pace::new);
         while !stop.load(Ordering::Relaxed) {
@@ -388,7 +392,8 @@ impl LiveUno {
         self.serve_receiver()?;
         self.roll();
         self.slices += 1;
-        // Not so much longer as the last instruction of each slice: several of them share a wheel.
+        // Counts from the start. The last instruction of each slice runs over its end, and these errors must not add
+        // up: several Unos share a wheel.
         self.uno.run_until(self.slices * SLICE_MS * (CYCLES_PER_SECOND / 1000))?;
         // They would pile up.
         let changes = self.uno.take_changes();
@@ -400,14 +405,14 @@ impl LiveUno {
         if self.slices.is_multiple_of(EEPROM_SLICES) { self.keep_eeprom() } else { Ok(()) }
     }
 
-    /// Passes on what is left.
+    /// Passes on the rest of the output.
     fn end(&mut self) -> Result<(), LiveError> {
         self.serve_terminal()?;
         self.serve_receiver()?;
         self.keep_eeprom()
     }
 
-    /// Pulls the cable. The chip runs on: it has power of its own.
+    /// Unplugs the cable. The chip runs on: it has its own power.
     fn unplug(&mut self) {
         self.pty = None;
     }
@@ -425,10 +430,10 @@ impl LiveUno {
         &self.uno
     }
 
-    /// Resets the chip where a program has opened the port, and passes bytes both ways.
+    /// Resets the chip when a program opens the port, and passes bytes both ways.
     fn serve_terminal(&mut self) -> Result<(), LiveError> {
         let Some(pty) = &mut self.pty else {
-            // What it says is heard by nobody.
+            // Discards the output: no program is connected.
             self.uno.received_bytes();
             return Ok(());
         };
@@ -448,7 +453,7 @@ impl LiveUno {
         give(pty, &mut self.unread)
     }
 
-    /// Has the satellite receiver say what it has to say by now.
+    /// Sends the receiver's output up to now.
     fn serve_receiver(&mut self) -> Result<(), LiveError> {
         match &mut self.receiver {
             Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),
@@ -456,12 +461,13 @@ impl LiveUno {
         }
     }
 
-    /// Sets the machine off once it has stood for long enough.
+    /// Starts a run when the machine has stood for long enough.
     fn roll(&mut self) {
         if let Some(course) = &self.course
             && self.uno.cycle() >= self.sets_off
         {
-            // At the same cycle for all that share the wheel, wherever their last instruction ended.
+            // All Unos that share the wheel use the same cycle, although their last instructions end at different
+            // cycles.
             let (changes, end, motion) = course.roll_along(self.sets_off);
             self.uno.drive(changes);
             let set_off_s = self.sets_off as f64 / CYCLES_PER_SECOND as f64;
@@ -478,7 +484,7 @@ impl LiveUno {
     }
 }
 
-/// A pseudo terminal, with a link to it where one is wanted.
+/// A pseudo terminal, with a link to it if `link` is given.
 fn terminal(link: Option<&Path>) -> Result<Pty, LiveError> {
     let mut pty = Pty::open()?;
     if let Some(link) = link {
@@ -487,7 +493,7 @@ fn terminal(link: Option<&Path>) -> Result<Pty, LiveError> {
     Ok(pty)
 }
 
-/// Keeps slices to the host's clock.
+/// Keeps slices in step with the PC's clock.
 struct Pace {
     due: Instant,
 }
@@ -497,7 +503,7 @@ impl Pace {
         Self { due: Instant::now() }
     }
 
-    /// Waits until the time of so many slices is over since the last ones'.
+    /// Waits until this number of slices has passed since the last call.
     fn wait(&mut self, slices: u64) {
         self.due += Duration::from_millis(slices * SLICE_MS);
         let now = Instant::now();
@@ -521,7 +527,7 @@ impl Ports {
         &self.path
     }
 
-    /// The path under which programs open the receiver's port, where there is one.
+    /// The path of the receiver's port, if there is one.
     pub fn receiver_path(&self) -> Option<&Path> {
         self.receiver_path.as_deref()
     }
@@ -540,14 +546,14 @@ impl Live for LiveUno {
     }
 }
 
-/// The file that keeps the EEPROM.
+/// The file with the EEPROM's content.
 struct EepromFile {
     path: PathBuf,
     content: Vec<u8>,
 }
 
 impl EepromFile {
-    /// Reads it; a file that does not exist yet is an erased EEPROM.
+    /// Reads it. A missing file is an erased EEPROM.
     fn open(path: PathBuf) -> Result<EepromFile, LiveError> {
         match std::fs::read(&path) {
             Ok(content) if content.len() == EEPROM_BYTES => Ok(EepromFile { path, content }),
@@ -562,7 +568,7 @@ impl EepromFile {
         }
     }
 
-    /// Writes it where the content has changed.
+    /// Writes it if the content has changed.
     fn keep(&mut self, content: Vec<u8>) -> Result<(), LiveError> {
         if content != self.content {
             std::fs::write(&self.path, &content)

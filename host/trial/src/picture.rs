@@ -1,6 +1,6 @@
-//! A picture of the row along the ground: what stood there, what the beam saw, and where the tool was.
+//! A picture of the row along the ground: plants and weeds, what the beam saw, and the tool's path.
 //!
-//! The row is broken into lanes, to be read like lines of a text.
+//! The row is divided into lanes, to be read like lines of a text.
 
 use drawing::{
     DOUBTFUL, LEFT_ALONE, Legend, MARK_SIZE, NOTE, PALE_INK, PAPER, PLANT, WEED, WEEDED, WRONG, document, line, paper,
@@ -13,7 +13,7 @@ use svg::Document;
 use svg::node::element::path::Data;
 use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Line, Path, Polyline};
 
-/// Ground in a lane, and the picture's pixels for a millimetre of it.
+/// Ground in a lane, and pixels for a millimetre.
 const LANE_MM: f64 = 2500.0;
 const PIXELS_PER_MM: f64 = 0.4;
 
@@ -37,7 +37,7 @@ const SCALE_Y: f64 = 140.0;
 const BEAM: &str = "#6a6fb5";
 const WINDOW: &str = "#c58fb8";
 
-/// Draws a row and what happened to it.
+/// Draws a row and its result.
 pub fn draw(row: &Row, judgement: &Judgement) -> Document {
     let span = row.span_mm();
     let lanes = ((span.end - span.start) / LANE_MM).ceil().max(1.0) as usize;
@@ -53,8 +53,7 @@ pub fn draw(row: &Row, judgement: &Judgement) -> Document {
     document
 }
 
-/// The part of the row in a lane, in a coordinate system that begins at its left end. What reaches beyond the lane's ends is cut
-/// by a clip of that name.
+/// The part of the row in a lane, with the origin at its left end. A clip of that name cuts it at the lane's ends.
 fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) -> Group {
     let x = |place_mm: f64| (place_mm - ground.start) * PIXELS_PER_MM;
     let is_here = |stretch: &Range<f64>| stretch.start < ground.end && ground.start < stretch.end;
@@ -108,8 +107,8 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
         .add(scale(ground))
 }
 
-/// The parts of a path of places and degrees that run over this ground, cut at its ends. There are several where the machine rolled
-/// back.
+/// The parts of a path of positions and degrees over this ground, cut at its ends. There are several if the machine
+/// rolled back.
 fn parts_within(path: &[(f64, f64)], ground: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
     for piece in path.windows(2) {
@@ -122,7 +121,7 @@ fn parts_within(path: &[(f64, f64)], ground: &Range<f64>) -> Vec<Vec<(f64, f64)>
     parts
 }
 
-/// What of a straight piece runs over this ground.
+/// The part of a straight piece over this ground.
 fn piece_within(from: (f64, f64), to: (f64, f64), ground: &Range<f64>) -> Option<((f64, f64), (f64, f64))> {
     let (way_mm, turn) = (to.0 - from.0, to.1 - from.1);
     if way_mm == 0.0 {
@@ -156,7 +155,7 @@ fn colour(verdict: Verdict) -> &'static str {
     }
 }
 
-/// What tells the verdicts apart where the colours do not: one stroke for a cut margin, a cross for a reached canopy.
+/// Marks for the verdicts, in addition to colours: one stroke for a cut margin, a cross for a reached canopy.
 fn strokes(x: f64, y: f64, reach: f64, verdict: Verdict) -> Path {
     let (left, right, top, bottom) = (tenth(x - reach), tenth(x + reach), tenth(y - reach), tenth(y + reach));
     let stroke = Data::new().move_to((left, bottom)).line_to((right, top));
@@ -190,7 +189,7 @@ fn scale(ground: &Range<f64>) -> Group {
 }
 
 fn legend() -> Group {
-    // They are held against the canopy, which is stricter than a plant's damage.
+    // The verdicts refer to the canopy, which is stricter than a plant's damage.
     let verdicts = [
         (Verdict::Kept, "canopy and margin kept"),
         (Verdict::MarginCut, "margin cut"),

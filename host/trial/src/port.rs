@@ -7,7 +7,7 @@ use uno::Uno;
 /// Longest time that a read waits for a byte, by the Uno's clock.
 const READ_MS: u64 = 20;
 
-/// A virtual Uno as a port, without a pseudo-terminal between. Its clock runs while it is read, as fast as it can.
+/// A virtual Uno as a port, without a pseudo terminal. Its clock runs while it is read, as fast as possible.
 pub struct UnoPort {
     uno: Uno,
     received: VecDeque<u8>,

@@ -1,12 +1,11 @@
-//! A simulated satellite receiver on the machine: what its antenna is told by satellites, as lines of NMEA 0183.
+//! A simulated satellite receiver on the machine. It sends the antenna's position as lines of NMEA 0183.
 //!
-//! The machine goes straight on from a place on the earth in one direction. So often a second, RMC and GGA tell where
-//! the antenna is, with noise to the east and to the north that is normal and independent from fix to fix; they come
-//! some time after the moment that they tell of. [`Trouble`] has the fix lost, has it jump, and has bytes of lines
-//! changed.
+//! The machine travels straight from a position on the earth in one direction. At a fixed rate RMC and GGA give the
+//! antenna's position. Their noise to the east and to the north is normal, and independent from fix to fix. The lines
+//! come some time after their moment. [`Trouble`] interrupts the fix, makes it jump, and changes bytes of lines.
 //!
-//! A real one's error wanders for minutes instead of changing from fix to fix. That a machine sways and turns is left
-//! out too.
+//! The error of a real receiver drifts over minutes instead of changing from fix to fix. The model also leaves out that
+//! a machine sways and turns.
 
 use gps::plane::{Metres, Place, Plane};
 use gps::sentence::DAY_MS;
@@ -16,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::ops::Range;
 
-/// A receiver and where its antenna is.
+/// A receiver and its antenna's position.
 #[derive(Clone, Debug)]
 pub struct ReceiverSetup {
     /// Fixes a second.
@@ -25,24 +24,24 @@ pub struct ReceiverSetup {
     pub error_mm: f64,
     /// From the moment of a fix until its lines have come.
     pub delay_ms: f64,
-    /// Where the beam stands beside the antenna.
+    /// The beam's position relative to the antenna.
     pub beam: Offset,
-    /// Where the beam is when the machine has not rolled yet.
+    /// The beam's position before the machine has moved.
     pub from: Place,
-    /// Where the machine is headed: degrees from north to the east.
+    /// The machine's direction, in degrees from north to the east.
     pub direction_degrees: f64,
     /// When the Uno is powered up: milliseconds from 1970, UTC.
     pub began_ms: i64,
-    /// What goes wrong, if anything does.
+    /// The receiver's faults, if there are any.
     pub trouble: Option<Trouble>,
-    /// Which of all the possible errors.
+    /// Selects the random errors.
     pub seed: u64,
 }
 
-/// What goes wrong with a receiver, over and over.
+/// Repeated faults of a receiver.
 #[derive(Clone, Debug)]
 pub struct Trouble {
-    /// Seconds after which it begins anew.
+    /// Seconds after which it repeats.
     pub every_s: f64,
     /// When there is no fix, in seconds of that.
     pub outage_s: Range<f64>,
@@ -50,7 +49,7 @@ pub struct Trouble {
     pub jump_s: Range<f64>,
     /// How far that is, in metres to the north.
     pub jump_m: f64,
-    /// The share of lines of which a byte is changed.
+    /// The share of lines with a changed byte.
     pub damaged: f64,
 }
 
@@ -72,7 +71,8 @@ impl Default for ReceiverSetup {
 }
 
 impl Default for Trouble {
-    /// Each minute six seconds without a fix, and three of them two metres off; a line in a hundred comes damaged.
+    /// Each minute there are six seconds without a fix, and three seconds of fixes that are two metres off. One line in
+    /// a hundred is damaged.
     fn default() -> Self {
         Self { every_s: 60.0, outage_s: 40.0..46.0, jump_s: 20.0..23.0, jump_m: 2.0, damaged: 0.01 }
     }
@@ -89,15 +89,14 @@ pub struct SimulatedReceiver {
 }
 
 impl SimulatedReceiver {
-    /// One that has had no fix yet.
+    /// A receiver before its first fix.
     pub fn new(setup: ReceiverSetup) -> Self {
         let plane = Plane::around(setup.from);
         let noise = ChaCha8Rng::seed_from_u64(setup.seed);
         Self { setup, plane, noise, fixes: 0 }
     }
 
-    /// Where something stands that the beam reaches when the machine has rolled so far, and that is so far beside the
-    /// beam.
+    /// The position of an object when the machine has travelled `way_m`. `beside` is its offset from the beam.
     pub fn place(&self, way_m: f64, beside: Offset) -> Place {
         self.plane.place(self.metres(way_m, beside))
     }
@@ -108,8 +107,8 @@ impl SimulatedReceiver {
         forward.times(way_m + beside.ahead_m).plus(forward.turned_right().times(beside.right_m))
     }
 
-    /// What has come by this time, in seconds since the Uno was powered up. `way_m` says how far the machine had rolled
-    /// at a time.
+    /// The bytes up to this time, in seconds since the Uno was powered up. `way_m` returns the distance travelled at a
+    /// time.
     pub fn bytes_until(&mut self, time_s: f64, way_m: impl Fn(f64) -> f64) -> Vec<u8> {
         let mut bytes = Vec::new();
         loop {
@@ -159,7 +158,7 @@ impl SimulatedReceiver {
         StandardNormal.sample(&mut self.noise)
     }
 
-    /// A sentence with its frame, as it goes over the wire.
+    /// A sentence with its frame, as sent.
     fn sent(&mut self, text: String) -> Vec<u8> {
         let checksum = text.bytes().fold(0, |sum, byte| sum ^ byte);
         let mut bytes = format!("${text}*{checksum:02X}\r\n").into_bytes();
@@ -183,7 +182,7 @@ fn date(utc_ms: i64) -> String {
 }
 
 fn coordinates(place: Place) -> String {
-    // Minutes with seven decimals are 0.2 mm. Counted whole, none of them becomes sixty.
+    // Minutes with seven decimals are 0.2 mm. Whole numbers avoid a result of sixty minutes.
     let angle = |degrees: f64| {
         let units = (degrees.abs() * 6e8).round() as u64;
         (units / 600_000_000, (units % 600_000_000) as f64 / 1e7)

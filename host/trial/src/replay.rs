@@ -1,7 +1,8 @@
-//! A recording of a real encoder, played to the firmware: what does it count?
+//! Plays a recording of a real encoder to the firmware, and reads its count.
 //!
-//! Net, lowest and highest count come from the firmware itself. Its console is too slow to be asked at every edge, so the
-//! recording is paused, pins still, at the moments of its own extremes; the question is asked, and the recording goes on.
+//! Net, lowest and highest count come from the firmware itself. Its console is too slow for a question at every edge.
+//! So the recording is paused, with constant levels, at its extremes. The question is asked, and the recording
+//! continues.
 
 use crate::console::Status;
 use crate::run::{TrialError, boot};
@@ -11,7 +12,7 @@ use std::path::Path;
 use uno::capture::Capture;
 use uno::{CYCLES_PER_SECOND, PinChange};
 
-/// What the firmware counted, relative to its position when the recording began.
+/// The firmware's count, relative to its position at the start of the recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counted {
     /// Count at the end.
@@ -44,7 +45,7 @@ const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 /// Plays the recording to the firmware at `elf`. `progress` is told the share done, from 0 to 1.
 ///
 /// # Errors
-/// Where the firmware cannot be run or does not answer.
+/// If the firmware cannot be run or does not answer.
 pub fn replay(capture: &Capture, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Replay, TrialError> {
     let (first_levels, edges) = split_first_levels(&capture.changes);
     let mut uno = boot(elf, &first_levels)?;
@@ -92,7 +93,7 @@ pub fn replay(capture: &Capture, elf: &Path, mut progress: impl FnMut(f64)) -> R
     })
 }
 
-/// The level that each pin begins with, and the edges after that.
+/// The first level of each pin, and the edges after that.
 fn split_first_levels(changes: &[PinChange]) -> (Vec<PinChange>, Vec<PinChange>) {
     let mut seen = Vec::new();
     changes.iter().partition(|change| {
@@ -104,8 +105,8 @@ fn split_first_levels(changes: &[PinChange]) -> (Vec<PinChange>, Vec<PinChange>)
     })
 }
 
-/// Where to pause, as numbers of edges played: behind the edges that bring a perfect counter to its lowest and its highest
-/// count, and behind the last one.
+/// Where to pause, as numbers of played edges: after the edges that bring a perfect counter to its lowest and highest
+/// count, and after the last edge.
 fn pauses(first_levels: &[PinChange], edges: &[PinChange]) -> Vec<usize> {
     let mut levels: Channels = 0;
     for change in first_levels {
@@ -133,7 +134,7 @@ fn pauses(first_levels: &[PinChange], edges: &[PinChange]) -> Vec<usize> {
     pauses
 }
 
-/// Puts a pin's change into the pair of channels.
+/// Applies a pin change to the pair of channels.
 fn apply(levels: &mut Channels, change: &PinChange) {
     let bit = match change.pin {
         wiring::ENCODER_A => 0b10,
@@ -147,7 +148,7 @@ fn apply(levels: &mut Channels, change: &PinChange) {
 mod tests {
     use super::*;
 
-    /// The edges of so many steps forward (or back, when negative) one after the other, from AB = 00.
+    /// The edges of these steps from AB = 00. A negative number of steps goes backwards.
     fn edges(steps: &[i32]) -> Vec<PinChange> {
         const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
         let mut count = 0_i32;

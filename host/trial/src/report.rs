@@ -1,4 +1,4 @@
-//! A trial's outcome for people: a table with a line per plant, the totals in plain words, and CSV tables.
+//! A trial's outcome for people: a table with a line for each plant, the totals in words, and CSV tables.
 //!
 //! The picture of the row is in [`crate::picture`].
 
@@ -23,7 +23,8 @@ const WORKING_WIDTH_MM: f64 = 400.0;
 const FLASH_BYTES: u64 = 32_768 - 512;
 const SRAM_BYTES: u64 = 2048;
 
-/// One line per plant: where it stood, where the tool was clear of the row and where it came back, and the verdict.
+/// One line for each plant: its position, the positions where the tool was clear of the row and came back, and the
+/// verdict.
 pub fn table(outcome: &Outcome) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
@@ -137,7 +138,7 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     text
 }
 
-/// How far the tool came into a canopy, at worst; `None` where it never did.
+/// The tool's deepest position in a canopy. `None` if it entered none.
 fn deepest_mm(plants: &[PlantOutcome]) -> Option<f64> {
     plants
         .iter()
@@ -148,8 +149,8 @@ fn deepest_mm(plants: &[PlantOutcome]) -> Option<f64> {
         .max_by(f64::total_cmp)
 }
 
-/// The share weeded of the whole strip, as weeds were counted in the paper: all that is beside the row, and of the tool's
-/// own width what it weeded.
+/// The weeded share of the whole strip, as the paper counted weeds: all ground beside the row, and the weeded part of
+/// the tool's width.
 fn strip_share(machine: &Machine, weeded_share: f64) -> f64 {
     1.0 - (1.0 - weeded_share) * machine.tool_width_mm / WORKING_WIDTH_MM
 }
@@ -180,7 +181,7 @@ fn count_words(outcome: &Outcome) -> String {
     format!("position {}, {place}; {} lost", counted(position_ticks, "tick"), counted(lost_ticks, "count"))
 }
 
-/// What happened to a plant, as a line of a table.
+/// The result for a plant, as a line of a table.
 #[derive(Debug, Serialize)]
 pub struct PlantRecord {
     position_mm: f64,
@@ -195,7 +196,7 @@ pub struct PlantRecord {
     verdict: &'static str,
 }
 
-/// What happened to a tall weed, as a line of a table.
+/// The result for a tall weed, as a line of a table.
 #[derive(Debug, Serialize)]
 pub struct WeedRecord {
     position_mm: f64,
@@ -203,7 +204,7 @@ pub struct WeedRecord {
     cut: bool,
 }
 
-/// A line per plant. An empty field is what [`PlantOutcome`] calls `None`.
+/// A line for each plant. An empty field is a `None` of [`PlantOutcome`].
 pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
     let record = |plant: &PlantOutcome| PlantRecord {
         position_mm: plant.plant.position_mm,
@@ -238,7 +239,7 @@ pub fn weeds(outcome: &Outcome) -> Vec<WeedRecord> {
 /// Writes [`plants`] as a CSV table.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write_plants_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
     write_csv(&plants(outcome), to)
 }
@@ -246,7 +247,7 @@ pub fn write_plants_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv
 /// Writes [`weeds`] as a CSV table.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write_weeds_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
     write_csv(&weeds(outcome), to)
 }
@@ -258,7 +259,7 @@ fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::
     Ok(())
 }
 
-/// What is about to be tried, in a line.
+/// The trial's parameters, in a line.
 pub fn introduction(row: &Row, machine: &Machine, motion: &Motion) -> String {
     let span = row.span_mm();
     format!(
@@ -279,7 +280,7 @@ pub(crate) mod tests {
     use field::verdict::{Timing, judge};
     use uno::{CYCLES_PER_SECOND, Pulse};
 
-    /// A trial in which the tool stayed in the row from one second on, and what came of it.
+    /// A trial in which the tool stayed in the row from one second on, and its outcome.
     pub fn ruined_row() -> (Trial, Outcome) {
         let row =
             Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(750.0, 15.0), Thing::plant(1000.0, 150.0)]).unwrap();

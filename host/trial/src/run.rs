@@ -1,8 +1,8 @@
 //! A row: the real firmware in the virtual Uno weeds it.
 //!
-//! The machine's motion does not depend on the firmware, so a [`Trial`] runs in one direction: motion and row give the levels
-//! on the firmware's inputs, the virtual Uno plays them, and its servo pulses tell what happened to the row
-//! ([`field::verdict`]). Before that the firmware is set up over its console, as an operator would: settings, then the
+//! The machine's motion does not depend on the firmware. So a [`Trial`] runs in one direction. Motion and row give the
+//! levels on the firmware's inputs, and the virtual Uno plays them. Its servo pulses give the result for the row
+//! ([`field::verdict`]). Before that, the firmware is set up over its console as by an operator: settings, then the
 //! start.
 
 use crate::console::{ConsoleError, Status, ask};
@@ -25,28 +25,28 @@ pub enum TrialError {
     /// The virtual Uno stopped.
     #[error(transparent)]
     Uno(#[from] UnoError),
-    /// The firmware's console did not answer as it should.
+    /// The console gave an unexpected answer.
     #[error(transparent)]
     Console(#[from] ConsoleError),
-    /// The firmware started anew on the way.
+    /// The firmware restarted during the trial.
     #[error("the firmware restarted {} during the trial, so that its position means nothing", counted(.0, "time"))]
     Restarted(usize),
 }
 
-/// What came of a trial.
+/// The outcome of a trial.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What happened to the row.
+    /// The result for the row.
     pub judgement: Judgement,
-    /// What the firmware said at the end.
+    /// The firmware's last status.
     pub status: Status,
-    /// Encoder counts, net, that a perfect counter would have at the end.
+    /// Net encoder counts of a perfect counter at the end.
     pub true_ticks: i64,
     /// Memory that the firmware takes.
     pub size: Size,
     /// The servo's pulses.
     pub pulses: Vec<Pulse>,
-    /// How many of them have no width that a servo knows.
+    /// Pulses with a width that no servo accepts.
     pub stray_pulses: usize,
     /// Every level on every pin, inputs first.
     pub changes: Vec<PinChange>,
@@ -60,16 +60,16 @@ const BOOT_CYCLES: u64 = 3 * CYCLES_PER_SECOND;
 /// Time for the firmware to see that a switch has stopped bouncing.
 const SWITCH_MS: u64 = 100;
 
-/// Time between the start and the first movement, and between the last one and the final question.
+/// Time between the start and the first movement, and between the last movement and the final question.
 const STILL_MS: u64 = 50;
 
 /// Simulated time between two reports of progress.
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
-/// Powers up the firmware with these levels on its inputs, and waits for the line by which it says that it is there.
+/// Powers up the firmware with these levels on its inputs, and waits for its greeting.
 ///
 /// # Errors
-/// Where the ELF cannot be run, or no line comes.
+/// If the ELF cannot be run, or no greeting comes.
 pub fn power_up(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
     let mut uno = Uno::boot(elf)?.wired(&wiring::WIRES);
     for level in levels {
@@ -79,7 +79,7 @@ pub fn power_up(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
     Ok(uno)
 }
 
-/// As [`power_up`], and clears the alarm by which the firmware says that its EEPROM holds no settings yet.
+/// As [`power_up`], and then clears the alarm for an EEPROM without settings.
 ///
 /// # Errors
 /// As [`power_up`].
@@ -93,7 +93,7 @@ pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
 /// Has the firmware at `elf` weed a trial's row. `progress` is told the share of the motion done, from 0 to 1.
 ///
 /// # Errors
-/// Where the firmware cannot be run or does not answer.
+/// If the firmware cannot be run or does not answer.
 pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Outcome, TrialError> {
     let Trial { row, machine, motion, .. } = trial;
     let mut inputs = vec![machine.beam_before(row, motion)];
@@ -149,7 +149,7 @@ pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<O
 /// Tells the firmware what it has to know of machine and timing, by its settings, and of the crop, by examples.
 ///
 /// # Errors
-/// Where it refuses something, or does not answer.
+/// If it refuses something, or does not answer.
 pub fn set_up(trial: &Trial, uno: &mut Uno) -> Result<(), ConsoleError> {
     for (setting, value) in trial.firmware_settings() {
         ask(uno, &format!("set {} {value}", name(setting)))?;

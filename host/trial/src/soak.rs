@@ -1,18 +1,19 @@
-//! The soak: hours of field work with everything going wrong now and then.
+//! The soak: hours of field work with random faults.
 //!
-//! [`hours`] has the decision core, the code of the firmware with its real classifier, work rows by chance for simulated hours
-//! on the host; in each hour its clock and its count run over their ends. [`minutes`] does the same for minutes with the real ELF
-//! on the virtual Uno. Both have faults injected by chance, and an operator who clears what is latched and starts again.
+//! [`hours`] runs the decision core with the firmware's real classifier on random rows, for simulated hours on the PC.
+//! In each hour its clock and its count overflow. [`minutes`] does the same for minutes with the real ELF on the
+//! virtual Uno. Both inject random faults. The operator clears latched alarms and starts again.
 //!
-//! Each hour of the decisions and each row of the firmware has random numbers of its own, from the seed and its number, so that [`hour`] and
-//! [`row`] can be called anywhere: [`total`] of all of them is the same.
+//! Each hour of the decisions and each row of the firmware has its own random numbers, from the seed and its number. So
+//! [`hour`] and [`row`] can run on any machine, and [`total`] of all of them is the same.
 //!
-//! A plant is *harmed* where the tool was not fully out over its canopy although the firmware could know of it: this must not
-//! be, and it ends the soak with the seed and the time at which it can be seen again. Excused are, and counted apart:
+//! A plant is *harmed* if the tool was not fully out over its canopy although the firmware could detect it. This ends
+//! the soak as a failure, with the seed and the time to repeat it. Two other cases are counted separately, and are
+//! allowed:
 //! - *mistaken*: plants that the classifier took for weeds;
-//! - *blind*: on the host, plants reached while the count was off by a quarter of the margin because the encoder had lied, or
-//!   within a swing and a tenth of a second of the lie; on the virtual Uno all of a row in which both channels jumped
-//!   at once, and those reached within 0.7 s of a reset.
+//! - *blind*: plants that the firmware could not protect. On the PC: plants reached while a faulty encoder had the
+//!   count off by a quarter of the margin, or within a swing and a tenth of a second of the fault. On the virtual Uno:
+//!   all plants of a row in which both channels jumped at once, and those reached within 0.7 s of a reset.
 
 mod core;
 mod elf;

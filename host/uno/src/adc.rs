@@ -1,11 +1,12 @@
-//! The ADC, where simavr differs from the chip: how long a conversion takes, and what it gives.
+//! Corrections of simavr's ADC: the time of a conversion, and its result.
 //!
-//! simavr asks for the input in the middle of each conversion, when the chip takes its sample. [`set_right`] then hands it the
+//! simavr asks for the input in the middle of each conversion, when the chip samples it. [`set_right`] then sets the
 //! voltage, and the time until the conversion ends. A conversion takes 13 clocks of the ADC, the first one 25 (data
-//! sheet, table 24-1); simavr multiplies these clocks by 2 or 14 and drops all but 8 bits of the product. The result is 1024 steps
-//! of the reference (data sheet, 24.7); simavr has 1023.
+//! sheet, table 24-1). simavr multiplies these clocks by 2 or 14 and drops all but 8 bits of the product. The result
+//! has 1024 steps of the reference (data sheet, 24.7); simavr has 1023.
 //!
-//! AVCC and the pin AREF are at 5 V. The temperature sensor and noise are not there, and free running is the only trigger.
+//! AVCC and the pin AREF are at 5 V. The temperature sensor and noise are not simulated, and free running is the only
+//! trigger.
 
 use std::ffi::CStr;
 use std::ptr::NonNull;
@@ -45,7 +46,7 @@ pub(super) unsafe fn find(avr: *mut simavr::avr_t) -> NonNull<simavr::avr_adc_t>
     }
 }
 
-/// Gives the running conversion its input and its end. simavr calls for it when the sample is taken.
+/// Sets the input and the end of the running conversion. simavr calls this when the sample is taken.
 ///
 /// # Safety
 ///
@@ -53,7 +54,7 @@ pub(super) unsafe fn find(avr: *mut simavr::avr_t) -> NonNull<simavr::avr_adc_t>
 pub(super) unsafe fn set_right(avr: *mut simavr::avr_t, adc: *mut simavr::avr_adc_t, millivolts: &[u16; ADC_CHANNELS]) {
     // SAFETY: the caller vouches for both; the registers are addresses inside `data`.
     unsafe {
-        // 11 times this is what simavr waits from here on.
+        // From here on simavr waits 11 times this number of cycles.
         let prescaler = 1_u8 << (*(*avr).data.add(ADCSRA.into()) & 0b111).max(1);
         (*adc).current_prescale = prescaler;
         let reference = match *(*avr).data.add(ADMUX.into()) & REFS {
@@ -63,7 +64,7 @@ pub(super) unsafe fn set_right(avr: *mut simavr::avr_t, adc: *mut simavr::avr_ad
         for (value, &input) in (*adc).adc_values.iter_mut().zip(millivolts) {
             let reference = u32::from(reference);
             let result = (u32::from(input) * 1024 / reference).min(LARGEST);
-            // The smallest voltage of which simavr makes this result.
+            // The smallest voltage that simavr converts to this result.
             *value = (result * reference).div_ceil(LARGEST) as u16;
         }
     }

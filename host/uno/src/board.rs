@@ -1,4 +1,4 @@
-//! The board: an Uno with a firmware in it, what is wired to its pins, and a terminal at its serial line.
+//! The board: an Uno with its firmware, the wires on its pins, and a terminal at its serial line.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -17,11 +17,11 @@ use crate::recorder::{ReceivedByte, Reset};
 use crate::terminal::Terminal;
 use crate::turns::Turns;
 
-/// An Arduino Uno with a firmware in it.
+/// An Arduino Uno with its firmware.
 pub struct Uno {
     core: Core,
     image: Image,
-    /// Where a reset starts the chip, in bytes of flash.
+    /// The address in flash where a reset starts the chip, in bytes.
     reset_address: u16,
     /// Levels to come, by cycle.
     to_drive: VecDeque<PinChange>,
@@ -33,16 +33,16 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where the ELF cannot be read or does not fit the chip.
+    /// If the ELF cannot be read or does not fit the chip.
     pub fn boot(elf: &Path) -> Result<Uno, UnoError> {
         Uno::boot_with_eeprom(elf, &[])
     }
 
-    /// As [`Uno::boot`], with `eeprom` from the EEPROM's address 0; the rest is erased.
+    /// As [`Uno::boot`], with `eeprom` at the EEPROM's address 0; the rest is erased.
     ///
     /// # Errors
     ///
-    /// As [`Uno::boot`], and where `eeprom` is longer than 1024 bytes.
+    /// As [`Uno::boot`], and if `eeprom` is longer than 1024 bytes.
     pub fn boot_with_eeprom(elf: &Path, eeprom: &[u8]) -> Result<Uno, UnoError> {
         if eeprom.len() > EEPROM_BYTES {
             return Err(UnoError::EepromTooLarge(eeprom.len()));
@@ -54,12 +54,12 @@ impl Uno {
         Ok(Uno::power_up(image, &content, 0))
     }
 
-    /// As [`Uno::boot_with_eeprom`], with a bootloader behind the firmware, or behind erased flash where `elf` is `None`. Every reset
-    /// starts the bootloader, as the fuses of a real Uno have it.
+    /// As [`Uno::boot_with_eeprom`], with a bootloader behind the firmware. If `elf` is `None`, the other flash is
+    /// erased. Every reset starts the bootloader, as with the fuses of a real Uno.
     ///
     /// # Errors
     ///
-    /// As [`Uno::boot_with_eeprom`], and where the firmware reaches into the bootloader.
+    /// As [`Uno::boot_with_eeprom`], and if the firmware overlaps the bootloader.
     pub fn boot_with_bootloader(bootloader: &Bootloader, elf: Option<&Path>, eeprom: &[u8]) -> Result<Uno, UnoError> {
         if eeprom.len() > EEPROM_BYTES {
             return Err(UnoError::EepromTooLarge(eeprom.len()));
@@ -79,8 +79,8 @@ impl Uno {
         }
     }
 
-    /// The Uno with this wired to its pins, each at its level at rest. Before the first instruction that is as if it
-    /// had been there when power came.
+    /// The Uno with these wires on its pins, each at its level at rest. Before the first instruction this is the same
+    /// as wires that were there at power-up.
     #[must_use]
     pub fn wired(mut self, wires: &[Wire]) -> Uno {
         for wire in wires {
@@ -94,14 +94,15 @@ impl Uno {
         self.core.reset();
     }
 
-    /// Lets the supply sag for a moment: too low to run, high enough for SRAM, which keeps its content, as do EEPROM, inputs and
-    /// the clock. A byte that was being written to the EEPROM is torn.
+    /// Lets the supply voltage drop for a moment: too low to run, high enough for SRAM, which keeps its content.
+    /// EEPROM, inputs and the clock are kept too. A byte that was being written to the EEPROM is torn.
     pub fn brown_out(&mut self) {
         self.core.brown_out();
     }
 
-    /// Hangs the main program where it is, as an endless loop would, until the next reset. Interrupts are as they are there:
-    /// inside a critical section none comes any more. The clock runs on until no handler is running.
+    /// Stops the main program in an endless loop at its present instruction, until the next reset. The interrupt flag
+    /// is not changed: inside a critical section no interrupt is served. The clock first runs on until no handler is
+    /// running.
     ///
     /// # Errors
     ///
@@ -114,8 +115,8 @@ impl Uno {
         Ok(())
     }
 
-    /// As [`Uno::power_cycle`], with SRAM that comes up with random content, the same for the same seed. Then
-    /// [`Uno::deepest_stack`] can be told only of a firmware that paints its stack.
+    /// As [`Uno::power_cycle`], but SRAM starts with random content, the same for the same seed. Then
+    /// [`Uno::deepest_stack`] is valid only for firmware that paints its stack.
     pub fn power_cycle_to_noise(&mut self, seed: u64) {
         self.power_cycle();
         let mut noise = [0; Core::SRAM_BYTES];
@@ -123,7 +124,7 @@ impl Uno {
         self.core.set_sram(core::SRAM_START, &noise);
     }
 
-    /// Takes the power away and gives it back. EEPROM, inputs and the clock stay; SRAM does not, and a byte that was being
+    /// Switches the power off and on. EEPROM, inputs and the clock are kept. SRAM is lost, and a byte that was being
     /// written to the EEPROM is torn.
     pub fn power_cycle(&mut self) {
         self.core.lose_power();
@@ -137,12 +138,12 @@ impl Uno {
         &self.core.recorder().resets
     }
 
-    /// The flash's 32 KiB, as the bootloader, if there is one, has written it.
+    /// The flash's 32 KiB, with the changes by the bootloader, if there is one.
     pub fn flash(&self) -> &[u8] {
         self.core.flash()
     }
 
-    /// The EEPROM's 1024 bytes, as they would be found if power went now: a byte that is being written is torn.
+    /// The EEPROM's 1024 bytes as after a power failure now: a byte that is being written is torn.
     pub fn eeprom(&self) -> Vec<u8> {
         self.core.eeprom()
     }
@@ -157,7 +158,7 @@ impl Uno {
         self.image.size
     }
 
-    /// Puts a level on a pin, now. While the firmware drives the pin, the level waits until it is an input again.
+    /// Sets the level of a pin now. While the firmware drives the pin, the level waits until it is an input again.
     pub fn set(&mut self, pin: Pin, high: bool) {
         if let Some(channel) = pin.adc_channel() {
             self.core.set_millivolts(channel, if high { SUPPLY_MILLIVOLTS } else { 0 });
@@ -170,7 +171,7 @@ impl Uno {
     ///
     /// # Panics
     ///
-    /// Where the pin is none of A0 to A5.
+    /// If the pin is none of A0 to A5.
     pub fn set_millivolts(&mut self, pin: Pin, millivolts: u16) {
         let channel = pin.adc_channel().unwrap_or_else(|| panic!("{pin} is not an analogue pin: take A0 to A5"));
         if millivolts >= SUPPLY_MILLIVOLTS / 10 * 6 {
@@ -186,13 +187,14 @@ impl Uno {
         self.core.output(pin)
     }
 
-    /// The level at a pin: what the firmware drives, or else what it reads there.
+    /// The level at a pin: the one that the firmware drives, or else the one that it reads.
     pub fn level(&self, pin: Pin) -> bool {
         self.core.output(pin).unwrap_or_else(|| self.core.input(pin))
     }
 
-    /// Queues levels for pins, as [`Uno::set`] puts them there. Each is there at the first instruction boundary at or after its cycle; what lies in the past
-    /// comes at once. Changes of the same cycle keep their order, and so do those of several calls.
+    /// Queues levels for pins, as [`Uno::set`] sets them. Each is applied at the first instruction boundary at or after
+    /// its cycle; changes in the past are applied at once. Changes of the same cycle keep their order, also over
+    /// several calls.
     pub fn drive(&mut self, changes: impl IntoIterator<Item = PinChange>) {
         self.to_drive.extend(changes);
         self.to_drive.make_contiguous().sort_by_key(|change| change.cycle);
@@ -202,7 +204,7 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where the firmware crashed or halted for good.
+    /// If the firmware crashed or halted for good.
     pub fn run_until(&mut self, cycle: u64) -> Result<(), UnoError> {
         while self.cycle() < cycle {
             self.step(cycle)?;
@@ -219,11 +221,11 @@ impl Uno {
         self.run_until(self.cycle() + time_ms * (CYCLES_PER_SECOND / 1000))
     }
 
-    /// Runs until the firmware has sent `text`, and takes all that it sent up to the text's end.
+    /// Runs until the firmware has sent `text`. Takes all output up to the text's end.
     ///
     /// # Errors
     ///
-    /// As [`Uno::run_until`], and where the text has not come after `timeout_cycles`.
+    /// As [`Uno::run_until`], and if the text has not come after `timeout_cycles`.
     pub fn run_until_serial(&mut self, text: &str, timeout_cycles: u64) -> Result<String, UnoError> {
         let deadline = self.cycle() + timeout_cycles;
         loop {
@@ -246,12 +248,12 @@ impl Uno {
         }
     }
 
-    /// Runs until the next instruction is the first of a function, by its path from the crate on: `main` is where the start-up
-    /// code has filled SRAM and no line of the firmware's own has run.
+    /// Runs until the next instruction is the first of a function. The function is named by its path from the crate on.
+    /// At `main` the start-up code has filled SRAM, and no line of the firmware's own has run.
     ///
     /// # Errors
     ///
-    /// As [`Uno::run_until`], where the ELF has no such function, and where it is not reached within `timeout_cycles`.
+    /// As [`Uno::run_until`], if the ELF has no such function, and if it is not reached within `timeout_cycles`.
     pub fn run_until_symbol(&mut self, symbol: &str, timeout_cycles: u64) -> Result<(), UnoError> {
         let address = self.image.functions.get(symbol).copied();
         let address = address.ok_or_else(|| UnoError::NoFunction(symbol.to_owned()))?;
@@ -265,7 +267,7 @@ impl Uno {
         Ok(())
     }
 
-    /// Runs one instruction. Where an interrupt is due, that is the first one of its handler, behind the response.
+    /// Runs one instruction. If an interrupt is due, that is the first one of its handler, after the response.
     ///
     /// # Errors
     ///
@@ -280,13 +282,13 @@ impl Uno {
         self.core.place()
     }
 
-    /// Gives the receiver a byte whose stop bit ends now, beside those that [`Uno::send`] has on their way. Returns whether it had
-    /// room.
+    /// Gives the receiver a byte whose stop bit ends now, independent of the queue of [`Uno::send`]. Returns whether it
+    /// had room.
     pub fn receive(&mut self, byte: u8) -> bool {
         self.core.receive(byte)
     }
 
-    /// Runs a step, and what falls due before it.
+    /// Runs one step, after applying all that is due.
     fn step(&mut self, until: u64) -> Result<(), UnoError> {
         while let Some(change) = self.to_drive.pop_front_if(|change| change.cycle <= self.core.cycle()) {
             self.set(change.pin, change.high);
@@ -303,24 +305,24 @@ impl Uno {
         })
     }
 
-    /// Types bytes into the serial line, at the pace of the line and behind those that are still on their way.
+    /// Sends bytes to the serial line at its pace, after those that are still queued.
     pub fn send(&mut self, bytes: &[u8]) {
         self.terminal.send(bytes, &self.core);
     }
 
-    /// From now on sent bytes come at the rate that the chip's UART is set to, whichever that is, and not at 115,200 baud: a
-    /// bootloader has a rate of its own.
+    /// From now on sent bytes use the rate of the chip's UART instead of 115,200 baud: a bootloader may have another
+    /// rate.
     pub fn follow_baud(&mut self) {
         self.terminal.follow_baud();
     }
 
-    /// Sent bytes that are still on their way to the receiver.
+    /// Sent bytes that have not reached the receiver yet.
     pub fn bytes_on_their_way(&self) -> usize {
         self.terminal.bytes_on_their_way()
     }
 
-    /// Pushes up to 63 bytes into the receiver at once, faster than any line could: simavr keeps them and hands them out one
-    /// by one.
+    /// Pushes up to 63 bytes into the receiver at once, faster than any line could. simavr buffers them and passes them
+    /// on one by one.
     pub fn send_at_once(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.core.flood(byte);
@@ -337,14 +339,14 @@ impl Uno {
         std::mem::take(&mut self.core.recorder_mut().received)
     }
 
-    /// Takes the text that has come from the firmware; what is not UTF-8 is replaced.
+    /// Takes the firmware's output as text. Invalid UTF-8 is replaced.
     pub fn received(&mut self) -> String {
         let bytes = to_bytes(&self.received_bytes());
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Takes the edges of the output pins: from now on [`Uno::changes`] begins with the next one. An Uno that runs for days
-    /// would pile them up.
+    /// Takes the edges of the output pins: from now on [`Uno::changes`] begins with the next one. This limits the
+    /// memory of an Uno that runs for days.
     pub fn take_changes(&mut self) -> Vec<PinChange> {
         std::mem::take(&mut self.core.recorder_mut().changes)
     }
@@ -364,17 +366,17 @@ impl Uno {
             .collect()
     }
 
-    /// Counts and times interrupts from now on; a second call starts afresh. The simulation is slower for it.
+    /// Counts and times interrupts from now on; a second call restarts. This slows the simulation.
     pub fn measure_interrupts(&mut self) {
         self.core.measure_interrupts();
     }
 
-    /// What the interrupts have cost since [`Uno::measure_interrupts`]; `None` before it.
+    /// The interrupts' statistics since [`Uno::measure_interrupts`]; `None` before it.
     pub fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
         self.core.interrupt_statistics()
     }
 
-    /// Times the main loop's turns from now on; a second call starts afresh. The simulation is slower for it.
+    /// Times the main loop's turns from now on; a second call restarts. This slows the simulation.
     pub fn measure_turns(&mut self) {
         self.core.measure_turns();
     }
@@ -384,7 +386,8 @@ impl Uno {
         self.core.turns()
     }
 
-    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` where there is no such symbol.
+    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` if there is no such
+    /// symbol.
     pub fn read(&self, symbol: &str) -> Option<&[u8]> {
         let variable = self.image.variables.get(symbol)?;
         Some(self.core.sram(variable.address, variable.size))
@@ -394,7 +397,7 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where there is no such symbol, or more bytes than it has.
+    /// If there is no such symbol, or more bytes than it has.
     pub fn write(&mut self, symbol: &str, bytes: &[u8]) -> Result<(), UnoError> {
         let length = bytes.len();
         match self.image.variables.get(symbol) {
@@ -407,7 +410,7 @@ impl Uno {
     ///
     /// # Errors
     ///
-    /// Where they do not fit into SRAM, which is from 0x0100 to 0x08FF.
+    /// If they do not fit into SRAM, which is from 0x0100 to 0x08FF.
     pub fn write_sram(&mut self, address: u16, bytes: &[u8]) -> Result<(), UnoError> {
         let length = bytes.len();
         let fits = u16::try_from(length).is_ok_and(|count| self.core.sram(address, count).len() == length);
@@ -418,12 +421,13 @@ impl Uno {
         Ok(())
     }
 
-    /// Address of the first byte behind the static data, down to which the stack may grow.
+    /// Address of the first byte behind the static data: the lower limit of the stack.
     pub fn first_stack_address(&self) -> u16 {
         core::SRAM_START + self.image.size.sram as u16
     }
 
-    /// The most bytes that the stack has taken since power-up, or since the firmware painted it, as far as they were written.
+    /// The most bytes that the stack has used since power-up, or since the firmware painted it. Bytes that were never
+    /// written are not counted.
     pub fn deepest_stack(&self) -> usize {
         self.core.deepest_stack(self.image.size.sram as u16)
     }
@@ -433,7 +437,7 @@ fn to_bytes(received: &[ReceivedByte]) -> Vec<u8> {
     received.iter().map(|received| received.byte).collect()
 }
 
-/// Where `text` begins in `bytes`.
+/// The index of `text` in `bytes`.
 fn find(bytes: &[u8], text: &[u8]) -> Option<usize> {
     (0..=bytes.len()).find(|&start| bytes[start..].starts_with(text))
 }

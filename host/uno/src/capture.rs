@@ -1,8 +1,8 @@
-//! Recordings of real signals: what a logic analyser saw on some pins, from its VCD file.
+//! Recordings of real signals: the levels of some pins, from a logic analyser's VCD file.
 //!
-//! A [`Capture`] is the recording as levels on the Uno's pins, in cycles, whatever unit the file counts in. Channels are chosen
-//! by the names that the analyser's software gave them. Nothing is filtered or repaired: a level that the file leaves open is an
-//! error, and what the signal means is for the firmware to say.
+//! A [`Capture`] holds levels on the Uno's pins, in cycles. It converts from any time unit of the file. The caller
+//! chooses channels by the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an
+//! error. The firmware, not this module, interprets the signal.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -21,10 +21,10 @@ pub enum CaptureError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What went wrong; for a file that is no VCD, with the line.
+        /// The error. For a file that is no VCD, it includes the line.
         source: std::io::Error,
     },
-    /// The file does not say what its times count.
+    /// The file has no time unit.
     #[error("{path} has no $timescale: export the recording as VCD once more")]
     NoTimescale {
         /// The file.
@@ -50,7 +50,7 @@ pub enum CaptureError {
         /// Their full names.
         known: Vec<String>,
     },
-    /// One channel was asked for twice.
+    /// A channel was chosen twice.
     #[error("channel `{name}` is given for two signals: each needs its own")]
     SharedChannel {
         /// The name.
@@ -86,7 +86,7 @@ pub enum CaptureError {
         /// Where.
         line: u64,
     },
-    /// The recording goes on for too long.
+    /// The recording is too long.
     #[error("{path} goes on beyond {MOST_HOURS} h at line {line}: cut the recording, or look at its $timescale")]
     TooLong {
         /// The file.
@@ -94,7 +94,7 @@ pub enum CaptureError {
         /// Where.
         line: u64,
     },
-    /// The channel has no level at all.
+    /// The channel has no level.
     #[error("{path} holds no samples of channel `{name}`")]
     NoSamples {
         /// The file.
@@ -104,10 +104,10 @@ pub enum CaptureError {
     },
 }
 
-/// Longest recording, in hours. Nobody waits for the firmware to play a longer one.
+/// Longest recording, in hours. Playing a longer one takes too long to be useful.
 const MOST_HOURS: u64 = 24;
 
-/// Most scopes within each other. An analyser makes one or two, and each takes of the reader's stack.
+/// Greatest nesting of scopes. An analyser writes one or two, and each uses the reader's stack.
 const MOST_SCOPES: usize = 50;
 
 /// Longest head of a file, in which its channels are declared.
@@ -116,8 +116,8 @@ const MOST_HEAD_BYTES: u64 = 1 << 20;
 /// A recording, as levels on the Uno's pins.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Capture {
-    /// The levels, sorted by cycle from the recording's time 0. Each channel's first is the level that it began with; from then
-    /// on each is an edge.
+    /// The levels, sorted by cycle from the recording's time 0. The first of each channel is its initial level, and the
+    /// others are edges.
     pub changes: Vec<PinChange>,
 }
 
@@ -129,12 +129,12 @@ struct Channel {
 }
 
 impl Capture {
-    /// Reads the recording at `path`. `channels` says by which channel of the file a pin is known; a name that stands in several
+    /// Reads the recording at `path`. `channels` maps pins to channel names in the file. A name that exists in several
     /// scopes is written `scope.name`.
     ///
     /// # Errors
     ///
-    /// Where the file is no VCD, has no such channels, or leaves their levels open.
+    /// If the file is no VCD, lacks a channel, or leaves a level undefined.
     pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, CaptureError> {
         let file = File::open(path).map_err(|source| CaptureError::Read { path: path.into(), source })?;
         Capture::parse(path, BufReader::new(file), channels)
@@ -204,7 +204,7 @@ impl Capture {
     }
 }
 
-/// The file's head, up to where its channels are declared.
+/// The file's head, up to the end of the channels' declarations.
 fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
     let wrong = |problem: String| Err(io::Error::new(ErrorKind::InvalidData, problem));
     let (mut head, mut scopes) = (Vec::new(), 0_usize);
@@ -227,7 +227,7 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
             }
         }
     }
-    // What is shorter is for the reader to judge.
+    // The reader reports an error in a shorter head.
     if rest.limit() == 0 {
         wrong("no $enddefinitions stands in its first MiB".to_owned())
     } else {
@@ -242,7 +242,7 @@ fn to_cycles(time: u64, (count, unit): (u32, TimescaleUnit)) -> u64 {
     u64::try_from((units + divisor / 2) / divisor).unwrap_or(u64::MAX)
 }
 
-/// Every channel with the scopes it stands in, as `scope.name`.
+/// Every channel with its scopes, as `scope.name`.
 fn list_channels<'a>(scope: &str, items: &'a [ScopeItem], known: &mut Vec<(String, &'a Var)>) {
     for item in items {
         match item {
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn times_become_cycles_whatever_the_unit() {
+    fn times_in_every_unit_become_cycles() {
         let (a, b) = (Pin::D2, Pin::D3);
         for (timescale, time) in [("1 us", 1000), ("10 us", 100), ("1 ms", 1), ("100 ps", 10_000_000)] {
             let file = recording(timescale, &format!("#0 0! 1\" #{time} 1! 1\" b101 # #{} 0\"", 3 * time));

@@ -1,17 +1,17 @@
-//! The ATmega328P on simavr: the one place that makes a chip and runs it. What C calls back is in [`super::recorder`], and in
-//! [`super::timer`] and [`super::eeprom`] for writes of their registers.
+//! The ATmega328P on simavr: the only module that makes a chip and runs it. The callbacks from C are in
+//! [`super::recorder`], and those for writes of registers in [`super::timer`] and [`super::eeprom`].
 //!
-//! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to, and offers the rest of
-//! [`super`] safe calls: one step, levels in, edges and bytes out. It knows pins by port and bit, cycles and bytes, and
-//! nothing of queues or of a terminal's pace; those are [`super::Uno`]'s.
+//! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to. It gives the rest of
+//! [`super`] safe calls: one step, levels in, edges and bytes out. It works with port bits, cycles and bytes. Queues
+//! and the pace of a terminal belong to [`super::Uno`].
 //!
 //! # Memory
 //!
-//! Two allocations exist a chip: simavr's `avr_t`, made by `avr_make_mcu_by_name`, and the recorder, a leaked box. Both are
-//! freed by `Drop` and by nothing else. simavr holds the recorder's address, or that of its timer or EEPROM, as its callbacks'
-//! parameter, and calls them only from inside the functions that this file calls; none of those calls is made while a
-//! reference into the recorder or into `avr_t` is alive. simavr keeps no state outside `avr_t` but its logger, which is never
-//! replaced here, so chips in several threads do not meet.
+//! Each chip has two allocations: simavr's `avr_t`, made by `avr_make_mcu_by_name`, and the recorder, a leaked box.
+//! Only `Drop` frees them. simavr holds the recorder's address, or that of its timer or EEPROM, as its callbacks'
+//! parameter. simavr calls the callbacks only from inside the functions that this file calls. None of those calls is
+//! made while a reference into the recorder or into `avr_t` is alive. simavr keeps no state outside `avr_t` except its
+//! logger, which is never replaced here. So chips in several threads do not interfere.
 
 use std::ffi::{CStr, c_void};
 use std::ptr::{self, NonNull};
@@ -32,7 +32,7 @@ use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
 use crate::pins::{CYCLES_PER_SECOND, Pin};
 
 unsafe extern "C" {
-    /// Runs the next instruction. It stands in sim_core.h, which simavr-ffi leaves out of its bindings.
+    /// Runs the next instruction. It is declared in sim_core.h, which simavr-ffi leaves out of its bindings.
     pub(crate) fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
 }
 
@@ -49,8 +49,8 @@ const WAKE_UP_CYCLES: u64 = 4;
 pub(super) const SRAM_START: u16 = 0x0100;
 const SRAM_END: u16 = 0x08FF;
 
-/// What SRAM holds at power-up, where nothing else is asked for. A real chip's content is random; a byte that is not zero
-/// catches those who count on it, and shows how deep the stack has been.
+/// Default content of SRAM at power-up. A real chip's content is random. A byte other than zero reveals code that
+/// expects zeros, and shows how deep the stack has been.
 const SRAM_AT_POWER_UP: u8 = 0xC5;
 
 /// The register of a reset's cause, by its address in the data space (data sheet, register summary).
@@ -76,7 +76,7 @@ const fn request(name: &[u8; 4]) -> u32 {
 /// What stopped a chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stop {
-    /// It met an instruction that does not exist, or ran past the end of its flash.
+    /// It met an invalid instruction, or ran past the end of its flash.
     Crashed,
     /// It sleeps with interrupts off: nothing can wake it.
     Halted,
@@ -87,7 +87,7 @@ pub(super) struct Core {
     chip: NonNull<simavr::avr_t>,
     recorder: NonNull<Recorder>,
     input: NonNull<simavr::avr_irq_t>,
-    /// Levels that the inputs are held at from outside, by port and bit.
+    /// External levels of the inputs, by port and bit.
     held: [HeldLevels; Port::NAMES.len()],
     /// The last step left the chip asleep.
     asleep: bool,
@@ -101,23 +101,24 @@ struct HeldLevels {
     levels: u8,
 }
 
-// SAFETY: a chip touches nothing but its own two allocations (see the module's text) and is tied to no thread; `Core` has no
+// SAFETY: a chip uses only its own two allocations (see the module's text) and is tied to no thread. `Core` has no
 // shared access that changes it, so moving it moves the only user.
 unsafe impl Send for Core {}
 
 impl Core {
-    /// A chip that has just been powered up, at `cycle`, with `flash` (from address 0) and `eeprom` (from address 0) in it.
-    /// Both must fit, which [`crate::elf::Image`] and [`super::Uno`] see to. It starts at `reset_address` in flash, now and
-    /// after every reset.
+    /// A chip after power-up, at `cycle`, with `flash` and `eeprom` written from address 0. Both must fit;
+    /// [`crate::elf::Image`] and [`super::Uno`] ensure this. It starts at `reset_address` in flash, now and after every
+    /// reset.
     pub(super) fn new(flash: &[u8], eeprom: &[u8], reset_address: u16, cycle: u64) -> Core {
-        // SAFETY: the name is a C string that lives for ever. The chip is known to every simavr, so a null pointer means
+        // SAFETY: the name is a C string that lives for ever. Every simavr knows this chip, so a null pointer means
         // that memory ran out.
         let chip =
             NonNull::new(unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) }).expect("simavr knows the ATmega328P");
         let avr = chip.as_ptr();
 
-        // SAFETY: `avr` was just made and nothing else has its address. `avr_init` is called once, with the clock set as it
-        // asks. `data` and `flash` are then simavr's, of `ramend + 1` and `flashend + 1` bytes, and `flash` fits.
+        // SAFETY: `avr` was just made and no other code has its address. `avr_init` is called once, after the clock was
+        // set as it requires. `data` and `flash` are then simavr's, of `ramend + 1` and `flashend + 1` bytes, and
+        // `flash` fits.
         unsafe {
             (*avr).frequency = CYCLES_PER_SECOND as u32;
             simavr::avr_init(avr);
@@ -156,9 +157,9 @@ impl Core {
         })));
         let parameter = recorder.as_ptr().cast::<c_void>();
 
-        // SAFETY: `avr` and `uart` are valid and initialised. Each `avr_io_getirq` names a peripheral that the chip has, and
-        // simavr ignores a null for a vector that it lacks. The callbacks get the recorder's address, which stays valid until
-        // `Drop` has ended the chip.
+        // SAFETY: `avr` and `uart` are valid and initialised. Each `avr_io_getirq` names a peripheral that the chip
+        // has, and simavr ignores a null for a vector that it lacks. The callbacks get the recorder's address, which
+        // stays valid until `Drop` has ended the chip.
         let input = unsafe {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
@@ -226,14 +227,14 @@ impl Core {
         unsafe { (*self.chip.as_ptr()).pc }
     }
 
-    /// What the callbacks have seen.
+    /// The recorded events.
     pub(super) fn recorder(&self) -> &Recorder {
-        // SAFETY: the recorder is valid for as long as `self` is, and simavr, its only other user, runs only in methods
-        // that borrow `self` mutably.
+        // SAFETY: the recorder is valid for as long as `self` is. simavr is its only other user, and runs only in
+        // methods that borrow `self` mutably.
         unsafe { self.recorder.as_ref() }
     }
 
-    /// What the callbacks have seen, to take it out.
+    /// The recorded events, for a caller that takes them.
     pub(super) fn recorder_mut(&mut self) -> &mut Recorder {
         // SAFETY: as in `recorder`.
         unsafe { self.recorder.as_mut() }
@@ -274,28 +275,28 @@ impl Core {
         }
     }
 
-    /// Has the main program jump to where it is, for ever; handlers go on. No handler may be running.
+    /// Makes the main program jump to its present address for ever. Handlers still run. No handler may be running now.
     pub(super) fn stall(&mut self) {
         self.stalled_at = Some(self.program_counter());
     }
 
-    /// Serves a pending interrupt, runs an instruction or sleeps, and lets the peripherals catch up. Several instructions
-    /// may run in one step, but never past `until`, except by the length of the last one.
+    /// Serves a pending interrupt, runs an instruction or sleeps, and updates the peripherals. Several instructions may
+    /// run in one step. A step passes `until` at most by the length of its last instruction.
     pub(super) fn step(&mut self, until: u64) -> Result<(), Stop> {
         let avr = self.chip.as_ptr();
         let uart = self.recorder().uart;
         let measuring = self.interrupt_statistics().is_some();
         let counting_turns = self.turns().is_some();
         let one_by_one = measuring || counting_turns || self.stalled_at.is_some();
-        // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder is alive
-        // while it does. This is `avr_callback_run_raw` without its two waits on the host's clock.
+        // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder
+        // is alive while it runs. This is `avr_callback_run_raw` without its two waits on the PC's clock.
         unsafe {
             self.init();
             uart::hand_over_received(avr, uart);
             if (*avr).interrupt_state != 0 {
                 simavr::avr_service_interrupts(avr);
             }
-            // Where every instruction must be seen, the limit is the shortest possible.
+            // To observe every instruction, the limit is the shortest possible.
             let limit = match one_by_one {
                 true => 1,
                 false => until.saturating_sub((*avr).cycle).max(1),
@@ -337,7 +338,8 @@ impl Core {
         Ok(())
     }
 
-    /// Halts the core for a moment if something has woken it: a level at a pin between two steps, or a peripheral in the last one.
+    /// Halts the core for a moment after a wake-up: by a level at a pin between two steps, or by a peripheral in the
+    /// last step.
     fn init(&mut self) {
         // SAFETY: as in `cycle`.
         let chip = unsafe { self.chip.as_mut() };
@@ -352,8 +354,8 @@ impl Core {
         self.reset_by(EXTRF, ResetCause::External);
     }
 
-    /// Lets the supply sag for a moment, too low to run and high enough for SRAM. The byte that was being written to the EEPROM
-    /// is torn.
+    /// Lets the supply voltage drop for a moment, too low to run and high enough for SRAM. A byte that was being
+    /// written to the EEPROM is torn.
     pub(super) fn brown_out(&mut self) {
         let eeprom = self.eeprom();
         self.set_eeprom(&eeprom);
@@ -370,10 +372,10 @@ impl Core {
         self.finish_reset(cause);
     }
 
-    /// The instruction that comes next, as far as it is one word.
+    /// The first word of the next instruction.
     fn next_instruction(&self) -> u16 {
-        // SAFETY: as in `cycle`; simavr's flash has room behind its last word, and the program counter lies inside it, or the
-        // chip has crashed before.
+        // SAFETY: as in `cycle`; simavr's flash has room behind its last word. The program counter lies inside it,
+        // because otherwise the chip has crashed before.
         unsafe {
             let avr = self.chip.as_ptr();
             let word = (*avr).flash.add((*avr).pc as usize);
@@ -381,7 +383,7 @@ impl Core {
         }
     }
 
-    /// Takes over from the chip that has lost its power: what was recorded, and the levels at its pins.
+    /// Takes over the state of the chip before the power failure: the recording, and the levels at its pins.
     pub(super) fn take_over(&mut self, before: &mut Core) {
         let old = before.recorder_mut();
         let new = self.recorder_mut();
@@ -405,7 +407,7 @@ impl Core {
         recorder.resets.push(Reset { cycle, cause: ResetCause::PowerOn });
     }
 
-    /// Sets right what simavr leaves behind a reset: its clock at 0, and the inputs' levels forgotten.
+    /// Corrects simavr after a reset: it sets its clock to 0 and forgets the inputs' levels.
     fn finish_reset(&mut self, cause: ResetCause) {
         let Some(cycle) = self.recorder_mut().reset_at.take() else {
             return;
@@ -426,7 +428,7 @@ impl Core {
         self.hold_inputs();
     }
 
-    /// Puts the levels that the inputs are held at on a chip that has just started.
+    /// Applies the external levels to a chip that has just started.
     fn hold_inputs(&mut self) {
         for pin in Pin::ALL {
             let (port, bit) = pin.port_and_bit();
@@ -437,7 +439,7 @@ impl Core {
         }
     }
 
-    /// Holds an input pin at a level from now on.
+    /// Sets the external level of an input pin from now on.
     pub(super) fn set_input(&mut self, pin: Pin, high: bool) {
         let (port, bit) = pin.port_and_bit();
         let held = &mut self.held[port_index(port)];
@@ -453,7 +455,7 @@ impl Core {
             __bindgen_padding_0: [0; 5],
         };
         let avr = self.chip.as_ptr();
-        // SAFETY: as in `step`; `external` is what this request takes, and simavr copies it.
+        // SAFETY: as in `step`; `external` has the type of this request, and simavr copies it.
         unsafe {
             // Only so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
             let set_external = request(&[b'i', b'o', b'p', port as u8]);
@@ -465,12 +467,12 @@ impl Core {
         }
     }
 
-    /// Puts a voltage on a channel of the ADC from now on.
+    /// Sets the voltage on a channel of the ADC from now on.
     pub(super) fn set_millivolts(&mut self, channel: u8, millivolts: u16) {
         self.recorder_mut().millivolts[usize::from(channel)] = millivolts;
     }
 
-    /// The level that the firmware drives the pin to; `None` where it is an input.
+    /// The level that the firmware drives the pin to; `None` if it is an input.
     pub(super) fn output(&self, pin: Pin) -> Option<bool> {
         let (port, bit) = pin.port_and_bit();
         // SAFETY: as in `cycle`.
@@ -492,18 +494,18 @@ impl Core {
         unsafe { uart::receive(self.chip.as_ptr(), uart, self.input.as_ptr(), byte) }
     }
 
-    /// Gives the receiver a byte without regard to the line's pace or the receiver's room.
+    /// Gives the receiver a byte, independent of the line's pace and the receiver's room.
     pub(super) fn flood(&mut self, byte: u8) {
         // SAFETY: as in `step`.
         unsafe { simavr::avr_raise_irq(self.input.as_ptr(), byte.into()) };
     }
 
-    /// The EEPROM's content, as it is left where power goes now.
+    /// The EEPROM's content after a power failure now.
     pub(super) fn eeprom(&self) -> Vec<u8> {
         let mut content = vec![0; EEPROM_BYTES];
         let mut description =
             simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: EEPROM_BYTES as u32 };
-        // SAFETY: `description` names a buffer of the size it gives, and simavr copies into it.
+        // SAFETY: `description` names a buffer and its size, and simavr copies into it.
         unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eegp"), (&raw mut description).cast()) };
         if let Some(torn) = self.recorder().eeprom.torn_byte(self.cycle()) {
             content[torn.address] |= torn.ones;
@@ -511,7 +513,7 @@ impl Core {
         content
     }
 
-    /// All of the flash, as the firmware or its bootloader has left it.
+    /// The whole flash, with the changes by the firmware or its bootloader.
     pub(super) fn flash(&self) -> &[u8] {
         // SAFETY: simavr owns `flash`, of `flashend + 1` bytes, and changes it only in methods that borrow `self` mutably.
         unsafe { std::slice::from_raw_parts((*self.chip.as_ptr()).flash, FLASH_BYTES) }
@@ -527,11 +529,11 @@ impl Core {
         let mut content = content.to_vec();
         let mut description =
             simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: content.len() as u32 };
-        // SAFETY: as in `eeprom`; simavr copies out of it, and refuses what is empty or too long.
+        // SAFETY: as in `eeprom`; simavr copies out of it, and refuses an empty or too long buffer.
         unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eesp"), (&raw mut description).cast()) };
     }
 
-    /// `length` bytes of SRAM from `address`; what lies outside is left out.
+    /// `length` bytes of SRAM from `address`, cut at the end of SRAM.
     pub(super) fn sram(&self, address: u16, length: u16) -> &[u8] {
         let start = address.clamp(SRAM_START, SRAM_END + 1);
         let end = address.saturating_add(length).clamp(start, SRAM_END + 1);
@@ -542,7 +544,7 @@ impl Core {
         }
     }
 
-    /// Puts bytes into SRAM from `address`; they must fit.
+    /// Writes bytes to SRAM from `address`; they must fit.
     pub(super) fn set_sram(&mut self, address: u16, bytes: &[u8]) {
         assert!(self.sram(address, bytes.len() as u16).len() == bytes.len(), "SRAM is from 0x0100 to 0x08ff");
         // SAFETY: as in `step`; the bytes fit into SRAM, which lies inside `data`.
@@ -555,9 +557,9 @@ impl Core {
     /// All of SRAM.
     pub(super) const SRAM_BYTES: usize = (SRAM_END - SRAM_START + 1) as usize;
 
-    /// The most bytes that the stack has taken, where `static_bytes` of SRAM lie below it for good. Below it SRAM still holds
-    /// one and the same byte, from power-up or from a firmware that painted it at its start. Bytes that were reserved
-    /// but never written are not seen.
+    /// The most bytes that the stack has used. `static_bytes` of SRAM below it are static. Below the deepest byte SRAM
+    /// still holds one fill byte, from power-up or from firmware that painted it at its start. Bytes that were reserved
+    /// but never written are not counted.
     pub(super) fn deepest_stack(&self, static_bytes: u16) -> usize {
         let start = SRAM_START.saturating_add(static_bytes);
         let above = self.sram(start, (SRAM_END + 1).saturating_sub(start));
@@ -569,7 +571,7 @@ impl Core {
 impl Drop for Core {
     fn drop(&mut self) {
         // SAFETY: both were allocated in `new`, the chip by simavr's malloc, which leaves freeing `avr_t` itself to its
-        // maker; nobody uses them after this.
+        // maker. Neither is used after this.
         unsafe {
             simavr::avr_terminate(self.chip.as_ptr());
             libc::free(self.chip.as_ptr().cast());

@@ -1,10 +1,10 @@
-//! The EEPROM's time: a byte takes 3.4 ms to write, and is undefined when power goes meanwhile.
+//! The EEPROM's write time: a byte takes 3.4 ms to write, and a power failure meanwhile leaves it undefined.
 //!
-//! simavr stores a byte the moment it is asked to. Its writer of EECR is replaced by one that lets simavr store it, and then
-//! keeps EEPE set for as long as the chip does (data sheet, 8.4.2); until then EECR takes no other order. A reset lets the
-//! write under way finish (8.4.3). Where power goes, [`TornByte`] says what is left.
+//! simavr stores a byte at once. Its writer of EECR is replaced by one that lets simavr store the byte, and then keeps
+//! EEPE set for as long as the chip does (data sheet, 8.4.2). Until then EECR accepts no other command. A reset lets
+//! the pending write finish (8.4.3). [`TornByte`] is the result of a power failure.
 //!
-//! Only writes that erase first are timed (EEPM 00), and the core is not halted for the few cycles after an order.
+//! Only writes that erase first are timed (EEPM 00). The core is not halted for the few cycles after a command.
 
 use std::ffi::c_void;
 
@@ -26,11 +26,11 @@ const EERE: u8 = 1 << 0;
 const EEPE: u8 = 1 << 1;
 const EEMPE: u8 = 1 << 2;
 
-/// Bits that a write leaves erased when power goes in its second half. The chip does not say which; what counts is that the
-/// byte is neither the old one nor the new one.
+/// Bits that stay erased after a power failure in the second half of a write. The data sheet does not define them.
+/// Important is that the byte is neither the old nor the new value.
 const STILL_ERASED: u8 = 0b0101_0101;
 
-/// The EEPROM's writer, and the write under way.
+/// The EEPROM's writer, and its pending write.
 pub(super) struct Eeprom {
     writer: Writer,
     write: Option<Write>,
@@ -42,12 +42,12 @@ struct Write {
     begun: u64,
 }
 
-/// A byte whose write was cut off.
+/// A byte whose write was interrupted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TornByte {
     /// Its address.
     pub(super) address: usize,
-    /// Bits that are set in it whatever was to be written: all of them while it is being erased.
+    /// Bits that the cell sets for any written value: all of them while it is being erased.
     pub(super) ones: u8,
 }
 
@@ -56,40 +56,40 @@ impl Eeprom {
     ///
     /// # Safety
     ///
-    /// `avr` must be an initialised chip whose writers have not been taken over.
+    /// `avr` must be an initialised chip whose writers have not been replaced.
     pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Eeprom {
         // SAFETY: the caller vouches for `avr`.
         Eeprom { writer: unsafe { Writer::of(avr, EECR) }, write: None }
     }
 
-    /// What is left of the byte that is being written, where power goes at `cycle`.
+    /// The result for the byte that is being written, after a power failure at `cycle`.
     pub(super) fn torn_byte(&self, cycle: u64) -> Option<TornByte> {
         let Write { address, begun } = self.write?;
         let ones = if cycle - begun < WRITE_CYCLES / 2 { 0xFF } else { STILL_ERASED };
         Some(TornByte { address, ones })
     }
 
-    /// A reset: the write under way finishes, and EECR is as at power-up.
+    /// Applies a reset: the pending write finishes, and EECR is as at power-up.
     pub(super) fn reset(&mut self) {
         self.write = None;
     }
 }
 
-/// Puts this file's writer of EECR in the place of simavr's.
+/// Replaces simavr's writer of EECR by the one in this file.
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip and `eeprom` its own, which stays where it is for as long as the chip runs, and of which no
-/// reference is alive while it does.
+/// `avr` must be an initialised chip, and `eeprom` its own EEPROM. `eeprom` must not move while the chip runs, and no
+/// reference to it may be alive while the chip runs.
 pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, eeprom: *mut Eeprom) {
-    // SAFETY: the caller vouches for both; the address is that of an I/O register.
+    // SAFETY: the caller guarantees both; the address is that of an I/O register.
     unsafe { Writer::replace(avr, EECR, on_control_write, eeprom.cast()) };
 }
 
 /// simavr's callback for a write of EECR.
 unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, value: u8, parameter: *mut c_void) {
-    // SAFETY: `parameter` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip; the registers are
-    // addresses inside `data`.
+    // SAFETY: `parameter` is the one that `take_over_writes` registered, alive and not borrowed, and `avr` its chip;
+    // the registers are addresses inside `data`.
     unsafe {
         let eeprom = parameter.cast::<Eeprom>();
         let control = (*avr).data.add(register.into());

@@ -1,7 +1,7 @@
-//! The firmware as a file: what an ELF holds.
+//! Reads the firmware's ELF.
 //!
-//! [`Image`] is an ELF taken apart as a programmer would: what goes into flash and EEPROM, how much memory it takes, and where
-//! its symbols lie. Nothing here builds the firmware, and nothing runs it; [`Uno`](crate::Uno) does.
+//! [`Image`] has the contents of flash and EEPROM, the memory that the program takes, and the addresses of its symbols.
+//! This module neither builds nor runs the firmware; [`Uno`](crate::Uno) runs it.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub const FLASH_BYTES: usize = 32 * 1024;
 /// EEPROM of the ATmega328P in bytes (data sheet, section 8.4).
 pub const EEPROM_BYTES: usize = 1024;
 
-/// Where AVR ELF files place SRAM, EEPROM and what follows it in their single address space.
+/// Origins of SRAM, EEPROM and the following sections in the single address space of AVR ELF files.
 const SRAM_ORIGIN: u64 = 0x80_0000;
 const EEPROM_ORIGIN: u64 = 0x81_0000;
 const FUSES_ORIGIN: u64 = 0x82_0000;
@@ -27,7 +27,7 @@ const FUSES_ORIGIN: u64 = 0x82_0000;
 pub struct Size {
     /// Flash: code, constants, and the first values of variables (.text, .data).
     pub flash: u64,
-    /// SRAM that is taken for good (.data, .bss, .noinit); the stack comes on top.
+    /// Static SRAM (.data, .bss, .noinit), without the stack.
     pub sram: u64,
 }
 
@@ -36,7 +36,7 @@ impl Size {
     ///
     /// # Errors
     ///
-    /// Where the file cannot be read or is no ELF for AVR.
+    /// If the file cannot be read or is no ELF for AVR.
     pub fn read(path: &Path) -> Result<Size, ImageError> {
         let bytes = read_bytes(path)?;
         parse(path, &bytes).map(|file| size(&file))
@@ -54,12 +54,12 @@ pub enum ImageError {
         /// The operating system's answer.
         source: std::io::Error,
     },
-    /// The file is no ELF, or a broken one.
+    /// The file is no ELF, or damaged.
     #[error("{path} is not a readable ELF file ({reason})")]
     NotElf {
         /// The file.
         path: PathBuf,
-        /// What was wrong with it.
+        /// The error.
         reason: object::Error,
     },
     /// The file was made for another processor.
@@ -67,10 +67,10 @@ pub enum ImageError {
     NotAvr {
         /// The file.
         path: PathBuf,
-        /// What it was made for.
+        /// Its target.
         architecture: Architecture,
     },
-    /// The file holds more than the chip does.
+    /// The file has more bytes than the chip's memory.
     #[error("{path} has {end} bytes for the {memory}: the ATmega328P holds {limit}")]
     TooLarge {
         /// The file.
@@ -84,7 +84,7 @@ pub enum ImageError {
     },
 }
 
-/// A variable's place in SRAM.
+/// A variable's address in SRAM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variable {
     /// Address in the data space.
@@ -93,12 +93,12 @@ pub struct Variable {
     pub size: u16,
 }
 
-/// What an ELF holds for the chip; by default nothing.
+/// The contents of an ELF for the chip; empty by default.
 #[derive(Clone, Debug, Default)]
 pub struct Image {
     /// Flash from address 0 to the last byte used.
     pub flash: Vec<u8>,
-    /// EEPROM from address 0 to the last byte given; usually empty.
+    /// EEPROM from address 0 to the last byte in the ELF; usually empty.
     pub eeprom: Vec<u8>,
     /// Memory taken.
     pub size: Size,
@@ -113,7 +113,7 @@ impl Image {
     ///
     /// # Errors
     ///
-    /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
+    /// If the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, ImageError> {
         let bytes = read_bytes(path)?;
         let file = parse(path, &bytes)?;
@@ -124,11 +124,11 @@ impl Image {
             if header.p_type(LittleEndian) != elf::PT_LOAD || content.is_empty() {
                 continue;
             }
-            // The physical address: for .data that is where its first values lie in flash.
+            // The physical address: for .data it is the address of its initial values in flash.
             let (memory, name, start, limit) = match u64::from(header.p_paddr(LittleEndian)) {
                 address @ ..SRAM_ORIGIN => (&mut flash, "flash", address, FLASH_BYTES),
                 address @ EEPROM_ORIGIN..FUSES_ORIGIN => (&mut eeprom, "EEPROM", address - EEPROM_ORIGIN, EEPROM_BYTES),
-                // Fuses and lock bits are not part of what runs.
+                // Fuses and lock bits are ignored.
                 _ => continue,
             };
             let end = start + content.len() as u64;
@@ -170,7 +170,8 @@ fn size(file: &ElfFile32<LittleEndian>) -> Size {
         if !sh_flags.contains(elf::SHF_ALLOC) {
             continue;
         }
-        // First values have a place in flash; what a start-up code leaves alone (.noinit) may have some in the file and none there.
+        // Initial values have an address in flash. A section that the start-up code does not fill (.noinit) may have
+        // some in the file and no address in flash.
         let is_loaded = file.elf_program_headers().iter().any(|header| {
             let (start, length) = (header.p_vaddr(LittleEndian), header.p_filesz(LittleEndian));
             let in_flash = u64::from(header.p_paddr(LittleEndian)) < SRAM_ORIGIN;
@@ -204,7 +205,7 @@ fn variables(file: &ElfFile32<LittleEndian>) -> HashMap<String, Variable> {
 }
 
 fn functions(file: &ElfFile32<LittleEndian>) -> HashMap<String, u32> {
-    // Those of libgcc have a size and no type.
+    // Symbols of libgcc have a size and no type.
     let is_untyped = |symbol: &ElfSymbol32<LittleEndian>| {
         let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
         symbol.kind() == SymbolKind::Unknown
@@ -217,9 +218,9 @@ fn functions(file: &ElfFile32<LittleEndian>) -> HashMap<String, u32> {
         .collect()
 }
 
-/// A symbol's name as its source has it: a Rust path from the crate on, without the compiler's numbers.
+/// A symbol's name in its source: a Rust path from the crate on, without the compiler's numbers.
 fn name<'data>(symbol: &impl ObjectSymbol<'data>) -> Option<String> {
-    // A local variable's symbol may carry a number behind its mangled name.
+    // A local variable's symbol may have a number behind its mangled name.
     let mangled = symbol.name().ok()?;
     let (mangled, _) = mangled.split_once('.').unwrap_or((mangled, ""));
     Some(format!("{:#}", rustc_demangle::demangle(mangled)))

@@ -1,4 +1,4 @@
-//! Why a virtual Uno could not start, stopped, or did not come to what was waited for.
+//! The errors of a virtual Uno: it could not start, it stopped, or a wait timed out.
 
 use crate::elf::{EEPROM_BYTES, ImageError};
 use crate::hex::HexError;
@@ -15,7 +15,7 @@ pub enum UnoError {
     /// The EEPROM content does not fit.
     #[error("{0} bytes of EEPROM content were given: the ATmega328P holds {EEPROM_BYTES}")]
     EepromTooLarge(usize),
-    /// The firmware met an instruction that does not exist, or ran past the end of its flash.
+    /// The firmware met an invalid instruction, or ran past the end of its flash.
     #[error("the firmware crashed at cycle {cycle}, address {program_counter:#06x} of flash")]
     Crashed {
         /// When.
@@ -38,13 +38,13 @@ pub enum UnoError {
     NoVariable {
         /// The symbol asked for.
         symbol: String,
-        /// Bytes that were to be put into it.
+        /// Number of bytes to write.
         length: usize,
     },
     /// The bytes do not fit into SRAM.
     #[error("{length} bytes from {address:#06x} do not fit into SRAM, which is from 0x0100 to 0x08ff")]
     NotInSram {
-        /// Where the first was to go.
+        /// Address of the first byte.
         address: u16,
         /// How many there were.
         length: usize,
@@ -52,12 +52,12 @@ pub enum UnoError {
     /// The ELF has no such function.
     #[error("the firmware has no function `{0}`: give its path from the crate on")]
     NoFunction(String),
-    /// The firmware did not come to a function.
+    /// The firmware did not reach a function.
     #[error("the firmware did not come to `{symbol}` within {timeout_cycles} cycles")]
     NotReached {
         /// The function.
         symbol: String,
-        /// How long it was waited for.
+        /// The timeout.
         timeout_cycles: u64,
     },
     /// A text that was waited for did not come.
@@ -67,7 +67,7 @@ pub enum UnoError {
         text: String,
         /// How long.
         timeout_cycles: u64,
-        /// What came instead; it can still be taken by [`Uno::received`](crate::Uno::received).
+        /// The received text; [`Uno::received`](crate::Uno::received) still returns it.
         received: String,
     },
 }

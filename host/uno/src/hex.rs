@@ -1,8 +1,8 @@
-//! Intel HEX, the files that the Arduino tools take: the firmware as one, and a bootloader out of one, or compiled here.
+//! Intel HEX, the file format of the Arduino tools: writes the firmware, and reads a bootloader or compiles one.
 //!
-//! A bootloader stands at the end of the flash and is started first by every reset; it writes a new firmware where it is sent
-//! one in time, and otherwise starts the one that is there. Its place says how much flash is left for the firmware.
-//! Nothing here runs one: [`Uno`](crate::Uno) does.
+//! A bootloader is at the end of the flash, and every reset starts it. If it receives new firmware in time it writes
+//! that, otherwise it starts the present firmware. Its address limits the flash for the firmware. This module does not
+//! run a bootloader; [`Uno`](crate::Uno) does.
 
 use crate::elf::{FLASH_BYTES, Image, ImageError};
 use ihex::{Reader, ReaderError, Record};
@@ -11,19 +11,19 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use thiserror::Error;
 
-/// Sizes in bytes that the fuses can give the boot section (data sheet, boot size configuration).
+/// Sizes of the boot section in bytes, selected by the fuses (data sheet, boot size configuration).
 const BOOT_SECTION_BYTES: [usize; 4] = [512, 1024, 2048, 4096];
 
-/// Optiboot's source, as Debian's arduino-core-avr brings it along.
+/// Path of Optiboot's source in Debian's arduino-core-avr.
 const OPTIBOOT_SOURCE: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c";
 
-/// Where Optiboot begins: it has the smallest boot section.
+/// Start address of Optiboot, in the smallest boot section.
 const OPTIBOOT_START: u16 = 0x7E00;
 
-/// Bytes of data in a line, as most tools write them.
+/// Bytes of data in a line, as in the files of most tools.
 const LINE_BYTES: usize = 16;
 
-/// What is wrong with a file, or with a firmware beside a bootloader.
+/// An error in a file, or a firmware that does not fit beside a bootloader.
 #[derive(Debug, Error)]
 pub enum HexError {
     /// The file could not be read.
@@ -39,10 +39,10 @@ pub enum HexError {
     NotHex {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         reason: ReaderError,
     },
-    /// The file's data do not lie where a bootloader does.
+    /// The file's data are not at a bootloader's address.
     #[error(
         "{path} is no bootloader for the ATmega328P: it fills flash from {start:#06x} to {end:#06x}, and should begin at \
          0x7000, 0x7800, 0x7c00 or 0x7e00 and end by 0x8000"
@@ -63,10 +63,10 @@ pub enum HexError {
         "optiboot cannot be compiled ({0}): it takes avr-gcc and {OPTIBOOT_SOURCE}, which Debian has as gcc-avr and arduino-core-avr"
     )]
     NotCompiled(String),
-    /// What was compiled is no ELF that could be read.
+    /// The compiled bootloader is not a readable ELF.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The firmware is too long to stand before the bootloader.
+    /// The firmware overlaps the bootloader.
     #[error("the firmware takes {bytes} bytes of flash: the bootloader leaves {available}")]
     NoRoom {
         /// The firmware's size.
@@ -87,7 +87,7 @@ impl Bootloader {
     /// Reads a bootloader's Intel HEX file.
     ///
     /// # Errors
-    /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
+    /// If it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
     pub fn read(path: &Path) -> Result<Bootloader, HexError> {
         let text = std::fs::read_to_string(path).map_err(|source| HexError::Read { path: path.into(), source })?;
         let pieces = pieces(&text).map_err(|reason| HexError::NotHex { path: path.into(), reason })?;
@@ -108,7 +108,7 @@ impl Bootloader {
     /// Compiles Optiboot, the Uno's own bootloader. The file of it that Debian has ready is longer than its boot section.
     ///
     /// # Errors
-    /// Where avr-gcc or the source is missing.
+    /// If avr-gcc or the source is missing.
     pub fn optiboot() -> Result<Bootloader, HexError> {
         let not_compiled = |reason: &dyn ToString| HexError::NotCompiled(reason.to_string());
         let elf = tempfile::NamedTempFile::new().map_err(|error| not_compiled(&error))?;
@@ -128,7 +128,7 @@ impl Bootloader {
         Ok(Bootloader { start: OPTIBOOT_START, code })
     }
 
-    /// Address of its first byte in flash, from which a reset starts it: the number of bytes that it leaves to the firmware.
+    /// Address of its first byte in flash, where a reset starts it. It equals the number of bytes for the firmware.
     pub fn start(&self) -> u16 {
         self.start
     }
@@ -136,7 +136,7 @@ impl Bootloader {
     /// All that goes into flash: the firmware, then erased flash, then the bootloader.
     ///
     /// # Errors
-    /// Where the firmware reaches into the bootloader.
+    /// If the firmware reaches into the bootloader.
     pub fn behind(&self, firmware: &[u8]) -> Result<Vec<u8>, HexError> {
         check_room(firmware.len(), self.start.into())?;
         let mut flash = firmware.to_vec();
@@ -149,7 +149,7 @@ impl Bootloader {
 /// Checks that a firmware of so many bytes fits into the flash that a bootloader leaves.
 ///
 /// # Errors
-/// Where it does not.
+/// If it does not.
 pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
     if bytes <= available { Ok(()) } else { Err(HexError::NoRoom { bytes, available }) }
 }
@@ -157,7 +157,7 @@ pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
 /// What goes into flash from address 0 on as Intel HEX.
 ///
 /// # Panics
-/// Where `flash` is longer than the ATmega328P's.
+/// If `flash` is longer than the ATmega328P's.
 pub fn text(flash: &[u8]) -> String {
     assert!(flash.len() <= FLASH_BYTES, "the ATmega328P holds {FLASH_BYTES} bytes");
     let lines = flash.chunks(LINE_BYTES).zip((0..).step_by(LINE_BYTES));
@@ -177,7 +177,7 @@ fn pieces(text: &str) -> Result<Vec<(usize, Vec<u8>)>, ReaderError> {
             Record::Data { offset, value } => pieces.push((base + usize::from(offset), value)),
             Record::ExtendedSegmentAddress(segment) => base = usize::from(segment) << 4,
             Record::ExtendedLinearAddress(upper) => base = usize::from(upper) << 16,
-            // Where a processor of Intel's would start.
+            // Start addresses are for Intel's processors.
             Record::StartSegmentAddress { .. } | Record::StartLinearAddress(_) | Record::EndOfFile => {}
         }
     }

@@ -1,11 +1,12 @@
-//! How long interrupts take: a count and the spread of cycles a vector, and the longest time that interrupts were off.
+//! Interrupt statistics: for each vector a count and the range of its cycles, and the longest time with interrupts off.
 //!
-//! The recorder is off until asked for, because watching every instruction makes the simulation slower. It does not see
-//! how long an interrupt waited before it was served; the longest time off bounds that.
+//! The recorder is off by default, because watching every instruction slows the simulation. It does not measure how
+//! long an interrupt waited; the longest time off is a bound for that.
 
 use std::collections::BTreeMap;
 
-/// Cycles that the handler of one vector took, from its entry (4 cycles) to the end of its `reti`, with what interrupted it.
+/// Cycles of one vector's handler, from its entry (4 cycles) to the end of its `reti`, with the handlers that
+/// interrupted it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HandlerCycles {
     /// Times it ran.
@@ -25,27 +26,27 @@ impl HandlerCycles {
     }
 }
 
-/// Where the program stands between two instructions.
+/// The program's state between two instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// In an interrupt's handler.
     InHandler,
-    /// In the main program, right before it turns interrupts off.
+    /// In the main program, directly before it turns interrupts off.
     BeforeCriticalSection,
     /// In the main program, elsewhere.
     InMain,
 }
 
-/// What the interrupts have cost since measuring began.
+/// The statistics since the start of measuring.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InterruptStatistics {
     /// By vector, counted from 0 (reset): INT0 is 1, PCINT0 3, Timer1 overflow 13.
     pub handlers: BTreeMap<u8, HandlerCycles>,
     /// Longest stretch of cycles with the interrupt flag of SREG clear, handlers included.
     pub longest_off: u64,
-    /// Longest such stretch that the program made by itself: a critical section outside every handler, from behind the
-    /// instruction that turns interrupts off to behind the one that turns them on. What a reset's start-up code does
-    /// before it first turns them on does not count.
+    /// Longest critical section of the main program, outside every handler. It lasts from the end of the instruction
+    /// that turns interrupts off to the end of the one that turns them on. The start-up code after a reset, before it
+    /// first turns them on, does not count.
     pub longest_critical_section: u64,
 }
 
@@ -57,7 +58,8 @@ pub(super) struct InterruptRecorder {
     running: Vec<(u8, u64)>,
     off_since: Option<u64>,
     critical_since: Option<u64>,
-    /// Interrupts have been on since measuring began, and since the last reset: what turned them off is known.
+    /// Interrupts have been on since measuring began, and since the last reset. So the instruction that turned them off
+    /// is known.
     knows_who: bool,
 }
 

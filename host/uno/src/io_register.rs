@@ -1,13 +1,14 @@
-//! What simavr does when the firmware writes an I/O register, and how another writer takes its place.
+//! simavr's function for a write to an I/O register, and its replacement.
 //!
-//! simavr has a function and its parameter a register, and calls it with the byte that is written. A peripheral that is set right
-//! keeps simavr's own writer, puts one of its own there, and calls simavr's where it does what the chip does.
+//! simavr stores a function and its parameter for each register, and calls it with the written byte. A correction
+//! stores simavr's own writer and puts its own function in its place. That function calls simavr's for the parts that
+//! are right.
 
 use std::ffi::c_void;
 
 use simavr_ffi as simavr;
 
-/// Address of the first I/O register in the data space, from which simavr counts them.
+/// Address of the first I/O register in the data space. simavr counts registers from here.
 const FIRST_IO: u16 = 0x20;
 
 /// simavr's function for writes of a register, and its parameter.
@@ -29,7 +30,7 @@ impl Writer {
         Writer { function: write.c, parameter: write.param }
     }
 
-    /// Puts `function` in the place of a register's writer, to be called with `parameter`.
+    /// Replaces a register's writer by `function`, which is called with `parameter`.
     ///
     /// # Safety
     ///
@@ -46,7 +47,7 @@ impl Writer {
         write.param = parameter;
     }
 
-    /// What simavr calls the function with: the peripheral that the register is of.
+    /// The function's parameter: the register's peripheral.
     pub(super) fn parameter(self) -> *mut c_void {
         self.parameter
     }

@@ -1,10 +1,10 @@
 #![doc = include_str!("../README.md")]
+//! # Imports
 //!
-//! # Who knows whom
-//!
-//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`, `turns` beside them -> `recorder`,
-//! which owns what simavr calls back with -> `core`, which runs it -> `terminal` -> `board`, which has the [`Uno`]. The files: `elf` -> `hex`, `core` -> `board`.
-//! `pins` knows none of these and is known to all; `capture`, `waveform` and `pty` know only `pins`.
+//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`,
+//! `turns` beside them -> `recorder`, which owns the state of simavr's callbacks -> `core`, which runs it -> `terminal`
+//! -> `board`, which has the [`Uno`]. The files: `elf` -> `hex`, `core` -> `board`. All modules import `pins`, and it
+//! imports none. `capture`, `waveform` and `pty` import only `pins`.
 
 #[cfg(feature = "simavr")]
 mod adc;

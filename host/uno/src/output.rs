@@ -1,8 +1,9 @@
-//! What the firmware drives at the pins: the registers of the ports, and the timers' outputs that take their place.
+//! The levels that the firmware drives at the pins: from the ports' registers, and from the timers' outputs that
+//! replace them.
 //!
-//! A pin is an output while its bit in DDRx is set. Its level is its bit in PORTx, or that of a timer's output which is connected
-//! to it (data sheet, section 14.3). simavr copies a timer's level into PORTx. A firmware that reads PORTx before an edge
-//! and writes it back behind the edge would take the edge back. So the level of a connected output is kept here.
+//! A pin is an output while its bit in DDRx is set. Its level is its bit in PORTx, or that of a connected timer output
+//! (data sheet, section 14.3). simavr copies a timer's level into PORTx. A firmware that reads PORTx before an edge and
+//! writes it back after the edge would undo the edge. So this module stores the level of a connected output.
 
 use simavr_ffi as simavr;
 
@@ -32,7 +33,7 @@ pub(super) const TIMER_OUTPUTS: [TimerOutput; 6] = [
     TimerOutput { pin: Pin::D3, timer: *b"tmr2", output: 1, control: 0xB0, connected: B },
 ];
 
-/// The level of the timer's output that is connected to a pin; `None` if none is.
+/// The level of the timer output that is connected to a pin; `None` without one.
 ///
 /// # Safety
 ///

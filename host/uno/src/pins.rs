@@ -1,8 +1,8 @@
 //! The board's pins, and levels on them at cycles.
 //!
-//! A [`Pin`] has the board's number. A [`PinChange`] is a level that a pin takes, whichever side drives it. A [`Wire`] says
-//! what is wired to a pin. This module needs no simulator: programs that only write or judge signals use the crate without
-//! its default features.
+//! A [`Pin`] has the board's number. A [`PinChange`] is a new level of a pin, driven by either side. A [`Wire`]
+//! describes the connection of a pin. This module needs no simulator: programs that only write or check signals use the
+//! crate without its default features.
 
 use std::fmt;
 
@@ -116,25 +116,25 @@ impl fmt::Display for Pin {
     }
 }
 
-/// What is wired to a pin.
+/// A wire on a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wire {
     /// The pin.
     pub pin: Pin,
-    /// What it is called in a waveform file.
+    /// Its name in a waveform file.
     pub name: &'static str,
-    /// The level before anything has happened.
+    /// Its level at rest.
     pub high_at_rest: bool,
 }
 
 /// A pin that took a level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PinChange {
-    /// When, in cycles since power-up.
+    /// Its time, in cycles since power-up.
     pub cycle: u64,
     /// Which pin.
     pub pin: Pin,
-    /// The level it has from then on.
+    /// The new level.
     pub high: bool,
 }
 

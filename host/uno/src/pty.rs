@@ -1,14 +1,14 @@
-//! A pseudo terminal: a serial port without a cable, for programs that expect an Uno behind one.
+//! A pseudo terminal: a serial port without a cable, for programs that expect an Uno.
 //!
-//! [`Pty`] is the device's side of it; programs open the other side by its path, or by a symbolic link, as they would open
-//! /dev/ttyACM0. It begins raw, so that bytes pass as they are. That a program opens it is noticed, since a real Uno is
-//! reset by that: its modem line DTR, which a pseudo terminal lacks, is wired to the reset pin.
+//! [`Pty`] is the device's side. Programs open the other side by its path, or by a symbolic link, like /dev/ttyACM0. It
+//! starts in raw mode, so that bytes pass unchanged. The crate notices when a program opens it, because opening a real
+//! Uno's port resets the Uno. There the modem line DTR is wired to the reset pin; a pseudo terminal has no such line.
 //!
-//! The other side is held open here as well, so that the terminal outlives the programs; inotify tells of theirs. It has no
-//! baud rate: bytes pass at the pace at which they are written and read. It needs Linux.
+//! The other side is held open here as well, so that the terminal outlives the programs. inotify reports their opening
+//! and closing. There is no baud rate: bytes pass at the pace of writing and reading. It needs Linux.
 //!
-//! The system's calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one and
-//! do not tell who opens it.
+//! The system calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one,
+//! and do not report who opens it.
 
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};
@@ -22,16 +22,16 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Bits in a second that the terminal says it has, to programs that ask and do not set it.
+/// The terminal's default baud rate, for programs that read it and do not set it.
 const BAUD: u32 = 115_200;
 
-/// Where the system keeps the programs' sides.
+/// The system's folder for the programs' sides.
 const TERMINALS: &str = "/dev/pts";
 
 /// Why a pseudo terminal does not work.
 #[derive(Debug, Error)]
 pub enum PtyError {
-    /// The system has none to give.
+    /// The system has no more pseudo terminals.
     #[error("no pseudo terminal can be opened: is /dev/pts mounted?")]
     Open(#[source] io::Error),
     /// It stopped working.
@@ -42,10 +42,10 @@ pub enum PtyError {
         /// The operating system's answer.
         source: io::Error,
     },
-    /// Something else is where the link should be.
+    /// The link's path exists and is no link.
     #[error("{0} exists already and is no link to a pseudo terminal: name another link, or remove it")]
     LinkExists(PathBuf),
-    /// The link leads to a pseudo terminal that somebody uses.
+    /// The link leads to a pseudo terminal that another process uses.
     #[error(
         "{} leads to {}, which {holder} has: end it, or name another link; if it is none of your virtual Unos, remove the link",
         path.display(), target.display()
@@ -55,29 +55,29 @@ pub enum PtyError {
         path: PathBuf,
         /// Where it leads.
         target: PathBuf,
-        /// Which process has the device's side of it.
+        /// The process that has the device's side.
         holder: String,
     },
     /// The link cannot be made.
     #[error("{path} cannot be made a link to the pseudo terminal")]
     Link {
-        /// Where the link should be.
+        /// The link's path.
         path: PathBuf,
         /// The operating system's answer.
         source: io::Error,
     },
 }
 
-/// The device's side of a pseudo terminal. Dropped, it is gone for those who have the other side open, as an Uno whose cable is
-/// pulled.
+/// The device's side of a pseudo terminal. Dropping it closes the terminal for the programs, like unplugging an Uno's
+/// cable.
 #[derive(Debug)]
 pub struct Pty {
     device: File,
     /// The programs' side, held open.
     other_side: OwnedFd,
-    /// Tells of programs that open and close it.
+    /// Reports programs that open and close it.
     watch: OwnedFd,
-    /// Whether a program has it open. inotify tells of two at the same moment once, so that they cannot be counted: where
+    /// Whether a program has it open. inotify merges two events of the same moment, so programs cannot be counted. If
     /// several have it open, the first that closes it counts for all.
     is_open: bool,
     path: PathBuf,
@@ -88,7 +88,7 @@ impl Pty {
     /// Opens one.
     ///
     /// # Errors
-    /// Where the system has none to give.
+    /// If the system has none to give.
     pub fn open() -> Result<Pty, PtyError> {
         let open = || -> io::Result<Pty> {
             let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
@@ -109,19 +109,20 @@ impl Pty {
         open().map_err(PtyError::Open)
     }
 
-    /// The path under which programs open it.
+    /// The path for programs.
     pub fn path(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.path)
     }
 
-    /// Makes a symbolic link to it, which is removed again at the end. A link to another pseudo terminal, which a process that was
-    /// killed has left over, is replaced, unless somebody has that terminal now.
+    /// Makes a symbolic link to it, and removes it at the end. A link to another pseudo terminal is replaced, unless a
+    /// process uses that terminal. Killed processes leave such links.
     ///
     /// # Errors
-    /// Where something else is there, somebody uses it, or the folder cannot be written to.
+    /// If the path is something else than a link, another process uses the terminal, or the folder cannot be written
+    /// to.
     pub fn link(&mut self, path: &Path) -> Result<(), PtyError> {
         let target = std::fs::read_link(path).ok().filter(|target| target.starts_with(TERMINALS));
-        // What was left over may lead to this very one: the system gives the numbers away again.
+        // A leftover link may point to this very terminal: the system reuses the numbers.
         if let Some(target) = target.as_ref().filter(|&target| *target != self.path && target.exists()) {
             let holder = holder(target);
             return Err(PtyError::LinkInUse { path: path.into(), target: target.clone(), holder });
@@ -145,7 +146,7 @@ impl Pty {
     /// that is gone.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn was_opened(&mut self) -> Result<bool, PtyError> {
         let mut opened = false;
         let mut buffer = [MaybeUninit::uninit(); 1024];
@@ -166,7 +167,7 @@ impl Pty {
             tcflush(&self.other_side, QueueSelector::IFlush).map_err(|error| self.failed(error.into()))?;
         }
         if !self.is_open {
-            // The claim of a program that was killed while it had the port to itself.
+            // A killed program may have left its exclusive claim of the port.
             ioctl_tiocnxcl(&self.other_side).map_err(|error| self.failed(error.into()))?;
         }
         Ok(opened)
@@ -175,7 +176,7 @@ impl Pty {
     /// Takes what programs have written, up to `buffer`'s length; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         self.count(|mut device| device.read(buffer))
     }
@@ -183,7 +184,7 @@ impl Pty {
     /// Hands over bytes to the program that reads, as many as it has room for; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn write(&mut self, bytes: &[u8]) -> Result<usize, PtyError> {
         self.count(|mut device| device.write(bytes))
     }
@@ -204,7 +205,7 @@ impl Pty {
 /// The process that has the device's side of a pseudo terminal, in words.
 fn holder(terminal: &Path) -> String {
     let number = terminal.file_name().unwrap_or_default().to_string_lossy();
-    // As the system tells of each open file; processes of others keep theirs to themselves.
+    // The system lists each open file this way. Processes of other users hide theirs.
     let index = format!("tty-index:\t{number}\n");
     let has_it = |process: &PathBuf| {
         let files = std::fs::read_dir(process.join("fdinfo")).into_iter().flatten().flatten();
@@ -228,7 +229,7 @@ impl Drop for Pty {
         if let Some(link) = &self.link
             && std::fs::read_link(link).is_ok_and(|target| target == self.path)
         {
-            // Nobody can be told, and the next one replaces a link that leads nowhere.
+            // An error here cannot be reported. The next process replaces a link that leads nowhere.
             let _ = std::fs::remove_file(link);
         }
     }
@@ -313,7 +314,7 @@ mod tests {
         let holder = format!("which process {} (", std::process::id());
         assert!(error.contains(&holder), "{error}");
         assert_eq!(std::fs::read_link(&path).unwrap(), first.path);
-        // What it has left over may lead to the next one itself.
+        // A leftover link may point to the next terminal.
         let mut next = Pty::open().unwrap();
         std::fs::remove_file(&path).unwrap();
         symlink(&next.path, &path).unwrap();

@@ -1,8 +1,9 @@
-//! What simavr calls back: levels on the output pins, interrupts, bytes to transmit, and resets.
+//! The callbacks from simavr: levels on output pins, interrupts, transmitted bytes, and resets.
 //!
-//! The callbacks only write down what happened in the [`Recorder`] and set simavr's clock and its UART's pace right, while there is
-//! time for it; they call nothing of simavr's. Their parameter is the recorder's address, which [`super::core::Core`]
-//! registers and keeps alive; its text says why nobody else looks at the recorder meanwhile.
+//! The callbacks write events into the [`Recorder`]. They also correct simavr's clock and the pace of its UART, because
+//! this is the only time for it. They call no function of simavr. Their parameter is the recorder's address, which
+//! [`super::core::Core`] registers and keeps alive. Its text explains why no other code accesses the recorder
+//! meanwhile.
 
 use std::ffi::c_void;
 
@@ -23,7 +24,7 @@ const INTERRUPT_ENTRY_CYCLES: u64 = 4;
 /// Cycles of `reti`; its end is the end of the handler.
 const RETURN_CYCLES: u64 = 4;
 
-/// Why the chip started anew.
+/// Why the chip restarted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// Power came back ([`Uno::power_cycle`](crate::Uno::power_cycle)).
@@ -48,13 +49,13 @@ pub struct Reset {
 /// A byte from the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceivedByte {
-    /// When the firmware handed it to the transmitter.
+    /// The time at which the firmware passed it to the transmitter.
     pub cycle: u64,
     /// The byte.
     pub byte: u8,
 }
 
-/// What simavr's callbacks have seen.
+/// The events from simavr's callbacks.
 pub(super) struct Recorder {
     pub(super) chip: *mut simavr::avr_t,
     pub(super) uart: *mut simavr::avr_uart_t,
@@ -80,7 +81,7 @@ pub(super) struct Recorder {
 }
 
 impl Recorder {
-    /// Records a level of an output pin, where it differs from the last one.
+    /// Records a level of an output pin, if it differs from the last one.
     pub(super) fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
         let level = &mut self.driven_high[usize::from(pin.number())];
         if *level != high {
@@ -89,7 +90,7 @@ impl Recorder {
         }
     }
 
-    /// Records the levels of a port whose registers hold these values now.
+    /// Records the levels of a port, from the present values of its registers.
     ///
     /// # Safety
     ///
@@ -113,7 +114,7 @@ impl Recorder {
         self.driven_high[usize::from(pin.number())]
     }
 
-    /// No pin is driven any more: the chip starts anew, or has no power.
+    /// The chip drives no pin any more: it restarts, or has no power.
     pub(super) fn release_pins(&mut self, cycle: u64) {
         self.timer_levels = Default::default();
         for pin in Pin::ALL {
@@ -122,14 +123,15 @@ impl Recorder {
     }
 }
 
-/// When the peripheral that simavr is serving was due. It serves one at the end of the instruction in which it falls due, up
-/// to four cycles late; its slot still says when it was. Without one, an instruction is running, and it began at `cycle`.
+/// The due time of the peripheral that simavr is serving. simavr serves it at the end of the instruction in which it
+/// falls due, up to four cycles late; its slot still has the due time. If simavr serves none, an instruction is
+/// running, and it began at `cycle`.
 ///
 /// # Safety
 ///
 /// `avr` must be an initialised chip.
 unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
-    // SAFETY: the caller vouches for `avr`. Both lists run through the pool's own slots and end in null. The slot being
+    // SAFETY: the caller guarantees `avr`. Both lists run through the pool's own slots and end in null. The slot being
     // served is in neither.
     unsafe {
         let pool = &raw const (*avr).cycle_timers;
@@ -149,9 +151,9 @@ unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
     }
 }
 
-/// simavr's callback for a write of a port's register, behind the write.
+/// simavr's callback for a write of a port's register, after the write.
 pub(super) unsafe extern "C" fn on_port<const NAME: char>(_: *mut simavr::avr_irq_t, port: u32, recorder: *mut c_void) {
-    // SAFETY: `recorder` is what `Core::new` registered, alive and not borrowed (see the module's text).
+    // SAFETY: `recorder` is the one that `Core::new` registered, alive and not borrowed (see the module's text).
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
         let direction = Port::named(NAME).direction(recorder.chip);
@@ -173,7 +175,7 @@ pub(super) unsafe extern "C" fn on_direction<const NAME: char>(
     }
 }
 
-/// simavr's callback for a level that a timer puts on its output, by its index in [`TIMER_OUTPUTS`].
+/// simavr's callback for a new level of a timer's output, by its index in [`TIMER_OUTPUTS`].
 pub(super) unsafe extern "C" fn on_timer_output<const INDEX: usize>(
     _: *mut simavr::avr_irq_t,
     level: u32,
@@ -203,7 +205,7 @@ pub(super) unsafe extern "C" fn on_sample(_: *mut simavr::avr_irq_t, _: u32, rec
     }
 }
 
-/// simavr's callback for an interrupt handler that begins (1) or has returned (0).
+/// simavr's callback for the start (1) or return (0) of an interrupt handler.
 pub(super) unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins: u32, recorder: *mut c_void) {
     // SAFETY: as in `on_output`. The chip's clock is simavr's to read only after this callback.
     unsafe {
@@ -220,7 +222,7 @@ pub(super) unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins
     }
 }
 
-/// simavr's callback for a byte that the firmware hands to the transmitter, before simavr decides how long it takes.
+/// simavr's callback for a byte that the firmware passes to the transmitter, before simavr decides how long it takes.
 pub(super) unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32, recorder: *mut c_void) {
     // SAFETY: as in `on_output`; the UART is part of the chip.
     unsafe {

@@ -1,21 +1,21 @@
-//! The terminal at the other end of the serial line: bytes that are typed into the chip, one behind the other at the line's pace.
+//! The terminal at the other end of the serial line: it sends bytes to the chip at the line's pace.
 //!
-//! What the chip has no room for is lost and counted. What the chip sends is in `recorder`.
+//! Bytes are lost and counted if the chip has no room. The chip's output is in `recorder`.
 
 use crate::core::Core;
 use crate::pins::CYCLES_PER_SECOND;
 use std::collections::VecDeque;
 
-/// Bits in a second at which a terminal sends, until it is told to follow the chip.
+/// The terminal's bit rate, until it follows the chip.
 pub const BAUD: u64 = 115_200;
 
 /// Cycles of a byte that a terminal sends: a start bit, eight data bits and a stop bit.
 pub const SENT_BYTE_CYCLES: u64 = (10 * CYCLES_PER_SECOND + BAUD / 2) / BAUD;
 
-/// A terminal, and what it has not sent yet.
+/// A terminal and its unsent bytes.
 #[derive(Default)]
 pub(crate) struct Terminal {
-    /// Bytes to come, and when the first one's stop bit ends.
+    /// Unsent bytes, and the time at which the first one's stop bit ends.
     to_send: VecDeque<u8>,
     next_byte_ends: u64,
     /// Whether bytes come at the chip's own baud rate, not at [`BAUD`].
@@ -24,7 +24,7 @@ pub(crate) struct Terminal {
 }
 
 impl Terminal {
-    /// Sends bytes behind those that are still on their way.
+    /// Queues bytes after the unsent ones.
     pub(crate) fn send(&mut self, bytes: &[u8], to: &Core) {
         if self.to_send.is_empty() {
             self.next_byte_ends = self.next_byte_ends.max(to.cycle() + self.byte_cycles(to));
@@ -49,12 +49,12 @@ impl Terminal {
         }
     }
 
-    /// The cycle at which the next byte ends, where one is on its way.
+    /// The cycle at which the next byte ends, if there is one.
     pub(crate) fn next_byte_ends(&self) -> Option<u64> {
         (!self.to_send.is_empty()).then_some(self.next_byte_ends)
     }
 
-    /// Bytes that are still on their way.
+    /// The number of unsent bytes.
     pub(crate) fn bytes_on_their_way(&self) -> usize {
         self.to_send.len()
     }

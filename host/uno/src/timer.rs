@@ -1,10 +1,12 @@
-//! Timer1's output A, where simavr differs from the chip: OCR1A and TCNT1.
+//! Corrections of simavr's Timer1: OCR1A and TCNT1, for output A.
 //!
-//! simavr's writers of OCR1A and TCNT1 are replaced. In fast PWM a new OCR1A only changes what the next bottom plans (data
-//! sheet, 16.9.3), and TCNT1 moves the counter: simavr's own writer does it, but exactly, with the pins disconnected and with the
-//! compare value that the running period began with. In other modes simavr's writers do their work alone.
+//! simavr's writers of OCR1A and TCNT1 are replaced. In fast PWM a new OCR1A only changes the compare value of the next
+//! period (data sheet, 16.9.3). A write of TCNT1 moves the counter. simavr's own writer does this exactly, but with the
+//! pins disconnected and with the compare value of the running period's start. In other modes simavr's writers work
+//! alone.
 //!
-//! Only the non-inverting output A is dealt with. A counter that is set above its top starts at the bottom, as simavr does it.
+//! Only the non-inverting output A is corrected. A counter that is set above its top restarts at the bottom, as in
+//! simavr.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
@@ -23,9 +25,9 @@ const OCR1AL: u16 = 0x88;
 const OCR1AH: u16 = 0x89;
 const TCNT2: u16 = 0xB2;
 
-/// TCCR1A: what the outputs are connected to; 0 is PORTB.
+/// TCCR1A: connections of the outputs; 0 is PORTB.
 const COM1: u8 = 0b1111 << 4;
-/// TCCR1B: the clock; 0 is none, and above [`LAST_PRESCALER`] it comes from a pin.
+/// TCCR1B: the clock. 0 is none, and values above [`LAST_PRESCALER`] select a pin.
 const CS1: u8 = 0b111;
 const LAST_PRESCALER: u8 = 5;
 
@@ -34,7 +36,7 @@ pub(super) struct Timer1 {
     timer: NonNull<simavr::avr_timer_t>,
     compare_writer: Writer,
     counter_writer: Writer,
-    /// Cycles from the running period's bottom to the match of output A; 0 where there is none.
+    /// Cycles from the running period's bottom to the match of output A; 0 without a match.
     running_compare_cycles: u64,
 }
 
@@ -43,7 +45,7 @@ impl Timer1 {
     ///
     /// # Safety
     ///
-    /// `avr` must be an initialised chip that outlives the result, and whose writers have not been taken over.
+    /// `avr` must be an initialised chip that outlives the result, and whose writers have not been replaced.
     pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Timer1 {
         // SAFETY: the caller vouches for `avr`.
         let (compare_writer, counter_writer) = unsafe { (Writer::of(avr, OCR1AL), Writer::of(avr, TCNT1L)) };
@@ -56,10 +58,11 @@ impl Timer1 {
         }
     }
 
-    /// Takes a level of output A. In fast PWM it rises at the bottom, where OCR1A's buffer takes effect.
+    /// Records a level of output A. In fast PWM it rises at the bottom, where OCR1A's buffer takes effect.
     pub(super) fn output_becomes(&mut self, high: bool) {
         if high {
-            // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it meanwhile.
+            // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it
+            // meanwhile.
             self.running_compare_cycles = unsafe { (*self.timer.as_ptr()).comp[0].comp_cycles };
         }
     }
@@ -70,7 +73,7 @@ impl Timer1 {
     ///
     /// `avr` must be this timer's chip.
     unsafe fn is_buffered(&self, avr: *mut simavr::avr_t) -> bool {
-        // SAFETY: the caller vouches for `avr`, and with it for the timer; TCCR1B is an address inside `data`.
+        // SAFETY: the caller guarantees `avr`, and with it the timer; TCCR1B is an address inside `data`.
         let (timer, control) = unsafe { (self.timer.as_ref(), *(*avr).data.add(TCCR1B.into())) };
         (1..=LAST_PRESCALER).contains(&(control & CS1))
             && timer.wgm_op_mode_kind == simavr::avr_timer_wgm_fast_pwm as i32
@@ -78,7 +81,7 @@ impl Timer1 {
     }
 }
 
-/// Stops all timers, as a reset does; simavr's reset leaves their modes and periods.
+/// Stops all timers, as a reset does. simavr's reset keeps their modes and periods.
 ///
 /// # Safety
 ///
@@ -98,14 +101,14 @@ pub(super) unsafe fn stop_all(avr: *mut simavr::avr_t, timer1: &Timer1) {
     }
 }
 
-/// Puts this file's writers of OCR1A and TCNT1 in the place of simavr's.
+/// Replaces simavr's writers of OCR1A and TCNT1 by those in this file.
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip and `timer` its own, which stays where it is for as long as the chip runs, and of which no
-/// reference is alive while it does.
+/// `avr` must be an initialised chip, and `timer` its own timer. `timer` must not move while the chip runs, and no
+/// reference to it may be alive while the chip runs.
 pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, timer: *mut Timer1) {
-    // SAFETY: the caller vouches for both; the addresses are those of I/O registers.
+    // SAFETY: the caller guarantees both; the addresses are those of I/O registers.
     unsafe {
         Writer::replace(avr, OCR1AL, on_compare_write, timer.cast());
         Writer::replace(avr, TCNT1L, on_counter_write, timer.cast());
@@ -114,8 +117,8 @@ pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, timer: *mut Timer
 
 /// simavr's callback for a write of OCR1A's low byte; the high byte is in its register.
 unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
-    // SAFETY: `timer1` is what `take_over_writes` registered, alive and not borrowed, and `avr` its chip. simavr's writer may
-    // call back, so no reference into it is kept over the call.
+    // SAFETY: `timer1` is the one that `take_over_writes` registered, alive and not borrowed, and `avr` its chip.
+    // simavr's writer may call back, so no reference into it is kept over the call.
     unsafe {
         let timer1 = timer1.cast::<Timer1>();
         if !(*timer1).is_buffered(avr) {
@@ -125,7 +128,7 @@ unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, lo
         *(*avr).data.add(register.into()) = low;
         let compare = u16::from_le_bytes([low, *(*avr).data.add(OCR1AH.into())]);
         let timer = (*timer1).timer.as_mut();
-        // The match of the running period is planned already; this is what the next bottom plans by.
+        // The match of the running period is already planned. The next period uses this value.
         timer.comp[0].comp_cycles = match compare <= timer.tov_top {
             true => u64::from(timer.cs_div_value) * (u64::from(compare) + 1),
             false => 0,
@@ -149,10 +152,10 @@ unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, lo
         let (cycle, top, next_compare_cycles, connections) =
             ((*avr).cycle, (*timer).tov_top, (*timer).comp[0].comp_cycles, *control);
 
-        // The prescaler runs on, so that the counter has had its new value since the last timer clock.
+        // The prescaler runs on, so the counter has had its new value since the last timer clock.
         let since_clock = cycle.wrapping_sub((*timer).tov_base) % prescaler;
         (*avr).cycle = cycle - since_clock;
-        // simavr divides the period by the top, which is a clock short of it.
+        // simavr divides the period by the top, which is one clock less.
         (*timer).tov_top = top.saturating_add(1);
         // A match in the clock after the write is blocked (data sheet, 16.7.2), and a lower one is past.
         let running = (*timer1).running_compare_cycles;

@@ -1,7 +1,7 @@
-//! How long the firmware's main loop takes to turn: the cycles from one `wdr` instruction to the next.
+//! The length of a turn of the firmware's main loop: the cycles from one `wdr` instruction to the next.
 //!
-//! A loop that feeds the watchdog once a turn shows its turns by that, whatever else it does; interrupts that come meanwhile
-//! are part of a turn. The recorder is off until asked for, because watching every instruction makes the simulation slower.
+//! This works for any loop that feeds the watchdog once a turn. The time of interrupts during a turn is included. The
+//! recorder is off by default, because watching every instruction slows the simulation.
 
 /// Cycles of the main loop's turns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,7 +47,7 @@ impl TurnRecorder {
         }
     }
 
-    /// A reset ends a turn that is not counted.
+    /// A reset ends a turn, which is not counted.
     pub(super) fn reset(&mut self) {
         self.begun = None;
     }

@@ -1,15 +1,17 @@
-//! The UART, where simavr differs from the chip: how long a byte takes, and what the receiver holds.
+//! Corrections of simavr's UART: the time of a byte, and the receiver's capacity.
 //!
-//! simavr takes every byte for one with a parity bit, raises the receiver's flag a byte too late, asks for its interrupt once a
-//! byte's time, and holds 64 bytes. Here a byte has the bits that the registers say, is there when its stop bit ends, and is
-//! lost where three wait. The transmitter's second buffer is not there.
+//! simavr adds a parity bit to every byte, and sets the receiver's flag one byte too late. It requests the interrupt
+//! once in a byte's time, and buffers 64 bytes. With the correction a byte has the number of bits that the registers
+//! select. It is available when its stop bit ends, and is lost if three bytes wait. The transmitter's second buffer is
+//! not simulated.
 
 use std::ffi::CStr;
 use std::ptr::NonNull;
 
 use simavr_ffi as simavr;
 
-/// Complete bytes that the receiver keeps: two in its buffer and one in the shift register (data sheet, USART0, receiver error flags).
+/// Complete bytes that the receiver holds: two in its buffer and one in the shift register (data sheet, USART0,
+/// receiver error flags).
 const RECEIVER_BYTES: u16 = 3;
 
 // Registers by their address in the data space (data sheet, register summary).
@@ -38,8 +40,8 @@ const UPM01: u8 = 1 << 5;
 ///
 /// `avr` must be an initialised chip.
 pub(super) unsafe fn find(avr: *mut simavr::avr_t) -> NonNull<simavr::avr_uart_t> {
-    // SAFETY: the caller vouches for `avr`: its peripherals form a list that ends in null, each with a C string for its kind.
-    // Every peripheral begins with its `avr_io_t`, and only the UART is called so.
+    // SAFETY: the caller guarantees `avr`: its peripherals form a list that ends in null, each with a C string for its
+    // kind. Every peripheral begins with its `avr_io_t`, and only the UART has this kind.
     unsafe {
         let mut peripheral = (*avr).io_port;
         while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != c"uart" {
@@ -49,7 +51,8 @@ pub(super) unsafe fn find(avr: *mut simavr::avr_t) -> NonNull<simavr::avr_uart_t
     }
 }
 
-/// Cycles of a byte on the serial line, as the UART's registers stand (data sheet, USART0, clock generation and frame formats).
+/// Cycles of a byte on the serial line, from the UART's registers (data sheet, USART0, clock generation and frame
+/// formats).
 ///
 /// # Safety
 ///
@@ -72,8 +75,8 @@ pub(super) unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
     cycles_per_bit * (1 + data_bits + parity_bits + stop_bits)
 }
 
-/// Keeps the receiver's interrupt asked for while bytes wait in it, as the chip does; simavr asks once a byte's time, and
-/// holds back a firmware that reads faster.
+/// Keeps the receiver's interrupt requested while bytes wait in it, as the chip does. simavr requests it once in a
+/// byte's time, and so delays a firmware that reads faster.
 ///
 /// # Safety
 ///
@@ -94,14 +97,14 @@ pub(super) unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut sima
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip, `uart` its UART, and `input` that one's line for received bytes.
+/// `avr` must be an initialised chip, `uart` its UART, and `input` the UART's line for received bytes.
 pub(super) unsafe fn receive(
     avr: *mut simavr::avr_t,
     uart: *mut simavr::avr_uart_t,
     input: *mut simavr::avr_irq_t,
     byte: u8,
 ) -> bool {
-    // SAFETY: the caller vouches for all three; the registers are addresses inside `data`.
+    // SAFETY: the caller guarantees all three; the registers are addresses inside `data`.
     unsafe {
         let fifo = &(*uart).input;
         let waiting = fifo.write.wrapping_sub(fifo.read) % fifo.buffer.len() as u16;
@@ -110,7 +113,7 @@ pub(super) unsafe fn receive(
             *(*avr).data.add(UCSR0A.into()) |= DOR0;
             return false;
         }
-        // simavr would raise the flag a whole byte later; it is due now.
+        // simavr would set the flag a whole byte later; it is due now.
         (*uart).cycles_per_byte = 1;
         simavr::avr_raise_irq(input, byte.into());
         (*uart).cycles_per_byte = cycles_per_byte(avr);

@@ -1,7 +1,7 @@
-//! Waveform files: what happened on the Uno's pins, as a VCD for PulseView or GTKWave.
+//! Waveform files: the levels of the Uno's pins over time, as a VCD for PulseView or GTKWave.
 //!
-//! One file holds every wire by its name ([`Wire::name`]), inputs and outputs together. The file counts in
-//! 100 ps, of which a cycle of 62.5 ns is exactly 625, so that [`crate::capture`] reads back the very cycles.
+//! One file holds every wire by its name ([`Wire::name`]), inputs and outputs together. The time unit is 100 ps: a
+//! cycle of 62.5 ns is exactly 625 units. So [`crate::capture`] reads back exactly the same cycles.
 
 use std::io::{self, Write};
 
@@ -15,11 +15,11 @@ const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
 /// Units of time a cycle.
 const UNITS_PER_CYCLE: u64 = 10_000_000_000 / CYCLES_PER_SECOND;
 
-/// Writes `changes`, in any order, as a VCD file. Each wire starts at rest; what changes on other pins is left out.
+/// Writes `changes`, in any order, as a VCD file. Each wire starts at rest. Changes on other pins are left out.
 ///
 /// # Errors
 ///
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
     let mut changes: Vec<PinChange> = changes.into_iter().collect();
     changes.sort_by_key(|change| change.cycle);

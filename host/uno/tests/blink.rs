@@ -1,4 +1,4 @@
-//! A test of somebody's firmware, as README.md shows it.
+//! A test of a user's own firmware, as in README.md.
 
 use std::path::Path;
 use std::process::Command;

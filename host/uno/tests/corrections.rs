@@ -1,8 +1,8 @@
-//! What is set right against simavr, shown by firmwares that measure it themselves: on the virtual Uno they tell what the data
-//! sheet says, on simavr alone something else.
+//! Tests of the corrections to simavr. Small firmwares measure the corrected behaviour. On the virtual Uno they print
+//! the values of the data sheet, and on simavr alone other values.
 //!
-//! Firmware and test stand in `upstream/`, in the form that simavr's own tests have. Where simavr alone begins to tell what the
-//! chip does, its test here fails: the correction can go. Corrections that only an observer outside the chip sees are tested in
+//! Firmwares and tests are in `upstream/`, in the form of simavr's own tests. If simavr alone becomes right, its test
+//! here fails, and the correction can be removed. Corrections that are visible only from outside the chip are tested in
 //! `virtual_uno.rs`.
 
 use std::ffi::{CStr, c_void};
@@ -17,7 +17,7 @@ unsafe extern "C" {
     fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
 }
 
-/// A correction: its firmware, the section of the data sheet, and what the firmware tells on simavr alone.
+/// A correction: its firmware, the section of the data sheet, and the firmware's output on simavr alone.
 struct Correction {
     name: &'static str,
     section: &'static str,
@@ -48,7 +48,7 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("upstream")
 }
 
-/// What simavr's own test of a firmware expects.
+/// The expected output in simavr's own test of a firmware.
 fn expected(name: &str) -> String {
     let test = std::fs::read_to_string(folder().join(format!("test_atmega328p_{name}.c"))).unwrap();
     let (_, text) = test.split_once("1000000, \"").unwrap();
@@ -66,7 +66,7 @@ fn compile(name: &str) -> PathBuf {
     elf
 }
 
-/// What a firmware tells on the virtual Uno, in a line.
+/// A firmware's output on the virtual Uno, in a line.
 fn on_the_virtual_uno(elf: &Path) -> String {
     let mut uno = Uno::boot(elf).unwrap();
     uno.set_millivolts(Pin::A0, MILLIVOLTS);
@@ -76,16 +76,17 @@ fn on_the_virtual_uno(elf: &Path) -> String {
 }
 
 unsafe extern "C" fn take(_: *mut simavr::avr_irq_t, byte: u32, text: *mut c_void) {
-    // SAFETY: `on_simavr` registers its own vector, to which it refers only after the chip has ended.
+    // SAFETY: `on_simavr` registers its own vector, and uses it again only after the chip has ended.
     unsafe { (*text.cast::<Vec<u8>>()).push(byte as u8) };
 }
 
-/// What a firmware tells on simavr alone, run as simavr's tests run it.
+/// A firmware's output on simavr alone, run as in simavr's tests.
 fn on_simavr(elf: &Path) -> String {
     let flash = Image::read(elf).unwrap().flash;
     let mut text = Vec::<u8>::new();
     let name: &CStr = c"atmega328p";
-    // SAFETY: the chip is made, set up, run and ended here; `flash` fits, as `Image` sees to, and `text` outlives the chip.
+    // SAFETY: the chip is made, set up, run and ended here. `flash` fits, because `Image` checks it, and `text`
+    // outlives the chip.
     unsafe {
         let avr = simavr::avr_make_mcu_by_name(name.as_ptr());
         simavr::avr_init(avr);

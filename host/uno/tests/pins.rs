@@ -100,7 +100,7 @@ fn every_output_of_the_timers_reaches_its_pin() {
     }
 }
 
-/// The fixture `adc`'s results, all of them taken from now on.
+/// The next results of the fixture `adc`.
 fn results(uno: &mut Uno) -> Vec<u16> {
     let rounds = |uno: &Uno| uno.read("rounds").unwrap()[0];
     let begun = rounds(uno);
@@ -155,7 +155,7 @@ fn an_analogue_pin_has_a_level_too() {
         uno.set_millivolts(Pin::A2, millivolts);
         uno.level(Pin::A2)
     };
-    // From 0.6 of the supply on it is high, up to 0.3 low, and in between as it was.
+    // Above 0.6 of the supply a pin reads high, below 0.3 low. Between them it keeps its level.
     assert_eq!([2999, 3000, 1501, 1500, 2999].map(&mut level_at), [false, true, true, false, false]);
 }
 

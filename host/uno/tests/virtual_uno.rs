@@ -1,6 +1,6 @@
-//! The virtual Uno against small C programs, compiled here by avr-gcc, whose timing the data sheet tells.
+//! The virtual Uno with small C programs, compiled here by avr-gcc. The data sheet gives their timing.
 //!
-//! Each program stands in `fixtures/` and shows one thing; the firmware itself plays no part here. Faults are in
+//! Each program is in `fixtures/` and shows one behaviour. The weeder's firmware is not used here. Faults are in
 //! `virtual_uno_faults.rs`.
 
 mod common;
@@ -63,7 +63,7 @@ fn the_receiver_keeps_three_bytes_and_loses_the_fourth() {
     uno.send(b"12345");
     uno.run_for_ms(1).unwrap();
     assert_eq!(uno.lost_bytes(), 2);
-    // The switch on D4 tells the fixture to read at last; it adds whether the chip reported the loss.
+    // The switch on D4 makes the fixture read. Its output also says whether the chip reported the loss.
     uno.set(Pin::D4, false);
     assert_eq!(uno.run_until_serial("\n", 5 * MILLISECOND).unwrap(), "lost 123\n");
 }
@@ -177,7 +177,7 @@ fn pulses_since(uno: &Uno, cycle: u64) -> Vec<(u64, u64)> {
 }
 
 #[test]
-fn a_new_width_begins_with_the_next_frame_whenever_it_is_written() {
+fn a_new_width_begins_with_the_next_frame_at_any_time_of_its_write() {
     let mut uno = boot("pulses");
     uno.run_until(2 * FRAME_CYCLES).unwrap();
     let start = pulses_since(&uno, 1000)[0].0;
@@ -292,7 +292,7 @@ fn a_watchdog_reset_is_reported_and_the_firmware_goes_on() {
 }
 
 #[test]
-fn a_watchdog_that_nobody_turns_off_bites_again_after_sixteen_milliseconds() {
+fn a_watchdog_that_stays_on_bites_again_after_sixteen_milliseconds() {
     let mut uno = boot("careless");
     uno.run_for_ms(200).unwrap();
     let cycles: Vec<u64> = uno.resets().iter().map(|reset| reset.cycle).collect();
@@ -376,7 +376,7 @@ fn an_elf_that_is_none_is_refused_by_name() {
 #[test]
 fn the_size_is_what_the_sections_add_up_to() {
     let mut uno = boot("memory");
-    // .noinit holds `kept`, .data `started`, whose first value takes flash as well.
+    // .noinit has `kept`. .data has `started`, whose initial value also takes flash.
     assert_eq!(uno.size().sram, 3);
     assert!((100..1000).contains(&uno.size().flash), "{:?}", uno.size());
     uno.run_for_ms(5).unwrap();
@@ -392,6 +392,6 @@ fn a_firmware_too_large_for_the_chip_is_measured_but_not_run() {
     let Err(UnoError::Image(ImageError::TooLarge { memory: "flash", end, .. })) = Uno::boot(&elf) else {
         panic!("40 kB do not fit into 32 KiB");
     };
-    // The first values of variables come behind the code, which is too large by itself.
+    // Initial values come after the code, which alone is too large.
     assert_eq!(end, flash - sram);
 }

@@ -1,5 +1,5 @@
-//! Faults on the virtual Uno, against small C programs whose behaviour the data sheet tells: resets and their causes, bytes
-//! that change by themselves, a program that hangs, and power that goes while the EEPROM is written.
+//! Faults on the virtual Uno, with small C programs whose behaviour the data sheet defines: resets and their causes,
+//! bytes that change by themselves, a program that hangs, and a power failure during a write to the EEPROM.
 
 mod common;
 
@@ -117,11 +117,11 @@ fn turns_are_timed_when_asked_for() {
     uno.run_for_ms(10).unwrap();
     let turns = *uno.turns().unwrap();
     assert!(turns.count.abs_diff((word(&uno, "turns") - before).into()) <= 1, "{turns:?}");
-    // A turn is some 20 cycles, and the longest has the interrupt of 30 in it.
+    // A turn takes some 20 cycles. The longest includes the interrupt of 30.
     assert!((10.0..30.0).contains(&turns.mean()) && turns.longest > 40 && turns.longest < 90, "{turns:?}");
 }
 
-/// Has the fixture write its byte, and returns the cycle at which it began.
+/// Makes the fixture write its byte, and returns the cycle at which the write began.
 fn order_write(uno: &mut Uno) -> u64 {
     uno.set(Pin::D4, false);
     uno.run_until(uno.cycle() + 300).unwrap();

@@ -1,24 +1,24 @@
-// The page as an app that works without a network: where it comes from https or localhost, a browser can install it. From the disk it
-// needs nothing of that, and from `weeder serve` it is of no use without that one.
+// The page as an app that works without a network. A browser can install it from https or localhost. A page on the disk
+// needs no installation, and a page from `weeder serve` is useless without its network.
 
 import { isServed } from "../link/served.ts";
 
-/** Time between two looks for a newer page. */
+/** Time between two checks for a newer page. */
 const LOOK_MS = 3_600_000;
 
-/** Makes the page one that can be installed. Calls back when a newer page is there, with what loads it. */
+/** Makes the page installable. Calls `onNewer` when a newer page is ready, with a function that loads it. */
 export async function makeInstallable(onNewer: (load: () => void) => void): Promise<void> {
     const { serviceWorker } = navigator;
     if (isServed() || !globalThis.isSecureContext || !serviceWorker || !location.protocol.startsWith("http")) return;
     const manifest = document.createElement("link");
     [manifest.rel, manifest.href] = ["manifest", "manifest.webmanifest"];
     document.head.append(manifest);
-    // Where the server does not give it, or the browser keeps nothing, the page works as it is.
+    // If the server lacks the worker, or the browser stores nothing, the page still works.
     const registration = await serviceWorker.register("worker.js").catch(() => undefined);
     if (!registration) return;
     const look = () => {
         const newer = registration.waiting;
-        // The first one of all is no newer one.
+        // The first installation is no update.
         if (!newer || !serviceWorker.controller) return;
         onNewer(() => {
             serviceWorker.addEventListener("controllerchange", () => location.reload());
@@ -27,9 +27,9 @@ export async function makeInstallable(onNewer: (load: () => void) => void): Prom
     };
     const follow = () => registration.installing?.addEventListener("statechange", look);
     registration.addEventListener("updatefound", follow);
-    // It may have been found before.
+    // It may have been found before this listener was added.
     follow();
     look();
-    // The browser looks by itself when the page is opened. Without a network there is nothing to be found.
+    // The browser checks when the page is opened. Without a network the check fails, and this is ignored.
     setInterval(() => void registration.update().catch(() => {}), LOOK_MS);
 }

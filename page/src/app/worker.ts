@@ -1,11 +1,11 @@
-// The service worker: keeps the page's files on the device, so that it opens without a network.
+// The service worker: stores the page's files on the device, so that it opens without a network.
 //
-// A newer page is kept beside the one that is shown, and takes its place when the operator says so. BUILD is another one for each
-// page that differs (build.mjs).
+// A newer page is stored beside the shown one, and replaces it when the operator confirms. BUILD differs for each
+// version of the page (build.mjs).
 
 declare const BUILD: string;
 
-/** Events and objects of a service worker, as far as they are used: the page's own types have a window's alone. */
+/** The used events and objects of a service worker: the page's own types are only those of a window. */
 interface Lasting extends Event {
     waitUntil(done: Promise<unknown>): void;
 }

@@ -4,12 +4,12 @@ import type { Plain } from "../words/words.ts";
 
 export interface Board {
     readonly id: string;
-    /** What it is called everywhere, or the text that says it. */
+    /** Its common name, or the key of a text. */
     readonly name: string | { readonly text: Plain };
-    /** The bootloader's rate in bits a second, and the flash that it leaves to the firmware, of 32 KiB. */
+    /** The bootloader's rate in bits a second, and the flash that remains for the firmware, of 32 KiB. */
     readonly baud: number;
     readonly roomBytes: number;
-    /** Whether its bootloader is the one that came before optiboot. */
+    /** Whether its bootloader is the one before optiboot. */
     readonly isOld: boolean;
 }
 

@@ -1,4 +1,4 @@
-// Flashing, as the operator sees it: a board, a button, how far it is, and what came of it.
+// Flashing, for the operator: a board, a button, the progress, and the result.
 
 import { download, Parts } from "../dom.ts";
 import { choosePort, PortError, SerialLine, whyNoSerial } from "../link/serial.ts";
@@ -11,7 +11,7 @@ import { BOARDS, type Board } from "./boards.ts";
 import { Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
 
 export class Flasher {
-    /** Called before a port is opened for flashing: whoever has it lets go of it. */
+    /** Called before a port is opened for flashing. The owner of the port must close it. */
     onBegin: (port: SerialPort) => Promise<void> = async () => {};
     /** The operator wants to work with the board that was just flashed. */
     onWork: (port: SerialPort) => void = () => {};
@@ -120,7 +120,7 @@ export class Flasher {
     #say(kind: "done" | "failed" | "", text: () => string): void {
         const said = this.#parts.html("flash-said");
         said.className = kind;
-        // Commands stand between backticks where they are printed.
+        // Commands are printed between backticks.
         show(said, () => {
             const plain = text().replaceAll("`", "");
             return plain === "" ? "" : sentence(plain);

@@ -1,16 +1,16 @@
-// The language of the Uno's bootloader, STK500 version 1, as far as flashing needs it (Atmel's application note AVR061).
+// The protocol of the Uno's bootloader: the parts of STK500 version 1 for flashing (Atmel's application note AVR061).
 //
-// A command ends in CRC_EOP, its answer begins with INSYNC and ends in OK. The bootloader listens for a second or two after
-// a reset. Addresses are in words. Optiboot and its predecessor erase each page as they write it.
+// A command ends with CRC_EOP. Its answer begins with INSYNC and ends with OK. The bootloader listens for a second or
+// two after a reset. Addresses are in words. Optiboot and its predecessor erase each page before they write it.
 
 import { type PortError, type SerialLine, wait } from "../link/serial.ts";
 import { english } from "../words/words.ts";
 import type { Board } from "./boards.ts";
 
-/** What is wrong with the flashing, and what to do. */
+/** An error of flashing, and what to do. */
 export class FlashError extends Error {}
 
-/** How far it is. */
+/** The progress. */
 export interface Progress {
     readonly phase: "waiting" | "writing" | "verifying";
     /** From 0 to 1. */
@@ -32,7 +32,7 @@ const FLASH = "F".charCodeAt(0);
 /** Bytes of a page of flash (data sheet, table 27-13). */
 export const PAGE_BYTES = 128;
 
-/** Who answers: an ATmega328P, and chips that are taken for one. */
+/** The signature of an ATmega328P, and of compatible chips. */
 const SIGNATURE = "1e950f";
 const OTHERS: Readonly<Record<string, string>> = {
     "1e9514": "ATmega328",
@@ -43,12 +43,15 @@ const OTHERS: Readonly<Record<string, string>> = {
     "1e9801": "ATmega2560 (Mega)",
 };
 
-/** Longest time that an answer takes: a page is written in 10 ms, and sent in 27 at 57600 baud. */
+/** Timeout of an answer: a page is written in 10 ms, and sent in 27 at 57600 baud. */
 const ANSWER_MS = 1000;
-/** Time between two calls for the bootloader, and calls after a reset: the old one blinks for a second before it listens. */
+/**
+ * Time between two sync commands, and their number after a reset: the old bootloader blinks for a second before it
+ * listens.
+ */
 const CALL_MS = 150;
 const CALLS = 12;
-/** How often the board is reset for it, and how often a page is tried. */
+/** The most resets of the board, and tries of a page. */
 const RESETS = 2;
 const TRIES = 3;
 
@@ -63,7 +66,7 @@ export class Bootloader {
         this.#line = line;
         this.#board = board;
         line.onBytes = (bytes) => {
-            // What a device pours out that is no bootloader needs no end.
+            // Another device may send without end: limits the buffer.
             if (this.#received.length < 4096) this.#received.push(...bytes);
             this.#arrived();
         };
@@ -73,7 +76,7 @@ export class Bootloader {
         };
     }
 
-    /** Writes a firmware and reads it back. Throws a FlashError, or a PortError where the line is gone. */
+    /** Writes a firmware and reads it back. Throws a FlashError, or a PortError if the line is gone. */
     async flash(image: Uint8Array, onProgress: (progress: Progress) => void): Promise<void> {
         onProgress({ phase: "waiting", share: 0 });
         await this.#call();
@@ -118,7 +121,7 @@ export class Bootloader {
         throw new FlashError(this.#whoIsThere(String.fromCharCode(...heard, ...this.#received)));
     }
 
-    /** Whether the bootloader answers a call. What comes instead is added to what was heard. */
+    /** Whether the bootloader answers a sync command. Other input is added to `heard`. */
     async #hears(heard: number[]): Promise<boolean> {
         this.#received = [];
         await this.#line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
@@ -128,7 +131,7 @@ export class Bootloader {
         return false;
     }
 
-    /** Waits until all calls are answered that came before, and whether that has an end. */
+    /** Waits for the answers of all previous sync commands. Returns false if the input does not end. */
     async #isQuiet(): Promise<boolean> {
         for (let waits = 0; waits < CALLS; waits++) {
             this.#received = [];
@@ -138,14 +141,14 @@ export class Bootloader {
         return false;
     }
 
-    /** Does something that can be done again, and does it again where a byte was lost on the way. */
+    /** Runs repeatable work, and repeats it after a lost byte. */
     async #patiently<Result>(work: () => Promise<Result>): Promise<Result> {
         for (let tries = 1; ; tries++)
             try {
                 return await work();
             } catch (error) {
                 if (!(error instanceof FlashError) || tries === TRIES) throw error;
-                // Optiboot leaves for the firmware when it does not understand.
+                // Optiboot starts the firmware after an invalid command.
                 await this.#call();
                 await this.#command([ENTER_PROGRAMMING], 0);
             }
@@ -174,7 +177,7 @@ export class Bootloader {
         await this.#command([LOAD_ADDRESS, words % 256, Math.floor(words / 256)], 0);
     }
 
-    /** Sends a command and gives back what its answer carries. */
+    /** Sends a command and returns the data of its answer. */
     async #command(bytes: number[], answerBytes: number): Promise<number[]> {
         this.#received = [];
         await this.#line.write(Uint8Array.of(...bytes, CRC_EOP));
@@ -186,7 +189,7 @@ export class Bootloader {
         );
     }
 
-    /** So many bytes as they come; nothing where they do not come in time. */
+    /** The next bytes; undefined if they do not come in time. */
     async #take(count: number, ms: number): Promise<number[] | undefined> {
         const by = performance.now() + ms;
         for (;;) {

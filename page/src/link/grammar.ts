@@ -1,7 +1,7 @@
-// What a line of the machine means. This is the page's one door to the console's grammar: `read` tells what was said, and nothing
-// else takes a line apart. Behind it is the project's own Rust (host/link/src/console_line.rs), of which these are the types.
+// Parses the machine's lines. This is the only place in the page that parses console lines: `read` returns the meaning
+// of a line. The parser is the project's own Rust (host/link/src/console_line.rs), and these are its types.
 //
-// Commands are put together where they are typed; their words stand in the firmware's help.
+// Commands are composed where they are typed. Their words are in the firmware's help.
 
 import { ask } from "../core.ts";
 import { type Mode, TOLD, type Told } from "./events.ts";
@@ -17,13 +17,13 @@ export interface Status {
     readonly position: number;
     /** Negative backwards. */
     readonly speedMmS: number;
-    /** Windows at the tool or ahead of it. */
+    /** Keep-out zones at the tool or ahead of it. */
     readonly windows: number;
-    /** How far the machine has to roll until ground that the beam has seen reaches the tool. */
+    /** Distance until ground that the beam has seen reaches the tool. */
     readonly unseenMm: number;
 }
 
-/** A setting as `get` shows it. A switched one is 0 or 1. */
+/** A setting as `get` shows it. A switch is 0 or 1. */
 export interface Setting {
     readonly name: string;
     readonly value: number;
@@ -32,27 +32,27 @@ export interface Setting {
     readonly greatest: number;
     readonly isSwitched: boolean;
     readonly default: number;
-    /** Nothing where none are saved. */
+    /** Undefined if nothing is saved. */
     readonly saved?: number;
 }
 
-/** What a line says. */
+/** The meaning of a line. */
 export type Said =
     /** The first line after a reset. */
     | { is: "greeting"; version: string; cause: string }
     /** The answer to `version`. */
     | { is: "version"; version: string }
-    /** The end of an answer: what was wrong, and what would be right, where something was. */
+    /** The end of an answer, with the error and what would be right, if there is one. */
     | { is: "end"; error?: string }
     | { is: "status"; status: Status }
     | { is: "setting"; setting: Setting }
-    /** What a setting or a command is. */
+    /** The description of a setting or a command. */
     | { is: "help"; name: string; help: string }
     | { is: "example"; fromField: boolean; number: number; label: string }
     | Told
     | { is: "other" };
 
-/** Whether the machine says it by itself, and not as a part of an answer. */
+/** Whether it is an event, and not a part of an answer. */
 export function isTold(said: Said): said is Told {
     return TOLD.some((is) => is === said.is);
 }
@@ -62,16 +62,16 @@ export function read(line: string): Said {
     return ask<Said>({ read: line });
 }
 
-/** The order in which values can be sent, or why they cannot be at all. */
+/** The order in which values can be sent, or why they cannot be sent. */
 export interface Steps {
-    /** What contradicts what, and what would be right. */
+    /** The contradiction, and what would be right. */
     readonly contradiction?: string;
     readonly steps: readonly (readonly [name: string, value: number])[];
 }
 
 /**
- * The values to send that lead from the machine's settings to some others, with no contradiction on the way. What no setting's
- * value can be goes last, for the machine to say what is wrong with it.
+ * The values to send to change the machine's settings, without a contradiction on the way. Invalid values come last:
+ * the machine reports their errors.
  */
 export function steps(from: readonly Setting[], to: ReadonlyMap<string, number>): Steps {
     const canBe = (value: number) => Number.isInteger(value) && value >= 0 && value <= 65_535;

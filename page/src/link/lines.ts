@@ -1,15 +1,15 @@
-// What comes over a wire, to lines, whatever it is.
+// Splits received text into lines. Any input is accepted.
 //
-// A line ends with CR, LF or both, or where it has more characters than any that the firmware writes. What is not printable
-// ASCII becomes U+FFFD. Empty lines say nothing.
+// A line ends with CR, LF or both, or when it is longer than any line of the firmware. A character that is not
+// printable ASCII becomes U+FFFD. Empty lines are dropped.
 
-/** Characters after which a line ends by itself: the firmware's own have less than 128. */
+/** The longest line in characters. The firmware's own lines are shorter than 128. */
 const LIMIT = 256;
 
 export class LineReader {
     #partial = "";
 
-    /** Takes what has come, and gives back the lines that are complete. */
+    /** Takes received text, and returns the complete lines. */
     take(text: string): string[] {
         const lines: string[] = [];
         const end = () => {

@@ -1,9 +1,9 @@
-// The log of a session, as `weeder replay` reads it: a CSV file of `time_ms,kind,line`, a line each, as the firmware wrote
-// them. The machine's settings and examples stand in it where it connected, so that it can be replayed by itself.
+// The log of a session, for `weeder replay`: a CSV file of `time_ms,kind,line`, with the firmware's own lines. It has
+// the machine's settings and examples at each connection, so that it can be replayed by itself.
 
 import type { Happening } from "./session.ts";
 
-/** Lines that are kept: some eleven hours at work. Of a longer session, what comes later is left out, and `isFull` says so. */
+/** Greatest number of lines: some eleven hours at work. Later lines are dropped, and `isFull` is true. */
 const MOST = 500_000;
 
 export class Log {
@@ -11,12 +11,12 @@ export class Log {
     #from: number | undefined;
     isFull = false;
 
-    /** Lines in it, the heading left out. */
+    /** Lines in it, without the heading. */
     get length(): number {
         return this.#lines.length;
     }
 
-    /** Writes down what happened, at a time. */
+    /** Records an event at a time. */
     add(happening: Happening, nowMs: number): void {
         this.#from ??= nowMs;
         const write = (kind: string, line: string) =>

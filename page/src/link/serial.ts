@@ -1,20 +1,20 @@
-// A serial port of the browser (Web Serial), as a line of bytes: open, listen, write, pull the Uno's reset, close.
+// A serial port of the browser (Web Serial), as a line of bytes: open, listen, write, reset the Uno, close.
 //
-// Every failure says its cause and the way out. The browser does not tell a port that is busy from one that may not be
-// opened: both are said then. What comes garbled is lost by the port and ends nothing; a pulled cable does.
+// Every error has its cause and what to do. The browser does not distinguish a busy port from one without permission,
+// so the message names both. Garbled input is lost, and does not end the line. A pulled cable does.
 
 import { english } from "../words/words.ts";
 import { isServed } from "./served.ts";
 import type { Wire } from "./session.ts";
 
-/** What is wrong with a port, and what to do. */
+/** An error of a port, and what to do. */
 export class PortError extends Error {}
 
-/** For how long DTR and RTS are let go of, so that the board's capacitor sees an edge, and the wait behind it. */
+/** How long DTR and RTS are released, so that the board's capacitor sees an edge, and the wait after it. */
 const RESET_MS = 250;
 const AFTER_RESET_MS = 50;
 
-/** Why this browser offers no serial port here, and the way that works; nothing where it does. */
+/** Why this browser offers no serial port here, and the alternative; undefined if it does. */
 export function whyNoSerial(): string | undefined {
     if (isServed()) return english("noSerialServed");
     if (globalThis.isSecureContext === false) return english("noSerialHttp");
@@ -22,7 +22,7 @@ export function whyNoSerial(): string | undefined {
     return undefined;
 }
 
-/** Asks the operator for a port; nothing where he chose none. */
+/** Asks the operator for a port; undefined if none was chosen. */
 export async function choosePort(): Promise<SerialPort | undefined> {
     try {
         return await navigator.serial.requestPort();
@@ -70,7 +70,7 @@ export class SerialLine {
         this.#listening = this.#listen();
     }
 
-    /** Writes bytes, behind those that were written before. Throws a PortError where the line is gone. */
+    /** Writes bytes, after earlier ones. Throws a PortError if the line is gone. */
     async write(bytes: Uint8Array): Promise<void> {
         try {
             await this.#writer.write(bytes);
@@ -83,7 +83,7 @@ export class SerialLine {
     /** Resets the board, as opening its port does: its bootloader runs then. */
     async reset(): Promise<void> {
         const set = async (level: boolean) =>
-            // A port without these lines, as a pseudo terminal is, has to be reset by hand.
+            // A port without these lines, such as a pseudo terminal, must be reset by hand.
             this.#port.setSignals({ dataTerminalReady: level, requestToSend: level }).catch(() => {});
         await set(false);
         await wait(RESET_MS);
@@ -91,7 +91,7 @@ export class SerialLine {
         await wait(AFTER_RESET_MS);
     }
 
-    /** Lets go of the port, so that it can be opened again. */
+    /** Closes the port, so that it can be opened again. */
     close(): Promise<void> {
         this.#closed ??= this.#close();
         return this.#closed;
@@ -99,7 +99,7 @@ export class SerialLine {
 
     async #close(): Promise<void> {
         this.#isClosing = true;
-        // What a line that is gone says to these is known.
+        // Errors of a lost line are already known here.
         const ignore = () => {};
         await this.#reader?.cancel().catch(ignore);
         await this.#listening;
@@ -108,7 +108,7 @@ export class SerialLine {
     }
 
     async #listen(): Promise<void> {
-        // A framing error ends a stream, and the port has another one then; none where it is gone.
+        // A framing error ends a stream, and the port then has another one. A lost port has none.
         while (this.#port.readable && !this.#isClosing) {
             const reader: ReadableStreamDefaultReader<Uint8Array> = this.#port.readable.getReader();
             this.#reader = reader;
@@ -119,7 +119,7 @@ export class SerialLine {
                     this.onBytes(value);
                 }
             } catch {
-                // Said by `readable`, as above.
+                // Reported by `readable`, as above.
             } finally {
                 reader.releaseLock();
                 this.#reader = undefined;
@@ -141,11 +141,11 @@ export function wireOf(line: SerialLine): Wire {
     const wire: Wire = {
         onText: () => {},
         onEnd: () => {},
-        // A line that is gone has said so.
+        // A lost line has reported its error.
         send: (text) => void line.write(encoder.encode(text)).catch(() => {}),
         close: () => line.close(),
     };
-    // A byte is a character: noise is nobody's UTF-8.
+    // A byte is one character: the input may be noise, which is no valid UTF-8.
     line.onBytes = (bytes) => wire.onText(String.fromCharCode(...bytes));
     line.onEnd = ({ message }) => wire.onEnd(message);
     return wire;

@@ -1,22 +1,22 @@
-// Settings as the TOML file that `weeder settings` reads and writes: help, range and unit stand above each value. What a file
-// does not name is left alone. Of TOML, a file may have what a settings file needs: a key and its value, and comments.
+// Settings as the TOML file of `weeder settings`: help, range and unit are above each value. Settings that a file does
+// not name are not changed. The parser accepts keys with values, and comments.
 
 import { english } from "../words/words.ts";
 import type { Setting } from "./grammar.ts";
 
-/** What is wrong with a settings file, and what would be right. */
+/** An error in a settings file, and what would be right. */
 export class SettingsFileError extends Error {}
 
 /** How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder. */
 const OLD_MERGE_GAP = "merge_gap_ticks";
 
-/** What a setting may be. */
+/** The range of a setting. */
 export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
     if (isSwitched) return english("rangeSwitched", { usual: String(usual === 1) });
     return english("range", { least, greatest: `${greatest}${unit && ` ${unit}`}`, usual });
 }
 
-/** The file that says all these settings. */
+/** Writes these settings as a file. */
 export function write(settings: readonly Setting[], help: ReadonlyMap<string, string>): string {
     const head =
         "# Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.\n" +
@@ -64,7 +64,7 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
     return values;
 }
 
-/** Ticks in a millimetre with these values; what they leave out is as the machine has it. */
+/** Ticks in a millimetre with these values. Missing values are the machine's. */
 function ticksPerMm(values: ReadonlyMap<string, number>, settings: readonly Setting[]): number {
     const value = (name: string) => values.get(name) ?? settings.find((setting) => setting.name === name)?.value ?? 0;
     return value("ticks_per_m") / 1000 || value("ticks_per_rev") / (Math.PI * value("wheel_mm"));

@@ -7,14 +7,14 @@ import { type Ask, Refused } from "../link/session.ts";
 import { type Plain, quantity, say, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
-/** Which of the servo's two places. */
+/** The servo's two positions. */
 type Place = "in" | "out";
 
 export class Calibration {
     readonly #parts: Parts;
     readonly #machine: Machine;
     readonly #ask: Ask;
-    /** Where the stretch began. */
+    /** The position at the stretch's beginning. */
     #from: number | undefined;
 
     constructor(parts: Parts, machine: Machine, ask: Ask) {
@@ -46,7 +46,7 @@ export class Calibration {
         parts.button("servo-save", () => void this.#do("servo-said", "save", () => say("isSavedNow")));
     }
 
-    /** Shows what changes while the machine rolls. */
+    /** Shows the values that change while the machine rolls. */
     show(): void {
         const { status, tickMm } = this.#machine;
         const isOn = this.#from !== undefined && status !== undefined;
@@ -66,7 +66,7 @@ export class Calibration {
         }
     }
 
-    /** Shows what came of timing the servo, if that is what the machine tells. */
+    /** Shows the result of timing the servo, if this event is one. */
     take(said: Told): void {
         let text: Plain;
         if (said.is === "calibratedBySwitch") text = said.isSet ? "timedSet" : "timedNotSet";
@@ -117,7 +117,7 @@ export class Calibration {
         }
     }
 
-    /** Types a command and says what came of it; whether it was carried out. */
+    /** Types a command and shows its result. Returns whether it succeeded. */
     async #do(said: string, command: string, done: () => string): Promise<boolean> {
         try {
             await this.#ask(command);

@@ -1,5 +1,5 @@
-// The real Uno at the browser's serial port: connected by a button, let go of by one, and taken up again where its cable was
-// pulled and plugged in.
+// The real Uno at the browser's serial port: buttons connect and disconnect it. After its cable was unplugged and
+// plugged in again, it is connected automatically.
 
 import type { Parts } from "../dom.ts";
 import { choosePort, PortError, SerialLine, whyNoSerial, wireOf } from "../link/serial.ts";
@@ -13,7 +13,7 @@ const BAUD = 115_200;
 const TURN_MS = 20;
 
 export class Connection {
-    /** Called when the machine was let go of, for the operator to flash it. */
+    /** Called after the port was closed, so that the operator can flash the machine. */
     onFlash: () => void = () => {};
     readonly #parts: Parts;
     readonly #panel: Panel;
@@ -21,7 +21,7 @@ export class Connection {
     /** Whether the port is open. */
     #isOpen = false;
     #isBusy = false;
-    /** Keeps a phone's screen lit while a machine is there. */
+    /** Keeps a phone's screen on while a machine is connected. */
     #light: WakeLockSentinel | undefined;
 
     constructor(parts: Parts, panel: Panel) {
@@ -49,18 +49,18 @@ export class Connection {
             this.#say(() => "");
             this.#show();
         };
-        // A page that was out of sight has lost it.
+        // A hidden page has lost it.
         document.addEventListener("visibilitychange", () => void this.#stayLit());
         setInterval(() => panel.turn(performance.now()), TURN_MS);
         this.#show();
     }
 
-    /** Whether a machine may be there. */
+    /** Whether a machine may be connected. */
     get isOpen(): boolean {
         return this.#isOpen;
     }
 
-    /** Opens a port and talks to the machine behind it. */
+    /** Opens a port and talks to its machine. */
     async connect(port: SerialPort): Promise<void> {
         if (this.#isBusy) return;
         this.#isBusy = true;
@@ -79,7 +79,7 @@ export class Connection {
         }
     }
 
-    /** Lets go of the port. */
+    /** Closes the port. */
     async disconnect(): Promise<void> {
         this.#port = undefined;
         if (!this.#isOpen) return;
@@ -88,14 +88,14 @@ export class Connection {
         this.#show();
     }
 
-    /** Lets go of this port, where it is the one. */
+    /** Closes this port, if it is the open one. */
     async release(port: SerialPort): Promise<void> {
         if (port === this.#port) await this.disconnect();
     }
 
     async #stayLit(): Promise<void> {
         await this.#light?.release();
-        // What has no such thing, or little power left, may go dark.
+        // A device without this function, or with little power left, may switch the screen off.
         this.#light = this.#isOpen ? await navigator.wakeLock?.request("screen").catch(() => undefined) : undefined;
     }
 
@@ -122,7 +122,7 @@ export class Connection {
     }
 }
 
-/** Whether two ports have the same kind of board: a browser may give one that was pulled another object. */
+/** Whether two ports have the same kind of board. A browser may give a port that was unplugged another object. */
 function isAlike(one: EventTarget | null, other: SerialPort): boolean {
     if (!one || !("getInfo" in one)) return false;
     const [a, b] = [(one as SerialPort).getInfo(), other.getInfo()];

@@ -1,12 +1,11 @@
-// The console: what was typed and what the machine said, line by line, and a line to type to it. It knows nothing of what
-// the words mean.
+// The console: typed lines and the machine's output, and an input line. It does not interpret the lines.
 
 import { make, type Parts } from "../dom.ts";
 
-/** Lines that are kept. */
+/** Greatest number of lines. */
 const LINES = 500;
 
-/** Distance from the end, in pixels, up to which the console still follows what is said. */
+/** Greatest distance from the end, in pixels, at which the console still scrolls with new lines. */
 const AT_THE_END = 8;
 
 export class Console {
@@ -37,13 +36,13 @@ export class Console {
         });
     }
 
-    /** Adds a line, of which kind. */
+    /** Adds a line of this kind. */
     add(line: string, kind: "typed" | "error" | "happened" | ""): void {
         this.#waiting.push(make("div", kind, line));
         if (this.#waiting.length > LINES) this.#waiting.shift();
     }
 
-    /** Shows what has come since the last time. */
+    /** Shows the new lines. */
     show(): void {
         if (this.#waiting.length === 0) return;
         const said = this.#said;

@@ -1,4 +1,4 @@
-// Teaching: what the last object was, said by two buttons; and the examples that the machine was taught.
+// Teaching: two buttons label the last detection. Below are the taught examples.
 
 import { make, type Parts } from "../dom.ts";
 import { read } from "../link/grammar.ts";
@@ -6,7 +6,7 @@ import { type Ask, Refused } from "../link/session.ts";
 import { quantity, say, show, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
-/** Places for examples from the field. */
+/** Number of slots for taught examples. */
 const PLACES = 32;
 
 type Label = "plant" | "weed";

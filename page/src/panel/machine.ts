@@ -1,5 +1,4 @@
-// What is known of the machine at the other end of the wire, and how that changes with what happens; and its words for the
-// operator.
+// The state of the machine at the other end of the wire, updated by events, with its texts for the operator.
 
 import faults from "faults.json";
 import type { Detection, Mode, Told } from "../link/events.ts";
@@ -10,16 +9,16 @@ import { advice, english, type Plain, quantity, say, told } from "../words/words
 /** Objects that are remembered. */
 const OBJECTS = 50;
 
-/** What the manual says of an alarm or a warning. */
+/** The manual's entry for an alarm or a warning. */
 export interface Fault {
     readonly name: string;
-    /** What it is called everywhere: for an alarm, the digits that the lamp blinks before its name, as in "3-1 too_fast". */
+    /** Its common name: for an alarm, the digits that the lamp blinks and the word, as in "3-1 too_fast". */
     readonly title: string;
     readonly cause: string;
     readonly advice: string;
 }
 
-/** What the manual says of an alarm or a warning; what is not in it can still be looked up. */
+/** The manual's entry for an alarm or a warning. An unknown one refers to the manual. */
 export function fault(name: string): Fault {
     const unknown = { name, title: name, cause: "", advice: say("lookItUp") };
     const found = faults.find((fault) => fault.name === name) ?? unknown;
@@ -36,13 +35,13 @@ const REASONS: Readonly<Record<string, Plain>> = {
 const STATES = { none: "stateNone", hold: "stateHold", work: "stateWork", alarm: "stateAlarm" } as const;
 
 export class Machine {
-    /** The firmware's version, where the machine is there. */
+    /** The firmware's version, if the machine is connected. */
     version: string | undefined;
-    /** Whether it may be started from here. */
+    /** Whether this page may start it. */
     mayStart = true;
-    /** Why it is not there, in English. */
+    /** Why it is lost, in English. */
     #lost: string = english("noneConnected");
-    /** Whether it may weed on where no page reaches it. */
+    /** Whether it may be weeding without a connection. */
     #mayWeedOn = false;
     mode: Mode = "hold";
     toolOut = true;
@@ -56,11 +55,11 @@ export class Machine {
     settings: readonly Setting[] = [];
     help: ReadonlyMap<string, string> = new Map();
     examples: readonly string[] = [];
-    /** The last objects, the newest first, and those of them whose windows the machine still knows of. */
+    /** The last detections, the newest first, and those with a zone that the machine still stores. */
     objects: Detection[] = [];
     windows: Detection[] = [];
 
-    /** Takes what happened, at a time. */
+    /** Takes an event at a time. */
     take(happening: Happening, nowMs: number): void {
         switch (happening.is) {
             case "connected":
@@ -73,7 +72,7 @@ export class Machine {
             case "lost":
                 this.version = undefined;
                 this.lost = happening.why;
-                // The operator has to know where HOLD is now.
+                // The operator must know where to find HOLD now.
                 this.#mayWeedOn = happening.forGood && !happening.isWanted && this.mode === "work";
                 [this.alarm, this.warning, this.status] = [undefined, undefined, undefined];
                 break;
@@ -126,7 +125,7 @@ export class Machine {
         }
     }
 
-    /** A setting's value; 0 where the machine has not shown it. */
+    /** A setting's value; 0 if the machine has not shown it. */
     setting(name: string): number {
         return this.settings.find((setting) => setting.name === name)?.value ?? 0;
     }
@@ -147,19 +146,19 @@ export class Machine {
         return hold * this.tickMm - 2 * this.setting("margin_mm");
     }
 
-    /** The position now, in counts: the last status', and what was rolled since. */
+    /** The position now, in counts: that of the last status, and the distance since. */
     positionAt(nowMs: number): number {
         const { status } = this;
         if (!status) return 0;
         return status.position + this.ticks((status.speedMmS * Math.min(nowMs - this.statusMs, 500)) / 1000);
     }
 
-    /** It is not there, and why, in English. */
+    /** Marks it as lost. `why` is in English. */
     set lost(why: string) {
         [this.#lost, this.#mayWeedOn] = [why, false];
     }
 
-    /** What the machine does. */
+    /** The machine's state. */
     get state(): Mode | "none" {
         return this.version === undefined ? "none" : this.mode;
     }
@@ -170,15 +169,15 @@ export class Machine {
     }
 
     /**
-     * What a screen reader says of it: the state, and the reason while that lasts. Distances, and swings at plants, would be said
-     * without an end.
+     * The text for a screen reader: the state, and its reason if that lasts. Distances and swings at plants are left
+     * out, as they would never end.
      */
     get heard(): string {
         if (this.version !== undefined && this.mode === "work" && !this.#isKeptOut) return sentence(this.stateWord);
         return `${sentence(this.stateWord)} ${this.#reason}`;
     }
 
-    /** What the tool does and why, in a sentence or two. */
+    /** The tool's state and its reason, in a sentence or two. */
     get why(): string {
         const { status } = this;
         const isUnseen = this.mode === "work" && this.#isKeptOut && status?.reason === "unseen_ground";
@@ -187,7 +186,7 @@ export class Machine {
             : this.#reason;
     }
 
-    /** Whether the tool is out at work for something else than a plant. */
+    /** Whether the tool is out at work for another reason than a plant. */
     get #isKeptOut(): boolean {
         return this.toolOut && (this.status?.reason ?? "plant") !== "plant";
     }

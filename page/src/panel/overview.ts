@@ -1,4 +1,5 @@
-// All machines of `weeder serve` at a glance: how each of them is, and one HOLD for all, with the time until the last one has obeyed.
+// The overview of all machines of `weeder serve`: the state of each, and one HOLD for all, with the time until the last
+// one has obeyed.
 
 import { make } from "../dom.ts";
 import type { HeldAll } from "../link/served.ts";
@@ -33,7 +34,7 @@ export class Overview {
         into.append(make("ul", "", ...rows), make("div", "hold-bar", said, hold));
     }
 
-    /** Shows what has changed. */
+    /** Shows the changes. */
     show(panels: readonly Panel[]): void {
         for (const [row, state] of this.#states.entries()) {
             const machine = panels[row]?.machine;
@@ -46,7 +47,7 @@ export class Overview {
     }
 }
 
-/** What came of a HOLD to all, those first that have not obeyed. */
+/** The result of a HOLD to all. Machines that have not obeyed come first. */
 function inWords({ machines, lastMs }: HeldAll): string {
     const failed = machines.filter(({ error }) => error !== null);
     const obeyed = machines.length - failed.length;

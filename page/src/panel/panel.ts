@@ -1,7 +1,7 @@
-// The operator's panel of a machine, whichever Uno is at the other end of its wire: a real one, or the page's own.
+// The operator's panel of a machine, for a real Uno or the page's own.
 //
-// It is made of the page's template, and connected to one session after the other. It shows what the machine says, and types
-// commands; it decides nothing.
+// It is made from the page's template, and connected to one session after the other. It shows the machine's output, and
+// types commands. It makes no decisions.
 
 import { download, Parts } from "../dom.ts";
 import { Log } from "../link/log.ts";
@@ -20,17 +20,17 @@ import { drawStrip } from "./strip.ts";
 /** At a machine's own port. */
 const EVERYTHING: Allowed = { mayStart: true, mayChange: true };
 
-/** Time for which a reason has to last before a screen reader says it; a state is said at once. */
+/** How long a reason must last before a screen reader says it. A state is said at once. */
 const LASTING_MS = 1000;
 
-/** What stands beside what is needed at work, a tab each. */
+/** The tabs beside the parts that are needed at work. */
 const TABS = ["settings", "calibrate", "examples", "console"] as const;
 
 export class Panel {
-    /** Told of all that happens, after the panel. */
+    /** Called for each event, after the panel. */
     onHappening: (happening: Happening) => void = () => {};
     readonly machine = new Machine();
-    /** What is read out before the machine's state, where there are several. */
+    /** The row's name for a screen reader, if there are several. */
     readonly #row: string;
     readonly #parts: Parts;
     readonly #console: Console;
@@ -40,16 +40,16 @@ export class Panel {
     readonly #examples: Examples;
     readonly #strip: SVGSVGElement;
     #log = new Log();
-    /** What a screen reader says next, the state that it tells, and when that state began. */
+    /** The next text for a screen reader, its state, and when that state began. */
     #heard = { text: "", state: "", sinceMs: 0 };
-    /** Whether the next state is this page's own HOLD, which its answer tells. */
+    /** Whether the next state follows this page's own HOLD, whose answer is already signalled. */
     #isHolding = false;
     #session: Session | undefined;
     #now = 0;
 
     /**
-     * Fills an element. `name` tells it from the page's other panels, `allowed` says what may be typed from here, and `row` is read out
-     * before what happens to this one of several machines.
+     * Fills an element. `name` distinguishes it from the page's other panels. `allowed` are the commands that may be
+     * typed here. `row` is read out before events of this machine, if there are several.
      */
     constructor(into: HTMLElement, name: string, allowed = EVERYTHING, row = "") {
         this.#row = row === "" ? "" : `${row}: `;
@@ -73,7 +73,7 @@ export class Panel {
         parts.button("log-clear", () => {
             this.#log = new Log();
             const { version, settings, examples } = this.machine;
-            // So that what comes can be replayed by itself.
+            // So that the later lines can be replayed by themselves.
             if (version !== undefined) this.#log.add({ is: "connected", version, settings, examples }, this.#now);
         });
         this.machine.mayStart = allowed.mayStart;
@@ -94,14 +94,14 @@ export class Panel {
         if (into.classList.contains("alone")) followDock(parts.html("dock"));
     }
 
-    /** Has the machine hold, before all that waits. */
+    /** Holds the machine, before all waiting commands. */
     hold(): void {
         const session = this.#session;
         if (!session || this.machine.version === undefined) return;
         this.#isHolding = this.machine.mode === "work";
         session.hold().then(
             () => signal("held"),
-            // A machine that is lost has said so.
+            // A lost machine has reported it.
             () => {},
         );
     }
@@ -117,7 +117,7 @@ export class Panel {
         this.#session = session;
     }
 
-    /** Lets go of the machine. */
+    /** Disconnects the machine. */
     async disconnect(): Promise<void> {
         await this.#session?.close();
         this.#session = undefined;
@@ -128,20 +128,20 @@ export class Panel {
         return this.#session.ask(command);
     }
 
-    /** Has the machine save these settings, and takes back the alarm that they were lost; whether it has taken all. */
+    /** Saves these settings on the machine, and clears the alarm for lost ones. Returns whether it has accepted all. */
     async putBack(values: ReadonlyMap<string, number>): Promise<boolean> {
         if (!(await this.#settings.putBack(values))) return false;
         if (this.machine.alarm === "settings_lost") await this.ask("clear");
         return true;
     }
 
-    /** Goes on, at the wire's time. */
+    /** Advances to the wire's time. */
     turn(nowMs: number): void {
         this.#now = nowMs;
         this.#session?.turn(nowMs);
     }
 
-    /** Shows what has changed, and what moves. */
+    /** Shows changes and moving parts. */
     show(): void {
         const { machine } = this;
         const parts = this.#parts;
@@ -217,25 +217,26 @@ export class Panel {
         this.onHappening(happening);
     }
 
-    /** Lets the operator hear what he has to know without looking. */
+    /** Gives the operator audible signals for events that must be noticed without looking. */
     #signal(happening: Happening, isOtherAlarm: boolean): void {
         if (isOtherAlarm && this.machine.alarm !== undefined) signal("alarm");
         if (happening.is === "lost" && !happening.isWanted) signal("lost");
         const said = happening.is === "told" ? happening.said : undefined;
         if (said?.is !== "state" && said?.is !== "alarm" && happening.is !== "lost") return;
-        // By its switch, or by another page's HOLD. The operator hears this page's own by its answer, which comes before this or after.
+        // By its switch, or by another page's HOLD. This page's own HOLD is signalled by its answer, which comes before
+        // or after this.
         if (said?.is === "state" && said.mode === "hold" && !this.#isHolding) signal("held");
         this.#isHolding = false;
     }
 
-    /** Buttons work where a machine is there. */
+    /** Enables buttons while a machine is connected. */
     #showConnected(): void {
         const isThere = this.machine.version !== undefined;
         for (const button of this.#parts.root.querySelectorAll<HTMLButtonElement>("button.needs-machine"))
             button.disabled = !isThere;
     }
 
-    /** Types a line of the console. A screen reader says its answer, and not all that the machine tells. */
+    /** Types a line of the console. A screen reader says its answer, but not the machine's other output. */
     async #type(line: string): Promise<void> {
         this.#parts.write("answered", "");
         try {
@@ -248,7 +249,7 @@ export class Panel {
         }
     }
 
-    /** Has a screen reader say the state at once, and its reason where that lasts. */
+    /** Lets a screen reader say the state at once, and its reason if that lasts. */
     #tell(): void {
         const { heard, state } = this.machine;
         const nowMs = performance.now();
@@ -291,7 +292,9 @@ export class Panel {
     }
 }
 
-/** Leaves room at the page's end for the dock that is on the screen, and has the browser scroll what has the focus to above it. */
+/**
+ * Reserves room at the page's end for the dock on the screen, so that the browser scrolls the focused element above it.
+ */
 function followDock(dock: HTMLElement): void {
     new ResizeObserver(() => {
         if (dock.offsetHeight > 0) document.documentElement.style.setProperty("--dock", `${dock.offsetHeight}px`);

@@ -1,4 +1,5 @@
-// The machines that `weeder serve` has at its ports, side by side: a panel for each, by its name. Several are at a glance above them.
+// The machines at the ports of `weeder serve`, side by side: a panel with its name for each. If there are several, an
+// overview is above them.
 
 import { make } from "../dom.ts";
 import { Served } from "../link/served.ts";
@@ -9,7 +10,7 @@ import { Panel } from "./panel.ts";
 /** Time between two turns. */
 const TURN_MS = 20;
 
-/** Fills an element with the machines' panels, and gives these back. */
+/** Fills an element with the machines' panels, and returns these. */
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
     const all = make("section", "overview");
@@ -26,7 +27,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         section.ariaLabel = name;
         into.append(section);
         const panel = new Panel(element, `served-${machine}`, served.allowed, overview ? name : "");
-        // Read out, they say whose parts they are.
+        // A screen reader says the row's name with each part.
         const label = () => {
             for (const part of element.querySelectorAll("section")) part.ariaLabel = `${name}: ${part.ariaLabel}`;
         };

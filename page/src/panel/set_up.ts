@@ -1,5 +1,5 @@
-// Setting the machine up: the steps of the manual, what is to be measured next, and how small the margin may be. The project's own
-// Rust has the steps and does the sum (host/page/src/set_up.rs); here the lines of the session are kept for it.
+// Setting up the machine: the steps of the manual, the next measurement, and the least margin. The project's Rust has
+// the steps and calculates the margin (host/page/src/set_up.rs). This module stores the session's lines for it.
 
 import { ask as askRust } from "../core.ts";
 import { make, type Parts } from "../dom.ts";
@@ -8,18 +8,18 @@ import type { Ask, Happening } from "../link/session.ts";
 import { quantity, say, step, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
-/** What the session tells of the steps. */
+/** The results of the session for the steps. */
 interface Advice {
     readonly steps: readonly { readonly title: string; readonly how: string; readonly tasks: readonly string[] }[];
-    /** What is to be done next; nothing before the first thing was measured. */
+    /** The next step; null before the first measurement. */
     readonly next: string | null;
-    /** What is to be measured until the margin is known. */
+    /** The missing measurements for the margin. */
     readonly missing: readonly string[];
     readonly marginMm: number | null;
     readonly warning: string | null;
 }
 
-/** Lines that are kept, and those of plants among them: the oldest go first. */
+/** Greatest number of lines, and of lines about plants among them. The oldest are dropped first. */
 const LINES = 200;
 const PLANTS = 12;
 
@@ -42,7 +42,7 @@ export class SetUp {
         });
     }
 
-    /** Keeps what tells of a measurement. */
+    /** Stores lines about a measurement. */
     take(happening: Happening): void {
         const { is } = happening;
         if (is === "connected" || is === "settings")
@@ -56,7 +56,7 @@ export class SetUp {
         this.show();
     }
 
-    /** Shows the steps and what is known of them. */
+    /** Shows the steps and their state. */
     show(): void {
         const advice = this.#advice();
         const list = this.#parts.html("set-up-steps");

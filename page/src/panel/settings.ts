@@ -1,5 +1,5 @@
-// The machine's settings as a form: name, help, unit, range, what is in use and what is saved; sent and saved by one button,
-// kept in a file and taken from one.
+// The machine's settings as a form: name, help, unit, range, and the current and saved values. One button sends and
+// saves them. They can be saved to a file and loaded from one.
 
 import { download, make, type Parts } from "../dom.ts";
 import { steps as order, type Setting } from "../link/grammar.ts";
@@ -14,7 +14,7 @@ export class SettingsForm {
     readonly #ask: Ask;
     readonly #list: HTMLElement;
     readonly #mayChange: boolean;
-    /** What the operator wants and the machine does not have, by name. */
+    /** The operator's values that the machine does not have yet, by name. */
     readonly #wanted = new Map<string, number>();
     readonly #problems = new Map<string, string>();
 
@@ -34,11 +34,11 @@ export class SettingsForm {
         file.addEventListener("change", () => void this.#open(file));
     }
 
-    /** Shows what is known now; what the operator has changed stays. */
+    /** Shows the present values. The operator's changes stay. */
     show(): void {
         for (const { name, value } of this.#machine.settings)
             if (this.#wanted.get(name) === value) this.#wanted.delete(name);
-        // A field that is being typed in keeps its cursor.
+        // A field that is being edited keeps its cursor.
         const focused =
             document.activeElement instanceof HTMLElement ? document.activeElement.dataset.setting : undefined;
         this.#list.replaceChildren(...this.#machine.settings.map((setting) => this.#row(setting)));
@@ -46,7 +46,7 @@ export class SettingsForm {
         this.#count();
     }
 
-    /** Has the machine save these values; whether it has. */
+    /** Saves these values on the machine. Returns whether it has. */
     async putBack(values: ReadonlyMap<string, number>): Promise<boolean> {
         for (const [name, value] of values) this.#wanted.set(name, value);
         this.show();
@@ -139,8 +139,8 @@ export class SettingsForm {
     }
 
     /**
-     * Sends what was changed, in an order in which no value contradicts one that is yet to be sent, and saves it. What contradicts
-     * itself in the end is not sent; what the machine refuses is shown with its words. Whether it is saved.
+     * Sends the changed values, in an order without contradictions on the way, and saves them. Nothing is sent if the
+     * result contradicts itself. Refusals are shown in the machine's words. Returns whether it is saved.
      */
     async #send(): Promise<boolean> {
         this.#problems.clear();

@@ -1,12 +1,15 @@
-// The ground between beam and tool, as the machine believes it: windows that move toward the tool.
+// The ground between beam and tool, as the machine knows it: keep-out zones that move toward the tool.
 //
-// One unit is a millimetre along the row. The tool stands at 0, the beam ahead of it on the right.
+// One unit is a millimetre along the row. The tool is at 0, and the beam ahead of it on the right.
 
 import { say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
-/** Ground behind the tool that is shown, as a share of the way from beam to tool, and the picture's height of its length. */
+/**
+ * Shown ground behind the tool, as a share of the distance from beam to tool, and the picture's height as a share of
+ * its length.
+ */
 const BEHIND = 0.25;
 const HEIGHT = 0.22;
 
@@ -16,7 +19,7 @@ function make(name: string, attributes: Record<string, string | number>): SVGEle
     return element;
 }
 
-/** Draws it, as things stand at a time. */
+/** Draws the state at a time. */
 export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): void {
     const beamMm = machine.setting("beam_to_tool_mm") || 400;
     const [left, length] = [-BEHIND * beamMm, (1 + 2 * BEHIND) * beamMm];

@@ -1,5 +1,5 @@
-// Whether the Uno that is connected has another firmware than this page, and the way to this page's: its settings go to a file, the
-// page flashes it, and what the new firmware has lost of them is put back by a button.
+// The update of a connected Uno whose firmware differs from the page's. Its settings go to a file, and the page flashes
+// it. A button then restores the settings that the new firmware has lost.
 
 import { ask as askRust } from "../core.ts";
 import { download, type Parts } from "../dom.ts";
@@ -15,7 +15,7 @@ interface Firmware {
     readonly settings: readonly string[];
 }
 
-/** Where the settings are kept until the new firmware has them. */
+/** The key of the stored settings, until the new firmware has them. */
 const KEPT = "settings";
 
 export class Update {
@@ -23,7 +23,7 @@ export class Update {
     readonly #panel: Panel;
     readonly #own = askRust<Firmware>("firmware");
 
-    /** `flash` leads to where the Uno is flashed. */
+    /** `flash` opens the view for flashing. */
     constructor(parts: Parts, panel: Panel, flash: () => Promise<void>) {
         [this.#parts, this.#panel] = [parts, panel];
         parts.button("update-go", () => {
@@ -39,14 +39,14 @@ export class Update {
         });
     }
 
-    /** Takes what happened to the machine. */
+    /** Takes an event of the machine. */
     take({ is }: Happening): void {
         if (is === "connected" && this.#isOwn && !this.#isLost()) keep(KEPT, "");
         if (is === "connected") this.#parts.write("restore-said", "");
         if (["connected", "lost", "settings", "told"].includes(is)) this.#show();
     }
 
-    /** Settings that the machine has and this page's firmware has not, and the other way round. */
+    /** Settings that only the machine has, and settings that only this page's firmware has. */
     #changes(): { gone: string[]; added: string[] } {
         const names = this.#panel.machine.settings.map(({ name }) => name);
         const { settings } = this.#own;
@@ -61,12 +61,12 @@ export class Update {
         return this.#panel.machine.version === this.#own.version && gone.length + added.length === 0;
     }
 
-    /** Whether the machine has nothing saved: its firmware has another table, or none was ever there. */
+    /** Whether the machine has no saved settings: its firmware has another table, or none were ever saved. */
     #isLost(): boolean {
         return this.#panel.machine.settings.every(({ saved }) => saved === undefined);
     }
 
-    /** What was kept of the settings, where that is not in the machine. */
+    /** The stored settings that differ from the machine's. */
     #kept(): [string, number][] {
         return JSON.parse(chosen(KEPT) || "[]");
     }

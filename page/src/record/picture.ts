@@ -1,10 +1,10 @@
-// What a log shows, as the project's own Rust reads it (host/page/src/record.rs). Distances are what the tool has rolled since the
-// log began, in mm. A day has a million of these values: they stay in tables, and only what is seen is looked at.
+// The content of a log, read by the project's Rust (host/page/src/record.rs). Distances are the tool's travel since the
+// log began, in mm. A day has a million of these values: they stay in tables, and only the visible ones are used.
 
 import { read } from "./reading.ts";
 import type { MapWords } from "./worker.ts";
 
-/** A detection: the canopy's ends, and the ground kept free. */
+/** A detection: its canopy's ends, and its keep-out zone. */
 export interface Found {
     readonly class: "plant" | "weed" | "unknown";
     readonly fromMm: number;
@@ -13,7 +13,7 @@ export interface Found {
     readonly zoneEndMm: number;
 }
 
-/** The machine's speed at a place and a time, negative backwards. */
+/** The machine's speed at a position and a time, negative backwards. */
 export interface Speed {
     readonly mm: number;
     readonly timeMs: number;
@@ -33,7 +33,7 @@ export interface Trouble {
     readonly isWarning: boolean;
 }
 
-/** On how much a log and this firmware agree, and the first thing on which they do not. */
+/** How much of a log and this firmware agrees, and the first difference. */
 export interface Replayed {
     readonly objects: number;
     readonly swings: number;
@@ -43,24 +43,24 @@ export interface Replayed {
 }
 
 export interface Problem {
-    /** Why there is none. */
+    /** The reason for a missing result. */
     readonly problem: string;
 }
 
-/** What the Rust tells besides its tables. */
+/** The Rust's answer besides its tables. */
 interface Head {
     readonly lengthMm: number;
     readonly timeMs: number;
     readonly swings: number;
     readonly alarms: readonly Trouble[];
-    /** Whether a satellite receiver has told positions. */
+    /** Whether it has a satellite receiver's positions. */
     readonly hasPlaces: boolean;
 }
 
-/** So many rows of a table share the ground over which they are looked for. */
+/** Number of rows in a block of a table. A block is found by its ground. */
 const BLOCK = 256;
 
-/** Rows of numbers in the log's order, and where on the ground each block of them lies. */
+/** Rows of numbers in the log's order, and the ground of each block of rows. */
 export class Table<Row> {
     readonly length: number;
     readonly #values: Float64Array;
@@ -69,7 +69,7 @@ export class Table<Row> {
     /** The first and the last mm of each block. */
     readonly #blocks: (readonly [number, number])[] = [];
 
-    /** The columns from `first` to before `end` are the places of a row, in mm. */
+    /** The columns from `first` to before `end` are the positions of a row, in mm. */
     constructor(
         values: Float64Array,
         columns: number,
@@ -93,14 +93,14 @@ export class Table<Row> {
         }
     }
 
-    /** The rows of all blocks that reach into this ground: all that lie there, and some beside it. */
+    /** The rows of all blocks that overlap this ground: all rows on it, and some beside it. */
     near(fromMm: number, toMm: number): Row[] {
         return this.#blocks.flatMap(([least, most], block) =>
             most >= fromMm && least <= toMm ? this.#rows(block) : [],
         );
     }
 
-    /** The rows of the block that is nearest to a place. */
+    /** The rows of the block that is nearest to a position. */
     nearest(placeMm: number): Row[] {
         const away = ([least, most]: readonly [number, number]) => Math.max(least - placeMm, placeMm - most, 0);
         const best = this.#blocks.reduce(
@@ -164,9 +164,9 @@ export async function replay(
 
 /** The map of some logs. */
 export interface GroundMap {
-    /** None where nothing has a position. */
+    /** Null if nothing has a position. */
     readonly svg: string | null;
-    /** How much has one. */
+    /** How many objects have one. */
     readonly placed: number;
 }
 

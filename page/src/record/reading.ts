@@ -1,4 +1,5 @@
-// A question about logs, answered by a worker. The worker's code is inside of the page, as a page from the disk has no other.
+// A question about logs, answered by a worker. The worker's code is inside the page, because a page on the disk can
+// start no other.
 
 import code from "log-worker.js";
 import { module } from "../core.ts";
@@ -9,12 +10,15 @@ export interface Answer<Said> {
     readonly tables: readonly Float64Array[];
 }
 
-/** Why there is no answer: it was cancelled. */
+/** The question was cancelled. */
 export class Cancelled extends Error {}
 
 let address: string | undefined;
 
-/** Asks; `progress` takes how far the answer is, from 0 to 1. The worker ends with its answer, or when `cancel` does. */
+/**
+ * Asks a question. `progress` gets the progress, from 0 to 1. The worker ends with its answer, or when `cancel`
+ * resolves.
+ */
 export function read<Said>(
     logs: readonly File[],
     wants: Asked["wants"],

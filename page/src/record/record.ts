@@ -1,7 +1,7 @@
-// Logs that were written before, as rows one below the other: what was seen and kept free, where the tool was in the row, how fast the
-// machine rolled, and its alarms. The buttons, the slider and the wheel move and zoom all of them at once. Each can be replayed.
+// Recorded logs, as rows one below the other: detections and keep-out zones, the tool in the row, the machine's speed,
+// and its alarms. The buttons, the slider and the wheel move and zoom all rows at once. Each log can be replayed.
 //
-// Only what is in the window is drawn, however long a log is. It is read and replayed beside the page, which can be used meanwhile.
+// Only the visible part of a log is drawn. Reading and replay run beside the page, which can be used meanwhile.
 
 import { make as element, Parts } from "../dom.ts";
 import { fault, sentence } from "../panel/machine.ts";
@@ -12,16 +12,16 @@ import { Cancelled } from "./reading.ts";
 const SVG = "http://www.w3.org/2000/svg";
 /** Ground in the window: at first, the least and the most. */
 const WINDOW_MM = { first: 8000, least: 1000, most: 200_000 };
-/** How much a press zooms, and how much of the window it moves. */
+/** The zoom of a press, and the share of the window that it moves. */
 const ZOOM = 2;
 const STEP = 0.5;
-/** The picture's height, and what stands in it from above: alarms, canopies, the tool's track, and the speed. */
+/** The picture's height, and its parts from above: alarms, canopies, the tool's track, and the speed. */
 const HEIGHT = 200;
 const AT = { alarm: 0, row: 24, rowEnd: 84, track: 100, speed: 120, speedEnd: 180, note: 196 };
-/** The distance between two marks is the first of these with at most so many marks in the window. */
+/** The possible distances between two marks. The first with few enough marks in the window is used. */
 const MARKS_MM = [200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000];
 const MARKS = 8;
-/** From here on a duration is told in minutes, and in hours. */
+/** From here on a duration is shown in minutes, and in hours. */
 const MINUTE_S = 120;
 const HOUR_S = 7200;
 
@@ -30,7 +30,7 @@ interface Row {
     readonly file: File;
     readonly picture: Picture;
     readonly drawing: SVGSVGElement;
-    /** What is told of the window's middle. */
+    /** The text about the window's middle. */
     readonly at: HTMLElement;
 }
 
@@ -105,8 +105,8 @@ export class RecordView {
     }
 
     /**
-     * Does something about each file, and shows how far all are. Another such work, or the operator, cancels it: false then. Why it
-     * failed is told in this part.
+     * Works on each file, and shows the progress of all. Another such work, or the operator, cancels it: then returns
+     * false. Errors are shown in this part.
      */
     async #eachOf(
         files: readonly File[],
@@ -174,10 +174,10 @@ export class RecordView {
         this.#draw();
     }
 
-    /** Goes to the next alarm on, or back, of any row. */
+    /** Moves to the next or previous alarm of any row. */
     #toAlarm(way: 1 | -1): void {
         const alarms = this.#rows.flatMap(({ file, picture }) => picture.alarms.map((alarm) => ({ ...alarm, file })));
-        // Rolled back, the machine may have come to an alarm's place again.
+        // After rolling back, the machine may have reached an alarm's position again.
         const ahead = alarms.filter(({ mm }) => way * (mm - this.#middleMm) > 0.5);
         const next = ahead.sort((one, other) => way * (one.mm - other.mm))[0];
         if (next) this.#go(next.mm);
@@ -188,7 +188,7 @@ export class RecordView {
         });
     }
 
-    /** What is told of a file, with its name where there are others. */
+    /** The text about a file, with its name if there are others. */
     #of(file: File, text: string): string {
         return this.#rows.length > 1 ? `${file.name}: ${text}` : text;
     }
@@ -233,7 +233,7 @@ export class RecordView {
         if (svg) drawn.src = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
     }
 
-    /** Draws the rows in the browser's next picture, once, however often they are moved until then. */
+    /** Draws the rows once in the browser's next frame, after any number of moves. */
     #draw(): void {
         if (this.#isToBeDrawn) return;
         this.#isToBeDrawn = true;
@@ -348,7 +348,7 @@ function agreement({ objects, alarms, swings, difference, notes }: Replayed): st
     ].join(" ");
 }
 
-/** What was told nearest to a place. */
+/** The speed nearest to a position. */
 function nearest(speeds: readonly Speed[], placeMm: number): Speed | undefined {
     return speeds.reduce<Speed | undefined>(
         (best, speed) => (best && Math.abs(best.mm - placeMm) <= Math.abs(speed.mm - placeMm) ? best : speed),

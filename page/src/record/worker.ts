@@ -1,31 +1,32 @@
-// Reads logs off the page, which goes on meanwhile: a day of a log takes a second to read, and its replay a minute.
+// Reads logs outside the page's thread, so that the page can be used meanwhile: a day's log takes a second to read, and
+// its replay a minute.
 //
-// It is asked one thing, tells how far it is, and is stopped by its end.
+// It gets one question, reports its progress, and is terminated to cancel it.
 
 import { Rust } from "../rust.ts";
 
 export interface Asked {
     readonly module: WebAssembly.Module;
-    /** One, but for a map. */
+    /** One log; several for a map. */
     readonly logs: readonly File[];
     readonly wants: "picture" | "replay" | { readonly map: MapWords };
 }
 
-/** The words of a map: host/gps/src/picture.rs says which. */
+/** The texts of a map: see host/gps/src/picture.rs. */
 export interface MapWords {
     readonly legend: readonly string[];
     readonly withoutPlace: string;
     readonly north: string;
 }
 
-/** What it tells: how far it is, from 0 to 1, or the answer with the tables that go with it, or why there is none. */
+/** Its messages: the progress from 0 to 1, the answer with its tables, or the error. */
 export type Told =
     | { readonly share: number }
     | { readonly answer: unknown; readonly tables: readonly Float64Array<ArrayBuffer>[] }
     | { readonly why: string };
 
 const PIECE_BYTES = 1 << 20;
-/** What of the time the reading takes, where all lines are held: of a replay, and of a map. */
+/** Share of the reading in the total time, for a replay and for a map. */
 const READING = { replay: 0.05, map: 0.5 };
 const TABLES = [0, 1, 2];
 

@@ -1,37 +1,38 @@
-// The machine between row and Uno: the project's own Rust (host/page/src/trial.rs) rolls it, and here it is wired to the Uno.
+// The machine between row and Uno: the project's Rust (host/page/src/trial.rs) simulates it, and this module connects
+// it to the Uno.
 //
-// The machine's place is what the beam sees; the tool works the ground beamToToolMm behind it. `runUntil` lets the Uno's clock run:
-// encoder and beams change their pins at their exact cycles, and the servo hears each pulse. Speed, slip, faults and what is yet to
-// be sown may change between two calls.
+// The machine's position is that of the beam; the tool works the ground beamToToolMm behind it. `runUntil` lets the
+// Uno's clock run: encoder and beams change their pins at their exact cycles, and the servo receives each pulse. Speed,
+// slip, faults and the parameters of the sowing may change between two calls.
 
 import { another } from "../core.ts";
 import type { Uno } from "../uno/uno.ts";
 import type { Thing } from "./row.ts";
 
-/** The Uno's pins that the page itself has to do with (README, wiring). */
+/** The Uno's pins that the page uses itself (README, wiring). */
 export const PIN = { workSwitch: 4, endSwitch: 5, servo: 9, lamp: 13 } as const;
 
-/** What is not as on the machine straight from the box. */
+/** The differences from the machine from the box. */
 export interface MachineKind {
     readonly toolWidthMm?: number;
-    /** Distance from the beam back to a second one; 0 where there is none. */
+    /** Distance from the beam back to a second one; 0 without one. */
     readonly secondBeamMm?: number;
     /** Pulse widths for the tool in the row, and out of it. */
     readonly servoInUs?: number;
     readonly servoOutUs?: number;
 }
 
-/** What the machine stands in front of. */
+/** The row in front of the machine. */
 export interface Ground {
-    /** In order of place, and apart. */
+    /** In order of position, without overlaps. */
     readonly things?: readonly Thing[];
-    /** How the row goes on behind them, by chance, for as long as the machine rolls. */
+    /** The random continuation of the row, while the machine rolls. */
     readonly sowing?: {
         readonly seed: number;
         readonly spacingMm: number;
-        /** Share of the gaps between plants in which a tall weed stands. */
+        /** Share of the gaps between plants with a tall weed. */
         readonly weedShare: number;
-        /** Where the first plant stands. */
+        /** The first plant's position. */
         readonly firstMm: number;
     };
 }
@@ -43,18 +44,18 @@ export interface Dimensions {
     readonly toolWidthMm: number;
 }
 
-/** How a plant fared, from good to bad: kept by its margin, or the tool came nearer, or was not out over its canopy. */
+/** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
 export type Verdict = "kept" | "margin cut" | "damaged";
 
-/** What may become different on the way, one at a time. */
+/** A change on the way. */
 export type Change =
-    /** The speed that the machine comes to; negative backwards. */
+    /** The new speed; negative backwards. */
     | { speedKmH: number }
-    /** The share of the wheel's way that is lost, below 1. */
+    /** The share of the wheel's distance that is lost, below 1. */
     | { slip: number }
     /** The first beam's wire is torn: its pin stays on the pull-up, as over bare ground. */
     | { beamWireTorn: boolean }
-    /** The encoder says nothing more: its pins stay as they are. */
+    /** The encoder has failed: its pins keep their levels. */
     | { encoderDead: boolean }
     | { spacingMm: number }
     | { weedShare: number };
@@ -67,7 +68,7 @@ const TABLE = { now: 0, changes: 1, sown: 2 } as const;
 export class Machine {
     readonly uno: Uno;
     readonly dimensions: Dimensions;
-    /** What stands in the row so far. */
+    /** The things in the row so far. */
     readonly things: Thing[] = [];
     /** The ground that the beam sees, and the ground under the tool. */
     placeMm = 0;
@@ -82,9 +83,11 @@ export class Machine {
     isClear = true;
     /** Whether the tool works the row's line. */
     isWeeding = false;
-    /** Whether something stands in the beam. */
+    /** Whether the beam is broken. */
     isBroken = false;
-    /** Counts of a perfect encoder, net, since the machine was put in front of the row, and what it rolls in one. */
+    /**
+     * Net counts of a perfect encoder since the machine was placed in front of the row, and the distance of one count.
+     */
     ticks = 0;
     groundMmATick = 0;
     /** Changes of the tool's command so far. The first is not a swing. */
@@ -92,7 +95,7 @@ export class Machine {
     readonly #rust = another();
     #pulseRise = 0;
 
-    /** Puts the machine, from the Uno's cycle on, in front of a row, where it stands. */
+    /** Places a standing machine in front of a row, at the Uno's cycle. */
     constructor(uno: Uno, { things = [], sowing }: Ground, kind: MachineKind = {}) {
         this.uno = uno;
         const { dimensions, levels } = this.#rust.ask<{ dimensions: Dimensions; levels: Levels }>({
@@ -110,16 +113,16 @@ export class Machine {
         };
     }
 
-    /** From now on something is different. */
+    /** Applies a change from now on. */
     change(change: Change): void {
         this.#set(this.#rust.ask<Levels>({ change }));
     }
 
-    /** Rolls on until a cycle that the Uno has not come to, and lets the Uno's clock run there. */
+    /** Rolls on until a future cycle, and lets the Uno's clock run until then. */
     runUntil(cycle: number): void {
         const { uno } = this;
         this.#rust.roll(cycle);
-        // A copy: the servo's pulses on the way change the memory that it is in.
+        // A copy: the servo's pulses on the way change its memory.
         const changes = this.#rust.trialTable(TABLE.changes).slice();
         for (let at = 0; at < changes.length; at += 3) {
             uno.runUntil(changes[at] ?? 0);
@@ -130,8 +133,8 @@ export class Machine {
     }
 
     /**
-     * Judges what lies behind the tool by now, by the margin and the stem zone that the firmware keeps: of each thing, by its number,
-     * how a plant fared, or whether a weed was cut. What is passed again is judged again; of a plant the worse stands.
+     * Judges the things behind the tool, by the firmware's margin and stem zone. Returns by number the result of a
+     * plant, or whether a weed was cut. Things that are passed again are judged again; a plant keeps its worse result.
      */
     judge(marginMm: number, stemZoneMm: number): [number: number, fate: Verdict | boolean][] {
         return this.#rust.ask({ judge: { marginMm, stemZoneMm } });
@@ -141,7 +144,7 @@ export class Machine {
         for (const [pin, high] of levels) this.uno.set(pin, high);
     }
 
-    /** Takes how the machine is now, and what was sown. */
+    /** Reads the machine's state and the newly sown things. */
     #look(): void {
         const now = this.#rust.trialTable(TABLE.now);
         const [placeMm = 0, toolMm = 0, speedMmS = 0, degrees = 0, acrossMm = 0] = now;

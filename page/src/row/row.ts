@@ -1,7 +1,7 @@
-// What stands in a crop row, as the beam sees it: crop plants and tall weeds, each with its place along the row and its
-// width at the beam's height. All places are millimetres along the ground.
+// The content of a crop row, as the beam sees it: crop plants and tall weeds, each with its position along the row and
+// its width at the beam's height. All positions are millimetres along the ground.
 
-/** What a thing in the row is. */
+/** The kinds of thing in the row. */
 export type Kind = "plant" | "weed";
 
 /** A plant or a tall weed: its centre along the row, and its width at the beam's height. */

@@ -1,7 +1,7 @@
-// The row from above, as an SVG: ground that rolls from right to left below a machine that stands still.
+// The row from above, as an SVG: the ground rolls from right to left below a standing machine.
 //
-// One unit is a millimetre on the ground. The machine rolls to the right; up is left of the row. What stands on the ground
-// is put there once and moved with it, and taken away when it has left the picture.
+// One unit is a millimetre on the ground. The machine rolls to the right; up is left of the row. Things on the ground
+// are drawn once and moved with it, and removed when they have left the picture.
 
 import type { Verdict } from "../row/machine.ts";
 import { span, type Thing } from "../row/row.ts";
@@ -9,15 +9,15 @@ import type { Trial } from "./trial.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** What the picture shows across the row, from its line: to the side to which the tool swings, and to the other. */
+/** The picture's width across the row, from its line: to the side of the tool's swing, and to the other side. */
 const ACROSS_MM = { out: 330, other: 170 };
-/** Ground behind the tool in the picture: part of its length, and no more than this. */
+/** Ground behind the tool in the picture: a share of its length, with a limit. */
 const BEHIND = { share: 0.3, mostMm: 700 };
-/** Distance between two short weeds, on the mean, and how far from the row's line they stand at most. */
+/** Mean distance between two short weeds, and their greatest distance from the row's line. */
 const SPECK_SPACING_MM = 14;
 const SPECK_ACROSS_MM = 150;
 
-/** A tick for a plant that was kept, a bar where its margin was cut, and a cross where it was damaged. */
+/** A tick for a kept plant, a bar for a cut margin, and a cross for a damaged plant. */
 const SIGNS: Readonly<Record<Verdict, string>> = {
     kept: "M-16 0L-5 12L17 -13",
     "margin cut": "M-16 0H16",
@@ -35,7 +35,7 @@ function make<Name extends keyof SVGElementTagNameMap>(
     return element;
 }
 
-/** A number from 0 to 1 for a whole number: the same for the same one. */
+/** A pseudo-random number from 0 to 1, from a whole number. */
 function spread(number: number): number {
     const value = Math.sin(number * 12.9898) * 43758.5453;
     return value - Math.floor(value);
@@ -161,7 +161,7 @@ export class Drawing {
         }
     }
 
-    /** Puts a sign at each plant that is judged. */
+    /** Draws a sign at each judged plant. */
     #drawVerdicts({ machine, outcome }: Trial): void {
         for (const [index, shape] of this.#shapes) {
             const [thing, verdict] = [machine.things[index], outcome.plants.get(index)];

@@ -1,15 +1,15 @@
-// Why ground of a trial was not weeded, tall weeds were left and plants were not kept, as the tool passes them.
+// The reasons why ground of a trial was not weeded, tall weeds were left and plants were not kept.
 //
-// Each stretch that the tool rolls over for the first time goes to one part of the loss budget, whose parts are those of
-// host/field/src/budget.rs without guarded ground. Its parts add up to all that was rolled over. What the firmware says decides: its
-// state, the reason that it gives, and its keep-out zones.
+// Each stretch that the tool passes for the first time goes to one part of the loss budget. The parts are those of
+// host/field/src/budget.rs without guarded ground, and add up to the whole stretch. The firmware's output decides: its
+// state, its reason, and its keep-out zones.
 
 import type { Machine } from "../row/machine.ts";
 import { span, type Thing } from "../row/row.ts";
 import { quantity, say, type Word } from "../words/words.ts";
 import type { Zone } from "./zone.ts";
 
-/** Where the ground goes, with the text for each part. */
+/** The parts of the ground, with the text of each. */
 const PARTS = {
     weeded: "groundWeeded",
     plants: "groundPlants",
@@ -20,7 +20,7 @@ const PARTS = {
 } as const satisfies Record<string, Word>;
 export type Part = keyof typeof PARTS;
 
-/** Why a tall weed was left, by the part to which its place went, and why a plant was not kept. */
+/** Why a tall weed was left, by the part of its ground, and why a plant was not kept. */
 const LEFT = {
     weeded: "leftSwings",
     swings: "leftSwings",
@@ -35,12 +35,12 @@ const NOT_KEPT = { unseen: "notKeptUnseen", off: "notKeptOff", late: "notKeptLat
 >;
 export type NotKept = keyof typeof NOT_KEPT;
 
-/** How far off a zone may lie that is where it should be: the encoder's count, and the beam's. */
+/** Tolerance of a zone's position: the encoder's count, and the beam's. */
 const OFF_MM = 5;
 /** Reasons of the firmware for which the tool is out on ground of no plant. */
 const CLOSED = ["unseen_ground", "too_fast", "encoder_doubtful"];
 
-/** Why a plant was not kept that is to have ground of this width free on both sides. */
+/** Why a plant was not kept that needs this width and the margins on both sides. */
 export function whyNotKept(plant: Thing, widthMm: number, zones: readonly Zone[], marginMm: number): NotKept {
     const { placeMm } = plant;
     const [fromMm, toMm] = [placeMm - widthMm / 2 - marginMm, placeMm + widthMm / 2 + marginMm];
@@ -55,7 +55,7 @@ export class Losses {
     readonly groundMm: Record<Part, number> = { weeded: 0, plants: 0, margins: 0, weeds: 0, swings: 0, closed: 0 };
     /** The part of the ground below each tall weed, by its number in the row. */
     readonly below = new Map<number, Part>();
-    /** How the machine is, and why its tool is out, as it has said last. */
+    /** The machine's state, and why its tool is out, from its last output. */
     isAtWork = false;
     reason: string | undefined;
     #passedMm: number;
@@ -65,7 +65,7 @@ export class Losses {
         this.#passedMm = toolMm;
     }
 
-    /** Takes the ground over which the tool has come since the last time, where the firmware keeps these zones. */
+    /** Takes the ground that the tool has passed since the last call, with the firmware's zones. */
     pass(machine: Machine, zones: readonly Zone[], marginMm: number): void {
         const { toolMm, things } = machine;
         if (toolMm <= this.#passedMm) return;
@@ -90,7 +90,7 @@ export class Losses {
     }
 }
 
-/** What kind of thing stands nearest to a place, and not beyond it by more than its own width. */
+/** The kind of the thing nearest to a position, within its own width. */
 function nearest(things: readonly Thing[], placeMm: number): Thing["kind"] | undefined {
     const away = (thing: Thing) => Math.abs(thing.placeMm - placeMm);
     const first = things.findIndex((thing) => span(thing).endMm >= placeMm);
@@ -99,7 +99,7 @@ function nearest(things: readonly Thing[], placeMm: number): Thing["kind"] | und
     return away(one) < away(other) ? one.kind : other.kind;
 }
 
-/** Where the ground went, in words; nothing before there was any. */
+/** The parts of the ground, in words; empty without ground. */
 export function groundInWords(groundMm: Readonly<Record<Part, number>>): string {
     const parts = Object.keys(PARTS) as Part[];
     const allMm = parts.reduce((sum, part) => sum + groundMm[part], 0);
@@ -108,7 +108,7 @@ export function groundInWords(groundMm: Readonly<Record<Part, number>>): string 
     return say("ground", { parts: parts.map((part) => say(PARTS[part], { share: share(part) })).join(", ") });
 }
 
-/** How often each text stands in a list, the most frequent first. */
+/** The counts of the texts in a list, the most frequent first. */
 function counted(words: readonly ((typeof LEFT)[Part] | (typeof NOT_KEPT)[NotKept])[]): string {
     const counts = new Map<(typeof words)[number], number>();
     for (const word of words) counts.set(word, (counts.get(word) ?? 0) + 1);

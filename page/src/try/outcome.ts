@@ -1,4 +1,5 @@
-// What became of each plant and each tall weed of a trial, which the machine judges as soon as its tool is well behind a thing.
+// The results for each plant and each tall weed of a trial. The machine judges a thing as soon as its tool is well
+// behind it.
 
 import type { Machine, Verdict } from "../row/machine.ts";
 import { say } from "../words/words.ts";
@@ -12,19 +13,19 @@ export interface Totals {
 }
 
 export class Outcome {
-    /** What is known of plants, and whether weeds were cut, by their numbers in the row. */
+    /** The verdicts on plants, and whether weeds were cut, by number in the row. */
     readonly plants = new Map<number, Verdict>();
     readonly weeds = new Map<number, boolean>();
     /** Why plants were not kept. */
     readonly notKept = new Map<number, NotKept>();
-    /** All that is judged so far, in numbers. */
+    /** The totals so far. */
     totals: Totals = { plants: { kept: 0, "margin cut": 0, damaged: 0 }, weeds: { cut: 0, passed: 0 } };
-    /** Ground that the firmware is to keep free on both sides of a canopy. */
+    /** The firmware's margin on both sides of a canopy. */
     marginMm = 50;
-    /** The zone that it keeps of a single plant; 0 for all of its canopy. */
+    /** The firmware's zone of a single plant; 0 for its whole canopy. */
     stemZoneMm = 0;
 
-    /** Judges what lies behind the tool by now, where the firmware kept these zones. */
+    /** Judges the things behind the tool, with the firmware's zones. */
     judge(machine: Machine, zones: readonly Zone[]): void {
         const judged = machine.judge(this.marginMm, this.stemZoneMm);
         if (judged.length === 0) return;

@@ -1,11 +1,11 @@
-// The machine that is set up, as the manual has it: what the page's own machine is like, and what its firmware is told.
+// The machine that is set up by the manual: its differences from the machine from the box, and its firmware's settings.
 //
-// The values are those of the manual's steps, which the project's own Rust has (host/page/src/set_up.rs).
+// The values come from the manual's steps, which the project's Rust has (host/page/src/set_up.rs).
 
 import { ask } from "../core.ts";
 import type { MachineKind } from "../row/machine.ts";
 
-/** What the measurements of the simulated machine ask for. */
+/** The margin from the measurements of the simulated machine. */
 const MARGIN_MM = 11;
 
 /** The values of the steps, by their names. */
@@ -26,7 +26,7 @@ export function machineSetUp(): MachineKind {
     return Object.fromEntries(taken.filter(([, value]) => value !== undefined));
 }
 
-/** What its firmware is told: all that is set, but of the second beam, which this machine has not. */
+/** Its firmware's settings, without those of the second beam, which this machine lacks. */
 export function commandsSetUp(): string[] {
     const set = [...values()].filter(([name]) => !name.includes(".") && name !== "second_beam_mm");
     return [...set, ["margin_mm", MARGIN_MM] as const].map(([name, value]) => `set ${name} ${value}`);

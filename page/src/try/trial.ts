@@ -1,7 +1,7 @@
-// A trial without an end: the real firmware on the virtual Uno, a machine, and a row that goes on for as long as it rolls.
+// An endless trial: the real firmware on the virtual Uno, a machine, and a row that continues while it rolls.
 //
-// `advance` lets time pass. What the operator does, to the machine or to the row, he may do between two calls. `outcome`
-// knows what became of each plant that the tool has left behind.
+// `advance` lets time pass. The operator may change the machine or the row between two calls. `outcome` has the result
+// for each plant behind the tool.
 
 import type { Detection } from "../link/events.ts";
 import type { Happening } from "../link/session.ts";
@@ -11,14 +11,14 @@ import { groundInWords, Losses, whyInWords } from "./losses.ts";
 import { Outcome } from "./outcome.ts";
 import type { Zone } from "./zone.ts";
 
-/** How the row is planted until that is changed, and where the first plant stands, ahead of the beam. */
+/** The first parameters of the row, and the first plant's position, ahead of the beam. */
 const SOWING = { spacingMm: 550, weedShare: 0.25, firstMm: 800 };
-/** Tracks and zones are remembered this far behind the tool. */
+/** Stored length of tracks and zones behind the tool. */
 const KEPT_MM = 3000;
-/** Cycles between two looks at the host's clock: a millisecond. */
+/** Cycles between two checks of the PC's clock: a millisecond. */
 const SLICE_CYCLES = CYCLES_PER_SECOND / 1000;
 
-/** A point of the tool's way over the ground: along the row, and across it from the row's line. */
+/** A point of the tool's path over the ground: along the row, and across it from the row's line. */
 export interface TrackPoint {
     readonly alongMm: number;
     readonly acrossMm: number;
@@ -29,15 +29,15 @@ export class Trial {
     readonly machine: Machine;
     readonly outcome = new Outcome();
     readonly losses: Losses;
-    /** What the firmware sends. */
+    /** Called with the firmware's output. */
     onText: (text: string) => void = () => {};
-    /** Keep-out zones at the tool or ahead of it, as the firmware has told them. */
+    /** Keep-out zones at the tool or ahead of it, from the firmware's output. */
     zones: Zone[] = [];
     track: TrackPoint[] = [];
     /** The machine's count when the firmware began to count. */
     #zero = 0;
 
-    /** With a machine straight from the box, but for what is given. */
+    /** A trial with a machine from the box, with the differences in `kind`. */
     constructor(hex: string, seed: number, kind: MachineKind = {}) {
         this.uno = new Uno(hex);
         this.machine = new Machine(this.uno, { sowing: { ...SOWING, seed } }, kind);
@@ -46,7 +46,7 @@ export class Trial {
         this.#mark();
     }
 
-    /** Lets time pass on the chip, for no longer than the host has for it, and gives back how much did. */
+    /** Lets time pass on the chip, for at most `budgetMs` of the PC's time. Returns how much passed. */
     advance(seconds: number, budgetMs: number): number {
         const { uno, machine, losses, outcome } = this;
         const begin = uno.cycle;
@@ -67,7 +67,7 @@ export class Trial {
         this.uno.set(PIN.workSwitch, !on);
     }
 
-    /** Where the ground went, why tall weeds were left and why plants were not kept, in words. */
+    /** The parts of the ground, and why tall weeds were left and plants not kept, in words. */
     get why(): string {
         const { losses, outcome } = this;
         const left = [...outcome.weeds].filter(([, cut]) => !cut).map(([number]) => losses.below.get(number));
@@ -79,12 +79,15 @@ export class Trial {
         return this.uno.isHigh(PIN.lamp);
     }
 
-    /** Where the tool is, as a point of its track: as in the machine's model, the arm's swing moves it across the row alone. */
+    /**
+     * The tool's position, as a point of its track. As in the machine's model, the arm's swing moves it only across the
+     * row.
+     */
     get tool(): TrackPoint {
         return { alongMm: this.machine.toolMm, acrossMm: this.machine.acrossMm };
     }
 
-    /** Takes note of what has happened at the console. */
+    /** Takes an event of the console. */
     take(happening: Happening): void {
         if (happening.is === "started") {
             this.#zero = this.machine.ticks;
@@ -109,8 +112,8 @@ export class Trial {
     }
 
     /**
-     * The ground of a zone. The paper's delay and hold are counted from the moment at which the leading edge is in the
-     * beam, when the tool is beamToToolMm behind it. Counts become ground as the machine rolls now.
+     * The ground of a zone. The paper's delay and hold count from the moment when the leading edge is in the beam and
+     * the tool is beamToToolMm behind it. Counts are converted to ground by the present slip.
      */
     #zone({ position, delay, hold }: Detection): Zone {
         const { placeMm, ticks, groundMmATick, dimensions } = this.machine;
@@ -118,7 +121,7 @@ export class Trial {
         return { startMm, endMm: startMm + hold * groundMmATick };
     }
 
-    /** Puts the tool's place on its track. On a straight way only its end moves. */
+    /** Adds the tool's position to its track. On a straight line only its end moves. */
     #mark(): void {
         const { track, tool } = this;
         const [before, last] = [track.at(-2), track.at(-1)];
@@ -129,7 +132,7 @@ export class Trial {
     #forget(): void {
         const behindMm = this.machine.toolMm - KEPT_MM;
         const gone = this.track.findIndex(({ alongMm }) => alongMm > behindMm);
-        // The point before is where a straight way comes from.
+        // The point before it is the start of the straight line.
         if (gone > 100) this.track.splice(0, gone - 1);
         this.zones = this.zones.filter(({ endMm }) => endMm > behindMm);
     }

@@ -1,4 +1,4 @@
-/** Ground along the row that the firmware keeps free. */
+/** A keep-out zone along the row. */
 export interface Zone {
     readonly startMm: number;
     readonly endMm: number;

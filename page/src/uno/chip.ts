@@ -1,8 +1,8 @@
 // An ATmega328P from power-up or a reset to the next one, on avr8js.
 //
-// avr8js resets neither its peripherals nor its registers, so a reset here makes a new chip, which takes over what
-// outlives a reset: flash, EEPROM, SRAM and the clock. The peripherals are avr8js's own, as they come. What is set right
-// in this file is the core's time with interrupts; docs/simulators.md has the whole list.
+// avr8js resets neither its peripherals nor its registers. So a reset here makes a new chip, which takes over the state
+// that survives a reset: flash, EEPROM, SRAM and the clock. The peripherals are avr8js's own, unchanged. This file
+// corrects the core's interrupt timing; docs/simulators.md has the whole list.
 
 import {
     AVRClock,
@@ -34,7 +34,7 @@ export const FLASH_BYTES = 32 * 1024;
 export const SRAM_BYTES = 2048;
 export const EEPROM_BYTES = 1024;
 
-/** Why a chip starts, as the bit of MCUSR that says so (data sheet, 11.9.1). */
+/** Reset causes, as their bits in MCUSR (data sheet, 11.9.1). */
 export const RESET_CAUSES = { "power-on": 1, external: 2, "brown-out": 4, watchdog: 8 } as const;
 export type ResetCause = keyof typeof RESET_CAUSES;
 
@@ -44,20 +44,20 @@ const UCSR0A = 0xc0;
 /** UCSR0A: a byte has been received and not read yet. */
 const RXC0 = 0x80;
 
-/** Where SRAM begins in the data space. */
+/** Start address of SRAM in the data space. */
 const SRAM_START = 0x100;
 
-/** Half of the time that a byte takes to be written to the EEPROM: 3.4 ms in all (data sheet, table 8-1). */
+/** Half of the write time of a byte in the EEPROM: 3.4 ms in all (data sheet, table 8-1). */
 const EEPROM_HALF_CYCLES = (CYCLES_PER_SECOND * 3.4e-3) / 2;
 
 /** Cycles that entering an interrupt takes more than avr8js counts: 4 (data sheet, 7.7.1) less 2. */
 const INTERRUPT_ENTRY_CYCLES = 2;
 
-/** Instructions behind which one more is carried out before an interrupt is entered (data sheet, 7.7). */
+/** Instructions after which one more is executed before an interrupt (data sheet, 7.7). */
 const RETI = 0x9518;
 const SEI = 0x9478;
 
-/** What a chip starts with. */
+/** The state at a chip's start. */
 export interface Start {
     program: Uint16Array;
     sram: Uint8Array;
@@ -70,7 +70,7 @@ export interface Start {
 export class Chip {
     readonly ports: { readonly B: AVRIOPort; readonly C: AVRIOPort; readonly D: AVRIOPort };
     readonly usart: AVRUSART;
-    /** Whether the watchdog has run out: the chip stands still and waits for its successor. */
+    /** Whether the watchdog has run out: the chip stands still until it is replaced. */
     watchdogRanOut = false;
     readonly #cpu: CPU;
     #until = 0;
@@ -94,7 +94,7 @@ export class Chip {
             writeCycles: EEPROM_HALF_CYCLES,
         });
         new AVRWatchdog(cpu, watchdogConfig, new AVRClock(cpu, CYCLES_PER_SECOND, clockConfig));
-        // From here on only the watchdog asks for it.
+        // From here on only the watchdog calls it.
         cpu.reset = () => {
             this.watchdogRanOut = true;
             this.#until = 0;
@@ -105,12 +105,12 @@ export class Chip {
         return this.#cpu.cycles;
     }
 
-    /** What SRAM holds now. */
+    /** The present content of SRAM. */
     get sram(): Uint8Array {
         return this.#cpu.data.slice(SRAM_START);
     }
 
-    /** Runs to the end of the instruction in which `cycle` comes, or until the watchdog runs out. */
+    /** Runs to the end of the instruction at `cycle`, or until the watchdog runs out. */
     run(cycle: number): void {
         const cpu = this.#cpu;
         const program = cpu.progMem;
@@ -125,14 +125,15 @@ export class Chip {
         }
     }
 
-    /** Has something happen in so many cycles, unless a reset comes before. */
+    /** Calls `happen` after this number of cycles, unless a reset comes before. */
     after(cycles: number, happen: () => void): void {
         this.#cpu.addClockEvent(happen, cycles);
     }
 
     /**
-     * Whether a byte that comes now is sure to be kept. avr8js has no buffer behind the byte that waits, and forgets that one
-     * when the firmware writes UCSR0B, as handlers do: it should come where its own handler follows at once.
+     * Whether a byte that arrives now is certain to be kept. avr8js has one waiting byte without a further buffer, and
+     * drops it when the firmware writes UCSR0B, as handlers do. So a byte must arrive when its own handler follows at
+     * once.
      */
     get takesByte(): boolean {
         return this.#cpu.interruptsEnabled && !((this.#cpu.data[UCSR0A] ?? 0) & RXC0);

@@ -1,8 +1,8 @@
-// Intel HEX, the form in which a firmware comes: text into the bytes of a flash.
+// Intel HEX, the file format of firmware: converts text into the bytes of a flash.
 //
-// Data records and the two kinds of base address that tools write are understood. Where a program starts is for other chips.
+// It supports data records and the two kinds of base address that tools write. Start addresses are for other chips.
 
-/** What is wrong with a HEX file, and what would be right. */
+/** An error in a HEX file, and what would be right. */
 export class HexError extends Error {}
 
 const DATA = 0;
@@ -15,7 +15,7 @@ const LINEAR_START = 5;
 /** Bytes of a record that are not data: count, address (2), kind and checksum. */
 const FRAME_BYTES = 5;
 
-/** Reads a HEX file into a flash of `size` bytes, erased (0xff) where the file says nothing. */
+/** Reads a HEX file into a flash of `size` bytes. Other bytes are erased (0xff). */
 export function readHex(text: string, size: number): Uint8Array {
     const flash = new Uint8Array(size).fill(0xff);
     let base = 0;
@@ -60,7 +60,7 @@ export function readHex(text: string, size: number): Uint8Array {
     throw new HexError("the HEX file has no end: load it again");
 }
 
-/** How many bytes of a flash a firmware takes: behind them it is erased. */
+/** The size of a firmware in a flash: all later bytes are erased. */
 export function usedBytes(flash: Uint8Array): number {
     return flash.findLastIndex((byte) => byte !== 0xff) + 1;
 }

@@ -1,13 +1,13 @@
 // The virtual Uno for another program, in lock step: a command for node, not a part of the page.
 //
-// Each line of standard input is a turn: until which cycle the clock runs, and what happens on the way. Each line of standard output
-// says what the Uno did in it. The first line has the firmware. `weeder check-board --second-simulator` puts this in the weeder's place
-// (host/check/src/second.rs has the other end).
+// Each line of standard input is a turn: the cycle until which the clock runs, and the inputs on the way. Each line of
+// standard output has the Uno's outputs in that turn. The first line has the firmware. `weeder check-board
+// --second-simulator` uses it instead of the weeder (host/check/src/second.rs is the other end).
 
 import { createInterface } from "node:readline";
 import { Uno } from "./uno.ts";
 
-/** What happens in a turn. Cycles are the Uno's own. */
+/** The inputs of a turn. Cycles are the Uno's own. */
 interface Turn {
     readonly until: number;
     /** Changes of input pins, in the order of their cycles. */
@@ -18,7 +18,7 @@ interface Turn {
     readonly reset: boolean;
 }
 
-/** What came of it. */
+/** The outputs of a turn. */
 interface Done {
     readonly edges: [cycle: number, pin: number, high: boolean][];
     readonly said: number[];

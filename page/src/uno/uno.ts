@@ -1,11 +1,12 @@
 // The virtual Uno: an ATmega328P at 16 MHz that runs a firmware's real HEX file, on avr8js.
 //
-// `new Uno` powers it up. `set` puts a level on a pin, `send` types into its serial line, `runUntil` lets its clock run;
-// `onLevel` and `onByte` hear what it does. Pins have the board's numbers: 0 to 13 are D0 to D13, 14 to 19 are A0 to A5.
-// Time is the chip's own count of cycles since the first power-up and goes on over resets; no other clock plays a part.
+// `new Uno` powers it up. `set` sets the level of a pin, `send` types into its serial line, and `runUntil` lets its
+// clock run. `onLevel` and `onByte` receive its outputs. Pins have the board's numbers: 0 to 13 are D0 to D13, 14 to 19
+// are A0 to A5. Time is the chip's own count of cycles since the first power-up, and continues over resets. No other
+// clock is used.
 //
-// It knows nothing of what its firmware is for. There is no bootloader, and no start-up time after a reset. What avr8js
-// does otherwise than the chip stands in docs/simulators.md.
+// It is independent of its firmware's purpose. There is no bootloader, and no start-up time after a reset.
+// docs/simulators.md lists the differences between avr8js and the chip.
 
 import { type EEPROMBackend, PinState } from "avr8js";
 import { Chip, CYCLES_PER_SECOND, EEPROM_BYTES, FLASH_BYTES, type ResetCause, SRAM_BYTES } from "./chip.ts";
@@ -17,13 +18,15 @@ export { HexError } from "./hex.ts";
 /** Cycles of a byte that a terminal sends at 115200 baud: a start bit, eight data bits and a stop bit. */
 export const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
 
-/** What SRAM holds at power-up. A real chip's content is random; a byte that is not zero catches who counts on it. */
+/**
+ * Content of SRAM at power-up. A real chip's content is random; a byte other than zero reveals code that expects zeros.
+ */
 const SRAM_AT_POWER_UP = 0xc5;
 
 /** Cycles after which a byte that could not be taken is offered again: the shortest instruction. */
 const NEXT_INSTRUCTION = 1;
 
-/** The level that the firmware drives on a pin became another one. A pin that is not driven counts as low. */
+/** Called when the level that the firmware drives on a pin has changed. An undriven pin counts as low. */
 export type OnLevel = (pin: number, high: boolean, cycle: number) => void;
 
 /** The firmware has handed a byte to its transmitter. */
@@ -37,7 +40,7 @@ export interface Reset {
 
 type Port = "B" | "C" | "D";
 
-/** The ports, with the number of the pin that is their bit 0, and how many pins of the board they have. */
+/** The ports, with the pin number of bit 0, and the number of the board's pins. */
 const PORTS: readonly { readonly port: Port; readonly first: number; readonly pins: number }[] = [
     { port: "D", first: 0, pins: 8 },
     { port: "B", first: 8, pins: 6 },
@@ -49,7 +52,7 @@ export class Uno {
     onByte: OnByte = () => {};
     /** Resets since the first power-up, oldest first. */
     readonly resets: Reset[] = [];
-    /** What the EEPROM holds. */
+    /** The content of the EEPROM. */
     readonly eeprom: Uint8Array;
     readonly #program: Uint16Array;
     readonly #backend: EEPROMBackend;
@@ -62,8 +65,8 @@ export class Uno {
     #chip: Chip;
 
     /**
-     * Powers up an Uno with a firmware, and an EEPROM whose first bytes are given and whose others are erased.
-     * Throws a HexError where `hex` is no firmware for this chip.
+     * Powers up an Uno with a firmware. `eeprom` has the first bytes of the EEPROM, and the others are erased. Throws a
+     * HexError if `hex` is no firmware for this chip.
      */
     constructor(hex: string, eeprom: Uint8Array = new Uint8Array()) {
         this.#program = new Uint16Array(readHex(hex, FLASH_BYTES).buffer);
@@ -97,7 +100,7 @@ export class Uno {
         }
     }
 
-    /** Puts a level on a pin from outside. It stays over resets. */
+    /** Sets the external level of a pin. It stays over resets. */
     set(pin: number, high: boolean): void {
         this.#inputs.set(pin, high);
         this.#setOn(this.#chip, pin, high);
@@ -108,19 +111,19 @@ export class Uno {
         return this.#driven.get(pin) ?? false;
     }
 
-    /** Types into the serial line, at 115200 baud behind what was typed before. */
+    /** Types into the serial line at 115200 baud, after earlier text. */
     send(text: string): void {
         const was = this.#toSend.length;
         for (const byte of new TextEncoder().encode(text)) this.#toSend.push(byte);
         if (was === 0 && this.#toSend.length > 0) this.#sendNext(this.#chip);
     }
 
-    /** Whether all that was typed has arrived. */
+    /** Whether all typed text has arrived. */
     get hasSentAll(): boolean {
         return this.#toSend.length === 0;
     }
 
-    /** Starts the chip anew. Only where the power went does SRAM lose its content. */
+    /** Resets the chip. SRAM loses its content only after a power failure. */
     reset(cause: Exclude<ResetCause, "watchdog">): void {
         this.#restart(
             cause,
@@ -131,7 +134,7 @@ export class Uno {
     #restart(cause: ResetCause, sram: Uint8Array): void {
         const { cycle } = this.#chip;
         this.resets.push({ cycle, cause });
-        // Every pin is let go of.
+        // All pins are released.
         for (const pin of [...this.#driven.keys()]) this.#drives(pin, false, cycle);
         this.#chip = this.#start(cause, cycle, sram);
         if (this.#toSend.length > 0) this.#sendNext(this.#chip);
@@ -163,7 +166,7 @@ export class Uno {
         this.onLevel(pin, high, cycle);
     }
 
-    /** Has the next byte arrive when it is due. */
+    /** Lets the next byte arrive at its time. */
     #sendNext(chip: Chip): void {
         this.#lineFree = Math.max(this.#lineFree, chip.cycle) + SENT_BYTE_CYCLES;
         const arrive = (): void => {
@@ -171,7 +174,7 @@ export class Uno {
                 chip.after(NEXT_INSTRUCTION, arrive);
                 return;
             }
-            // A receiver that is off does not hear it.
+            // A receiver that is off ignores it.
             chip.usart.writeByte(this.#toSend.shift() ?? 0, true);
             if (this.#toSend.length > 0) this.#sendNext(chip);
         };

@@ -1,8 +1,8 @@
-// The page's texts in English, which is their source. A hole in braces is filled when the text is shown. Where a text depends on
-// `count`, its forms stand one after the other, divided by "|": the first for one.
+// The page's English texts, which are the source. A placeholder in braces is filled when the text is shown. If a text
+// depends on `count`, its forms are separated by "|": the first is for one.
 
 export const en = {
-    /** What the page itself says. */
+    /** The page's own texts. */
     words: {
         // The head of the page.
         whatToDo: "What to do",
@@ -317,7 +317,10 @@ export const en = {
         mapMissing: "without a position:",
         north: "north is up",
     },
-    /** What is English until it is shown: what goes to a log or a file as well, and what the project's Rust says. */
+    /**
+     * Texts that stay English until they are shown: those that also go to a log or a file, and those of the project's
+     * Rust.
+     */
     heard: {
         // The browser's port.
         portGone: "the port is gone: its cable was pulled, or the Uno lost its power; plug it in again",
@@ -336,7 +339,7 @@ export const en = {
         noSerial:
             "This browser has no Web Serial. Chrome, Edge and Opera have it on a computer: open the page in one of them. Without one, avrdude writes the HEX, and any serial monitor at 115200 baud talks to the machine.",
 
-        // The session, as session.ts and `weeder serve` say it.
+        // Texts of the session, as in session.ts and `weeder serve`.
         waitingForMachine: "Waiting for the machine to answer.",
         noneConnected: "no machine is connected",
         holdFirst: "hold came first, so this was not sent",
@@ -384,7 +387,7 @@ export const en = {
         otherChip:
             "this board has another chip, {chip}: nothing was written. The firmware is for the Uno's ATmega328P. Choose an Uno's port.",
 
-        // What the machine refuses (control/src/say/texts.rs), and settings that contradict each other (host/link/src/settings.rs).
+        // The machine's errors (control/src/say/texts.rs), and contradictory settings (host/link/src/settings.rs).
         refusedTooLong: "send 80 characters at most",
         refusedNotText: "send letters, digits and blanks only",
         refusedLost: "characters were lost, send the line again",
@@ -420,7 +423,7 @@ export const en = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
 
-        // What is to be measured next (host/link/src/set_up.rs).
+        // The next step of the set-up (host/link/src/set_up.rs).
         timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
         takeWorst: "take the worst time: `set {name} {worst}`",
         measureWheel: "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)",

@@ -1,9 +1,9 @@
-// What a language's table has to have: a text for each of the English ones.
+// The required content of a language's table: a text for each English one.
 
 import type { en } from "./en.ts";
 
 export type Word = keyof typeof en.words;
-/** Those whose texts have no holes. */
+/** The keys of texts without placeholders. */
 export type Plain = { [Key in Word]: [Holes<(typeof en.words)[Key]>] extends [never] ? Key : never }[Word];
 export type HeardWord = keyof typeof en.heard;
 
@@ -11,11 +11,11 @@ export type HeardWord = keyof typeof en.heard;
 export interface Language {
     /** The texts of the page. */
     readonly words: Readonly<Record<Word, string>>;
-    /** What is English until it is shown. */
+    /** Texts that stay English until they are shown. */
     readonly heard: Readonly<Record<HeardWord, string>>;
-    /** What to do about an alarm or a warning, by its name. In English the manual says it. */
+    /** The advice for an alarm or a warning, by its name. In English it comes from the manual. */
     readonly advice: Readonly<Record<string, string>>;
-    /** What each setting is, by its name. In English the machine says it. */
+    /** The description of each setting, by its name. In English it comes from the machine. */
     readonly settings: Readonly<Record<string, string>>;
     /** The steps of setting a machine up, by their titles in the manual: the title, and how. */
     readonly steps: Readonly<Record<string, readonly [title: string, how: string]>>;

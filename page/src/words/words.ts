@@ -1,7 +1,8 @@
 // The page in the operator's language: its texts, its numbers and its units.
 //
-// The texts stand in a table for each language. en.ts is the source. The page's HTML has them in English; `translate` finds
-// them there. What is shown by `show` or `translate` changes with the language; all else is written again by who wrote it.
+// Each language has a table of texts. en.ts is the source. The page's HTML has the English texts, and `translate` finds
+// them there. Texts that were set by `show` or `translate` change with the language. Other texts must be written again
+// by their own module.
 
 import { chosen, keep } from "../preferences.ts";
 import { en } from "./en.ts";
@@ -21,7 +22,7 @@ export const LANGUAGES = {
 } as const satisfies Readonly<Record<string, { name: string; table: Language }>>;
 export type Code = keyof typeof LANGUAGES;
 
-/** What fills the holes of a text; nothing where it has none. Numbers are written as the language has them. */
+/** The values of a text's placeholders; empty without any. Numbers are formatted for the language. */
 type Filling<Text extends string> = [Holes<Text>] extends [never]
     ? []
     : [Readonly<Record<Holes<Text>, string | number>>];
@@ -45,7 +46,7 @@ const formats = new Map<string, Intl.NumberFormat>();
 /** The language of the page. */
 export const language = (): Code => code;
 
-/** Chooses a language, and has all write again what is not shown over and over. */
+/** Chooses a language, and writes all texts again that are not updated continuously. */
 export function speak(chosen: Code): void {
     keep("language", chosen);
     [code, table] = [chosen, LANGUAGES[chosen].table];
@@ -53,12 +54,12 @@ export function speak(chosen: Code): void {
     for (const change of changes) change();
 }
 
-/** Calls back when the language is another one. */
+/** Calls `change` after a change of language. */
 export function onLanguage(change: () => void): void {
     changes.push(change);
 }
 
-/** Numbers of this kind. As this country writes them, where the browser names one with this language. */
+/** The number format for the language, and for the browser's country if it names one. */
 function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
     const key = JSON.stringify(options);
     let found = formats.get(key);
@@ -71,9 +72,9 @@ function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
     return found;
 }
 
-/** A number with so many digits behind the point. */
+/** A number with this number of decimal places. */
 export function number(value: number, digits = 0): string {
-    // Rounded to it, a small negative number is no negative 0.
+    // Rounding a small negative number gives no negative 0.
     return format({ minimumFractionDigits: digits, maximumFractionDigits: digits, signDisplay: "negative" }).format(
         value,
     );
@@ -116,13 +117,13 @@ export function say<Key extends Word>(word: Key, ...[holes]: Filling<(typeof en.
     return fill(table.words[word], holes);
 }
 
-/** A text that is to be English until it is shown. */
+/** A text that stays English until it is shown. */
 export function english<Key extends HeardWord>(word: Key, ...[holes]: Filling<(typeof en.heard)[Key]>): string {
     const texts = Object.entries(holes ?? {}).map(([hole, value]) => [hole, String(value)]);
     return fill(en.heard[word], Object.fromEntries(texts));
 }
 
-/** What is English until it is shown, as patterns, those with the longest texts first. */
+/** These texts as patterns, those with the longest texts first. */
 const heard = Object.entries(en.heard)
     .sort(([, one], [, other]) => other.length - one.length)
     .map(([word, text]) => {
@@ -131,10 +132,10 @@ const heard = Object.entries(en.heard)
         return { word: word as HeardWord, holes, pattern: new RegExp(`^${parts.join("(.*)")}$`, "s") };
     });
 
-/** A text that was English until now, and what fills its holes. What no table has stays: the machine itself speaks English. */
+/** Translates such a text, with its values. Unknown text stays: the machine itself speaks English. */
 export function told(text: string): string {
     if (code === "en") return text;
-    // The same, whether it was a sentence or stood in one.
+    // The same text as a sentence or within one.
     const bare = `${text.charAt(0).toLowerCase()}${text.slice(1).replace(/\.$/, "")}`;
     for (const { word, holes, pattern } of heard) {
         const found = pattern.exec(text) ?? pattern.exec(bare);
@@ -147,10 +148,10 @@ export function told(text: string): string {
     return text;
 }
 
-/** What to do about an alarm or a warning, where the language has words of its own for that. */
+/** The advice for an alarm or a warning, if the language has its own. */
 export const advice = (name: string): string | undefined => table.advice[name];
 
-/** What a setting is, where the language has words of its own for that. */
+/** A setting's description, if the language has its own. */
 export const settingHelp = (name: string): string | undefined => table.settings[name];
 
 /** A step of setting a machine up, from its title and its text in the manual. */
@@ -161,7 +162,10 @@ onLanguage(() => {
     for (const [element, text] of shown) if (element.isConnected) element.textContent = text();
 });
 
-/** Shows a text in an element, in another language too; without one, the element is written by others from now on. */
+/**
+ * Shows a text in an element, also after a change of language. Without a text, other code writes the element from now
+ * on.
+ */
 export function show(element: Element, text?: () => string): void {
     shown.delete(element);
     if (!text) return;
@@ -171,7 +175,9 @@ export function show(element: Element, text?: () => string): void {
 
 const words = new Map(Object.entries(en.words).map(([word, text]) => [text as string, word as Word]));
 
-/** Puts the page's texts and the names of its elements into the language, now and whenever it is another one. */
+/**
+ * Sets the page's texts and the names of its elements in the current language, now and after each change of language.
+ */
 export function translate(root: Element | DocumentFragment): void {
     const nodes: (() => void)[] = [];
     const take = (text: string, write: (text: string) => void) => {

@@ -1,9 +1,9 @@
-//! The firmware in the virtual Uno as a machine that is driven: what the world shows goes onto its pins, and what is known of it is the
-//! servo's pulse and what its console says.
+//! The firmware in the virtual Uno as a machine for model-based tests. The test drives its pins, and observes the
+//! servo's pulse and the console.
 //!
-//! The settings in use follow from what was acknowledged. What the firmware alone knows, as the times that it has measured of its
-//! servo, leaves them in doubt until `get` is typed. What is kept is read from the EEPROM, and held against what the woken firmware
-//! says of it.
+//! The settings in use follow from acknowledged commands. Values that only the firmware knows, such as measured times
+//! of its servo, make them uncertain until `get` is typed. Saved data is read from the EEPROM, and compared with the
+//! output of the restarted firmware.
 
 use crate::common::{elf, number, value};
 use control::alarm::Alarm;
@@ -37,19 +37,19 @@ const CYCLES_A_US: u64 = CYCLES_PER_SECOND / 1_000_000;
 /// Longest time from a reset to the greeting: a loop that stalls is reset after a quarter of a second.
 const GREETING_CYCLES: u64 = CYCLES_PER_SECOND;
 
-/// Changes on the pins that come one after the other at once, as dust in the beam does, come so far apart: 10 us.
+/// Least distance of simultaneous changes on the pins, as by dust in the beam: 10 us.
 const APART_CYCLES: u64 = 160;
 
-/// A pulse's width is one that was set, give or take this.
+/// Tolerance of a pulse's width against its setting.
 const SAME_US: f64 = 1.5;
 
 /// Free bytes of stack that are an alarm.
 const LOW_STACK: u16 = 40;
 
-/// Ticks that a disturbance of both channels may add: two as it comes, and two as it goes.
+/// Ticks that a disturbance of both channels may add: two at its start, and two at its end.
 const SPIKE_TICKS: i64 = 4;
 
-/// The servo's line, as it is seen on D9.
+/// The servo's line, observed on D9.
 #[derive(Debug, Default)]
 struct ServoLine {
     rise: Option<u64>,
@@ -76,25 +76,25 @@ impl ServoLine {
 /// The machine, see the module's words.
 pub struct Board {
     uno: Uno,
-    /// Levels that come in this turn, and whether each is one of the encoder's, in time with the others of these.
+    /// Levels of this turn, and whether each is the encoder's; those keep their order in time.
     to_come: Vec<(Vec<(Pin, bool)>, bool)>,
-    /// Where the encoder is in its cycle.
+    /// The encoder's phase.
     phase: usize,
     /// The world's count at which the firmware's was 0.
     zero: i64,
     servo: ServoLine,
-    /// Lines that were typed and are yet to be answered, and the one that is being answered.
+    /// Typed lines without an answer, and the line that is being answered.
     typed: VecDeque<String>,
     current: Option<String>,
-    /// What has come, whole lines and the beginning of the next.
+    /// Received text: whole lines and the beginning of the next.
     heard: String,
     settings: Settings,
     in_doubt: bool,
-    /// Whether the firmware times its servo, and may set what it has found.
+    /// Whether the firmware is timing its servo. It may then change its leads.
     times_the_servo: bool,
     state: State,
     unseen_mm: i16,
-    /// Since when the machine is not at work, as it has said.
+    /// The time since which the machine is not at work, by its own report.
     rests_since: Option<u64>,
     resets: usize,
     stack_was_low: bool,
@@ -136,7 +136,7 @@ impl Board {
         alarm.map(State::Alarm).ok_or_else(|| Failure::fail(format!("no alarm is called {word:?}")))
     }
 
-    /// Takes what was said of the state and of the settings.
+    /// Takes the reported state and settings.
     fn hear(&mut self, line: &str) -> Checked {
         if line.starts_with("state=") {
             self.state = match value(line, "state") {
@@ -151,7 +151,7 @@ impl Board {
         } else if line.contains("calibrated") {
             (self.times_the_servo, self.in_doubt) = (false, true);
         } else if let Some((setting, value)) = setting(line) {
-            // A value that is out of range is another one in the end, and found out.
+            // A value out of range would differ later, and be found.
             let _ = self.settings.set(setting, value);
         }
         Ok(())
@@ -187,12 +187,12 @@ impl Board {
         }
     }
 
-    /// The servo's pulse has some time again to be the one that is due.
+    /// The servo's pulse gets some time again until it must be right.
     fn rest_anew(&mut self) {
         self.rests_since = self.rests_since.map(|_| self.uno.cycle());
     }
 
-    /// Puts the turn's levels onto the pins, spread over it.
+    /// Drives the turn's levels on the pins, spread over the turn.
     fn drive(&mut self, cycles: u64) {
         let begin = self.uno.cycle();
         let ticks = self.to_come.iter().filter(|(_, is_tick)| *is_tick).count() as u64;
@@ -206,7 +206,7 @@ impl Board {
         self.uno.drive(changes);
     }
 
-    /// The examples that the firmware says it has from the field.
+    /// The number of taught examples that the firmware reports.
     fn told_examples(&mut self) -> Result<usize, Failure> {
         let lines = ask(&mut self.uno, "examples").map_err(unanswered)?;
         Ok(lines.iter().filter(|line| line.starts_with("field ")).count())
@@ -226,9 +226,9 @@ fn setting(line: &str) -> Option<(Setting, u16)> {
 
 impl Machine for Board {
     const IS_OPEN: bool = false;
-    /// The widest weed of the built-in examples, and what may be like it.
+    /// The widest weed of the built-in examples, with a tolerance.
     const NARROW_MM: u16 = 45;
-    /// A frame of the servo, a pulse that is told by its end, and a turn.
+    /// A frame of the servo, a pulse that is known at its end, and a turn.
     const LATENESS_US: u64 = 26_000;
 
     fn new(beginning: &Beginning, world: &World) -> Result<Self, Failure> {
@@ -375,12 +375,12 @@ impl Machine for Board {
             attended.begun = self.current.clone();
             match self.current.as_deref().and_then(|line| line.split([' ', '\t']).next()) {
                 Some("start" | "servo" | "calibrate" | "test") => self.rests_since = None,
-                // It may be another pulse that has the tool out, from now on or soon.
+                // The pulse for out may change, now or soon.
                 Some("set" | "defaults" | "revert") => self.rest_anew(),
                 _ => {}
             }
         }
-        // One end at a time: the next line begins behind it.
+        // One line end at a time: the next line begins after it.
         while let Some((line, rest)) = self.heard.split_once('\n') {
             let (line, rest) = (line.trim_end().to_owned(), rest.to_owned());
             self.heard = rest;
@@ -412,7 +412,7 @@ impl Machine for Board {
     }
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
-        // A line that is on its way would go on to the machine that wakes up.
+        // A line on its way would otherwise reach the restarted machine.
         while self.uno.bytes_on_their_way() > 0 {
             self.uno.run_for_ms(1).map_err(stopped)?;
         }

@@ -1,4 +1,4 @@
-//! What the tests of the check share.
+//! Shared code of the tests of the check.
 
 use check::pair::{Pair, PairPort, Side, Wiring};
 use check::tester::Tester;
@@ -15,7 +15,7 @@ pub fn boards(wiring: Wiring) -> (Weeder, Tester) {
     (weeder, tester)
 }
 
-/// The same, with the Unos to look at.
+/// The same, and the pair of Unos for the test to inspect.
 pub fn boards_and_pair(wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
     boards_with(&firmware::build().expect("the weeder's firmware is built"), wiring)
 }

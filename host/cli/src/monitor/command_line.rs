@@ -1,7 +1,7 @@
-//! The line in which commands are typed: editing, history, completion.
+//! The command line of the monitor: editing, history, completion.
 //!
-//! It is by hand because crates with all three (rustyline, reedline) want the terminal for themselves, and those for ratatui
-//! (tui-input) have only the editing, which is the least of it, and no limit of characters.
+//! It is written here because no crate fits. Those with all three (rustyline, reedline) take the whole terminal. The
+//! one for ratatui (tui-input) has only editing, and no limit of characters.
 
 use link::COMMAND_LENGTH;
 use link::completion::{common, complete};
@@ -11,13 +11,13 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
 /// Lines remembered.
 const HISTORY: usize = 100;
 
-/// A line that is being typed. All its characters are printable ASCII, a byte each.
+/// A line that is being typed. All characters are printable ASCII, one byte each.
 #[derive(Clone, Debug, Default)]
 pub struct CommandLine {
     text: String,
     cursor: usize,
     history: Vec<String>,
-    /// Which line of the history is shown, from the newest; none for a new one.
+    /// The shown line of the history, counted from the newest. `None` for a new line.
     browsed: Option<usize>,
     candidates: Vec<String>,
 }
@@ -28,30 +28,30 @@ impl CommandLine {
         &self.text
     }
 
-    /// How many characters stand before the cursor.
+    /// Number of characters before the cursor.
     pub fn cursor(&self) -> usize {
         self.cursor
     }
 
-    /// What the line may become, after Tab.
+    /// The possible completions after Tab.
     pub fn candidates(&self) -> &[String] {
         &self.candidates
     }
 
-    /// Drops what is being typed.
+    /// Clears the line.
     pub fn clear(&mut self) {
         self.show(None, String::new());
         self.candidates.clear();
     }
 
-    /// Where the command begins: behind a row's name and a colon, where they are typed.
+    /// The beginning of the command: after a row's name and colon, if they are typed.
     fn command_start(&self) -> usize {
         let Some(colon) = self.text.find(':').filter(|&colon| colon <= NAME_LENGTH) else { return 0 };
         let behind = &self.text[colon + 1..];
         colon + 1 + usize::from(behind.starts_with(' '))
     }
 
-    /// Takes a key; returns the line when it is entered.
+    /// Handles a key. Returns the line when it is entered.
     pub fn key(&mut self, key: KeyEvent) -> Option<String> {
         if key.kind == KeyEventKind::Release {
             return None;
@@ -95,12 +95,12 @@ impl CommandLine {
         (self.browsed, self.cursor, self.text) = (browsed, text.len(), text);
     }
 
-    /// Characters that the line may have: those of a command, and of the name before it.
+    /// Greatest length of the line: that of a command, and of the name before it.
     fn most(&self) -> usize {
         COMMAND_LENGTH + self.command_start()
     }
 
-    /// Completes what stands before the cursor, as far as there is one way to go on.
+    /// Completes the word before the cursor, as far as all candidates agree.
     fn complete(&mut self) {
         let (before, behind) = self.text.split_at(self.cursor);
         let (address, begun) = before.split_at(self.command_start().min(before.len()));

@@ -1,4 +1,4 @@
-//! What is known of each row, and how that changes with what happens.
+//! The state of each row, and its changes by events.
 
 use super::To;
 use super::command_line::CommandLine;
@@ -27,11 +27,11 @@ pub enum Connection {
 /// An object that the beam has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
-    /// What it was taken for.
+    /// Its class.
     pub class: Class,
     /// Votes for that.
     pub votes: u8,
-    /// Where the beam broke, in ticks.
+    /// The position where the beam broke, in ticks.
     pub leading: i32,
     /// How far the machine rolled while the beam was broken, in ticks.
     pub width: i32,
@@ -39,24 +39,24 @@ pub struct Seen {
     pub spacing: i32,
 }
 
-/// What has become of the last command to a row.
+/// The state of the last command to a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Answer {
     /// There was none.
     #[default]
     None,
-    /// It is not answered yet.
+    /// It has no answer yet.
     Waiting,
-    /// The machine has done it.
+    /// The machine has executed it.
     Done,
     /// The machine has refused it, or it was not typed.
     Refused,
 }
 
-/// What is known of a row.
+/// The state of a row.
 #[derive(Clone, Debug)]
 pub struct RowModel {
-    /// What the operator calls it.
+    /// The operator's name for it.
     pub name: String,
     /// Whether it is there.
     pub connection: Connection,
@@ -66,39 +66,39 @@ pub struct RowModel {
     pub settings: Settings,
     /// The last objects, the newest first.
     pub objects: VecDeque<Seen>,
-    /// The canopies that the tool leaves alone: those of `objects` since the schedule was last emptied.
+    /// The canopies in keep-out zones: those of `objects` since the zones were last emptied.
     pub windows: VecDeque<Seen>,
-    /// What the operator has to see to.
+    /// Advice for the operator.
     pub advice: Option<String>,
-    /// What has become of the last command.
+    /// The state of the last command.
     pub answer: Answer,
-    /// What was measured of it since it has been watched, and what was said to be done next.
+    /// The measurements since the start, and the last step that was shown.
     set_up: SetUp,
     step: Option<Step>,
     heading: Heading,
-    /// What was said of the margin.
+    /// The last warning about the margin.
     warning: Option<String>,
 }
 
-/// What is known of the machine.
+/// The state of the machine.
 #[derive(Clone, Debug)]
 pub struct Model {
     /// Its rows, at least one.
     pub rows: Vec<RowModel>,
-    /// The row to which commands go; none: to all.
+    /// The row that commands go to. `None` for all.
     pub target: Option<usize>,
-    /// The last HOLD to all, until something else is asked for.
+    /// The last HOLD to all, until the next command.
     pub hold: Option<Hold>,
-    /// What was typed, answered and told, the newest last.
+    /// Typed lines, answers and events, the newest last.
     pub lines: VecDeque<String>,
     /// What is being typed.
     pub line: CommandLine,
-    /// Whether the bell is to ring.
+    /// Whether to ring the bell.
     rings: bool,
 }
 
 impl Model {
-    /// Rows of which nothing is known yet.
+    /// Rows in unknown state.
     pub fn new(names: Vec<String>) -> Self {
         Self {
             rows: names.into_iter().map(RowModel::new).collect(),
@@ -110,7 +110,7 @@ impl Model {
         }
     }
 
-    /// Whether the bell is to ring: since the last call, an alarm was latched or a row was lost.
+    /// Whether to ring the bell: since the last call an alarm was latched or a row was lost.
     pub fn take_ring(&mut self) -> bool {
         std::mem::take(&mut self.rings)
     }
@@ -125,7 +125,7 @@ impl Model {
         self.rows.iter().map(|row| row.name.clone()).collect()
     }
 
-    /// The row that is meant; none for all.
+    /// The addressed row. `None` for all.
     pub fn meant(&self, to: To) -> Option<usize> {
         match to {
             To::Chosen => self.target,
@@ -134,12 +134,12 @@ impl Model {
         }
     }
 
-    /// A row, or all of them.
+    /// The numbers of a row, or of all.
     pub fn targets(&self, row: Option<usize>) -> Vec<usize> {
         row.map_or_else(|| (0..self.rows.len()).collect(), |row| vec![row])
     }
 
-    /// Has commands go to the next row, or the one before; all of them stand before the first.
+    /// Chooses the next or previous row for commands. "All" is before the first.
     pub fn choose(&mut self, forward: bool) {
         let places = self.rows.len() + 1;
         let place = self.target.map_or(0, |row| row + 1);
@@ -147,7 +147,7 @@ impl Model {
         self.target = place.checked_sub(1).filter(|_| self.are_several());
     }
 
-    /// A command was sent to a row, or to all.
+    /// Records that a command was sent to a row, or to all.
     pub fn sent(&mut self, row: Option<usize>, command: &str) {
         self.hold = None;
         for row in self.targets(row) {
@@ -159,7 +159,7 @@ impl Model {
         }
     }
 
-    /// HOLD was asked of all.
+    /// Records a HOLD to all.
     pub fn held(&mut self, hold: Hold) {
         self.hold = Some(hold);
         for row in &mut self.rows {
@@ -170,7 +170,7 @@ impl Model {
         }
     }
 
-    /// Takes what was heard of a row.
+    /// Takes an event of a row.
     pub fn take(&mut self, heard: Heard) {
         if let Some(hold) = &mut self.hold {
             hold.take(&heard);
@@ -192,9 +192,9 @@ impl Model {
         }
     }
 
-    /// Takes what happened to a row.
+    /// Updates a row by an event.
     pub fn update(&mut self, number: usize, happening: Happening) {
-        // What each plant and each swing was is more than anybody reads of several rows.
+        // Plants and swings of several rows are too many lines to read.
         let said = match &happening {
             Happening::Connected { version, .. } => Some(format!("-- connected to weeder {version}")),
             Happening::Lost(why) => Some(format!("-- {why}")),
@@ -231,7 +231,7 @@ impl Model {
         }
     }
 
-    /// Adds a line to what was said.
+    /// Adds a line to the console.
     pub fn say(&mut self, line: String) {
         if self.lines.len() == LINES {
             self.lines.pop_front();
@@ -239,7 +239,7 @@ impl Model {
         self.lines.push_back(line);
     }
 
-    /// Adds a line of a row, under its name where there are several.
+    /// Adds a line of a row, with its name if there are several.
     fn say_of(&mut self, number: usize, line: &str) {
         match self.rows.get(number) {
             Some(row) if self.are_several() => self.say(format!("{}: {line}", row.name)),
@@ -249,7 +249,7 @@ impl Model {
 }
 
 impl RowModel {
-    /// A row of which nothing is known yet.
+    /// A row in unknown state.
     fn new(name: String) -> Self {
         Self {
             name,
@@ -268,14 +268,14 @@ impl RowModel {
         }
     }
 
-    /// What speaks against the margin, if it is something else now.
+    /// The warning about the margin, if it has changed.
     fn take_warning(&mut self) -> Option<String> {
         let warning = self.set_up.warning(&self.settings);
         let before = std::mem::replace(&mut self.warning, warning.clone());
         warning.filter(|_| before != self.warning)
     }
 
-    /// The next step of setting it up, if it is another one now.
+    /// The next step of the set-up, if it has changed.
     fn take_step(&mut self) -> Option<Step> {
         let step = self.set_up.next(&self.settings);
         let before = std::mem::replace(&mut self.step, step.clone());
@@ -301,7 +301,7 @@ impl RowModel {
                 self.connection = Connection::Down(why);
                 // It rolls on unseen.
                 self.windows.clear();
-                // What is not answered by now will not be.
+                // A command that is unanswered now stays unanswered.
                 if self.answer == Answer::Waiting {
                     self.answer = Answer::Refused;
                 }
@@ -333,7 +333,7 @@ impl RowModel {
     fn take_event(&mut self, event: EventLine) {
         match event {
             EventLine::Detection { class, position, votes, spacing, hold, .. } => {
-                // The hold is the canopy and both margins.
+                // The hold includes both margins.
                 let margins = self.settings.wheel().ticks(2 * self.settings.get(Setting::MarginMm)).0;
                 let width = hold.wrapping_sub(margins);
                 let seen = Seen { class, votes, leading: position, width, spacing };

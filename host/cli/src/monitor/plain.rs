@@ -1,7 +1,8 @@
 //! The monitor without a screen: each line of the input is a command, each line of the output an answer or an event.
 //!
-//! With several rows a command goes to one of them behind its name and a colon, or to all; what they say stands behind their names. A
-//! `hold` to all goes to them at the same moment, and how long the last one took is said.
+//! With several rows a command goes to all, or to the row whose name and colon stand before it. Output lines begin with
+//! the row's name. A `hold` to all goes to all rows at the same moment, and its result includes the time of the last
+//! row.
 
 use super::{To, addressed};
 use crate::finding::Finding;
@@ -17,22 +18,22 @@ use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Time after which it looks again at whether something was typed.
+/// Time between two checks of the input.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there`
 /// says which rows were there when they were opened.
 ///
 /// # Errors
-/// Where a line is no command, an Uno goes away with commands unanswered, or output or log fail.
+/// If a line is no command, an Uno goes away with commands unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
     let (sender, commands) = mpsc::channel();
-    // Reading waits for as long as nobody types, so it does so by itself; it ends with the process.
+    // Reading blocks until the operator types, so it has its own thread. The thread ends with the process.
     thread::spawn(move || io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
     let standing = are_there.iter().map(|&is_there| Standing { is_there, ..Standing::default() }).collect();
     let talk = Talk { rows, chosen, logs, standing, hold: None, finding: Finding::Good };
     match talk.run(&commands, &mut io::stdout().lock()) {
-        // Whoever read the output has seen enough.
+        // The reader has closed the pipe: it has read enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
             Ok(Finding::Good)
         }
@@ -48,7 +49,7 @@ struct Standing {
     unanswered: usize,
     /// Statuses since the last answer.
     statuses: usize,
-    /// Whether it went away with commands unanswered.
+    /// Whether it was lost with commands unanswered.
     has_failed: bool,
     heading: Heading,
 }
@@ -58,7 +59,7 @@ struct Talk<'a> {
     chosen: &'a Chosen,
     logs: Option<Logs>,
     standing: Vec<Standing>,
-    /// A `hold` to all of several rows that is under way.
+    /// A pending `hold` to all of several rows.
     hold: Option<Hold>,
     finding: Finding,
 }
@@ -67,7 +68,7 @@ impl Talk<'_> {
     fn run(mut self, commands: &Receiver<String>, output: &mut impl Write) -> Result<Finding> {
         let mut ended = false;
         loop {
-            // One at a time, so that the commands wait in the pipe.
+            // One at a time, so that the other commands wait in the pipe.
             if self.is_idle() && !ended {
                 match commands.try_recv() {
                     Ok(line) => self.command(line.trim(), output)?,
@@ -75,7 +76,7 @@ impl Talk<'_> {
                     Err(TryRecvError::Empty) => {}
                 }
             }
-            // What the last command brought about is told before the machine has given its status twice.
+            // Two statuses after a command, all its events have come.
             let has_told = |row: &Standing| !row.is_there || row.statuses >= 2;
             if ended && self.is_idle() && self.standing.iter().all(has_told) {
                 return self.end();
@@ -90,7 +91,7 @@ impl Talk<'_> {
         self.standing.iter().all(|row| row.unanswered == 0)
     }
 
-    /// What came of it all.
+    /// The finding of the whole session.
     fn end(&self) -> Result<Finding> {
         let failed = self.chosen.rows.iter().zip(&self.standing).filter(|(_, standing)| standing.has_failed);
         let failed: Vec<&str> = failed.map(|(row, _)| row.name.as_str()).collect();
@@ -98,7 +99,7 @@ impl Talk<'_> {
         Ok(self.finding)
     }
 
-    /// Types a line to the rows that it is for.
+    /// Types a line to the addressed rows.
     fn command(&mut self, line: &str, output: &mut impl Write) -> Result<()> {
         let (to, command) = addressed(line, &self.chosen.names()).map_err(Error::msg)?;
         // The machine does not answer a line without a word.
@@ -179,7 +180,7 @@ impl Talk<'_> {
         self.tell_of_hold(output)
     }
 
-    /// Says what came of a `hold` to all once nobody is waited for any more.
+    /// Prints the result of a `hold` to all rows, once no row is left to answer.
     fn tell_of_hold(&mut self, output: &mut impl Write) -> Result<()> {
         if let Some(hold) = self.hold.take_if(|hold| hold.is_over()) {
             writeln!(output, "{}", hold.summary(&self.chosen.names()))?;

@@ -10,13 +10,13 @@ use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, Ke
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-/// Time between two looks at the keyboard, after which the screen is drawn anew.
+/// Time between two reads of the keyboard. After each, the screen is drawn again.
 const TURN: Duration = Duration::from_millis(20);
 
 /// Watches until Ctrl-C or Ctrl-D.
 ///
 /// # Errors
-/// Where the terminal or a log fails.
+/// If the terminal or a log fails.
 pub fn run(rows: &Rows, names: Vec<String>, mut logs: Option<Logs>) -> Result<()> {
     let mut terminal = ratatui::try_init().context("the terminal cannot be drawn on: --plain does without")?;
     let result = watch(&mut terminal, rows, Model::new(names), &mut logs);
@@ -48,7 +48,7 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
     }
 }
 
-/// Rings the terminal's bell where the operator has to look: he watches the row, and not the screen.
+/// Rings the terminal's bell: the operator watches the row, not the screen.
 fn ring(model: &mut Model, mut terminal: impl Write) -> io::Result<()> {
     if model.take_ring() {
         terminal.write_all(b"\x07")?;
@@ -57,8 +57,8 @@ fn ring(model: &mut Model, mut terminal: impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Takes a key: Esc before all others, whatever is being typed. What was typed by half goes with it, or it would stand before the next
-/// command.
+/// Handles a key. Esc comes before all others, even while a command is being typed. It also clears the half-typed line,
+/// which would otherwise stand before the next command.
 fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
     match key.code {
         _ if key.kind == KeyEventKind::Release => {}
@@ -95,7 +95,7 @@ fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
     }
 }
 
-/// HOLD to all rows, those that are not there included.
+/// HOLD to all rows, also to those that are lost.
 fn hold_all(model: &mut Model, rows: &Rows) {
     let since = Instant::now();
     for row in 0..rows.count() {
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn one_key_has_all_rows_hold_whatever_is_being_typed_and_whichever_row_is_chosen() {
+    fn one_key_holds_all_rows_during_typing_and_for_every_chosen_row() {
         let opener = || -> link::rows::Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
         let (rows, _) = Rows::open(vec![opener(), opener()]);
         let mut model = Model::new(vec!["left".to_owned(), "right".to_owned()]);
@@ -136,7 +136,7 @@ mod tests {
             Some("HOLD 0 of 2; NOT THERE: left, right")
         );
         assert_eq!((model.line.text(), model.target), ("", Some(0)), "it does not stand before the next command");
-        // As does the word, typed to all.
+        // The word `hold`, typed to all rows, does the same.
         (model.hold, model.target) = (None, None);
         typed(&mut model, &rows, "hold");
         take_key(&mut model, &rows, KeyCode::Enter.into());
@@ -188,7 +188,7 @@ mod tests {
         assert_eq!(enter("all: hold"), said("row1 row2 row3", "> all: hold", true));
         let unknown = "-- there is no row row4: there are row1, row2, row3; nothing was sent";
         assert_eq!(enter("row4: start"), said("", unknown, false));
-        // Only what is typed to that row is not typed, as none is there.
+        // No row is connected, so each command is reported as not typed. The line for the unknown row4 was not sent.
         let mut not_typed = Vec::new();
         while not_typed.len() < 4 {
             let heard = rows.next(Duration::from_secs(20)).expect("each is told");

@@ -1,7 +1,7 @@
-//! The monitor's screen: from what is known to what is drawn, and nothing else.
+//! The monitor's screen: draws the model, and does nothing else.
 //!
-//! State, alarm and the key for HOLD stand at the top, whatever else there is no room for. [`one`] draws one row, [`several`] all rows
-//! of a machine at a glance, both with the same [`parts`].
+//! State, alarm and the key for HOLD are at the top, so they are visible on a small terminal too. [`one`] draws one
+//! row. [`several`] draws all rows of a machine. Both use the same [`parts`].
 
 mod one;
 mod parts;

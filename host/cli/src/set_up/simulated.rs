@@ -1,4 +1,4 @@
-//! What each step of the manual brings in the simulated field.
+//! The effect of each step of the manual in the simulated field.
 
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table, presets};
@@ -10,10 +10,10 @@ use trial::by_the_manual::Novice;
 /// Plots of each spacing.
 const REPLICATIONS: u32 = 10;
 
-/// Which of all the possible fields and measurements.
+/// Selects the random fields and measurements.
 const SEED: u64 = 1;
 
-/// A line for the machine from the box and for each step, when those before it are done.
+/// A line for the machine from the box, and one after each step. The steps add up.
 pub fn table() -> Result<Table> {
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY);

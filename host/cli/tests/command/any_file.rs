@@ -1,5 +1,5 @@
-//! Every file that a host tool reads, by chance: real ones that were mutilated, and noise. Each is read or refused, with a message
-//! that names it in a line; nothing panics, and what is read is bounded.
+//! Random input for every file that a host tool reads: damaged real files, and noise. Each is read, or refused with a
+//! message in one line that names the file. No input may cause a panic or unbounded memory.
 
 use experiments::evaluation::{self, Analysis};
 use experiments::training::table;
@@ -21,10 +21,10 @@ use uno::capture::Capture;
 use uno::elf::Image;
 use uno::hex::{self, Bootloader};
 
-/// What reads a file of each kind, and a file of that kind.
+/// The reader of a kind of file, and a file of that kind.
 type Reader = (&'static str, fn(&Path) -> Result<(), Box<dyn Error>>, fn() -> Vec<u8>);
 
-/// Longest row that is also rolled along, in mm: longer ones only take longer.
+/// Longest row that is also rolled along, in mm. Longer rows only take longer.
 const ROLLED_MM: f64 = 20_000.0;
 
 const READERS: [Reader; 11] = [
@@ -148,7 +148,7 @@ const READERS: [Reader; 11] = [
     ),
 ];
 
-/// Numbers that are too large, too small, or none.
+/// Numbers that are too large, too small, or invalid.
 const NUMBERS: [&str; 12] = [
     "4294967296",
     "18446744073709551616",
@@ -164,11 +164,11 @@ const NUMBERS: [&str; 12] = [
     "99999999999999999999999999999999999999",
 ];
 
-/// What gives a file its shape, and what a terminal obeys.
+/// Characters with a meaning in files or terminals.
 const MARKS: [&str; 16] =
     ["\"", "\"\"\"", "'", "'''", "`", ",", ";", "=", "#", "[", "{", "\n", "\r", "\0", "\u{1b}[2J", "\u{2028}"];
 
-/// What may befall a file.
+/// A random change of a file.
 #[derive(Clone, Debug)]
 enum Mishap {
     /// It ends early.
@@ -177,9 +177,9 @@ enum Mishap {
     Bytes(prop::sample::Index, Vec<u8>),
     /// A number is another.
     Number(prop::sample::Index, prop::sample::Index),
-    /// A mark stands where none did.
+    /// Inserts a mark.
     Mark(prop::sample::Index, prop::sample::Index),
-    /// A part stands there many times.
+    /// Repeats a part.
     Repeat(prop::sample::Index, usize, usize),
     /// A part is gone.
     Gone(prop::sample::Index, usize),
@@ -236,7 +236,7 @@ impl Mishap {
     }
 }
 
-/// A message in a line. What else gives a terminal orders is written out where the command tells it.
+/// The message must be one line. Other control characters are escaped when the command prints it.
 fn assert_is_message(name: &str, error: &dyn Error) {
     let message = error.to_string();
     assert!(!message.is_empty() && message.lines().count() == 1, "{name}: {message:?}");
@@ -245,7 +245,7 @@ fn assert_is_message(name: &str, error: &dyn Error) {
 #[test]
 fn the_files_from_which_mishaps_start_are_read() {
     let folder = tempfile::tempdir().unwrap();
-    // The bytes of the bootloader lie where none may.
+    // The bytes of the bootloader are at an invalid address.
     for (name, read, file) in READERS.into_iter().filter(|(name, ..)| *name != "boot.hex") {
         let path = folder.path().join(name);
         std::fs::write(&path, file()).unwrap();

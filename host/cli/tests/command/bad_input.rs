@@ -1,4 +1,4 @@
-//! What the `weeder` command says to input that is wrong. None of these runs the firmware.
+//! The errors of the `weeder` command for wrong input. None of these tests runs the firmware.
 
 use crate::common::{self, weeder};
 use std::fs;
@@ -85,7 +85,7 @@ fn no_cause_is_told_twice() {
     }
 }
 
-/// A cause is told behind its message: one that the message has as well is told twice.
+/// The cause is printed after the message. A message that includes its cause would print it twice.
 #[test]
 fn no_message_in_the_source_repeats_its_cause() {
     let host = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -1,9 +1,9 @@
-//! `weeder` as a user calls it, in a folder, and what it says.
+//! Runs `weeder` in a folder as a user does, and returns its output.
 
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// A field so small that a trial in it takes a moment.
+/// A small field, so that a trial takes a moment.
 pub const SMALL: &str = "[plot]\nrows = 1\nrow_m = 6\n";
 
 /// Runs `weeder` with these arguments in a folder.
@@ -12,7 +12,7 @@ pub fn weeder(folder: &Path, arguments: &[&str]) -> Output {
     command.current_dir(folder).args(arguments).output().expect("cargo has built the command")
 }
 
-/// What a command prints that has to succeed.
+/// The output of a command that must succeed.
 #[track_caller]
 pub fn said(folder: &Path, arguments: &[&str]) -> String {
     let output = weeder(folder, arguments);
@@ -20,7 +20,7 @@ pub fn said(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("it prints text")
 }
 
-/// Asserts status 2, a message that contains `words`, and that nothing is printed as a result.
+/// Asserts status 2, a message that contains `words`, and no result.
 #[track_caller]
 pub fn assert_refused(folder: &Path, arguments: &[&str], words: &str) {
     let output = weeder(folder, arguments);

@@ -1,9 +1,9 @@
-//! `weeder completions`: what the shells make of it.
+//! `weeder completions` in real shells.
 
 use std::fs;
 use std::process::Command;
 
-/// What `weeder completions` prints for a shell.
+/// The output of `weeder completions` for a shell.
 fn completions(shell: &str) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["completions", shell]).output();
     let output = output.expect("cargo has built the command");
@@ -11,12 +11,12 @@ fn completions(shell: &str) -> String {
     String::from_utf8(output.stdout).expect("it is text")
 }
 
-/// What Tab offers in bash behind these words, the last of which is begun.
+/// The words that Tab offers in bash after these words. The last word is incomplete.
 fn offered_by_bash(words: &[&str]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let file = folder.path().join("weeder");
     fs::write(&file, completions("bash")).expect("it can be written");
-    // As bash itself calls it: the command, the word that is begun, and the one before.
+    // The call of bash itself: the command, the incomplete word, and the word before it.
     let script = r#"source "$1"; shift
         COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
         _weeder "$1" "${@: -1}" "${@: -2:1}"
@@ -42,7 +42,7 @@ fn bash_completes_presets_crops_and_what_an_axis_can_be() {
     assert_eq!(offered_by_bash(&["weeder", "sweep", "--x", "lead_"]), ["lead_out_ms=", "lead_in_ms="]);
     assert_eq!(offered_by_bash(&["weeder", "sweep", "--y", "ground.slip_p"]), ["ground.slip_percent="]);
     assert_eq!(offered_by_bash(&["weeder", "train", "--crop", "m"]), ["maize"]);
-    // Where no name fits, bash offers files.
+    // If no name matches, bash offers files.
     assert_eq!(offered_by_bash(&["weeder", "trial", "--field", "my-f"]), [""]);
 }
 

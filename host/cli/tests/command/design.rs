@@ -1,4 +1,4 @@
-//! `weeder design`, as it is called.
+//! `weeder design` as a user runs it.
 
 use crate::common::{assert_refused, said};
 use serde_json::Value;
@@ -16,7 +16,7 @@ fn folder_with(machine: &str) -> TempDir {
     folder
 }
 
-/// What it prints for this machine, with these arguments more.
+/// The output for this machine, with further arguments.
 #[track_caller]
 fn printed(machine: &str, arguments: &[&str]) -> String {
     said(folder_with(machine).path(), &[&["design", "--machine", "my.toml"], arguments].concat())
@@ -144,8 +144,8 @@ fn a_file_that_does_not_exist_is_named() {
 fn the_swing_comes_as_settings_for_the_firmware() {
     let machine = "[intra_row]\nwidth = \"55 mm\"\nblade_height = \"5 mm\"\n";
     let words = printed(machine, &[]);
-    // 95 + 10 + 27.5 mm of an arm of 350 are 22.2 degrees, 247 us, told as 250: 22.5 degrees, half of what 45 take. The soil
-    // takes 19.7 of 60 kg cm, and two thirds of the speed are left.
+    // 95 + 10 + 27.5 mm of an arm of 350 are 22.2 degrees or 247 us, rounded to 250: 22.5 degrees, half of the pulse
+    // for 45. The soil takes 19.7 of 60 kg cm, which leaves two thirds of the speed.
     for line in [
         "The tool clears a canopy of 190 mm at 22.5 degrees, 250 us of the pulse away from the row.",
         "That takes 60 ms without load, and 89 ms against the soil, which takes 33 % of the servo's torque.",

@@ -1,4 +1,5 @@
-//! Where commands write: what cannot be written is said before the work, and costs no result after it.
+//! Outputs of commands: an output that cannot be written is an error before the work, and never loses a result after
+//! it.
 
 use crate::common::{self, SMALL};
 use std::fs;
@@ -11,7 +12,7 @@ fn weeder(folder: &Path, arguments: &[&str]) -> Output {
     common::weeder(folder, arguments)
 }
 
-/// Arguments that name something to write, without it; the tests in `main.rs` have all of them.
+/// The arguments that name an output, without its name. The tests in `main.rs` have all of them.
 const WRITERS: [(&[&str], Kind); 13] = [
     (&["trial", "--field", "small.toml", "--out"], Kind::Folder),
     (&["evaluate", concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv"), "--out"], Kind::Folder),
@@ -60,7 +61,7 @@ fn a_folder_is_no_file_and_a_file_is_no_folder() {
                 fs::write(folder.path().join("report"), "mine").unwrap();
                 ("report", "report is a file, and a folder has to be named")
             }
-            // A log is gone on with, and says so itself.
+            // An existing log is continued, and has its own error.
             Kind::File("log.csv") => continue,
             Kind::File(name) => {
                 fs::create_dir(folder.path().join(name)).unwrap();
@@ -91,7 +92,7 @@ fn a_folder_called_report_where_the_command_is_typed_keeps_it_from_nothing() {
             assert!(folder.path().join(&out).join("report.html").is_file(), "{arguments:?} {out}");
         }
     }
-    // What stands in the way of a file is said before the work.
+    // An obstacle to a file is reported before the work.
     fs::create_dir_all(folder.path().join("old/trial.csv")).unwrap();
     let output = weeder(folder.path(), &[WRITERS[0].0, &["old"]].concat());
     let message = String::from_utf8_lossy(&output.stderr);
@@ -99,7 +100,7 @@ fn a_folder_called_report_where_the_command_is_typed_keeps_it_from_nothing() {
 }
 
 #[test]
-fn the_table_is_printed_whatever_happens_to_the_file() {
+fn the_table_is_printed_even_if_the_file_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/full"];
     let output = weeder(folder.path(), &sweep);

@@ -1,4 +1,5 @@
-//! `weeder evaluate`, as it is called: on the manual's example, on trials that carry no model, and on tables that are wrong.
+//! `weeder evaluate` as a user runs it: on the manual's example, on trials that are too small for a model, and on wrong
+//! tables.
 
 use crate::common::{assert_refused, said};
 use serde_json::Value;

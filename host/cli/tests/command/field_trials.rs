@@ -14,7 +14,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Asserts that it is refused with these words, and that nothing was written.
+/// Asserts that the command fails with these words, and that nothing was written.
 #[track_caller]
 fn assert_writes_nothing(arguments: &[&str], words: &str) {
     let folder = folder();

@@ -1,7 +1,6 @@
-//! The product on its way onto an Uno: `weeder flash` with the real avrdude, the real bootloaders in `weeder virtual-uno`, and what
-//! is said where something is not as it should be.
+//! Flashing: `weeder flash` with the real avrdude and the real bootloaders in `weeder virtual-uno`, and its errors.
 //!
-//! Waits end when what is waited for has come; how long that takes on a busy host says nothing.
+//! The tests wait for results, not for fixed times, because a busy PC may be slow.
 
 use std::fs;
 use std::io::{BufRead, BufReader, ErrorKind, Write};
@@ -14,10 +13,10 @@ use trial::firmware;
 use uno::elf::Image;
 use uno::pty::Pty;
 
-/// Debian's arduino-core-avr has them here; setup.sh installs it.
+/// Path in Debian's arduino-core-avr, which setup.sh installs.
 const BOOTLOADERS: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders";
 
-/// No answer after so long is none: a hundred times what a busy host takes.
+/// Timeout of an answer: a hundred times the time on a busy PC.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 fn weeder() -> Command {
@@ -36,13 +35,13 @@ fn assert_refused(output: &Output, words: &str) {
     assert!(message.contains(words), "{message}");
 }
 
-/// `weeder virtual-uno` in a process of its own.
+/// `weeder virtual-uno` in its own process.
 struct VirtualUno {
     process: Child,
 }
 
 impl VirtualUno {
-    /// Starts it, and waits until its port is there.
+    /// Starts it, and waits for its port.
     #[track_caller]
     fn start(arguments: &[&Path]) -> VirtualUno {
         let mut process =
@@ -54,7 +53,7 @@ impl VirtualUno {
         VirtualUno { process }
     }
 
-    /// Ends it as Ctrl-C does, and returns whether it ended well.
+    /// Ends it by Ctrl-C. Returns whether it succeeded.
     fn interrupt(mut self) -> bool {
         let id = self.process.id().to_string();
         assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill is there").success());
@@ -70,7 +69,7 @@ impl Drop for VirtualUno {
     }
 }
 
-/// Reads until one of these texts has come, and returns all of it.
+/// Reads until one of these texts has come. Returns the whole text.
 #[track_caller]
 fn read_until(port: &mut dyn serialport::SerialPort, texts: &[&str]) -> String {
     let mut heard = Vec::new();
@@ -85,8 +84,8 @@ fn read_until(port: &mut dyn serialport::SerialPort, texts: &[&str]) -> String {
     String::from_utf8_lossy(&heard).into_owned()
 }
 
-/// Optiboot, the Uno's bootloader, from the sources that arduino-core-avr brings along: the file that Debian has made of them
-/// is longer than its boot section.
+/// Optiboot, the Uno's bootloader, compiled from the sources in arduino-core-avr. Debian's compiled file is longer than
+/// its boot section.
 fn optiboot(folder: &Path) -> PathBuf {
     let (elf, hex) = (folder.join("optiboot.elf"), folder.join("optiboot.hex"));
     let mut compiler = Command::new("avr-gcc");
@@ -102,8 +101,8 @@ fn optiboot(folder: &Path) -> PathBuf {
     hex
 }
 
-/// Has `weeder flash` flash an Uno. On a busy host avrdude may come too late for the bootloader's window; a user would try again,
-/// too.
+/// Flashes an Uno with `weeder flash`. On a busy PC avrdude may miss the bootloader's time window, so this tries again,
+/// as a user would.
 #[track_caller]
 fn flash(port: &Path, arguments: &[&str]) {
     let flashed = (0..5).any(|_| {
@@ -113,9 +112,9 @@ fn flash(port: &Path, arguments: &[&str]) {
     assert!(flashed, "avrdude's own words stand above");
 }
 
-/// Asserts that the firmware greets who opens the port, once the bootloader has waited, and answers. On a busy host the greeting of the run
-/// before may be read before the opening is noticed; what is typed then is lost in the reset, and typed again at the next greeting, as
-/// `weeder` does.
+/// Asserts that the firmware greets the program that opens the port, after the bootloader's wait, and answers. On a
+/// busy PC the greeting of the previous run may be read before the Uno is reset. Lines that are typed then are lost,
+/// and are typed again after the next greeting, as `weeder` does.
 #[track_caller]
 fn assert_talks(link: &Path) {
     const GREETING_ENDS: &str = "help lists the commands\r\n";
@@ -133,7 +132,7 @@ fn assert_talks(link: &Path) {
     assert!(read_until(&mut *port, &["ok\r\n"]).contains("tool=out"));
 }
 
-/// An ELF for the chip that takes so many bytes of flash.
+/// An ELF for the chip with this number of bytes in flash.
 fn elf_of(folder: &Path, bytes: usize) -> PathBuf {
     let (source, elf) = (folder.join("filler.S"), folder.join("filler.elf"));
     fs::write(&source, format!(".space {bytes}\n")).unwrap();
@@ -192,7 +191,7 @@ fn a_firmware_that_reaches_into_the_old_bootloader_is_refused() {
     assert_refused(&flash(&[]), "avrdude cannot be started: ./setup.sh installs it");
 }
 
-/// A program in a folder that does this in the place of avrdude.
+/// A script that replaces avrdude.
 fn avrdude(folder: &Path, script: &str) {
     let avrdude = folder.join("avrdude");
     fs::write(&avrdude, format!("#!/bin/sh\n{script}")).unwrap();
@@ -200,11 +199,11 @@ fn avrdude(folder: &Path, script: &str) {
 }
 
 #[test]
-fn an_elf_whose_bounds_are_not_proved_goes_nowhere_unless_somebody_insists() {
+fn an_elf_with_unproved_bounds_is_flashed_only_with_unproved() {
     let folder = tempfile::tempdir().unwrap();
     let pty = Pty::open().unwrap();
     let elf = elf_of(folder.path(), 100);
-    // What stands beside the ELF is the user's.
+    // Files beside the ELF belong to the user.
     fs::write(elf.with_extension("hex"), "mine").unwrap();
     avrdude(folder.path(), "echo \"$@\" >\"${0%/*}/called\"");
     let called = folder.path().join("called");
@@ -369,7 +368,7 @@ fn the_hex_file_holds_what_the_elf_does() {
     let out = folder.path().join("weeder.hex");
     let output = weeder().arg("hex").arg(&out).arg("--elf").arg(&elf).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    // Taken apart by binutils, which has not written it.
+    // Converted by binutils, an independent program.
     let binary = folder.path().join("weeder.bin");
     let mut objcopy = Command::new("avr-objcopy");
     objcopy.args(["-I", "ihex", "-O", "binary"]).args([&out, &binary]);

@@ -1,4 +1,4 @@
-//! The host's tools over a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
+//! The host tools at a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
 
 use crate::typed::{printed, typed};
 use field::conditions::Conditions;
@@ -18,7 +18,7 @@ fn lines_of(log: &Path, kind: &str) -> usize {
     text.lines().filter(|line| line.split(',').nth(1) == Some(kind)).count()
 }
 
-/// Says a line to whoever listens to this receiver until the log has so many lines of a kind.
+/// Sends a line to all clients of this receiver, until the log has this number of lines of a kind.
 #[track_caller]
 fn say_until(receiver: Option<&mut Pty>, log: &Path, kind: &str, count: usize) {
     const GGA: &[u8] = b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\r\n";
@@ -75,7 +75,7 @@ fn a_receiver_that_is_unplugged_and_plugged_in_again_goes_on_in_the_record() {
     assert_eq!((map["type"].as_str(), map["features"].as_array().map(Vec::len)), (Some("FeatureCollection"), Some(0)));
 }
 
-/// A virtual Uno at rest that runs as fast as it can.
+/// A virtual Uno at rest that runs at full speed.
 fn uno() -> Background<LiveUno> {
     let setup = Setup {
         elf: Some(firmware::build().expect("the firmware builds")),
@@ -119,11 +119,11 @@ fn settings_are_pulled_changed_compared_and_pushed() {
     let again = printed(&weeder(&["settings", "push", name, "--json"], uno.path(), ""), 0);
     let again: serde_json::Value = serde_json::from_str(&again).expect("it is JSON");
     assert_eq!(again, serde_json::json!({ "set": [], "saved": true }));
-    // Each of these opened the port anew, which is a reset: what was saved is still there.
+    // Each of these opened the port again, which resets the Uno. The saved settings are still there.
     printed(&weeder(&["settings", "diff", name], uno.path(), ""), 0);
     let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
     assert!(json.contains("\"wheel_mm\": 405") && json.contains("\"end_switch\": false"), "{json}");
-    // Replaced when it is told to, with its comments.
+    // `--force` replaces it, and keeps its comments.
     fs::write(&file, "wheel_mm = 390 # measured\n").expect("it can be written");
     printed(&weeder(&["settings", "pull", name, "--force"], uno.path(), ""), 0);
     let text = fs::read_to_string(&file).expect("it is there");
@@ -136,7 +136,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let [taught, again] = ["taught.csv", "again.csv"].map(|name| folder.path().join(name));
     let [taught, again] = [&taught, &again].map(|path| path.to_str().expect("it is text"));
-    // Stalks, which the built-in examples take for weeds, and the weeds beside them.
+    // Stalks, which the built-in examples classify as weeds, and the weeds beside them.
     let heading = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n";
     let table = format!("{heading}278,250,300,120,459,plant\n278,100,300,108,447,weed\n278,100,300,108,447,weed\n");
     fs::write(taught, &table).expect("it can be written");
@@ -151,7 +151,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     let pushed: serde_json::Value = serde_json::from_str(&pushed).expect("it is JSON");
     assert_eq!(pushed, serde_json::json!({ "taught": 0, "forgotten": 0 }));
 
-    // Each of these opened the port anew, which is a reset.
+    // Each of these opened the port again, which resets the Uno.
     printed(&weeder(&["examples", "diff", taught], uno.path(), ""), 0);
     printed(&weeder(&["examples", "pull", again, "--force"], uno.path(), ""), 0);
     printed(&weeder(&["examples", "push", again, "--force"], other.path(), ""), 0);
@@ -298,7 +298,7 @@ fn a_session_is_logged_and_replayed() {
     let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", log]).output().expect("it ends");
     let replayed = printed(&output, 0);
     assert!(replayed.contains("0 objects, 0 alarms and 2 swings"), "{replayed}");
-    // Opened again, it is gone on with.
+    // An existing log is continued.
     printed(&weeder(&["monitor", "--plain", "--log", log], uno.path(), ""), 0);
     assert_eq!(fs::read_to_string(log).expect("it is there").matches(",connected,").count(), 2);
 }
@@ -350,7 +350,7 @@ fn a_recording_survives_an_uno_that_is_unplugged_and_ends_by_ctrl_c() {
         .stderr(Stdio::null())
         .spawn()
         .expect("cargo has built the command");
-    // Waits for what the log shows; the test's own time limit is the test program's.
+    // Waits for lines in the log. The test runner has the time limit.
     let wait_for = |what: &str, count: usize| {
         for _ in 0..1200 {
             if fs::read_to_string(&log).is_ok_and(|text| text.matches(what).count() >= count) {
@@ -372,7 +372,7 @@ fn a_recording_survives_an_uno_that_is_unplugged_and_ends_by_ctrl_c() {
     assert_eq!(weeder.wait().expect("it ends").code(), Some(0));
     let text = fs::read_to_string(&log).expect("it is there");
     assert!(text.ends_with('\n'));
-    // Gone on with, it counts what was added and what is there.
+    // A continued log counts the new lines and all lines.
     let words = ["record", "--out", log.to_str().expect("it is text")];
     let mut weeder = Command::new(env!("CARGO_BIN_EXE_weeder"))
         .args(words)

@@ -1,7 +1,7 @@
-//! The `weeder` command as a user calls it: what it prints, writes, refuses and does with the Unos at its ports.
+//! The `weeder` command as a user runs it: its output, files, errors, and its work with Unos at its ports.
 //!
-//! One file a subject. They are modules of one test program, so that it is linked once, and tests that wait for a machine leave the
-//! processor's cores to those that compute.
+//! Each file has one subject. All are modules of one test program, so that it is linked once. Tests that wait for a
+//! machine leave the cores to those that compute.
 
 mod any_file;
 mod bad_input;

@@ -1,9 +1,10 @@
-//! The manual holds: what README, the pages beside it and docs/ tell to type is typed here, and their links lead somewhere.
+//! Tests of the manual: the commands in the README, the pages beside it and docs/ are typed here, and links must lead
+//! to a target.
 //!
-//! In a block marked `sh`, every command of this repository is known, with its options, and those that need neither an
-//! Uno nor a minute are run. In a block marked `console`, every line behind `>` is typed into the virtual Uno and answered
-//! by `ok`; the lines between are said in that order, or the beginning of what is said. Where the reader would roll the
-//! machine, the virtual Uno rolls.
+//! In a block marked `sh`, every command of this repository must exist with its options. Those that need neither an Uno
+//! nor a minute are run. In a block marked `console`, every line behind `>` is typed into the virtual Uno and must be
+//! answered by `ok`. The lines between must come in that order, at least their beginnings. The virtual Uno rolls where
+//! the reader would roll the machine.
 
 use field::machine::{Machine, cycle_at};
 use field::motion::Motion;
@@ -22,7 +23,7 @@ use uno::Uno;
 /// The repository's folder.
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
-/// Objects as `dump` prints them, for the commands that learn of them.
+/// Detections as `dump` prints them, for the commands that train from them.
 const OBJECTS: &str = "\
 speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
 555,550,350,250,600,plant,3,plant
@@ -35,7 +36,7 @@ speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label
 555,310,350,106,456,weed,3,weed
 ";
 
-/// Programs that are not of this repository; what they do with their options is their business.
+/// Programs outside this repository. Their options are not checked.
 const FOREIGN: [&str; 7] = ["avrdude", "cp", "echo", "npm", "scontrol", "squeue", "sudo"];
 
 /// Subcommands that need neither an Uno nor much time.
@@ -73,7 +74,7 @@ impl Page {
         blocks
     }
 
-    /// The anchors of its headings, as the usual renderers of Markdown make them.
+    /// The anchors of its headings, as common renderers of Markdown make them.
     fn anchors(&self) -> Vec<String> {
         let headings = self.text.lines().filter(|line| line.starts_with('#'));
         let anchor = |heading: &str| {
@@ -85,13 +86,13 @@ impl Page {
     }
 }
 
-/// A command line's words up to its comment or to where its output goes.
+/// The words of a command line, up to its comment or redirection.
 fn words(line: &str) -> Vec<String> {
     let words = shlex::split(line).unwrap_or_else(|| panic!("unbalanced quotes: {line}"));
     words.into_iter().take_while(|word| word != ">").collect()
 }
 
-/// The aliases of .cargo/config.toml that run `weeder`, with the arguments that they give it.
+/// The aliases in .cargo/config.toml that run `weeder`, with their arguments.
 fn aliases() -> Vec<(String, Vec<String>)> {
     let config = fs::read_to_string(Path::new(ROOT).join(".cargo/config.toml")).expect("cargo is configured");
     let alias = |line: &str| {
@@ -102,7 +103,7 @@ fn aliases() -> Vec<(String, Vec<String>)> {
     config.lines().filter_map(alias).collect()
 }
 
-/// What a command line gives to `weeder`, if it runs it.
+/// The arguments for `weeder` in a command line, if it runs `weeder`.
 fn weeder_arguments(words: &[String]) -> Option<Vec<String>> {
     let (program, arguments) = words.split_first()?;
     match (program.as_str(), arguments) {
@@ -119,7 +120,7 @@ fn weeder_arguments(words: &[String]) -> Option<Vec<String>> {
     }
 }
 
-/// Runs `weeder` in a folder and returns what it said, if it went wrong.
+/// Runs `weeder` in a folder. Returns its output if it fails.
 fn complaint(folder: &Path, arguments: &[String]) -> Option<String> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     let output = command.current_dir(folder).args(arguments).output().expect("cargo has built the command");
@@ -128,7 +129,7 @@ fn complaint(folder: &Path, arguments: &[String]) -> Option<String> {
     (!matches!(output.status.code(), Some(0 | 1))).then_some(said)
 }
 
-/// The lines of all pages that are for a shell, as words.
+/// The shell commands of all pages, as words.
 fn shell_lines() -> Vec<(String, Vec<String>)> {
     let of_page = |page: &Page| -> Vec<(String, Vec<String>)> {
         let name = page.path.display();
@@ -147,7 +148,7 @@ fn every_command_in_the_manual_exists_with_its_options() {
     for (line, words) in shell_lines() {
         let known = if let Some(arguments) = weeder_arguments(&words) {
             seen += 1;
-            // Options are read before it gives help and ends.
+            // Options are parsed before `--help` ends the command.
             complaint(Path::new(ROOT), &[arguments, vec!["--help".to_owned()]].concat()).is_none()
         } else if words[0] == "cargo" {
             of_cargo.lines().any(|listed| listed.split_whitespace().next() == words.get(1).map(String::as_str))
@@ -175,7 +176,7 @@ fn the_readme_s_first_screen_has_both_ways_in_to_be_copied_as_a_whole_and_the_ga
         let block = ["<!-- from nothing -->", "```sh", command, "```"];
         assert!(screen.windows(block.len()).any(|lines| lines == block), "{command} is not a block of its own");
     }
-    // All tests are run there, and nowhere else.
+    // This step of the gate runs all tests, and no other step does.
     let gate = fs::read_to_string(Path::new(ROOT).join(".ci/run")).expect("there is a gate");
     let steps: Vec<&str> = gate.lines().filter(|line| line.starts_with("step ")).collect();
     assert!(steps.iter().any(|step| step.ends_with("env WEEDER_THOROUGH=1 .ci/from-nothing")), "{steps:?}");
@@ -210,7 +211,7 @@ fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
     }
 }
 
-/// All files in a folder and those below.
+/// All files in a folder and its subfolders.
 fn files_below(folder: &Path, files: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("it is a folder") {
         let path = entry.expect("it can be read").path();
@@ -233,7 +234,7 @@ fn every_file_that_contributing_and_the_page_of_the_sources_name_is_there() {
     let names: Vec<&str> = quoted.filter(|word| ends.iter().any(|end| word.ends_with(end))).collect();
     assert!(names.len() > 80, "only {} names were found", names.len());
     for name in names {
-        // Beside one that was named in full, a name alone does.
+        // After a full path, the bare name of another file is enough.
         let is_there = root.join(name).is_file() || files.iter().any(|file| file.ends_with(name));
         assert!(is_there, "there is no {name}");
     }
@@ -279,7 +280,7 @@ fn every_console_line_in_the_manual_is_answered_by_ok_and_by_what_stands_there()
     assert!(typed > 30, "only {typed} lines were found");
 }
 
-/// Waits for a line that begins like this, and drops it with what was said before it.
+/// Waits for a line with this beginning. Drops it and the lines before it.
 #[track_caller]
 fn expect(uno: &mut Uno, said: &mut String, line: &str, place: &str) {
     const PATIENCE_S: u64 = 15;
@@ -299,7 +300,7 @@ fn expect(uno: &mut Uno, said: &mut String, line: &str, place: &str) {
     panic!("{place}: that is not said, but {said:?}");
 }
 
-/// Rolls on by so much at a walking pace, past a plant in the middle, with a wheel that is a little worn.
+/// Rolls on by a distance at walking pace, past a plant in the middle, with a slightly worn wheel.
 fn roll(uno: &mut Uno, distance_mm: f64) {
     const SPEED_MM_S: f64 = 1000.0;
     const ACCELERATION_MM_S2: f64 = 2000.0;
@@ -317,7 +318,7 @@ struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It may have ended by itself, which the test has noticed.
+        // It may have ended already; the test has noticed that.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

@@ -1,11 +1,12 @@
-//! `weeder plan`, as it is called: what it draws can be filled in by hand, and `weeder evaluate` judges it.
+//! `weeder plan` as a user runs it: its table can be filled in by hand, and `weeder evaluate` evaluates it.
 
 use crate::common::{assert_refused, said};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// The table with every empty cell filled in: more damage and more weeds left the faster, and a good block and a bad one.
+/// The table with every empty cell filled in. Damage and remaining weeds rise with speed. One block is good and one is
+/// bad.
 fn filled_in(table: &str) -> String {
     let fill = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();

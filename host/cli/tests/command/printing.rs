@@ -1,4 +1,4 @@
-//! What becomes of what a command prints: a reader that has seen enough, a disk that is full, a terminal that is interrupted.
+//! Tests of output: a reader that closes the pipe, a full disk, and an interrupted terminal.
 
 use crate::common::SMALL;
 use std::fs::{File, OpenOptions};
@@ -9,13 +9,13 @@ use std::thread::sleep;
 use std::time::Duration;
 use uno::pty::Pty;
 
-/// Objects, none of which would be cut.
+/// Detections. The tool cuts none of them.
 const OBJECTS: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\n694,500,226,250,573,plant\n";
 
 /// The manual's example of a trial.
 const TRIAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
 
-/// Commands of each kind that need no firmware, with what they say.
+/// Commands of each kind that need no firmware, with a part of their output.
 const COMMANDS: [&[&str]; 10] = [
     &["design"],
     &["design", "--json"],
@@ -39,7 +39,7 @@ fn weeder(arguments: &[&str], stdout: impl Into<Stdio>) -> Output {
 }
 
 #[test]
-fn whoever_closes_the_pipe_early_ends_no_command_badly() {
+fn a_pipe_that_is_closed_early_makes_no_command_fail() {
     for arguments in COMMANDS {
         let (reader, writer) = io::pipe().unwrap();
         drop(reader);
@@ -80,7 +80,7 @@ fn ctrl_c_takes_the_progress_bar_away() {
         .expect("cargo has built the command");
     let mut shown = Vec::new();
     let mut read = |until: &dyn Fn(&str) -> bool| {
-        // The end of the wait is the test program's own.
+        // The test runner has the time limit.
         loop {
             let mut buffer = [0; 4096];
             let count = terminal.read(&mut buffer).unwrap();
@@ -116,7 +116,7 @@ fn dash_is_standard_input_wherever_a_file_is_read() {
     assert_eq!(run(&["classify", "-"], OBJECTS).0, Some(0));
     assert_eq!(run(&["evaluate", "-"], &std::fs::read_to_string(TRIAL).unwrap()).0, Some(0));
     assert_eq!(run(&["design", "--machine", "-"], "weeder.mass = \"130 kg\"").0, Some(0));
-    // These are read, and refused for what stands there.
+    // These are read, and refused for their content.
     for (arguments, wrong) in [
         (&["sim", "--row", "-"][..], "the column `position_mm` is missing"),
         (&["train", "-"], "the column `speed_mm_s` is missing"),

@@ -1,7 +1,8 @@
-//! `weeder serve` as a phone finds it: the real process at a real `weeder virtual-uno`, asked over http by good and bad clients.
+//! `weeder serve` from a phone's side: the real process with a real `weeder virtual-uno`, and good and bad http
+//! clients.
 //!
-//! 127.0.0.2 stands for the computer's address in the network: what comes in there is the network's, whoever sent it. Waits end when
-//! what is waited for has come.
+//! 127.0.0.2 stands for the computer's address in the network: every request to it counts as a request from the
+//! network. The tests wait for results, not for fixed times.
 
 use serde_json::Value;
 use socket2::{Domain, Socket, Type};
@@ -19,13 +20,13 @@ use ureq::Agent;
 
 mod attacks;
 
-/// No answer after so long is none: a hundred times what a busy host takes.
+/// Timeout of an answer: a hundred times the time on a busy PC.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Time between two looks.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Bytes of the page's script here: more than anybody keeps for a client that does not read.
+/// Bytes of the page's script here: more than the buffers for a client that does not read.
 const SCRIPT_BYTES: usize = 8 << 20;
 
 /// The address in the network, and the options that serve there.
@@ -39,7 +40,7 @@ fn weeder() -> Command {
 struct Running(Child);
 
 impl Running {
-    /// Ends it as Ctrl-C does.
+    /// Ends it by Ctrl-C.
     fn interrupt(mut self) {
         let id = self.0.id().to_string();
         assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill is there").success());
@@ -55,7 +56,7 @@ impl Drop for Running {
     }
 }
 
-/// A folder with a page in it, and with the ports' names.
+/// A folder with a page and a file of the ports' names.
 fn folder() -> TempDir {
     let folder = TempDir::new().expect("there is room for a folder");
     fs::create_dir(folder.path().join("page")).expect("it can be written to");
@@ -87,12 +88,12 @@ struct Served {
     here: String,
     lan: String,
     code: String,
-    /// What it has told the operator.
+    /// The output for the operator.
     told: Arc<Mutex<String>>,
     agent: Agent,
 }
 
-/// Serves these ports, the network's door with them.
+/// Serves these ports, also in the network.
 fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
     let mut serve = weeder();
     serve.arg("serve").args(["--http-port", "0", "--page"]).arg(folder.path().join("page")).args(LAN).args(options);
@@ -111,7 +112,7 @@ fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
     let (heard, stderr) = (Arc::clone(&told), process.stderr.take().expect("it is piped"));
     thread::spawn(move || {
         for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-            heard.lock().expect("nobody died").push_str(&(line + "\n"));
+            heard.lock().expect("no thread has panicked").push_str(&(line + "\n"));
         }
     });
     let agent = Agent::config_builder().http_status_as_error(false).max_redirects(0).timeout_global(Some(PATIENCE));
@@ -119,9 +120,9 @@ fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
 }
 
 impl Served {
-    /// Whether the operator has been told this.
+    /// Whether the output for the operator contains these words.
     fn has_told(&self, words: &str) -> bool {
-        self.told.lock().expect("nobody died").contains(words)
+        self.told.lock().expect("no thread has panicked").contains(words)
     }
 
     #[track_caller]
@@ -132,17 +133,17 @@ impl Served {
             }
             thread::sleep(LOOK);
         }
-        panic!("{words:?} is not told, but {:?}", self.told.lock().expect("nobody died"));
+        panic!("{words:?} is not told, but {:?}", self.told.lock().expect("no thread has panicked"));
     }
 
-    /// Looks at a path of a host: the status and what came.
+    /// Sends a GET request. Returns the status and the body.
     fn get(&self, host: &str, path: &str, cookie: &str) -> (u16, String) {
         let answer = self.agent.get(format!("http://{host}{path}")).header("Cookie", cookie).call();
         let mut answer = answer.expect("it answers");
         (answer.status().as_u16(), answer.body_mut().read_to_string().expect("it is text"))
     }
 
-    /// Sends something from the host's own page.
+    /// Sends a POST request as the host's own page does.
     fn post(&self, host: &str, path: &str, cookie: &str, body: &str) -> (u16, String) {
         let request = self.agent.post(format!("http://{host}{path}"));
         let request = request.header("Origin", format!("http://{host}")).header("Cookie", cookie);
@@ -155,7 +156,7 @@ impl Served {
         self.post(host, "/machines/0/command", cookie, line)
     }
 
-    /// Sends a code; the cookie, where it was right.
+    /// Sends a code. Returns also the cookie, if it was right.
     fn try_code(&self, code: &str) -> (u16, String, Option<String>) {
         let request =
             self.agent.post(format!("http://{}/pair", self.lan)).header("Origin", format!("http://{}", self.lan));
@@ -174,7 +175,7 @@ impl Served {
         token.to_owned()
     }
 
-    /// A machine that is there and holds, its settings saved: what a new board's alarm is about.
+    /// Prepares a connected machine in HOLD: saves its settings, which clears a new board's alarm.
     fn make_ready(&self, machine: usize) {
         let mut events = Events::open(&self.here, "", 0);
         events.wait_for(|message| message["machine"] == machine && message["is"] == "status");
@@ -195,14 +196,14 @@ fn has(message: &Value, field: &str, words: &str) -> bool {
 struct Events(BufReader<TcpStream>);
 
 impl Events {
-    /// Listens, with room for so many bytes that are not read; 0: as the system has it.
+    /// Opens the event stream. `room` is the size of the receive buffer; 0 is the system's default.
     fn open(host: &str, cookie: &str, room: usize) -> Self {
         let mut stream = connect(host, room);
         write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\n\r\n").expect("it listens");
         Self(BufReader::new(stream))
     }
 
-    /// The next message; none where there are no more.
+    /// The next message. `None` at the end.
     fn next(&mut self) -> Option<Value> {
         loop {
             let mut line = String::new();
@@ -239,7 +240,7 @@ fn connect(host: &str, room: usize) -> TcpStream {
     socket.into()
 }
 
-/// Sends a request as it stands there, and returns the status.
+/// Sends a request unchanged. Returns the status.
 fn raw(address: &str, head: &str) -> u16 {
     let mut stream = connect(address, 0);
     stream.write_all(head.as_bytes()).expect("it listens");
@@ -263,7 +264,7 @@ const PATHS: [(&str, &str); 10] = [
 ];
 
 #[test]
-fn without_the_code_nobody_sees_or_does_anything() {
+fn without_the_code_a_phone_sees_nothing_and_does_nothing() {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
     let served = serve(&folder, &[&port], &[]);
@@ -306,14 +307,14 @@ fn of_a_hundred_wrong_codes_five_are_looked_at_and_the_operator_knows() {
     let served = serve(&folder, &[&port], &[]);
     let phone = served.pair();
     let statuses: Vec<u16> = (0..100).map(|number| served.try_code(&format!("{number:08}")).0).collect();
-    // A slow host sees the minute end, and five more.
+    // On a slow PC the minute may end, and five more tries follow.
     assert_eq!(statuses[..5], [403; 5]);
     let looked_at = statuses.iter().filter(|&&status| status == 403).count();
     assert!(looked_at % 5 == 0 && looked_at < 20 && statuses[5] == 429, "{statuses:?}");
     let (status, said, cookie) = served.try_code(&served.code);
     assert!(status == 429 && said.contains("too many wrong codes") && cookie.is_none(), "{status} {said}");
     served.wait_until_told("127.0.0.1 has sent a wrong code, the last of five: no code is taken for a minute");
-    // Whoever was paired before is not locked out.
+    // A phone that was paired before is not locked out.
     assert_eq!(served.get(&served.lan, "/machines", &phone).0, 200);
 }
 
@@ -402,7 +403,7 @@ fn a_paired_phone_watches_and_holds_and_nothing_else_unless_the_operator_allowed
             assert_eq!(served.command(&served.here, "", "start"), (200, "ok\n".to_owned()));
         }
         events.wait_for(|message| message["is"] == "event" && has(message, "line", "state is=work"));
-        // Whoever did not start it may hold it.
+        // A phone that did not start the machine may hold it.
         assert_eq!(served.command(&served.lan, &other, "hold"), (200, "ok\n".to_owned()));
         events.wait_for(|message| message["is"] == "event" && has(message, "line", "state is=hold"));
         served.process.interrupt();
@@ -416,7 +417,7 @@ fn memory_kb(process: &Running) -> usize {
     line.split_whitespace().nth(1).and_then(|number| number.parse().ok()).expect("it is a number")
 }
 
-/// All that comes until the other side lets go.
+/// All bytes until the other side closes.
 fn bytes_to_the_end(mut stream: impl Read) -> usize {
     let mut buffer = vec![0; 1 << 16];
     let mut count = 0;
@@ -447,12 +448,12 @@ fn clients_that_never_read_are_let_go_of_and_hold_up_neither_the_machine_nor_the
     let mut asking = connect(&served.lan, LITTLE);
     write!(asking, "GET /page.js HTTP/1.1\r\nHost: {}\r\nCookie: {phone}\r\n\r\n", served.lan).expect("it listens");
 
-    // And one that never ends what it says.
+    // And one that never ends its request.
     let mut beginning = connect(&served.lan, LITTLE);
     write!(beginning, "GET /pair.js HTTP/1.1\r\nHost: ").expect("it listens");
 
     assert_eq!(served.command(&served.here, "", "plot on").0, 200);
-    // Several times what is kept for one that does not read.
+    // Several times the buffers for a client that does not read.
     let (mut heard, mut turns) = (0, 0);
     while heard < 200_000 {
         heard += watching.next().expect("it goes on").to_string().len();
@@ -470,7 +471,7 @@ fn clients_that_never_read_are_let_go_of_and_hold_up_neither_the_machine_nor_the
     let bytes = bytes_to_the_end(asking);
     assert!(bytes < SCRIPT_BYTES / 2, "{bytes} bytes came late");
     assert!(bytes_to_the_end(beginning) < 1000);
-    // And it may come again.
+    // And it may connect again.
     Events::open(&served.lan, &phone, 0).wait_for(|message| message["is"] == "there");
 }
 

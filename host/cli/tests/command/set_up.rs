@@ -19,7 +19,7 @@ use trial::live::{Course, Live, LiveUno, Setup};
 /// The page of the manual.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");
 
-/// Which of all the possible fields and measurements.
+/// Selects the random fields and measurements.
 const SEED: u64 = 1;
 
 /// The firmware in a field at 2.5 km/h.
@@ -33,8 +33,8 @@ fn weeded(conditions: &Conditions, replications: u32) -> Total {
     totals(&experiment.run(&Engine::Native, |_| ()).expect("it can be weeded"))[0]
 }
 
-/// Every machine that comes of doing these steps in every order, with what was done: any of them may be the last that is done, so that
-/// those that leave steps out are among them.
+/// Every machine after any set of these steps in any order. Each step may be the last, so sets that leave steps out are
+/// included.
 fn follow_all(
     novice: &Novice,
     rest: &[ManualStep],
@@ -58,7 +58,7 @@ fn follow_all(
 
 #[test]
 fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_nor_more_than_a_zone_in_2000_reached() {
-    // What the simulated machine is already like changes nothing, wherever it comes.
+    // A step that the simulated machine already fulfils changes nothing, in any order.
     let box_machine = Novice::new(Conditions::default(), SEED);
     let changes = |step: &ManualStep| {
         step.tasks.iter().any(|task| match *task {
@@ -71,7 +71,8 @@ fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_nor_
     let mut found = BTreeMap::new();
     found.insert(String::new(), (box_machine.conditions.clone(), Vec::new()));
     follow_all(&box_machine, &steps, &mut Vec::new(), &mut found);
-    // Each set of steps, some of them in several orders that end in other settings: what is weeded depends on the settings alone.
+    // Each set of steps, some in several orders with different settings: the weeded ground depends on the settings
+    // only.
     assert!(found.len() > 1 << (steps.len() - 1), "{}", found.len());
     for (conditions, done) in found.into_values() {
         let total = weeded(&conditions, 10);
@@ -86,7 +87,7 @@ fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_nor_
 
 #[test]
 fn a_lead_that_is_too_short_for_the_stroke_would_be_seen() {
-    // What was printed once as an example, with a margin that measurements of the same machine never ask for.
+    // An earlier example in the manual had a margin that measurements of the same machine never give.
     let mut conditions = Conditions::default();
     for (setting, value) in [("lead_out_ms", 180.0), ("ticks_per_m", 2010.0), ("margin_mm", 20.0)] {
         conditions.set(setting, value).expect("it is in its range");
@@ -133,7 +134,7 @@ fn the_page_and_the_design_give_the_same_numbers() {
     let folder = TempDir::new().expect("there is room for a folder");
     fs::write(folder.path().join("my.toml"), machine).expect("there is room for a file");
     let printed = said(folder.path(), &["design", "--machine", "my.toml"]);
-    // Its margin is that of a machine of which nothing was measured: the page's follows from measurements.
+    // Nothing was measured on this machine, so it has the default margin. The page's margin comes from measurements.
     let set_lines: Vec<&str> =
         printed.lines().filter(|line| line.starts_with("set ") && !line.starts_with("set margin_mm ")).collect();
     let of_a_step = |step: &ManualStep| -> Vec<String> {
@@ -184,7 +185,7 @@ fn the_terminal_leads_through_the_steps_is_stopped_and_goes_on() {
         printed(&typed(&mut command, input), 0)
     };
     weeder(&["monitor", "--plain"], "save\nclear\nset end_switch on\nsave\n");
-    // An answer for each question of each step, as the page has them: parts are fitted, and values are the manual's.
+    // An answer for each question of each step, as on the page: fit the parts, and take the manual's values.
     let mut answers = Vec::new();
     for step in steps() {
         let mut input = "\n".to_owned();

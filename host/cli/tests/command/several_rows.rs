@@ -1,4 +1,4 @@
-//! The host's tools with several rows, as a user runs them, with virtual Unos at their ports.
+//! The host tools with several rows, as a user runs them, with virtual Unos at their ports.
 
 use crate::typed::{printed, typed};
 use std::fs;
@@ -11,7 +11,7 @@ use trial::firmware;
 use trial::live::rows::{LiveRows, Mishap};
 use trial::live::{Background, Live, Setup};
 
-/// Rows that stand, their ports linked in a folder as `row0` and so on.
+/// Standing rows. A folder has links to their ports: `row0` and so on.
 fn rows(folder: &TempDir, count: usize) -> Background<LiveRows> {
     let elf = firmware::build().expect("the firmware builds");
     let setup =
@@ -23,7 +23,7 @@ fn port(folder: &TempDir, number: usize) -> PathBuf {
     folder.path().join(format!("row{number}"))
 }
 
-/// A file with the names of so many rows.
+/// A file with the names of these rows.
 fn named(folder: &TempDir, count: usize) -> String {
     let file = folder.path().join("rows.toml");
     let file = file.to_str().expect("it is text").to_owned();
@@ -111,7 +111,7 @@ fn settings_of_several_rows_are_pulled_pushed_and_compared_and_the_row_that_fail
     let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!([&json["left"]["wheel_mm"], &json["right"]["wheel_mm"]], [400, 405]);
 
-    // One is not there: the others have it done, and it is named.
+    // One row is unplugged. The others succeed, and the output names it.
     machine.happen(1, Mishap::Unplugged);
     while port(&folder, 1).exists() {
         sleep(Duration::from_millis(10));
@@ -208,7 +208,7 @@ fn of_several_rows_each_has_a_log_and_one_that_is_unplugged_and_back_is_told_in_
     let weeder = command(&["record", "--out", out, "--all", "--rows-file", &file]).spawn().expect("it is built");
     let mut weeder = Running(weeder);
     let text = |name: &str| fs::read_to_string(logs.join(format!("{name}.csv"))).unwrap_or_default();
-    // Waits for what a log shows; the test's own time limit is the test program's.
+    // Waits for lines in a log. The test runner has the time limit.
     let wait_for = |name: &str, what: &str, count: usize| {
         for _ in 0..2400 {
             if text(name).matches(what).count() >= count {

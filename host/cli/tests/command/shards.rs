@@ -1,4 +1,5 @@
-//! `--shard` and `weeder merge`: the parts of a study give the bytes of an undivided one, and what is no whole study is refused.
+//! `--shard` and `weeder merge`: the merged parts of a study equal the undivided study byte by byte. Incomplete studies
+//! are refused.
 
 use crate::common::{SMALL, assert_refused, said, weeder};
 use model_test::is_thorough;
@@ -19,7 +20,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Has a study computed in `of` shards, each to the part `I.part`, the last one first.
+/// Computes a study in `of` shards, each to the part `I.part`, the last one first.
 #[track_caller]
 fn compute_parts(folder: &Path, study: &[&str], of: u32) {
     for number in (1..=of).rev() {
@@ -28,8 +29,7 @@ fn compute_parts(folder: &Path, study: &[&str], of: u32) {
     }
 }
 
-/// Asserts that four parts of a study, shown in this way, give what the undivided study gives: what is printed, the status, and these
-/// files.
+/// Asserts that four parts of a study give the same output, status and files as the undivided study.
 #[track_caller]
 fn assert_same(study: &[&str], shown: &[&str], files: &[&str]) {
     let (single, merged) = (folder(), folder());
@@ -82,7 +82,7 @@ fn more_shards_than_plots_are_a_whole_study_too() {
     assert_eq!(merged.stdout, weeder(folder.path(), &trial).stdout);
 }
 
-/// Asserts that it is refused with these words, and that no report was written.
+/// Asserts that the command fails with these words, and that no report was written.
 #[track_caller]
 fn assert_reports_nothing(folder: &Path, arguments: &[&str], words: &str) {
     assert_refused(folder, arguments, words);
@@ -153,13 +153,13 @@ fn what_does_not_go_with_parts_is_refused() {
 }
 
 #[test]
-fn a_shard_that_is_killed_leaves_no_file_and_computes_the_same_when_it_starts_anew() {
+fn a_shard_that_is_killed_leaves_no_file_and_computes_the_same_when_it_is_restarted() {
     let folder = folder();
     let path = folder.path();
     let endless = ["soak", "--hours", "10000", "--uno-minutes", "0", "--shard", "1/2", "--out", "1.part"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     let mut shard = command.current_dir(path).args(endless).spawn().expect("cargo has built the command");
-    // However far it has come: it would take hours.
+    // At any progress: it would take hours.
     thread::sleep(Duration::from_millis(500));
     assert!(shard.try_wait().unwrap().is_none(), "it computes");
     shard.kill().unwrap();

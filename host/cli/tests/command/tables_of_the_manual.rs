@@ -1,7 +1,7 @@
-//! What stands in the manual and follows from the code: the wiring, every setting, what to do about every alarm, and the
-//! simulated field; and what the classifier's page has of the figures that `weeder figures` writes.
+//! The parts of the manual that follow from the code: the wiring, every setting, the advice for every alarm, the
+//! simulated field, and the classifier's figures in the output of `weeder figures`.
 //!
-//! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test command tables` updates it.
+//! `UPDATE_EXPECT=1 cargo test -p weeder-cli --test command tables` updates them.
 
 use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
@@ -24,7 +24,7 @@ fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
     [before, &begin, "\n", part, "\n", &end, after].concat()
 }
 
-/// All events, and what their lines tell.
+/// All events, and their values.
 fn events() -> String {
     let mut table = "| event | value | meaning |\n| --- | --- | --- |\n".to_owned();
     for EventDescription { meaning, beginning, values, .. } in EVENTS {
@@ -63,7 +63,7 @@ fn texts(drawing: &str) -> Vec<(f64, f64, String)> {
 
 #[test]
 fn the_wiring_diagram_shows_the_pins_and_pull_ups_of_the_pin_table() {
-    /// Contacts are named left of the board's edge; below is the optocoupler, which goes to no other contact.
+    /// Contacts are named left of the board's edge. Below is the optocoupler, which has no other contact.
     const BOARD_EDGE_X: f64 = 250.0;
     const BOARD_END_Y: f64 = 616.0;
     let texts = texts(&expect_file!["../../../../docs/wiring.svg"].data());
@@ -146,7 +146,7 @@ fn the_classifier_s_page_has_the_figures_of_the_bench() {
     page.assert_eq(&with_part(&page, "cycles", &table));
 }
 
-/// What the page of figures has of the classifier's searches among random examples, as a table in Markdown.
+/// The classifier's searches among random examples, from the page of figures, as a table in Markdown.
 fn cycles(figures: &str) -> String {
     let mut table = "| examples | fewest | mean | most |\n| --- | --- | --- | --- |\n".to_owned();
     for line in figures.lines() {
@@ -212,7 +212,7 @@ fn parameters() -> String {
     list
 }
 
-/// Every setting in two tables in Markdown: what it is, and its values.
+/// Every setting in two tables in Markdown: its meaning, and its values.
 fn settings() -> String {
     let mut meanings = "| name | what it is |\n| --- | --- |\n".to_owned();
     let mut values =

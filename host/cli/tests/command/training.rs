@@ -86,7 +86,7 @@ fn a_table_larger_than_the_flash_budget_is_refused_by_name() {
 
 #[test]
 fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_name() {
-    // Plants and weeds like the squares of a chessboard, 200 of each; four objects a square, so that none is noise.
+    // Plants and weeds in a chessboard pattern, 200 of each; four detections a square, so that none is noise.
     let square = |place: i32| {
         let (spacing_mm, hold_mm) = (100 + place / 20 * 50, 100 + place % 20 * 10);
         let label = if (place / 20 + place) % 2 == 0 { "plant" } else { "weed" };

@@ -1,4 +1,4 @@
-//! `weeder` with a terminal's input, and all that it printed.
+//! Runs `weeder` with a terminal's input, and returns its whole output.
 
 use std::io::Write;
 use std::process::{Command, Output, Stdio};
@@ -7,12 +7,12 @@ use std::process::{Command, Output, Stdio};
 pub fn typed(weeder: &mut Command, input: &str) -> Output {
     let weeder = weeder.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut weeder = weeder.spawn().expect("cargo has built the command");
-    // One that fails at once reads nothing.
+    // A command that fails at once reads no input.
     let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_bytes());
     weeder.wait_with_output().expect("it ends")
 }
 
-/// What it printed, where it ended with this status.
+/// Its output, if it ended with this status.
 #[track_caller]
 pub fn printed(output: &Output, status: i32) -> String {
     let [out, error] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());

@@ -1,14 +1,14 @@
-//! What a trial found, in plain sentences.
+//! A trial's findings, in sentences.
 
 use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment};
 use crate::statistics::{LinearModel, Share, Term};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// A coefficient is taken for an effect where chance makes one as large less often than this.
+/// A coefficient counts as an effect if its p-value is below this.
 pub const SIGNIFICANCE: f64 = 0.05;
 
 impl Analysis {
-    /// What the trial found, a sentence each: its plots, the damage, what each measure depends on, and what cannot be right.
+    /// The findings, a sentence each: the plots, the damage, the effects on each measure, and impossible values.
     pub fn findings(&self) -> Vec<String> {
         let mut findings = vec![self.size(), self.damage()];
         for response in &self.responses {
@@ -49,7 +49,7 @@ impl Analysis {
         )
     }
 
-    /// How much damage there was, and where most.
+    /// The damage, and the treatment with most of it.
     fn damage(&self) -> String {
         let share = super::damaged(&self.records);
         let Share { count, of, .. } = share;
@@ -70,7 +70,7 @@ impl Analysis {
 }
 
 impl ResponseAnalysis {
-    /// What the measure depends on.
+    /// The effects on the measure.
     fn finding(&self) -> String {
         let title = self.response.title();
         match &self.model {
@@ -86,8 +86,8 @@ impl ResponseAnalysis {
 }
 
 impl Analysis {
-    /// Where a slope of this trial contradicts the paper's text: a sentence for each measure whose 95 % interval leaves the
-    /// paper's out, and one if there is none.
+    /// Contradictions to the paper's text: a sentence for each measure whose 95 % interval of the slope excludes the
+    /// paper's slope. One sentence if there is none.
     pub fn against_the_paper(&self) -> Vec<String> {
         let said: Vec<String> = self.responses.iter().filter_map(ResponseAnalysis::against_the_paper).collect();
         let compared =
@@ -101,7 +101,7 @@ impl Analysis {
 }
 
 impl ResponseAnalysis {
-    /// What contradicts the paper's slope by speed.
+    /// A contradiction to the paper's slope by speed.
     fn against_the_paper(&self) -> Option<String> {
         let paper = self.published.text.per_km_h?;
         let model = self.model.as_ref().ok()?;
@@ -117,7 +117,7 @@ impl ResponseAnalysis {
         })
     }
 
-    /// What speed does to the odds of what was counted, where that is an effect.
+    /// The effect of speed on the odds of the counts, if it is significant.
     fn odds(&self) -> Option<String> {
         let model = self.binomial.as_ref()?.as_ref().ok()?;
         let term = model.term("speed").filter(|term| term.p < SIGNIFICANCE)?;
@@ -132,7 +132,7 @@ impl ResponseAnalysis {
         ))
     }
 
-    /// What the residuals say, a sentence each.
+    /// The findings of the residuals, a sentence each.
     pub fn checked(&self) -> Vec<String> {
         self.checks.as_ref().map(|checks| checks.sentences(self.response.title())).unwrap_or_default()
     }
@@ -155,7 +155,7 @@ fn explained(model: &LinearModel) -> String {
     format!("the model explains {:.1} % of its variation", model.r_squared * 100.0)
 }
 
-/// A probability with its sign: four digits, or what it is below.
+/// A p-value with its sign: four digits, or the limit that it is below.
 pub fn probability(p: f64) -> String {
     if p < 0.0001 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") }
 }

@@ -1,4 +1,4 @@
-//! A plot as it is counted and measured, and what follows from it by the paper's Eq. 22 to 27.
+//! A plot's counts and measurements, and its measures by the paper's Eq. 22 to 27.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -9,10 +9,10 @@ const M2_PER_HA: f64 = 10_000.0;
 /// Seconds in an hour.
 const S_PER_H: f64 = 3600.0;
 
-/// One plot of a trial, as counted and measured in it.
+/// The counts and measurements of one plot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotRecord {
-    /// Which repetition of its speed and spacing it is.
+    /// The number of its replication.
     pub replication: u32,
     /// Forward speed that the machine was set to, km/h.
     pub speed_km_h: f64,
@@ -36,12 +36,12 @@ pub struct PlotRecord {
     pub power_hp: f64,
 }
 
-/// What follows from one plot.
+/// The measures of one plot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Performance {
     /// Plants injured, percent of those in the plot (Eq. 23).
     pub plant_damage_percent: f64,
-    /// Weeds gone, percent of those before weeding (Eq. 22).
+    /// Weeds removed, percent of those before weeding (Eq. 22).
     pub weeding_efficiency_percent: f64,
     /// Area an hour at the set speed with the whole width and no time lost, ha/h (Eq. 25).
     pub theoretical_capacity_ha_h: f64,
@@ -49,12 +49,12 @@ pub struct Performance {
     pub effective_capacity_ha_h: f64,
     /// Effective in percent of theoretical capacity (Eq. 24).
     pub field_efficiency_percent: f64,
-    /// Capacity times the percentages of plants and weeds done right, a horsepower (Eq. 27). The paper does not say which
-    /// capacity it takes; here it is the effective one. ha %2/(h hp).
+    /// Capacity times the percentages of undamaged plants and removed weeds, divided by power (Eq. 27), in ha %2/(h
+    /// hp). The paper does not say which capacity it uses; this is the effective one.
     pub performance_index: f64,
 }
 
-/// A plot cannot be as it is written down.
+/// A plot has impossible values.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error("{column} is {value}: {right}")]
 pub struct Implausible {
@@ -67,7 +67,7 @@ pub struct Implausible {
 }
 
 impl PlotRecord {
-    /// Says whether a plot can be like this.
+    /// Checks that a plot's values are possible.
     ///
     /// # Errors
     /// Names the first quantity that is out of its range or contradicts another.
@@ -99,7 +99,7 @@ impl PlotRecord {
         wrong.map_or(Ok(()), |(column, value, _, right)| Err(Implausible { column, value, right }))
     }
 
-    /// What follows from the plot by Eq. 22 to 27. Finite where [`PlotRecord::check`] is content.
+    /// The plot's measures by Eq. 22 to 27. They are finite if [`PlotRecord::check`] succeeds.
     pub fn performance(&self) -> Performance {
         let share = |part: u32, whole: u32| f64::from(part) / f64::from(whole);
         let plant_damage_percent = share(self.damaged, self.plants) * 100.0;

@@ -1,33 +1,35 @@
-//! What the paper printed of its own trial: equations, slopes, fits and ranges, and where these contradict each other.
+//! The paper's printed figures of its own trial: equations, slopes, fits and ranges, and their contradictions.
 //!
-//! The trial had four speeds, two spacings and three replications: 24 plots, which the adjusted R2 of Eq. 30 and 31 agree with.
+//! The trial had four speeds, two spacings and three replications: 24 plots. The adjusted R2 of Eq. 30 and 31 agree
+//! with that.
 //!
-//! **Which of its figures fit Eq. 27?** The paper's capacity of 0.041 ha/h, with some 85 % of the weeds gone, 2 % of
-//! the plants damaged and its engine of 2.5 hp, makes a performance index of 137, and no machine of that capacity and
-//! power could exceed 164. The printed 185 to 202 need 0.056 to 0.060 ha/h at 2.5 hp, or 1.8 to 1.7 hp at 0.041 ha/h.
-//! With the capacities that Eq. 24 and 25 give for its width of 0.40 m and its field efficiencies, the index doubles
-//! from 123 at 1 km/h to 257 at 2.5 km/h, since capacity grows with speed: for 202 and 185 the power would have to grow
-//! with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, is what Eq. 27 says of one engine; Eq.
-//! 30, where it falls, is not.
+//! **Which of its figures fit Eq. 27?** The paper has a capacity of 0.041 ha/h, with some 85 % of the weeds removed and
+//! 2 % of the plants damaged, and an engine of 2.5 hp. This gives a performance index of 137, and no machine of that
+//! capacity and power could exceed 164. The printed 185 to 202 need 0.056 to 0.060 ha/h at 2.5 hp, or 1.8 to 1.7 hp at
+//! 0.041 ha/h. Eq. 24 and 25 give capacities for its width of 0.40 m and its field efficiencies. With these the index
+//! doubles from 123 at 1 km/h to 257 at 2.5 km/h, since capacity grows with speed. For 202 and 185 the power would have
+//! to grow with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, follows from Eq. 27 for one
+//! engine. Eq. 30, where it falls, does not.
 
 use super::response::Response;
 use serde::Serialize;
 
-/// The speeds of its trial, least and greatest, km/h: beyond them its slopes say nothing.
+/// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
 pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
 
-/// A machine that weeds in the row, as its authors measured it in a field or on a test track. Each counts weeds in its own way.
+/// A machine that weeds in the row, as measured by its authors in a field or on a test track. Each source counts weeds
+/// in its own way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct PublishedMachine {
     /// Who built it.
     pub name: &'static str,
-    /// In which crop it worked.
+    /// Its crop.
     pub crop: &'static str,
-    /// What tells it where a plant stands.
+    /// Its sensor for plants.
     pub sees_by: &'static str,
     /// Its speeds.
     pub speed_km_h: &'static str,
-    /// Weeds that were gone, and of which ground.
+    /// Weeds removed, in percent, and the ground on which they were counted.
     pub weeds_gone_percent: &'static str,
     /// Crop plants that were damaged.
     pub damaged_percent: &'static str,
@@ -96,7 +98,7 @@ pub const MACHINES: &[PublishedMachine] = &[
     },
 ];
 
-/// A response as a linear function of speed (A, km/h) and plant spacing (B, cm), as far as it was printed.
+/// A response as a linear function of speed (A, km/h) and plant spacing (B, cm), with the printed coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Coefficients {
     /// At speed 0 and spacing 0, in the response's unit.
@@ -108,7 +110,7 @@ pub struct Coefficients {
 }
 
 impl Coefficients {
-    /// The response at a speed in km/h and a spacing in cm, where all coefficients are known.
+    /// The response at a speed in km/h and a spacing in cm, if all coefficients are known.
     pub fn at(&self, speed_km_h: f64, spacing_cm: f64) -> Option<f64> {
         Some(self.constant? + self.per_km_h? * speed_km_h + self.per_cm? * spacing_cm)
     }
@@ -119,17 +121,17 @@ impl Coefficients {
 pub struct Published {
     /// The equation's number in the paper.
     pub equation_number: u32,
-    /// Its coefficients; all `None` where the equation cannot be read in the copy at hand.
+    /// Its coefficients. All are `None` if the equation is illegible in the available copy.
     pub equation: Coefficients,
-    /// The coefficients as the text around it gives them.
+    /// The coefficients in the text around it.
     pub text: Coefficients,
     /// R2, 0 to 1.
     pub r_squared: f64,
     /// Adjusted R2, 0 to 1.
     pub adjusted_r_squared: Option<f64>,
-    /// Ranges that the text gives, lowest and highest, in the response's unit: they should be one.
+    /// Ranges in the text, lowest and highest, in the response's unit. They should be equal.
     pub ranges: &'static [(f64, f64)],
-    /// What contradicts what, a sentence each.
+    /// The contradictions, a sentence each.
     pub contradictions: &'static [&'static str],
 }
 
@@ -213,7 +215,7 @@ mod tests {
     /// The working width with the inter-row tools, m.
     const WIDTH_M: f64 = 0.40;
 
-    /// The index of a plot with these counts out of 10,000, as the paper prints two digits behind the point.
+    /// The index of a plot with these counts out of 10,000: the paper prints two decimals.
     fn index(capacity_ha_h: f64, damaged: u32, weeds_after: u32, power_hp: f64) -> f64 {
         let record = PlotRecord {
             replication: 1,

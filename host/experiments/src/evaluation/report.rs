@@ -16,7 +16,7 @@ const MEASURES: [&str; 6] = [
     "performance\nindex",
 ];
 
-/// What the probabilities and the index mean.
+/// The legend of p-values and the index.
 const LEGEND: &str = "\
 p is how probable it is that chance alone makes an effect as large: below 0.05 it is taken for one.
 Capacities are by Eq. 25 and 26 of the paper, field efficiency by Eq. 24. The performance index (Eq. 27) is
@@ -40,7 +40,7 @@ impl Display for Analysis {
 }
 
 impl Analysis {
-    /// Every plot and what follows from it.
+    /// Every plot and its measures.
     fn plots(&self) -> Table {
         let mut table = table(["plot", "replication", "speed\nkm/h", "spacing\ncm"].into_iter().chain(MEASURES));
         for (index, (record, performance)) in self.records.iter().zip(&self.performances).enumerate() {
@@ -101,7 +101,7 @@ impl Display for ResponseAnalysis {
 }
 
 impl ResponseAnalysis {
-    /// This trial's model, the paper's equation, and what the paper's text says of it.
+    /// This trial's model, the paper's equation, and the paper's text.
     fn beside_the_paper(&self) -> Table {
         let published = self.published;
         let equation = format!("paper,\nEq. {}", published.equation_number);
@@ -182,7 +182,7 @@ impl Display for BinomialModel {
     }
 }
 
-/// A term as a row of a table says it.
+/// A term's name in a table.
 fn term_name(name: &'static str) -> &'static str {
     match name {
         "speed" => "speed, for each km/h",
@@ -245,7 +245,7 @@ fn table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
     table
 }
 
-/// The table with its columns aligned right from this one on.
+/// The table with its columns aligned right from column `from` on.
 fn right(mut table: Table, from: usize) -> Table {
     for column in table.column_iter_mut().skip(from) {
         column.set_cell_alignment(CellAlignment::Right);

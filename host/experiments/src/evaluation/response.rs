@@ -32,7 +32,7 @@ impl Response {
         }
     }
 
-    /// Its unit; that of the index is seldom printed.
+    /// Its unit. That of the index is seldom printed.
     pub fn unit(self) -> &'static str {
         match self {
             Self::PerformanceIndex => "ha %²/(h hp)",
@@ -40,7 +40,7 @@ impl Response {
         }
     }
 
-    /// What it counts in a plot, and of how many; none of a measure that is not counted.
+    /// The count in a plot, and its total. `None` for a measure that is not counted.
     pub fn count(self, record: &PlotRecord) -> Option<(u32, u32)> {
         match self {
             Self::PlantDamage => Some((record.damaged, record.plants)),

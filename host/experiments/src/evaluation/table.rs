@@ -1,7 +1,7 @@
-//! The plots of a trial as a CSV table, which a spreadsheet or a simulated trial may have written.
+//! The plots of a trial as a CSV table, from a spreadsheet or a simulated trial.
 //!
-//! The columns are the fields of [`PlotRecord`], in any order, with others among them that are not read; lines that begin
-//! with `#` are comments. Every line is checked before anything follows from one.
+//! The columns are the fields of [`PlotRecord`], in any order. Other columns are ignored. Lines that begin with `#` are
+//! comments. Every line is checked before any is used.
 
 use super::plot::PlotRecord;
 pub use files::FileError;
@@ -28,8 +28,9 @@ pub const COLUMNS: [&str; 11] = [
 /// Reads the plots of a trial.
 ///
 /// # Errors
-/// Names the file, the line and the column, and what would be right: a missing column, plots that are not filled in, text in a
-/// number, a value out of its range, more weeds after than before, more damaged plants than plants, or a replication of a speed and spacing that stood there before.
+/// Names the file, the line and the column, and what would be right. The errors are: a missing column, empty plots,
+/// text in a number, a value out of range, more weeds after than before, more damaged plants than plants, and a
+/// replication of a speed and spacing that occurs twice.
 pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
     let table = CsvTable::read(path, &COLUMNS)?;
     let empty = |line: Line| COLUMNS.into_iter().find(|column| line.text(column).is_empty());
@@ -57,7 +58,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
     Ok(plots.into_iter().map(|(_, plot)| plot).collect())
 }
 
-/// One line of the table.
+/// Parses one line of the table.
 fn record(line: Line) -> Result<PlotRecord, FileError> {
     let plot = PlotRecord {
         replication: count(line, "replication", 0)?,
@@ -76,7 +77,7 @@ fn record(line: Line) -> Result<PlotRecord, FileError> {
     Ok(plot)
 }
 
-/// A count, whose least value [`PlotRecord::check`] holds it to.
+/// Parses a count. Its least value is the one in [`PlotRecord::check`].
 fn count(line: Line, column: &str, least: u32) -> Result<u32, FileError> {
     line.value(column, &format!("a whole number, {least} or more"))
 }
@@ -86,7 +87,7 @@ fn number(line: Line, column: &str) -> Result<f64, FileError> {
     Ok(value)
 }
 
-/// A number as people write it: neither `inf` nor `nan`.
+/// A decimal number, without `inf` and `nan`.
 struct Number(f64);
 
 impl FromStr for Number {
@@ -100,7 +101,7 @@ impl FromStr for Number {
 /// Writes the plots as a table that [`read_csv`] reads.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write_csv(records: &[PlotRecord], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
     for record in records {
@@ -119,7 +120,7 @@ mod tests {
         "replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp\n";
     const LINE: &str = "1,1.5,50,200,30,50,1,24,180,0.4,2.5\n";
 
-    /// The plots of a table of this text, or what is said of it.
+    /// The plots of a table with this text, or the error.
     fn read(text: &str) -> Result<Vec<PlotRecord>, String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trial.csv");

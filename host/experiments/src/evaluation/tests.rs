@@ -1,8 +1,8 @@
-//! A trial judged: the equations, what cannot be, and means of treatments.
+//! Tests of the evaluation: the equations, impossible values, and means of treatments.
 
 use super::*;
 
-/// A plot whose figures come out round.
+/// A plot whose measures are round numbers.
 const PLOT: PlotRecord = PlotRecord {
     replication: 1,
     speed_km_h: 1.5,

@@ -6,7 +6,7 @@ use field::budget::Part;
 use serde::Serialize;
 use std::io;
 
-/// A line of [`write_csv`]: a [`PlotRecord`], and what only a simulated field can tell.
+/// A line of [`write_csv`]: a [`PlotRecord`], and values that only a simulated field has.
 #[derive(Serialize)]
 struct Line {
     controller: &'static str,
@@ -42,11 +42,11 @@ struct Line {
     alarms: u32,
 }
 
-/// Writes what some of the controllers did as CSV, a line a plot: a table that [`crate::evaluation::read_csv`] reads where it is one
-/// controller's.
+/// Writes the results of some controllers as CSV, one line a plot. [`crate::evaluation::read_csv`] can read a table of
+/// one controller.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Treatment], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
     for outcome in outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)) {
@@ -92,7 +92,7 @@ pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Treatment], to: impl i
     Ok(())
 }
 
-/// As many digits as mean anything.
+/// Rounds to a thousandth: further digits are not significant.
 fn thousandth(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }

@@ -1,10 +1,11 @@
-//! Examples in a study's settings: of each its features and its label. The classifier's crate is the chip's too, and knows no files.
+//! Serialises examples in a study's settings: the features and label of each. The classifier's crate also runs on the
+//! chip, and has no serialisation.
 
 use control::ground::features;
 use knn::Example;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// An example as it is written down.
+/// The serialised form of an example.
 type Written = ([u8; features::COUNT], u8);
 
 pub fn serialize<S: Serializer>(examples: &[Example<{ features::COUNT }>], serializer: S) -> Result<S::Ok, S::Error> {

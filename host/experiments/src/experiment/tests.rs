@@ -1,4 +1,4 @@
-//! The experiment: what its controllers come to in the presets, whatever the threads, the seed and the parameters.
+//! The experiment: the results of its controllers in the presets, for all thread counts, seeds and parameters.
 
 use super::*;
 use crate::evaluation::Analysis;
@@ -25,7 +25,7 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn a_controller_finds_the_same_field_whoever_else_takes_part() {
+fn a_controller_gets_the_same_field_with_and_without_others() {
     let all = experiment(&[1.5], "transplanted");
     let alone = Experiment { controllers: vec![Treatment::Firmware], ..all.clone() };
     assert_eq!(records(&run(&all), Treatment::Firmware), records(&run(&alone), Treatment::Firmware));
@@ -45,7 +45,7 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
         }
         assert!(of(Treatment::Ideal).all(|total| total.effect.damaged == 0));
         let damage: Vec<f64> = of(Treatment::Paper).map(Total::plant_damage_percent).collect();
-        // A weed as wide as a plant takes its one slot at any speed; what comes too late grows with it.
+        // A weed as wide as a plant takes the only slot at any speed. Late swings increase with speed.
         let (slow, fast) = damage.split_at(3);
         assert!(slow.iter().all(|percent| *percent < 1.0) && fast[0] > 1.0, "{damage:?}");
         assert!(fast.is_sorted() && fast[0] < fast[1] && fast[1] < fast[2], "{damage:?}");
@@ -53,8 +53,8 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
 }
 
 #[test]
-fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_firmware() {
-    // Without look-ahead, the firmware weeds more, and over plants.
+fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_firmware() {
+    // Without look-ahead, the firmware weeds more, but damages plants.
     for preset in presets().filter(|preset| *preset != "paper") {
         let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
         for pair in totals.chunks(Treatment::ALL.len()) {
@@ -67,10 +67,10 @@ fn whoever_knows_every_plant_damages_none_in_any_field_and_weeds_more_than_the_f
 }
 
 #[test]
-fn whoever_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
+fn a_controller_that_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
     for preset in presets() {
         for seed in 1..=3 {
-            // Rows of their own: a plot with one damaged plant may weed more than its bound.
+            // A row for each plot: a plot with one damaged plant may weed more than its bound.
             let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5], preset) };
             experiment.conditions.set("plot.rows", 1.0).unwrap();
             for outcome in run(&experiment).iter().filter(|outcome| outcome.effect.damaged == 0) {
@@ -85,7 +85,7 @@ fn whoever_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
 fn the_loss_budget_of_every_row_of_every_preset_adds_up_to_the_whole_row() {
     for preset in presets() {
         for seed in 1..=2 {
-            // A row a plot, so that none hides behind others.
+            // One row a plot, so that an average hides no row.
             let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5, 6.0], preset) };
             experiment.conditions.set("plot.rows", 1.0).unwrap();
             for outcome in run(&experiment) {
@@ -109,8 +109,9 @@ fn the_loss_budget_is_what_a_hand_calculation_says() {
     let budget = totals(&run(&experiment))[0].budget;
     // A canopy of 150 mm, a margin of 50 mm on both sides, a plant every 500 mm, 694.4 mm/s.
     let mm_s = 2.5e6 / 3600.0;
-    // Out: led by 181 ms, of which 2 ms of pulse, 65 ms of dead time, and 12 ms to the 4.5 degrees at which the tool leaves the line go
-    // by before ground is lost. In: led by 41 ms, then pulse, dead time and 108 ms back to the line.
+    // Out: the command leads by 181 ms. Before the tool loses ground, 2 ms of pulse, 65 ms of dead time and 12 ms of
+    // travel pass: at 4.5 degrees the tool leaves the line. In: the command leads by 41 ms. Then come pulse, dead time
+    // and 108 ms of travel back to the line.
     let swings_mm = mm_s * ((0.181 - 0.002 - 0.065 - 0.012) + (0.0015 + 0.065 + 0.108 - 0.041));
     let expected = [
         (Part::Plants, 150.0),
@@ -133,16 +134,17 @@ fn each_part_of_the_loss_budget_is_found_where_it_is_to_be_expected() {
         changes.iter().for_each(|&(name, value)| experiment.conditions.set(name, value).unwrap());
         totals(&run(&experiment))[0].budget
     };
-    // Weeds as wide as plants are kept, dust and narrow weeds are not.
+    // Weeds as wide as plants get a zone; dust and narrow weeds do not.
     let (even, weedy) = (budget("even-stand", 1.0, &[]), budget("weedy", 1.0, &[]));
     assert!(even[Part::Weeds] == 0.0 && weedy[Part::Weeds] > 0.01, "{even:?}, {weedy:?}");
-    // Gaps in the crop are guarded where a plant is expected: 20 % of the places, with 80 mm and two margins of 50 mm.
+    // Gaps in the crop are guarded where a plant is expected: 20 % of the planting positions, with 80 mm and two
+    // margins of 50 mm.
     let gaps = [("crop.missing_percent", 20.0), ("weeds.tall_per_m", 0.0)];
     let guard = [("guard_spacing_mm", 500.0), ("guard_scatter_mm", 40.0)];
     let (open, guarded) = (budget("even-stand", 1.0, &gaps), budget("even-stand", 1.0, &[gaps, guard].concat()));
     let expected = 0.2 * 180.0 / 500.0;
     assert!(open[Part::Guarded] == 0.0 && (guarded[Part::Guarded] - expected).abs() < 0.02, "{open:?}, {guarded:?}");
-    // A machine that outruns its beam ends in an alarm.
+    // A machine that is too fast for its beam ends in an alarm.
     let fast = budget("transplanted", 7.0, &[]);
     assert_eq!(fast.largest_loss().0, Part::Closed, "{fast:?}");
     // A quicker tool loses less to swings, and as much to canopies.
@@ -184,7 +186,7 @@ fn a_shorter_stroke_that_the_firmware_is_told_weeds_more_and_reaches_no_canopy()
     let shorter = totals(&run(&shorter))[0];
     assert_eq!((shorter.effect.damaged, shorter.zones.reached), (0, 0), "{shorter:?}");
     assert!(shorter.weeded_share > paper.weeded_share + 0.05, "{shorter:?}, {paper:?}");
-    // Too short for the canopies, and said to be.
+    // The stroke is too short for the canopies, and the result says so.
     let mut stub = experiment(&[1.0], "transplanted");
     stub.conditions.set("servo_out_us", 1620.0).unwrap();
     let stub = totals(&run(&stub))[0];
@@ -226,7 +228,7 @@ fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
             let mut experiment = experiment(&[1.0, 4.0], "transplanted");
             let small = [("plot.rows", 1.0), ("plot.row_m", 4.0), ("machine.sweeps_a_side", 0.0)];
             for (name, value) in small.into_iter().chain([(parameter.name, end)]) {
-                // Sweeps so wide would run through the next row, and are refused.
+                // Sweeps that are too wide would run through the next row, so `set` refuses them.
                 let _ = experiment.conditions.set(name, value);
             }
             match experiment.run(&Engine::Native, |_| ()) {

@@ -1,4 +1,4 @@
-//! What each controller did at each speed, all plots together, and the controllers side by side.
+//! Totals of each controller at each speed, over all plots, and their comparison.
 
 use super::{PlotOutcome, Treatment, Zones};
 use crate::page::{Comparison, ControllerCurve, ControllerPoint, Work};
@@ -7,7 +7,7 @@ use field::budget::Budget;
 use field::tool_path::Effect;
 use std::collections::BTreeMap;
 
-/// All plots of one speed that one controller weeded.
+/// The total of one controller at one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Total {
     /// Who weeded them.
@@ -20,25 +20,25 @@ pub struct Total {
     pub zones: Zones,
     /// Share of the rows' ground that the tool weeded, from 0 to 1.
     pub weeded_share: f64,
-    /// Share that this servo could weed with every canopy and margin kept.
+    /// The largest share that this servo could weed with every canopy and margin kept.
     pub weedable_share: f64,
     /// Share that could be weeded at best without a plant damaged.
     pub undamaged_share: f64,
-    /// Where the rows' ground went.
+    /// The loss budget.
     pub budget: Budget,
-    /// The weeded share, percent, as a mean of the replications, each with all its spacings.
+    /// The weeded share, percent: the mean of the replications, each with all its spacings.
     pub weeded_percent: Mean,
     /// Rows in which an alarm took the tool out.
     pub alarms: u32,
 }
 
 impl Total {
-    /// Plants damaged by the tool or by sweeps, with how far their share may be off.
+    /// Plants damaged by the tool or by sweeps, with the interval of their share.
     pub fn damage(&self) -> Share {
         Share::of(self.effect.injured(), self.effect.plants)
     }
 
-    /// Zones over which the tool was not fully out, with how far their share may be off.
+    /// Zones over which the tool was not fully out, with the interval of their share.
     pub fn reached(&self) -> Share {
         Share::of(self.zones.reached, self.zones.all)
     }
@@ -53,14 +53,14 @@ impl Total {
         self.reached().percent()
     }
 
-    /// Zones whose margin was cut, but not they, % of all.
+    /// Other zones whose margin was cut, % of all.
     pub fn margins_cut_percent(&self) -> f64 {
         Share::of(self.zones.margins_cut, self.zones.all).percent()
     }
 }
 
-/// What each controller did at each speed, all spacings and replications together: by speed, then in the order in which the
-/// controllers took part.
+/// The totals of each controller at each speed, over all spacings and replications: by speed, then in the order of
+/// controllers.
 pub fn totals(outcomes: &[PlotOutcome]) -> Vec<Total> {
     let mut totals: Vec<(Total, Vec<&PlotOutcome>)> = Vec::new();
     for outcome in outcomes {

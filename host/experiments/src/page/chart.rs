@@ -1,8 +1,8 @@
-//! The page's charts: lines with markers over speed, and clouds of points, as SVG that stands within a page.
+//! The page's charts: lines with markers over speed, and scatter plots, as SVG within a page.
 //!
-//! Series differ in colour, marker and dashes. The colours in here are those of light paper, and at the same time names:
-//! the page's style sheet puts others in their place for dark paper, and dashes the lines. Charts are drawn at twice the
-//! size at which they are usually shown, because plotters works in whole pixels. Legends and titles are the page's.
+//! Series differ in colour, marker and dashes. The colours in this file are for light paper, and also serve as names:
+//! the page's style sheet replaces them for dark paper, and dashes the lines. Charts are drawn at twice their usual
+//! size on the page, because plotters works in whole pixels. Legends and titles are part of the page.
 
 use plotters::coord::Shift;
 use plotters::element::{DynElement, IntoDynElement};
@@ -10,7 +10,7 @@ use plotters::prelude::*;
 use std::io;
 use std::ops::Range;
 
-/// What plotters says where it cannot draw.
+/// plotters' error.
 pub type DrawingError = DrawingAreaErrorKind<io::Error>;
 
 /// Size of a chart, and of a series' mark in a legend, in pixels.
@@ -23,8 +23,8 @@ const AXIS: RGBColor = RGBColor(0x8A, 0x85, 0x7A);
 const MESH: RGBColor = RGBColor(0xE6, 0xE2, 0xD6);
 const LIMIT: RGBColor = RGBColor(0x5F, 0x5B, 0x52);
 
-/// Colours after Okabe and Ito, darker where they would be pale on white, and markers: people who see few colours tell them
-/// apart too.
+/// Colours after Okabe and Ito, darkened where they would be pale on white, and markers. Colour-blind readers can also
+/// distinguish them.
 const LOOKS: [Look; 4] = [
     Look { colour: RGBColor(0x00, 0x72, 0xB2), marker: Some(Marker::Circle) },
     Look { colour: RGBColor(0xD5, 0x5E, 0x00), marker: Some(Marker::Triangle) },
@@ -51,7 +51,7 @@ impl Look {
     /// A limit, which is not measured and so has no markers.
     pub const LIMIT: Self = Self { colour: LIMIT, marker: None };
 
-    /// The look of one of many series; they recur after four.
+    /// The look of a series by its index. Looks repeat after four.
     pub fn of_series(index: usize) -> Self {
         LOOKS[index % LOOKS.len()]
     }
@@ -71,17 +71,17 @@ pub struct Series {
     pub cloud: Vec<(f64, f64)>,
 }
 
-/// A chart: what is in it, and which part of the plane it shows.
+/// A chart: its content, and the visible range.
 pub struct Chart<'a> {
-    /// What is to the right, with its unit.
+    /// The label of the x axis, with its unit.
     pub x_label: &'a str,
     /// The part of the plane.
     pub x: Range<f64>,
     /// The same upwards.
     pub y: Range<f64>,
-    /// What is drawn, the last on top.
+    /// The series, the last one on top.
     pub series: &'a [Series],
-    /// A limit, shaded from the line upwards; empty where there is none.
+    /// A limit, shaded from the line upwards. Empty if there is none.
     pub limit: &'a [(f64, f64)],
 }
 
@@ -89,7 +89,7 @@ impl Chart<'_> {
     /// Draws it.
     ///
     /// # Errors
-    /// Where plotters cannot draw it, as for a range without extent.
+    /// If plotters cannot draw it, as for a range without extent.
     pub fn svg(&self) -> Result<String, DrawingError> {
         svg(CHART_SIZE, |area| {
             let mut chart = ChartBuilder::on(area)
@@ -136,7 +136,7 @@ impl Chart<'_> {
 /// Draws the mark of a series in a legend, on a piece of its line where it has one.
 ///
 /// # Errors
-/// Where plotters cannot draw it.
+/// If plotters cannot draw it.
 pub fn key(look: Look, has_line: bool) -> Result<String, DrawingError> {
     let (width, height) = (KEY_SIZE.0 as i32, KEY_SIZE.1 as i32);
     svg(KEY_SIZE, |area| {
@@ -150,8 +150,8 @@ pub fn key(look: Look, has_line: bool) -> Result<String, DrawingError> {
     })
 }
 
-/// A range that holds all values with some air around them, from zero where `from_zero` says so. It has an extent even
-/// where all values are the same, or there are none.
+/// A range that contains all values with a margin. `from_zero` makes it begin at zero. It is never empty, even without
+/// values or with equal values.
 pub fn range_of(values: impl IntoIterator<Item = f64>, from_zero: bool) -> Range<f64> {
     const AIR: f64 = 0.08;
     let start = if from_zero { 0.0 } else { f64::INFINITY };
@@ -190,7 +190,7 @@ fn tick(value: f64) -> String {
     (rounded + 0.0).to_string().replace('-', "\u{2212}")
 }
 
-/// An SVG of that size with what is drawn on it.
+/// An SVG of this size with the drawing.
 fn svg(
     size: (u32, u32),
     draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Result<(), DrawingError>,

@@ -1,4 +1,4 @@
-//! The page's figures: which chart shows what, its legend, and the same in words for those who cannot see it.
+//! The page's figures: their charts and legends, and texts for readers who cannot see the charts.
 
 use super::chart::{Chart, DrawingError, Look, Series, key, range_of};
 use super::comparison::{Comparison, ControllerPoint};
@@ -6,19 +6,19 @@ use super::table::{fixed, short};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::statistics::LinearModel;
 
-/// A chart with all that belongs to it.
+/// A chart with its texts.
 pub struct Figure {
     /// What it shows.
     pub title: String,
-    /// The unit of what is upwards, or what it is a share of.
+    /// The unit of the y axis, or the total of its share.
     pub unit: String,
     /// The chart.
     pub svg: String,
-    /// What the lines and markers mean.
+    /// The legend of lines and markers.
     pub legend: Vec<Key>,
     /// The chart in words.
     pub words: String,
-    /// What else has to be known.
+    /// The caption.
     pub caption: String,
 }
 
@@ -32,7 +32,7 @@ pub struct Key {
 
 const SPEED: &str = "speed, km/h";
 
-/// What the line is called that a controller can stay below without cutting a margin.
+/// The name of the line below which a controller cuts no margin.
 pub const BOUND: &str = "most with every zone and margin kept";
 
 /// Plant damage of each controller against speed.
@@ -50,7 +50,7 @@ pub fn weeding(comparison: &Comparison) -> Result<Figure, DrawingError> {
     curves(comparison, title, caption, |point| point.in_row_weeding_percent, &comparison.bound)
 }
 
-/// Plants whose zone each controller's tool reached against speed.
+/// Plants whose zone each controller's tool reached, against speed.
 pub fn zones(comparison: &Comparison) -> Result<Figure, DrawingError> {
     let title = ("Zones reached", "% of the plants' zones");
     let caption = "Zones over which the tool was not fully out, of all in the rows: what the firmware keeps of a plant, less the margin. Lower is better.";
@@ -78,7 +78,7 @@ fn curves(
         words += &said(BOUND, limit);
         legend.push(Key { svg: key(Look::LIMIT, true)?, meaning: BOUND.to_owned() });
     }
-    // The first is drawn last: it is the one to be seen where lines meet.
+    // The first series is drawn last: it stays visible where lines meet.
     series.reverse();
     let points = || series.iter().flat_map(|series| &series.line).chain(limit);
     let chart = Chart {
@@ -91,7 +91,7 @@ fn curves(
     Ok(Figure { title: title.into(), unit: unit.into(), svg: chart.svg()?, legend, words, caption: caption.into() })
 }
 
-/// One measure of a trial against speed, a line a spacing through the means, with the plots around them.
+/// One measure of a trial against speed: for each spacing a line through the means, with the plots around it.
 pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, DrawingError> {
     let treatments = analysis.treatments();
     let spacings = spacings_cm(analysis);
@@ -136,7 +136,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, Drawi
     })
 }
 
-/// What a model leaves of each plot, against what it says of it.
+/// The residuals of a model against its fitted values.
 pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel) -> Result<Figure, DrawingError> {
     let x = range_of(model.fitted.iter().copied(), false);
     let mut series = vec![Series { look: Look::LIMIT, line: vec![(x.start, 0.0), (x.end, 0.0)], cloud: Vec::new() }];

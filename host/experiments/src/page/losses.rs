@@ -1,4 +1,4 @@
-//! Where the row's ground went, as bars of parts that fill them, and the same as a table.
+//! The loss budget as stacked bars, and as a table.
 
 use super::comparison::Work;
 use super::table::{Table, fixed, short};
@@ -9,7 +9,7 @@ const LEAST_LABELLED: u32 = 45;
 
 /// The loss budget of some speeds.
 pub struct Losses {
-    /// What the colours mean: a part's key and what it is called.
+    /// The legend of the colours: a part's key and its title.
     pub legend: [(&'static str, &'static str); Part::ALL.len()],
     /// A bar a speed.
     pub bars: Vec<Bar>,
@@ -31,14 +31,14 @@ pub struct Bar {
 pub struct Piece {
     /// The part's key.
     pub key: &'static str,
-    /// How much of the bar it is, of 1000.
+    /// Its share of the bar, in thousandths.
     pub tenths: u32,
-    /// What is written in it.
+    /// Its text in the bar.
     pub label: String,
 }
 
 impl Losses {
-    /// Those of what was done; none where nothing was.
+    /// The loss budget of this work. `None` without work.
     pub fn of(work: &[Work]) -> Option<Self> {
         let bars: Vec<Bar> = work.iter().map(Bar::of).collect();
         let titles = Part::ALL.map(|part| format!("{}, %", part.title()));

@@ -1,4 +1,4 @@
-//! A chapter of the page: what the plots together say of one measure, with what the paper printed of it beside.
+//! A chapter of the page: the analysis of one measure, beside the paper's figures.
 
 use super::chart::DrawingError;
 use super::figure::{Figure, residuals};
@@ -7,13 +7,13 @@ use crate::evaluation::published::{Coefficients, Published};
 use crate::evaluation::{Analysis, ResponseAnalysis};
 use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
 
-/// What the page says of one measure.
+/// The chapter of one measure.
 pub struct Chapter {
     /// The measure.
     pub title: &'static str,
     /// The model as an equation, or why there is none.
     pub model: Result<String, String>,
-    /// The paper's equation, and its number; empty where it cannot be read.
+    /// The paper's equation and its number. Empty if it is illegible.
     pub published: String,
     /// The paper's equation number.
     pub equation_number: u32,
@@ -21,15 +21,15 @@ pub struct Chapter {
     pub terms: Table,
     /// How well the model fits.
     pub fit: Table,
-    /// The binomial model, or why there is none; empty for a measure that is not counted.
+    /// The binomial model, or why there is none. `None` for a measure that is not counted.
     pub binomial: Option<Result<Table, String>>,
     /// The analysis of variance, or why there is none.
     pub variance: Result<Table, String>,
-    /// What has to be known of either, and of the paper's figures.
+    /// Remarks on the models and on the paper's figures.
     pub remarks: Vec<String>,
-    /// What contradicts what in the paper.
+    /// The paper's contradictions.
     pub contradictions: &'static [&'static str],
-    /// The residuals; there are none without a model.
+    /// The residuals; `None` without a model.
     pub residuals: Option<Figure>,
 }
 
@@ -37,7 +37,7 @@ impl Chapter {
     /// The chapter on a measure.
     ///
     /// # Errors
-    /// Where plotters cannot draw the residuals.
+    /// If plotters cannot draw the residuals.
     pub fn of(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Self, DrawingError> {
         let (model, variance) = (of.model.as_ref(), of.variance.as_ref());
         let name = of.response.title().to_lowercase();
@@ -76,7 +76,7 @@ fn coefficients(model: &LinearModel) -> Coefficients {
     Coefficients { constant: estimate("constant"), per_km_h: estimate("speed"), per_cm: estimate("spacing") }
 }
 
-/// A measure as an equation; empty where no coefficient is known.
+/// A measure as an equation. Empty if no coefficient is known.
 fn equation(name: &str, coefficients: &Coefficients, said: fn(f64) -> String) -> String {
     let factors =
         [(coefficients.constant, ""), (coefficients.per_km_h, " × speed"), (coefficients.per_cm, " × spacing")];
@@ -94,7 +94,7 @@ fn equation(name: &str, coefficients: &Coefficients, said: fn(f64) -> String) ->
     if right.is_empty() { right } else { format!("{name} = {right}") }
 }
 
-/// The coefficients with what chance may have done to them, beside the paper's.
+/// The coefficients with their intervals, beside the paper's.
 fn terms(of: &ResponseAnalysis, model: Option<&LinearModel>) -> Table {
     let Published { equation, text, equation_number, .. } = of.published;
     let mut table = Table::new(
@@ -156,7 +156,7 @@ fn fit(analysis: &Analysis, of: &ResponseAnalysis, model: Option<&LinearModel>) 
     table
 }
 
-/// What speed and spacing do to the odds of what was counted.
+/// The effects of speed and spacing on the odds of the counts.
 fn odds(model: &BinomialModel) -> Table {
     let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
     let mut table = Table::new("Binomial model of the counts", columns);
@@ -195,7 +195,7 @@ fn sources(variance: &AnalysisOfVariance) -> Table {
     table
 }
 
-/// Words with a capital letter in front and a full stop behind.
+/// A text with a capital letter at its beginning and a full stop at its end.
 fn sentence(words: &str) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();

@@ -1,14 +1,14 @@
-//! The page's tables, and how numbers read in them.
+//! The page's tables, and the format of numbers in them.
 
 /// A table whose first column names its rows.
 pub struct Table {
     /// What is in it.
     pub caption: String,
-    /// What stands above each column.
+    /// The heading of each column.
     pub columns: Vec<String>,
     /// The rows, with a cell a column.
     pub rows: Vec<Vec<String>>,
-    /// Whether its cells are words, which stand to the left.
+    /// Whether its cells are text, which is aligned left.
     pub is_prose: bool,
 }
 
@@ -20,23 +20,23 @@ impl Table {
     }
 }
 
-/// What stands where there is no number.
+/// The text of a missing number.
 pub const NOTHING: &str = "\u{2013}";
 
-/// A number with so many decimal places. Its minus is a real one, and nothing is no less than nothing.
+/// A number with `decimals` decimal places. It has a typographic minus, and never `-0`.
 pub fn fixed(value: f64, decimals: usize) -> String {
     let digits = format!("{:.decimals$}", value.abs());
     let is_zero = digits.bytes().all(|digit| matches!(digit, b'0' | b'.'));
     if value < 0.0 && !is_zero { format!("\u{2212}{digits}") } else { digits }
 }
 
-/// A number as short as it can be said with six decimal places.
+/// A number with at most six decimal places, without trailing zeros.
 pub fn short(value: f64) -> String {
     let digits = fixed(value, 6);
     digits.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A number with four digits that count, or more before the point; and five decimal places at most.
+/// A number with four significant digits, or more before the point, and at most five decimal places.
 pub fn significant(value: f64) -> String {
     const DIGITS: f64 = 4.0;
     const DECIMALS: f64 = 5.0;
@@ -46,12 +46,12 @@ pub fn significant(value: f64) -> String {
     fixed(value, (DIGITS - 1.0 - value.abs().log10().floor()).clamp(0.0, DECIMALS) as usize)
 }
 
-/// A probability: what is below a thousandth is said to be that.
+/// A p-value. Values below a thousandth are shown as such.
 pub fn probability(p: f64) -> String {
     if p < 0.001 { "< 0.001".to_owned() } else { fixed(p, 3) }
 }
 
-/// A number that may not be there.
+/// A number that may be missing.
 pub fn optional(value: Option<f64>, said: impl Fn(f64) -> String) -> String {
     value.map_or_else(|| NOTHING.to_owned(), said)
 }

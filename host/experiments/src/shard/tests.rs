@@ -13,7 +13,7 @@ fn header(shard: &str, all: u64) -> Header {
     Header::new(program(), "trial", shard.parse().unwrap(), all, settings)
 }
 
-/// A part's text, whose outcomes are what `of` gives for their numbers.
+/// A part's text. Its outcomes are the values of `of` for their numbers.
 fn written(header: &Header, of: impl Fn(u64) -> f64) -> Vec<u8> {
     let mut text = Vec::new();
     let outcomes = header.shard.numbers(header.all).map(|number| Numbered { number, outcome: of(number) });
@@ -26,7 +26,7 @@ fn read(name: &str, mut text: &[u8]) -> Result<Part<f64>, PartError> {
     read_outcomes(name, header, &mut text)
 }
 
-/// What is wrong with parts of these headers.
+/// The error for parts with these headers.
 #[track_caller]
 fn refusal(headers: &[Header]) -> String {
     let named: Vec<_> = ('a'..).map(String::from).zip(headers.iter().cloned()).collect();

@@ -1,22 +1,23 @@
 //! The binomial model of counts on speed and spacing: the logarithm of the odds as `constant + a speed + b spacing`.
 //!
-//! So many plants of so many were damaged, so many weeds of so many are gone: such counts scatter by their share and their
-//! number, and a share ends at 0 and 1. The linear model knows neither. This is R's `glm(cbind(count, of - count) ~ speed +
-//! spacing, family = binomial)`, fitted by iteratively reweighted least squares with nalgebra.
+//! A count of damaged plants or removed weeds is a number out of a total. Its scatter depends on its share and on the
+//! total, and a share ends at 0 and 1. The linear model ignores both. This is R's `glm(cbind(count, of - count) ~
+//! speed + spacing, family = binomial)`, fitted by iteratively reweighted least squares with nalgebra.
 //!
-//! Plots of one field differ by more than the counting does. [`BinomialModel::dispersion`] says by how much, and where it is
-//! above 1 standard errors are as much too small as its root says; they are left as R's binomial family has them.
+//! Plots of one field differ by more than the scatter of counting. [`BinomialModel::dispersion`] measures this. If it
+//! is above 1, the true standard errors are larger by its root. The reported ones are those of R's binomial family,
+//! without this correction.
 
 use super::design::{Column, Design, NoModel, Remark};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Steps after which a fit that has not settled never will, and the change of the deviance at which it has.
+/// The most steps of a fit, and the change of the deviance at which it has converged.
 const STEPS: usize = 100;
 const SETTLED: f64 = 1e-14;
 
-/// Odds of e to this power have left what counts can tell: the counts lie on one side of the speeds or spacings.
+/// Greatest logarithm of odds that counts can support. Beyond it the counts lie on one side of the speeds or spacings.
 const NEVER_LOG_ODDS: f64 = 30.0;
 
 /// One coefficient of a binomial model.
@@ -24,18 +25,18 @@ const NEVER_LOG_ODDS: f64 = 30.0;
 pub struct OddsTerm {
     /// `constant`, `speed` (for each km/h) or `spacing` (for each cm).
     pub name: &'static str,
-    /// The coefficient: what is added to the logarithm of the odds.
+    /// The coefficient: the change of the logarithm of the odds.
     pub estimate: f64,
     /// Its standard error.
     pub standard_error: f64,
     /// Estimate by standard error.
     pub z: f64,
-    /// How probable such a z is where the true coefficient is zero, 0 to 1, both sides together.
+    /// The two-sided p-value of z, 0 to 1.
     pub p: f64,
 }
 
 impl OddsTerm {
-    /// By what the odds are multiplied for each unit, with the ends of its 95 % interval.
+    /// The factor of the odds for each unit, with the ends of its 95 % interval.
     pub fn odds_ratio(&self) -> (f64, f64, f64) {
         const QUANTILE: f64 = 1.959_963_984_540_054;
         let at = |errors: f64| (self.estimate + errors * self.standard_error).exp();
@@ -50,19 +51,19 @@ pub struct BinomialModel {
     pub terms: Vec<OddsTerm>,
     /// Twice the logarithm of the likelihood that the model falls short of a share for each plot.
     pub deviance: f64,
-    /// The same of one share for all plots.
+    /// The deviance of a model with one share for all plots.
     pub null_deviance: f64,
     /// Plots less terms, at least 1.
     pub degrees_of_freedom: usize,
-    /// Pearson's chi-square by the degrees of freedom: 1 where plots differ by chance of counting alone.
+    /// Pearson's chi-square divided by the degrees of freedom: 1 if plots differ only by the scatter of counting.
     pub dispersion: f64,
-    /// What the model says of each plot, 0 to 1.
+    /// The model's share for each plot, 0 to 1.
     pub fitted: Vec<f64>,
-    /// What a reader has to know of it.
+    /// Remarks for the reader.
     pub remarks: Vec<Remark>,
 }
 
-/// A fit on its way.
+/// An unfinished fit.
 struct Fit {
     coefficients: DVector<f64>,
     covariance: DMatrix<f64>,
@@ -74,10 +75,10 @@ impl BinomialModel {
     /// Fits the model to a plot's count, and to how many it is of.
     ///
     /// # Errors
-    /// Where the plots carry none: nothing was counted or everything, no factor varies, or the counts lie on one side.
+    /// If the plots carry none: nothing was counted or everything, no factor varies, or the counts lie on one side.
     ///
     /// # Panics
-    /// Where there are more or fewer counts than plots.
+    /// If there are more or fewer counts than plots.
     pub fn fit(design: &Design, counts: &[(u32, u32)]) -> Result<Self, NoModel> {
         assert_eq!(counts.len(), design.plots(), "a response has a count for each plot");
         let (all, of) =
@@ -110,18 +111,18 @@ impl BinomialModel {
         })
     }
 
-    /// The term of this name, where the model has it.
+    /// The term with this name, if the model has it.
     pub fn term(&self, name: &str) -> Option<&OddsTerm> {
         self.terms.iter().find(|term| term.name == name)
     }
 }
 
-/// A dispersion above this is said: half as much again as counting alone makes.
+/// A dispersion above this is reported: half as much again as the scatter of counting.
 const OVERDISPERSED: f64 = 1.5;
 
-/// Iteratively reweighted least squares; none where the coefficients run away.
+/// Iteratively reweighted least squares. `None` if the coefficients diverge.
 fn fit(matrix: &DMatrix<f64>, counts: &[(u32, u32)]) -> Option<Fit> {
-    // R begins half a count inside, so that no plot is at 0 or 1.
+    // R starts half a count inside, so that no plot is at 0 or 1.
     let begin = |(count, of): &(u32, u32)| (f64::from(*count) + 0.5) / (f64::from(*of) + 1.0);
     let mut fitted: Vec<f64> = counts.iter().map(begin).collect();
     let (mut last, mut is_settled) = (f64::INFINITY, false);
@@ -149,7 +150,7 @@ fn fit(matrix: &DMatrix<f64>, counts: &[(u32, u32)]) -> Option<Fit> {
         }
         fitted = log_odds.iter().map(|odds| 1.0 / (1.0 + (-odds).exp())).collect();
         let deviance = deviance(counts, &fitted);
-        // The deviance is flat where it is least: one step more has the coefficients settle as well.
+        // The deviance is flat at its minimum: one more step lets the coefficients converge as well.
         if is_settled {
             return Some(Fit { coefficients, covariance, fitted, deviance });
         }

@@ -1,13 +1,14 @@
-//! Whether a linear model may be trusted: what its residuals say, as tests with a probability each.
+//! Checks of a linear model by its residuals, as tests with a p-value each.
 //!
-//! - **Lack of fit**: do the treatments' means leave the straight lines by more than their plots scatter?
-//!   R: `anova(m, lm(y ~ factor(speed):factor(spacing)))`.
+//! - **Lack of fit**: do the treatments' means differ from the straight lines by more than their plots scatter? R:
+//!   `anova(m, lm(y ~ factor(speed):factor(spacing)))`.
 //! - **Unequal scatter**: do plots scatter more at one speed or spacing than at another? Breusch and Pagan's test in
 //!   Koenker's form, R: `n * summary(lm(residuals(m)^2 ~ speed + spacing))$r.squared` as a chi-square.
-//! - **Outlier**: is one plot farther off than the farthest of so many may be? R: the greatest `abs(rstudent(m))`, its
-//!   probability times the number of plots.
+//! - **Outlier**: is one plot farther off than the farthest of this many plots may be? R: the greatest
+//!   `abs(rstudent(m))`, its probability times the number of plots.
 //!
-//! Whether the residuals are normal is not asked: with a few dozen plots no test could tell, and means forgive it.
+//! Normality of the residuals is not tested. A few dozen plots are too few for such a test, and means tolerate
+//! deviations.
 
 use super::design::{Design, is_zero, scatter, varies};
 use super::linear::LinearModel;
@@ -16,24 +17,24 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 use std::collections::BTreeMap;
 
-/// A check finds something where chance would make as much less often than this.
+/// A check has a finding if its p-value is below this.
 const SIGNIFICANCE: f64 = 0.05;
 
-/// What the residuals of a model say. A check that the plots do not allow is none.
+/// The checks of a model. A check that the plots do not allow is `None`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Checks {
-    /// How probable so much lack of fit is by chance; it takes repeated treatments, and more of them than terms.
+    /// The p-value of the lack of fit. It needs repeated treatments, and more treatments than terms.
     pub lack_of_fit_p: Option<f64>,
     /// How probable scatter as unequal is by chance.
     pub unequal_scatter_p: Option<f64>,
-    /// The plot that is farthest off, numbered from 1, and how probable one as far off is among so many.
+    /// The plot that is farthest off, numbered from 1, and its p-value among this many plots.
     pub farthest: Option<(usize, f64)>,
 }
 
 impl Checks {
-    /// Those of a model of these values in this design.
+    /// The checks of a model of these values in this design.
     pub fn of(design: &Design, values: &[f64], model: &LinearModel) -> Self {
-        // What lies on the model exactly has no residuals to look at.
+        // A model that fits exactly has no residuals.
         if model.terms.iter().any(|term| term.p.is_none()) {
             return Self { lack_of_fit_p: None, unequal_scatter_p: None, farthest: None };
         }
@@ -44,7 +45,7 @@ impl Checks {
         }
     }
 
-    /// What they say, a sentence each. `name` is the measure's.
+    /// The findings, a sentence each. `name` is the measure's.
     pub fn sentences(&self, name: &str) -> Vec<String> {
         let mut said = Vec::new();
         let is_found = |p: &f64| *p < SIGNIFICANCE;

@@ -1,14 +1,14 @@
-//! The design of a trial: where each plot stands, what of it makes the columns of a model, and why there may be none.
+//! The design of a trial: the factors of each plot, the columns of a model, and the reasons why there may be no model.
 
 use serde::Serialize;
 use thiserror::Error;
 
-/// Where each plot stands in the trial.
+/// The factors of each plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
     pub(super) speeds_km_h: Vec<f64>,
     pub(super) spacings_cm: Vec<f64>,
-    /// The block in which each plot lies; empty where there are none.
+    /// The block of each plot; empty without blocks.
     pub(super) blocks: Vec<u32>,
 }
 
@@ -22,7 +22,7 @@ impl Design {
     /// The same plots, each in its block: what differs from block to block is no chance to the analysis of variance.
     ///
     /// # Panics
-    /// Where there are more or fewer blocks than plots.
+    /// If there are more or fewer blocks than plots.
     pub fn in_blocks(self, blocks: Vec<u32>) -> Self {
         assert_eq!(blocks.len(), self.plots(), "each plot lies in a block");
         Self { blocks, ..self }
@@ -36,7 +36,7 @@ impl Design {
     /// The columns of a model with all factors that vary, and a remark on each that does not.
     ///
     /// # Errors
-    /// Where the plots carry none.
+    /// If the plots carry none.
     pub(super) fn columns(&self) -> Result<(Vec<Column>, Vec<Remark>), NoModel> {
         let mut columns = vec![("constant", vec![1.0; self.plots()])];
         let mut remarks = Vec::new();
@@ -76,25 +76,25 @@ pub enum NoModel {
     /// No factor varies.
     #[error("all plots have the same speed and spacing: a model needs two levels of one of them")]
     OneTreatment,
-    /// Nothing is left to tell an effect from chance.
+    /// There are no degrees of freedom left for the scatter.
     #[error("plots: {plots}, parameters: {parameters}: it takes at least one plot more than parameters")]
     TooFewPlots {
         /// The plots that there are.
         plots: usize,
-        /// The parameters that have to be found.
+        /// The number of parameters.
         parameters: usize,
     },
     /// Speed and spacing go together.
     #[error("speed and spacing change together, so that their effects cannot be told apart")]
     Inseparable,
-    /// A binomial model's slope has no end.
+    /// A binomial model's slope diverges.
     #[error(
         "all that was counted lies on one side of the speeds or spacings, so that the odds have no slope that could be named"
     )]
     OneSided,
 }
 
-/// What a reader has to know of a table of figures.
+/// A remark on a table of figures.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Remark {
@@ -117,7 +117,7 @@ pub enum Remark {
     /// Too few plots for blocks.
     #[error("the replications are no blocks here: with them no plot would be left to tell an effect from chance")]
     NoBlocks,
-    /// Plots differ by more than counting makes them.
+    /// Plots differ by more than the scatter of counting.
     #[error(
         "plots differ by more than the counting does: take these standard errors times {factor:.2}, and p for too small"
     )]
@@ -130,7 +130,7 @@ pub enum Remark {
     NoScatter,
 }
 
-/// Sums of squares below this share of the response's own are what rounding leaves of zero.
+/// Sums of squares below this share of the response's own are rounding errors of zero.
 const ROUNDING: f64 = 1e-24;
 
 /// Whether a sum of squares of deviations is zero but for rounding.
@@ -154,9 +154,9 @@ pub(super) fn varies(values: &[f64]) -> bool {
     values.windows(2).any(|pair| pair[0] != pair[1])
 }
 
-/// Whether one column follows from the other.
+/// Whether one column is a linear function of the other.
 fn is_collinear(a: &[f64], b: &[f64]) -> bool {
-    /// Share of a column that the other leaves unexplained, below which the coefficients are all rounding.
+    /// If less than this share of a column is unexplained by the other, the coefficients are only rounding errors.
     const TOLERANCE: f64 = 1e-9;
     let (mean_a, mean_b) = (mean(a), mean(b));
     let together: f64 = a.iter().zip(b).map(|(a, b)| (a - mean_a) * (b - mean_b)).sum();

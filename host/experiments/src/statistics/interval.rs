@@ -1,39 +1,39 @@
-//! How far a figure may be off: exact intervals of shares that were counted, and intervals of means.
+//! Intervals of figures: exact intervals of counted shares, and intervals of means.
 //!
-//! A share's interval is Clopper and Pearson's, by the quantiles of the beta distribution, as R's `binom.test` has it: it
-//! covers the true share in at least 95 of 100 trials, however few plants there were. Where none or all were counted, the
-//! 5 % lie on the one side that is left (R's `alternative = "less"` or `"greater"`), so that none of `n` says "below about
-//! `3 / n`". A mean's interval is Student's, as R's `t.test` has it, over replications that are taken for independent.
+//! A share's interval is Clopper and Pearson's, by the quantiles of the beta distribution, as in R's `binom.test`. It
+//! covers the true share in at least 95 of 100 trials, for any number of plants. If none or all were counted, the 5 %
+//! lie on one side (R's `alternative = "less"` or `"greater"`). So none of `n` gives "below about `3 / n`". A mean's
+//! interval is Student's, as in R's `t.test`, over replications that are assumed independent.
 
 use super::design::{mean, scatter};
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF, Normal, StudentsT};
 use std::fmt::{self, Display, Formatter};
 
-/// How probable it is at least that an interval covers the true figure.
+/// The least probability that an interval covers the true figure.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// So many of so many, and how far their share may be off.
+/// A count out of a total, with the interval of its share.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Share {
     /// Those counted.
     pub count: u64,
-    /// All, at least as many.
+    /// The total, at least the count.
     pub of: u64,
-    /// The least share that the count goes with, percent; 0 where none was counted.
+    /// The lower end of the interval, percent; 0 if none was counted.
     pub least_percent: f64,
-    /// The greatest, percent; 100 where all were counted.
+    /// The upper end, percent; 100 if all were counted.
     pub greatest_percent: f64,
 }
 
 impl Share {
-    /// The share of `count` of `of`. Where there is nothing to count, any share may be true.
+    /// The share of `count` of `of`. If `of` is 0, the interval is everything.
     pub fn of(count: impl Into<u64>, of: impl Into<u64>) -> Self {
         let (count, of) = (count.into(), of.into());
         let chance = 1.0 - CONFIDENCE;
         let (hits, misses) = (count as f64, of.saturating_sub(count) as f64);
         let quantile = |a: f64, b: f64, probability: f64| 100.0 * beta_quantile(a, b, probability);
-        // None and all leave one side only, and there the quantile has a closed form.
+        // None and all have a one-sided interval, and its quantile has a closed form.
         let one_sided = || -100.0 * (chance.ln() / of.max(1) as f64).exp_m1();
         let (least_percent, greatest_percent) = match (count, of) {
             (_, 0) => (0.0, 100.0),
@@ -44,20 +44,21 @@ impl Share {
         Self { count, of, least_percent, greatest_percent }
     }
 
-    /// The share itself, percent; 0 of nothing.
+    /// The share itself, percent; 0 if the total is 0.
     pub fn percent(&self) -> f64 {
         100.0 * self.count as f64 / self.of.max(1) as f64
     }
 }
 
-/// Halvings after which the quantile of any count of fewer than 2^64 is known to the last of a number's digits.
+/// Bisections that give the quantile of any count below 2^64 to the last digit of an `f64`.
 const HALVINGS: usize = 120;
 
-/// Counts from which on the library's distribution is not exact any more, while the normal one is to a thousandth of the interval.
+/// From these counts on the library's distribution is not exact, but the normal distribution is, to a thousandth of the
+/// interval.
 const MANY: f64 = 1e6;
 
-/// The share that a beta distribution stays below with such a probability, 0 to 1. By halving, which always ends: the library's
-/// own quantile never comes back from counts of thousands of millions.
+/// The quantile of a beta distribution, 0 to 1. It uses bisection, which always ends: the library's own quantile does
+/// not return for counts of thousands of millions.
 fn beta_quantile(a: f64, b: f64, probability: f64) -> f64 {
     if a.min(b) > MANY {
         let (mean, all) = (a / (a + b), a + b);
@@ -76,7 +77,7 @@ fn beta_quantile(a: f64, b: f64, probability: f64) -> f64 {
     greatest
 }
 
-/// The interval, as it stands behind a share: `below 0.07` where none was counted, else `0.53 to 1.68`.
+/// The interval as text behind a share: `below 0.07` if none was counted, else `0.53 to 1.68`.
 impl Display for Share {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         let digits = if self.greatest_percent - self.least_percent < 2.0 { 2 } else { 1 };
@@ -89,17 +90,17 @@ impl Display for Share {
     }
 }
 
-/// A mean, and how far it may be off.
+/// A mean and its interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mean {
     /// The mean, in the values' unit.
     pub mean: f64,
-    /// Half the width of its interval, in the same unit; none of a single value.
+    /// Half the width of its interval, in the same unit. `None` for a single value.
     pub within: Option<f64>,
 }
 
 impl Mean {
-    /// The mean of values that are independent of each other; of none, 0.
+    /// The mean of independent values; 0 without values.
     pub fn of(values: &[f64]) -> Self {
         let count = values.len() as f64;
         let quantile = || {

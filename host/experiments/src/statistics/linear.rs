@@ -13,9 +13,9 @@ pub struct Term {
     pub estimate: f64,
     /// Its standard error, in the same unit.
     pub standard_error: f64,
-    /// Estimate by standard error; none where the plots do not scatter.
+    /// Estimate divided by standard error. `None` if the plots do not scatter.
     pub t: Option<f64>,
-    /// How probable such a t is where the true coefficient is zero, 0 to 1, both sides together; none where t is.
+    /// The two-sided p-value of t, 0 to 1. `None` if t is `None`.
     pub p: Option<f64>,
 }
 
@@ -26,17 +26,17 @@ pub struct LinearModel {
     pub terms: Vec<Term>,
     /// Share of the response's variation that the model explains, 0 to 1.
     pub r_squared: f64,
-    /// The same, less what chance explains with so many terms; below 0 where the model explains less than that.
+    /// The same, adjusted for the number of terms. It is below 0 if the model explains less than chance.
     pub adjusted_r_squared: f64,
     /// Standard deviation of the plots around the model, in the response's unit.
     pub residual_standard_error: f64,
     /// Plots less terms, at least 1.
     pub degrees_of_freedom: usize,
-    /// What the model says of each plot, in the response's unit.
+    /// The model's value for each plot, in the response's unit.
     pub fitted: Vec<f64>,
-    /// The response less what the model says, a plot each.
+    /// The response less the model's value, for each plot.
     pub residuals: Vec<f64>,
-    /// What a reader has to know of it.
+    /// Remarks for the reader.
     pub remarks: Vec<Remark>,
 }
 
@@ -44,10 +44,10 @@ impl LinearModel {
     /// Fits the model to a response with a finite value for each plot.
     ///
     /// # Errors
-    /// Where the plots carry none.
+    /// If the plots carry none.
     ///
     /// # Panics
-    /// Where there are more or fewer values than plots.
+    /// If there are more or fewer values than plots.
     pub fn fit(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
         assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
         let total = scatter(values);
@@ -58,7 +58,7 @@ impl LinearModel {
 
         let row = |plot: usize| [values[plot]].into_iter().chain(columns.iter().map(move |(_, column)| column[plot]));
         let rows: Vec<f64> = (0..values.len()).flat_map(row).collect();
-        // It refuses what has been refused above.
+        // It refuses only what was refused above.
         let fit = fit_low_level_regression_model(&rows, values.len(), columns.len() + 1)
             .map_err(|_| NoModel::TooFewPlots { plots: values.len(), parameters: columns.len() })?;
         let residuals = fit.residuals().to_vec();
@@ -83,7 +83,7 @@ impl LinearModel {
         })
     }
 
-    /// The term of this name, where the model has it.
+    /// The term with this name, if the model has it.
     pub fn term(&self, name: &str) -> Option<&Term> {
         self.terms.iter().find(|term| term.name == name)
     }

@@ -1,9 +1,9 @@
-//! The two-way analysis of variance: how much of a response's variation goes with speed, with spacing, with both together,
-//! and with neither.
+//! The two-way analysis of variance: how a response's variation divides into speed, spacing, their interaction, and the
+//! residual.
 //!
-//! Models are nested in each other: one mean, a mean for each block, effects of block and speed that add up, those of block,
-//! speed and spacing, those of block and treatment. A source's sum of squares is what its model leaves less than the one before.
-//! Without blocks the first of them falls away.
+//! The models are nested: one mean; a mean for each block; additive effects of block and speed; of block, speed and
+//! spacing; and of block and treatment. A source's sum of squares is the difference between the residuals of its model
+//! and of the one before. Without blocks the first model is left out.
 
 use super::design::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
 use nalgebra::{DMatrix, DVector};
@@ -15,28 +15,28 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 pub struct Source {
     /// `block`, `speed`, `spacing`, `speed x spacing` or `residual`.
     pub name: &'static str,
-    /// Free parameters that it stands for, at least 1.
+    /// Its degrees of freedom, at least 1.
     pub degrees_of_freedom: usize,
-    /// The variation that goes with it, in the response's unit squared.
+    /// Its part of the variation, in the response's unit squared.
     pub sum_of_squares: f64,
     /// The same for each degree of freedom.
     pub mean_square: f64,
-    /// Its mean square by that of the residual; none for the residual, and where the plots do not scatter.
+    /// Its mean square divided by that of the residual. `None` for the residual, and if the plots do not scatter.
     pub f: Option<f64>,
-    /// How probable an F as large is where the source has no effect, 0 to 1; none where F is.
+    /// The p-value of F, 0 to 1. `None` if F is `None`.
     pub p: Option<f64>,
 }
 
 /// A response's variation, taken apart by speed and spacing as factors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AnalysisOfVariance {
-    /// The sources that the trial can tell apart, the residual last.
+    /// The sources that the trial can separate, the residual last.
     pub sources: Vec<Source>,
-    /// What a reader has to know of it.
+    /// Remarks for the reader.
     pub remarks: Vec<Remark>,
 }
 
-/// What a model leaves of a response.
+/// The residual of a model.
 #[derive(Clone, Copy)]
 struct Fit {
     parameters: usize,
@@ -47,10 +47,10 @@ impl AnalysisOfVariance {
     /// Takes a response apart that has a finite value for each plot.
     ///
     /// # Errors
-    /// Where the plots carry no such analysis.
+    /// If the plots carry no such analysis.
     ///
     /// # Panics
-    /// Where there are more or fewer values than plots.
+    /// If there are more or fewer values than plots.
     pub fn of(design: &Design, values: &[f64]) -> Result<Self, NoModel> {
         assert_eq!(values.len(), design.plots(), "a response has a value for each plot");
         if is_zero(scatter(values), values) {
@@ -139,7 +139,7 @@ impl AnalysisOfVariance {
         Ok(Self { sources, remarks })
     }
 
-    /// The source of this name, where the analysis has it.
+    /// The source with this name, if the analysis has it.
     pub fn source(&self, name: &str) -> Option<&Source> {
         self.sources.iter().find(|source| source.name == name)
     }
@@ -157,7 +157,7 @@ struct Levels {
 }
 
 impl Levels {
-    /// The levels of plots by what they have.
+    /// The levels of the plots' factors.
     fn of(plots: impl Iterator<Item = (f64, f64)>) -> Self {
         let mut known: Vec<(f64, f64)> = Vec::new();
         let of_plot = plots.map(|plot| {
@@ -170,7 +170,7 @@ impl Levels {
         Self { of_plot, count: known.len() }
     }
 
-    /// Whether there are so many levels, with as many plots each.
+    /// Whether there are `count` levels, with equal numbers of plots.
     fn are_balanced(&self, count: usize) -> bool {
         let plots = |level| self.of_plot.iter().filter(|of_plot| **of_plot == level).count();
         self.count == count && (1..count).all(|level| plots(level) == plots(0))
@@ -187,7 +187,7 @@ fn additive_fit(factors: &[&Levels], values: &[f64]) -> Fit {
     }
     let mean = mean(values);
     let response = DVector::from_iterator(values.len(), values.iter().map(|value| value - mean));
-    // A column for each level of each: more than needed, which the singular values tell.
+    // A column for each level of each factor: more than needed. The singular values show the rank.
     let columns: Vec<(&Levels, usize)> =
         factors.iter().flat_map(|levels| (0..levels.count).map(move |level| (*levels, level))).collect();
     let matrix = DMatrix::from_fn(values.len(), columns.len(), |plot, column| {

@@ -1,17 +1,16 @@
-//! From many objects to the few examples that decide alike.
+//! Reduces many detections to the few examples that decide alike.
 //!
-//! 1. **Wilson's editing** (D. L. Wilson, 1972): an object whose three nearest others vote for the other class is noise,
-//!    or has the wrong label, and is taken out.
-//! 2. **Hart's condensing** (P. E. Hart, 1968): while there are objects that the examples kept so far do not treat as they
-//!    should, one of them is kept. A weed has to be known as a weed, within half the squared radius, so that what is a
-//!    little unlike all objects is still known later; a plant must not be taken for one. Hart takes such objects as
-//!    they come; here the one goes first that has the most others of its class and plight around it, as long as they
-//!    have no example near.
-//! 3. **Filling up**: plants that no kept example is near are unknown, which spares them. As long as there is room, they
-//!    are kept in the same order; and in any case so many objects as are to vote. Hart's rule has the last word: a table
-//!    that cannot treat all of them as it should without more examples than there is room for is refused.
+//! 1. **Wilson's editing** (D. L. Wilson, 1972): a detection whose three nearest others vote for the other class is
+//!    noise, or has the wrong label. It is removed.
+//! 2. **Hart's condensing** (P. E. Hart, 1968): while the chosen examples mistreat some detections, one of these is
+//!    added. A weed must be recognised within half the squared radius, so that slightly different weeds are recognised
+//!    later. A plant must not be classified as a weed. Hart adds such detections in their order. Here the next one is
+//!    the detection with the most others of its class around it that are mistreated too and have no example near.
+//! 3. **Filling up**: plants without an example near are unknown, which spares them. While there is room they are added
+//!    in the same order, and in any case until `k` examples can vote. Hart's rule is checked last. A table is refused
+//!    if it would need more examples than there is room for.
 //!
-//! Where several objects would do, the first in the list does.
+//! Among equals the first in the list is chosen.
 
 use super::model::{answer_of_others, class_of};
 use control::ground::{
@@ -35,10 +34,10 @@ pub struct TooMany {
     pub most: usize,
 }
 
-/// Neighbours that vote on whether an object is noise, as Wilson has it.
+/// Neighbours that vote whether a detection is noise, as in Wilson's paper.
 const EDITORS: u8 = 3;
 
-/// The places of those examples that are not noise.
+/// The indices of the examples that are not noise.
 pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
     let is_noise = |index: usize| {
         answer_of_others(examples, index, EDITORS, u32::MAX)
@@ -47,11 +46,11 @@ pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
     (0..examples.len()).filter(|&index| !is_noise(index)).collect()
 }
 
-/// Chooses at most `most` of those `examples` whose places are `edited`, for a vote of `k` within `radius`; gives their
-/// places, in the order in which they were chosen.
+/// Chooses at most `most` of the `examples` with indices in `edited`, for a vote of `k` within `radius`. Returns their
+/// indices, in the order of choice.
 ///
 /// # Errors
-/// [`TooMany`], where more are needed.
+/// [`TooMany`], if more are needed.
 pub fn condense(
     examples: &[Example<COUNT>],
     edited: &[usize],
@@ -85,11 +84,12 @@ pub fn condense(
     Ok(kept)
 }
 
-/// Chooses at most `most` of `examples` that, beside those which are `given`, have every plant spared and, as far as there is room
-/// and no plant is lost by it, weeds known: their places, in the order in which they were chosen. No two of them are alike.
+/// Chooses at most `most` of `examples` to add to those that are `given`. All plants must be spared. As many weeds as
+/// possible are recognised, without losing a plant. Returns their indices, in the order of choice. No two chosen
+/// examples are equal.
 ///
 /// # Errors
-/// [`TooMany`], where that many leave a plant that is taken for a weed.
+/// [`TooMany`], if with that many a plant is still classified as a weed.
 pub fn beside(
     given: &[Example<COUNT>],
     examples: &[Example<COUNT>],
@@ -112,7 +112,7 @@ pub fn beside(
     keep_most_needed(&all, &plants, &mut kept, usize::MAX, radius / 2, is_taken_for_a_weed);
     let lost = |kept: &[Example<COUNT>]| plants.iter().filter(|&&plant| is_taken_for_a_weed(plant, kept)).count();
     let table: Vec<Example<COUNT>> = kept.iter().map(|&index| all[index]).collect();
-    // One that is an example may be outvoted by those around it.
+    // An example itself may be outvoted by those around it.
     let lost_already = lost(&table);
     let costs_no_plant = |index: usize, kept: &[Example<COUNT>]| lost(&[kept, &[all[index]]].concat()) <= lost_already;
     keep_most_needed(&all, &weeds, &mut kept, room, radius / 2, |index, kept| {
@@ -122,8 +122,8 @@ pub fn beside(
     if chosen.len() > most { Err(TooMany { needed: chosen.len(), most }) } else { Ok(chosen) }
 }
 
-/// While fewer than `most` are kept and `needs` says of any of `candidates` that the examples kept are not enough for it:
-/// keeps the one that has the most of those within `reach` that have no example of their class there.
+/// Repeats while fewer than `most` are chosen and some of `candidates` need more examples, as `needs` decides. Each
+/// time it adds the candidate with the most others within `reach` that have no example of their class there.
 fn keep_most_needed(
     examples: &[Example<COUNT>],
     candidates: &[usize],
@@ -136,7 +136,7 @@ fn keep_most_needed(
     while kept.len() < most {
         let needy: Vec<usize> =
             candidates.iter().copied().filter(|index| !kept.contains(index) && needs(*index, &table)).collect();
-        // Those near a kept example may need another one yet, but those that have none come first.
+        // Candidates near an example may need another one, but those without any come first.
         let is_alone = |index: &usize| !table.iter().any(|example| are_fellows(example, &examples[*index], reach));
         let alone: Vec<usize> = needy.iter().copied().filter(is_alone).collect();
         let serves =

@@ -1,14 +1,14 @@
-//! Who was taken for whom.
+//! The confusion matrix.
 //!
-//! What is unknown is treated as a plant, so that two errors are told apart: a plant taken for a weed is cut, a weed
-//! taken for a plant or for unknown is left standing.
+//! Unknown detections are treated as plants. So there are two kinds of error: a plant classified as a weed is cut, and
+//! a weed classified as a plant or unknown is left.
 
 use comfy_table::{CellAlignment, Table, presets};
 use control::ground::class::Class;
 use field::row::Kind;
 use std::fmt;
 
-/// How many objects of each kind were taken for each class.
+/// How many detections of each kind were classified as each class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Confusion {
     plants: Counts,
@@ -66,7 +66,7 @@ impl Confusion {
         self.plants.taken_for_weed
     }
 
-    /// Weeds that the machine would spare, those that are unknown included.
+    /// Weeds that the machine would spare, including unknown ones.
     pub fn weeds_taken_for_plants(&self) -> usize {
         self.weeds.taken_for_plant + self.weeds.unknown
     }
@@ -76,12 +76,12 @@ impl Confusion {
         self.plants.unknown
     }
 
-    /// Share of all objects that the machine treats as it should, from 0 to 1.
+    /// Share of detections that the machine treats correctly, from 0 to 1.
     pub fn accuracy(&self) -> f64 {
         1.0 - share(self.plants_taken_for_weeds() + self.weeds_taken_for_plants(), self.total())
     }
 
-    /// What is bad about it, worst first: plants cut, weeds spared, plants not known.
+    /// The errors, worst first: plants cut, weeds spared, plants unknown.
     pub(super) fn harm(&self) -> (usize, usize, usize) {
         (self.plants_taken_for_weeds(), self.weeds_taken_for_plants(), self.plants_unknown())
     }

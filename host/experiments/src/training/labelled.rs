@@ -1,9 +1,9 @@
-//! An object of which somebody knows what it was.
+//! A labelled detection.
 
 use control::ground::{class::label, features::Features};
 use field::row::Kind;
 
-/// An object whose kind is known.
+/// A detection with a known kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Labelled {
     /// What the machine measured.
@@ -12,7 +12,7 @@ pub struct Labelled {
     pub kind: Kind,
 }
 
-/// The label that stands for a kind in an example.
+/// The label for a kind in an example.
 pub const fn label_of(kind: Kind) -> u8 {
     match kind {
         Kind::Plant => label::PLANT,

@@ -1,14 +1,14 @@
-//! A trained table written down: as the Rust source that the firmware is built from, or as CSV that can be read again.
+//! Writes a trained table: as the Rust source for the firmware, or as CSV that can be read again.
 //!
-//! The source lists the examples in physical units, a line each, so that a person can check it and a change of it can be
-//! read. The compiler turns them into bytes.
+//! The source lists the examples in physical units, one a line, so that a person can check them and see changes. The
+//! compiler converts them to bytes.
 
 use super::{Labelled, Training, label_of, table};
 use control::ground::class::label;
 use std::fmt::Write;
 use std::io;
 
-/// What stands above the table; `{how}` is the command that wrote it.
+/// The head of the table; `{how}` is the command that wrote it.
 const HEAD: &str = "\
 //! The trained example table: scale, radius, k and examples, in millimetres and millimetres a second.
 //!
@@ -19,7 +19,7 @@ use crate::ground::features::COUNT as FEATURES;
 use knn::Range;
 ";
 
-/// The table as `control/src/ground/examples/table.rs`, in the shape that rustfmt gives it. `how` is the command that wrote it.
+/// The table as `control/src/ground/examples/table.rs`, in rustfmt's form. `how` is the command that wrote it.
 pub fn rust(training: &Training, how: &str) -> String {
     let Training { ranges, radius, k, kept, .. } = training;
     let mut text = HEAD.replace("{how}", how);
@@ -45,7 +45,7 @@ pub fn rust(training: &Training, how: &str) -> String {
 /// Writes examples as a table that [`table::read_labelled`] reads.
 ///
 /// # Errors
-/// Those of the writer.
+/// The errors of the writer.
 pub fn write_csv(examples: &[Labelled], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
     writer.write_record(table::COLUMNS.into_iter().chain([table::LABEL]))?;

@@ -1,4 +1,4 @@
-//! A classifier as the firmware has it, and what it takes objects for.
+//! A classifier like the firmware's, and its classes for detections.
 
 use super::confusion::Confusion;
 use super::labelled::{Labelled, label_of};
@@ -11,7 +11,7 @@ use control::ground::{
 };
 use knn::{Answer, ClassifyError, Example, Scale, classify};
 
-/// What the machine takes an object for, given the classifier's answer.
+/// The machine's class for a classifier's answer.
 pub const fn class_of<const CLASSES: usize>(answer: &Answer<CLASSES>) -> Class {
     match (answer.kind, answer.label) {
         (knn::Kind::Known, label::PLANT) => Class::Plant,
@@ -20,7 +20,7 @@ pub const fn class_of<const CLASSES: usize>(answer: &Answer<CLASSES>) -> Class {
     }
 }
 
-/// A classifier that is ready for use: what `control::ground::examples` holds, with the k that goes with it.
+/// A classifier: the examples as in `control::ground::examples`, with their k.
 #[derive(Clone, Debug)]
 pub struct Model {
     /// From features to bytes.
@@ -34,7 +34,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// The table that the firmware carries, with the k that it starts with.
+    /// The firmware's built-in table, with its default k.
     pub fn built_in() -> Self {
         Self { scale: examples::SCALE, radius: examples::RADIUS, k: examples::K, examples: examples::EXAMPLES.to_vec() }
     }
@@ -42,12 +42,12 @@ impl Model {
     /// The classifier's answer to an object.
     ///
     /// # Errors
-    /// Where k does not suit the number of examples.
+    /// If k does not suit the number of examples.
     pub fn answer(&self, features: &Features) -> Result<Answer<{ label::COUNT }>, ClassifyError> {
         classify(self.examples.as_slice(), &self.scale.quantise(&features.values()), self.k, self.radius)
     }
 
-    /// What the machine takes an object for; unknown where the classifier has no answer.
+    /// The machine's class for a detection; unknown if the classifier has no answer.
     pub fn class(&self, features: &Features) -> Class {
         self.answer(features).map_or(Class::Unknown, |answer| class_of(&answer))
     }
@@ -55,7 +55,7 @@ impl Model {
     /// A line an object: what it was, what it is taken for, and what speaks for it.
     ///
     /// # Errors
-    /// Where k does not suit the number of examples.
+    /// If k does not suit the number of examples.
     pub fn table(&self, objects: &[Recorded]) -> Result<Table, ClassifyError> {
         let mut table = Table::new();
         table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
@@ -93,7 +93,7 @@ impl Model {
         Ok(table)
     }
 
-    /// Who of `objects` is taken for whom.
+    /// The confusion matrix of `objects`.
     pub fn classify(&self, objects: &[Labelled]) -> Confusion {
         objects.iter().map(|object| (object.kind, self.class(&object.features))).collect()
     }
@@ -105,7 +105,7 @@ pub(super) fn quantised(scale: &Scale<COUNT>, objects: &[Labelled]) -> Vec<Examp
     objects.iter().map(example).collect()
 }
 
-/// The answer of all examples but the one at `index` to that one.
+/// The answer of all other examples to the one at `index`.
 pub(super) fn answer_of_others(
     examples: &[Example<COUNT>],
     index: usize,

@@ -1,8 +1,8 @@
-//! A picture of what a table decides: hold against spacing, a panel for each speed class.
+//! A picture of a table's decisions: hold against spacing, a panel for each speed class.
 //!
-//! The ground of a panel is coloured by the answer to an object of that spacing and hold, described as the machine
-//! would; the dots are the objects that were learned from, the ringed ones those that were kept as examples. Delay and
-//! actuation follow from the other features, so that nothing is hidden behind the two that are drawn.
+//! The background of a panel shows the class of a detection with that spacing and hold. The dots are the training
+//! detections. Those that were chosen as examples have a ring. Delay and actuation follow from the other features, so
+//! the two drawn ones suffice.
 
 use super::Training;
 use super::labelled::Labelled;
@@ -28,7 +28,7 @@ const BELOW: f64 = 42.0;
 const RIGHT: f64 = 16.0;
 const PANELS_ABREAST: usize = 2;
 
-/// Hold of an object without width: the two margins of the reference machine.
+/// Hold of a detection without width: the two margins of the reference machine.
 const LEAST_HOLD_MM: f64 = 100.0;
 
 const PLANT: &str = "#2f7d34";
@@ -61,14 +61,14 @@ pub fn draw(training: &Training, objects: &[Labelled]) -> Document {
     document
 }
 
-/// What the panels show of spacing and hold.
+/// The ranges of spacing and hold.
 struct Axes {
     spacing_mm: Range<f64>,
     hold_mm: Range<f64>,
 }
 
 impl Axes {
-    /// From nothing to a little more than the objects have.
+    /// From 0 to a little more than the detections' values.
     fn around(objects: &[Labelled]) -> Self {
         let greatest = |value: fn(&Features) -> i16| {
             objects.iter().map(|object| f64::from(value(&object.features))).fold(LEAST_HOLD_MM, f64::max)
@@ -88,7 +88,7 @@ impl Axes {
         PANEL_HEIGHT - (hold_mm - self.hold_mm.start) / (self.hold_mm.end - self.hold_mm.start) * PANEL_HEIGHT
     }
 
-    /// The object that a place in the panel stands for.
+    /// The detection at a point of the panel.
     fn features_at(&self, class_mm_s: i16, x: f64, y: f64) -> Features {
         let share = |part: f64, range: &Range<f64>| range.start + part * (range.end - range.start);
         let spacing_mm = share(x / PANEL_WIDTH, &self.spacing_mm);
@@ -133,7 +133,7 @@ fn marks(range: &Range<f64>) -> impl Iterator<Item = f64> + use<> {
     (first..=last).map(move |mark| f64::from(mark) * step)
 }
 
-/// What the table answers, as stripes of cells with the same answer.
+/// The table's classes, as stripes of equal cells.
 fn ground(model: &Model, class_mm_s: i16, axes: &Axes) -> Group {
     let mut ground = Group::new().set("shape-rendering", "crispEdges");
     let (columns, lines) = ((PANEL_WIDTH / CELL) as usize, (PANEL_HEIGHT / CELL) as usize);

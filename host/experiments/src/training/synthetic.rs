@@ -1,15 +1,15 @@
-//! Objects from simulated rows, as the firmware's own code sees them.
+//! Detections from simulated rows, seen by the firmware's own code.
 //!
-//! The machine rolls past rows of a [`Crop`] at its speeds and two spacings, and the levels that its encoder and its
-//! beam give go through the firmware's decoder and its [`Controller`]; no feature is made up. What varies: speed within
-//! a tenth of its class, spacing and canopy, plants that are missing, tall weeds wherever there is ground, closed and
-//! ragged canopies, and the slip of the wheel.
+//! The machine rolls past rows of a [`Crop`] at its speeds and two spacings. The levels of its encoder and beam pass
+//! through the firmware's decoder and its [`Controller`], so all features are the firmware's own. Several things vary:
+//! the speed within a tenth of its class, spacing and canopy, missing plants, tall weeds on bare ground, closed and
+//! ragged canopies, and the wheel's slip.
 //!
-//! Each pass begins with the firmware waking up on bare ground while the machine rolls already, so that weeds are met at
-//! every distance from where counting begins.
+//! Each pass begins with the firmware's start on bare ground while the machine already rolls. So weeds are met at every
+//! distance from the start of counting.
 //!
-//! The classifier here only takes notes. It is told the truth about each object, in the order in which they stand, so
-//! that the spacing of the next one is counted from a plant.
+//! The classifier here only records. It gets the true class of each detection, in their order, so that the next spacing
+//! is counted from a plant.
 
 use super::labelled::Labelled;
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
@@ -35,12 +35,12 @@ use std::ops::RangeInclusive;
 use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, PinChange};
 
-/// How a crop stands, and which weeds outgrow the beam beside it.
+/// A crop, and the weeds that outgrow the beam.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crop {
     /// What it is called.
     pub name: &'static str,
-    /// The speed classes at which it is weeded, in mm/s.
+    /// The speed classes for it, in mm/s.
     pub speeds_mm_s: &'static [i16],
     /// Its plant spacings.
     pub spacings_mm: [f64; 2],
@@ -52,8 +52,8 @@ pub struct Crop {
     pub canopy_scatter_mm: f64,
     /// Whether there are canopies through which the beam passes.
     pub is_ragged: bool,
-    /// Bare ground between the places where the firmware wakes up and the first plant's place, in turn: where no plant was before, spacing
-    /// is counted from there.
+    /// Bare ground between the firmware's start and the first planting position, used in turn. Without an earlier
+    /// plant, spacing is counted from the start.
     pub headlands_mm: &'static [f64],
     /// Passes over a row at each speed and spacing.
     pub passes: usize,
@@ -61,7 +61,7 @@ pub struct Crop {
     pub weed_widths_mm: RangeInclusive<f64>,
 }
 
-/// The crops that there are, the paper's first. All but its spacings is assumed.
+/// The crops, the paper's first. Everything except its spacings is assumed.
 pub const CROPS: [Crop; 3] = [
     Crop {
         name: "chilli",
@@ -88,7 +88,8 @@ pub const CROPS: [Crop; 3] = [
         passes: 12,
         weed_widths_mm: 12.0..=30.0,
     },
-    // Stalks below their leaves, and grasses, which are the narrower ones. Above 1.25 km/h so narrow a spacing leaves the tool no time.
+    // Stalks below their leaves, and grasses, which are narrower. Above 1.25 km/h this narrow spacing leaves the tool
+    // no time.
     Crop {
         name: "maize",
         speeds_mm_s: &[SPEED_CLASSES_MM_S[0]],
@@ -103,30 +104,30 @@ pub const CROPS: [Crop; 3] = [
     },
 ];
 
-/// Plants in a row before any go missing.
+/// Plants in a row before some are removed.
 const PLANTS: usize = 20;
 
 /// Share of the plants that did not come up; never two neighbours.
 const MISSING: f64 = 0.05;
 
-/// Tall weeds: how many grow on a metre of bare ground, and how far they stand from everything else, so
-/// that the beam sees each as an object of its own.
+/// Tall weeds: their number on a metre of bare ground, and their distance from everything else. The distance makes each
+/// weed a detection of its own.
 const WEEDS_PER_METRE: f64 = 3.0;
 const WEED_MARGIN_MM: f64 = 25.0;
 
-/// Ground behind the last thing, over which the machine sees that it was the last.
+/// Ground behind the last plant or weed, over which the beam stays clear.
 const RUN_OUT_MM: f64 = 100.0;
 
 /// The speed of a pass, as a share of its class.
 const PACE: RangeInclusive<f64> = 0.9..=1.1;
 
-/// How much farther than its circumference the wheel goes in a turn; negative where it drags.
+/// Slip: the additional distance of the wheel in a turn, as a share of its circumference; negative if it drags.
 const SLIP: RangeInclusive<f64> = -0.03..=0.03;
 
-/// The machine rolls from the beginning: it has its speed within a fraction of a millisecond.
+/// The machine rolls from the start: it reaches its speed within a fraction of a millisecond.
 const ACCELERATION_MM_S2: f64 = 1e6;
 
-/// How often the firmware's main loop takes its readings here; on the chip it is more often.
+/// How often the firmware's main loop reads its inputs here. The chip reads them more often.
 const LOOP_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
 
 /// The Uno's cycles in a step of the firmware's clock.
@@ -138,10 +139,10 @@ pub enum SyntheticError {
     /// The plants do not fit.
     #[error(transparent)]
     Planting(#[from] PlantingError),
-    /// The row is not one.
+    /// The row is invalid.
     #[error(transparent)]
     Row(#[from] Problem),
-    /// The beam did not see the row as it was planted, so that nothing can be labelled.
+    /// The beam saw another number of detections than was planted, so labels cannot be assigned.
     #[error("the beam saw {seen} objects on a row of {planted}: it has to see each as one")]
     Miscounted {
         /// Objects that the controller classified.
@@ -154,7 +155,7 @@ pub enum SyntheticError {
 /// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
 ///
 /// # Errors
-/// Where rows cannot grow or be seen as they should.
+/// If rows cannot grow or be seen as they should.
 pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut objects = Vec::new();
@@ -217,7 +218,7 @@ fn grow(
     Ok(Row::new(things)?)
 }
 
-/// Takes notes of what the controller asks, and answers with the truth.
+/// Records the controller's requests, and answers with the true class.
 struct Recorder<'a> {
     row: &'a Row,
     seen: RefCell<Vec<Labelled>>,
@@ -228,7 +229,7 @@ impl Classifier for &Recorder<'_> {
 
     fn classify(&self, features: &Features, _k: u8) -> Vote {
         let mut seen = self.seen.borrow_mut();
-        // More objects than things are found out at the end.
+        // Too many detections are an error at the end.
         let kind = self.row.things().get(seen.len()).map_or(Kind::Plant, |thing| thing.kind);
         seen.push(Labelled { features: *features, kind });
         let class = match kind {
@@ -238,7 +239,7 @@ impl Classifier for &Recorder<'_> {
         Vote { class, votes: 0 }
     }
 
-    // It knows the truth already: there is nothing to teach it, and nothing to forget.
+    // It already knows the true classes: it cannot be taught, and cannot forget.
 
     fn built_in_class(&mut self, _: &Features) -> Class {
         Class::Unknown
@@ -269,10 +270,10 @@ impl Classifier for &Recorder<'_> {
     }
 }
 
-/// What the controller sees of a row.
+/// The controller's detections in a row.
 fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, SyntheticError> {
     let standard = Machine::default();
-    // The firmware knows the wheel; the wheel that slips goes farther in a turn than it knows.
+    // The firmware has the nominal wheel; a slipping wheel goes farther in a turn.
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
     let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
@@ -308,7 +309,7 @@ fn readings(cycle: u64, position: Position) -> Readings {
     Readings::new(now, position)
 }
 
-/// The encoder's two channels, and the position that the firmware's decoder makes of them.
+/// The encoder's two channels, and the position from the firmware's decoder.
 #[derive(Default)]
 struct Encoder {
     channels: u8,

@@ -1,8 +1,8 @@
-//! Tables of objects in CSV files, as the firmware's console and its users write them.
+//! Reads and writes tables of detections as CSV, as the console and its users write them.
 //!
-//! The header names the five features and `label`, in any order; more columns are passed over, and so are lines that
-//! begin with `#` and the `ok` that ends what the console prints. All features are whole numbers. A label is `plant`,
-//! `weed`, or empty where nobody said what it was.
+//! The header names the five features and `label`, in any order. Other columns are ignored. So are lines that begin
+//! with `#`, and the `ok` that ends the console's answer. All features are whole numbers. A label is `plant`, `weed`,
+//! or empty for an unlabelled detection.
 
 use super::labelled::Labelled;
 use control::ground::features::Features;
@@ -23,11 +23,11 @@ pub const LABEL: &str = "label";
 pub struct Recorded {
     /// What the machine measured.
     pub features: Features,
-    /// What it was, where somebody said so.
+    /// Its label, if it has one.
     pub kind: Option<Kind>,
 }
 
-/// Reads objects that may or may not have a label. At least one is there.
+/// Reads detections with or without labels, at least one.
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
@@ -38,13 +38,13 @@ pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
 /// Objects to learn from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lesson {
-    /// Those with a label, of both classes.
+    /// The labelled ones, of both classes.
     pub objects: Vec<Labelled>,
-    /// How many there were without, which teach nothing.
+    /// The number of unlabelled ones, which are not used.
     pub unlabelled: usize,
 }
 
-/// Reads objects of both classes from files that together make one table.
+/// Reads detections of both classes from files that together make one table.
 ///
 /// # Errors
 /// Names the file, the line and what would be right.

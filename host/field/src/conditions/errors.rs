@@ -1,4 +1,4 @@
-//! What can be wrong with a field's conditions, where in the file it stands, and what would be right.
+//! The errors of a field's conditions: what is wrong, its line in the file, and what would be right.
 
 use super::parameters::PARAMETERS;
 use super::presets::presets;
@@ -27,7 +27,7 @@ pub enum ConditionsError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What is wrong, and what would be right where that is known.
+        /// What is wrong, and what would be right if that is known.
         problem: String,
     },
     /// A value in a file is out of its range.
@@ -59,10 +59,10 @@ pub enum WrongValue {
         least: f64,
         /// The greatest value.
         greatest: f64,
-        /// What it is.
+        /// Its meaning.
         meaning: String,
     },
-    /// Sweeps would run through what is to be kept.
+    /// Sweeps would run through a protected zone.
     #[error("machine.sweep_from_mm is {from_mm}, but {why}")]
     Sweeps {
         /// Where they begin.
@@ -78,7 +78,7 @@ pub enum WrongValue {
         /// Its value.
         value: f64,
     },
-    /// Nobody knows the name.
+    /// The name is unknown.
     #[error("{0} is neither a parameter of the field nor a setting of the firmware; there are {known}", known = names().collect::<Vec<_>>().join(", "))]
     Unknown(String),
 }
@@ -100,7 +100,7 @@ impl WrongValue {
     }
 }
 
-/// The line, from 1, in which `table.key` stands.
+/// The number of the line with `table.key`, from 1.
 pub(super) fn line(text: &str, name: &str) -> Option<usize> {
     let (table, key) = name.split_once('.')?;
     let root = DeTable::parse(text).ok()?;
@@ -108,12 +108,13 @@ pub(super) fn line(text: &str, name: &str) -> Option<usize> {
     Some(line_at(text, key.span().start))
 }
 
-/// The line, from 1, in which this byte stands.
+/// The number of the line with this byte, from 1.
 pub(super) fn line_at(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|&byte| byte == b'\n').count() + 1
 }
 
-/// What the TOML reader found wrong, in a line; where it is the value of a parameter or setting, what that has to be.
+/// The TOML reader's error in one line. If it is the value of a parameter or setting, the line also gives the valid
+/// range.
 pub(super) fn explain(text: &str, error: &toml::de::Error) -> String {
     let at = error.span().map_or(0, |span| span.start);
     let root = DeTable::parse(text).ok();

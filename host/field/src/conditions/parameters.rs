@@ -1,7 +1,7 @@
-//! The one table of a field's parameters: name, default, range, meaning, and where the number comes from.
+//! The table of a field's parameters: name, default, range, meaning, and source of the number.
 //!
-//! [`Conditions`] and its tables, their TOML form and [`PARAMETERS`] are made from it. What the values may not be together is not
-//! here.
+//! [`Conditions`] and its tables, their TOML form and [`PARAMETERS`] are made from it. Checks of combined values are
+//! elsewhere.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -39,12 +39,12 @@ macro_rules! parameters {
             }
         })*
 
-        /// What a field trial takes place in, and with.
+        /// The conditions of a field trial.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct Conditions {
             $($(#[doc = $about])* pub $table: $Table,)*
-            /// Settings that the firmware is told instead of those that follow from the machine, by their names.
+            /// Settings of the firmware, by name, that replace those calculated from the machine.
             pub settings: BTreeMap<String, u16>,
         }
 
@@ -112,7 +112,7 @@ parameters! {
         turn_s: f64 = 1.0, 0 to 600, "mean time that a turn takes beside its way", "fitted, as turn_m";
         steering_mm: f64 = 0.0, 0 to 150, "the machine strays within this of the row's line, evenly spread, gradually over a metre or two", "none: by hand it is some 10 to 25 mm";
     }
-    /// What the sensors suffer.
+    /// Disturbances of the sensors.
     sensors: Sensors {
         unseen_percent: f64 = 0.0, 0 to 100, "share of the plants that the beam does not see though they are as high as the others: bent, eaten, planted late", "none: no controller can spare them";
         beam_height_mm: f64 = 150.0, 5 to 1000, "height of the beam above the ground", "assumed: half way up the mean plant, three times as high as most weeds";

@@ -1,4 +1,4 @@
-//! The presets: fields that are usual, each by what differs from the default.
+//! The presets: common fields, each a list of differences from the default.
 
 /// The presets: a name, and a file that says what differs from the default.
 pub(super) const PRESETS: &[(&str, &str)] = &[
@@ -17,7 +17,7 @@ pub(super) const PRESETS: &[(&str, &str)] = &[
     ("broccoli", include_str!("../../presets/broccoli.toml")),
     ("maize", include_str!("../../presets/maize.toml")),
     ("maize-uneven", include_str!("../../presets/maize-uneven.toml")),
-    // The same field as the first, by what the machine in it is.
+    // The same field as the first, named by its machine.
     ("from-the-box", ""),
     ("paper", include_str!("../../presets/paper.toml")),
 ];

@@ -1,9 +1,9 @@
-//! The classifier of a replay, which knows what the log tells of a detection and what it cannot.
+//! The classifier of a replay. It uses the votes in the log for inputs that the log lacks.
 //!
-//! A detection's class rests on its width, on its distance from the plant before, and on the class of the machine's speed when it was
-//! classified. The first two stand in the log's line. The speed does not: the log has it only ten times a second, and near the edge
-//! between two speed classes it may have been in either. So a detection is classified in every speed class that the machine may have
-//! been in, and the log's vote stands where one of them gives it.
+//! A detection's class depends on its width, its distance from the plant before, and the machine's speed class at that
+//! moment. The log's line has the first two. It has the speed only ten times a second, so near the limit of two speed
+//! classes both are possible. So the replay classifies a detection in every possible speed class. It accepts the log's
+//! vote if one of them gives it.
 
 use control::ground::features::{self, Features};
 use control::ground::{
@@ -16,26 +16,26 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
-/// By how much the machine's own measure of its speed may differ from what the log has around it, in mm/s.
+/// Tolerance of the machine's own speed against the log's speeds around it, in mm/s.
 const SPEED_SLACK_MM_S: i32 = 25;
 
-/// Objects that a label may still mean, as many as the firmware remembers.
+/// Detections that a label may still refer to: as many as the firmware stores.
 const OBJECTS: usize = 16;
 
-/// What the log tells of the detection in the beam.
+/// The log's values for the detection in the beam.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// What the machine took it for.
+    /// The machine's vote.
     pub(super) vote: Vote,
     /// Distance from the leading edge of the plant before, in mm.
     pub(super) spacing_mm: i16,
     /// Its width in mm.
     pub(super) width_mm: i16,
-    /// Whether the log has to be believed, because what the vote rests on came before it began.
+    /// Whether to accept the log's vote: it depends on ground from before the log.
     pub(super) is_given: bool,
 }
 
-/// What the classifier has to know of the log.
+/// The log's values that the classifier uses.
 #[derive(Debug, Default)]
 pub(super) struct Witness {
     /// The detection that was in the beam last.
@@ -45,7 +45,7 @@ pub(super) struct Witness {
 }
 
 impl Witness {
-    /// The speed classes that the machine may have been in.
+    /// The possible speed classes of the machine.
     fn speed_classes(&self) -> impl Iterator<Item = i16> {
         let class = |speed: i32| features::speed_class(speed.clamp(i16::MIN.into(), i16::MAX.into()) as i16);
         let (slowest, fastest) = self.speeds_mm_s.get();
@@ -55,25 +55,25 @@ impl Witness {
     }
 }
 
-/// The firmware's classifier, asked with what the log tells.
+/// The firmware's classifier, with values from the log.
 pub(super) struct ReplayClassifier<'a> {
-    /// The built-in examples alone, which a label may not contradict.
+    /// The built-in examples alone. A label must not contradict them.
     built_in: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
     nearest: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
     witness: Rc<Witness>,
-    /// The last detections: as the replay describes them, and as the machine did.
+    /// The last detections: the replay's features, and the machine's features.
     described: RefCell<VecDeque<(Features, Features)>>,
 }
 
 impl<'a> ReplayClassifier<'a> {
-    /// A classifier with a log's examples, of which so many are built in: the first.
+    /// A classifier with a log's examples. The first `built_in` of them are those of the firmware.
     pub(super) fn new(examples: &'a [Example<{ features::COUNT }>], built_in: usize, witness: Rc<Witness>) -> Self {
         let nearest = |examples| Nearest::new(examples, Volatile::new());
         let (built_in, all) = (nearest(&examples[..built_in]), nearest(examples));
         Self { built_in, nearest: all, witness, described: RefCell::default() }
     }
 
-    /// What the machine took for the features of a detection that the replay describes like this.
+    /// The machine's features for a detection with these features in the replay.
     fn by_machine(&self, features: &Features) -> Features {
         let described = self.described.borrow();
         described.iter().find(|(by_replay, _)| by_replay == features).map_or(*features, |&(_, by_machine)| by_machine)

@@ -1,10 +1,10 @@
-//! What a log tells beside what its replay tells.
+//! Compares the events of a log with those of its replay.
 
 use super::replayed::{DETECTION_TICKS, Difference, Replayed, SWING_MS, SWING_TICKS};
 use crate::{EventLine, advice};
 use control::say::names;
 
-/// Farther than any detection's hold goes, 5 m at the default wheel.
+/// Longer than any detection's hold: 5 m at the default wheel.
 const FAR_TICKS: i32 = 10_000;
 
 /// Something that was told.
@@ -12,28 +12,28 @@ const FAR_TICKS: i32 = 10_000;
 pub(super) struct Heard {
     /// The log's line; 0 for the replay.
     pub(super) line: u64,
-    /// Steps of the replay until it was told; 0 for the log.
+    /// Steps of the replay until this event; 0 for the log.
     pub(super) steps: u64,
     /// What.
     pub(super) event: EventLine,
     /// The machine's speed then, in ticks a second.
     pub(super) speed: i32,
-    /// Whether its place is given, not decided.
+    /// Whether its position comes from the log, not from the replay.
     pub(super) is_given: bool,
 }
 
-/// Where a stretch of a log was replayed.
+/// The limits of a replayed stretch.
 pub(super) struct Bounds {
     /// The first place.
     pub(super) first: i32,
-    /// Swings before this place are not judged.
+    /// Swings before this position are not compared.
     pub(super) judged_from: i32,
     /// The last place.
     pub(super) end: i32,
 }
 
-/// Compares what the log tells with what its replays tell, each kind in its order, and notes the first difference: something on
-/// which none of the replays agrees with the log. Each is at another pace, the likeliest first.
+/// Compares the log's events with those of its replays, each kind in its order. Records the first difference: an event
+/// on which no replay agrees with the log. Each replay has another pace. The most likely pace is first.
 pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, result: &mut Replayed) {
     let kinds: [fn(&EventLine) -> bool; 3] = [
         |event| matches!(event, EventLine::Detection { .. }),
@@ -41,12 +41,13 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
         |event| matches!(event, EventLine::Alarm { .. }),
     ];
     let is_judged = |heard: &&Heard| match heard.event {
-        // What was in the beam when the log began is cut for the replay.
+        // The replay cuts a detection that was in the beam at the start of the log.
         EventLine::Detection { position, .. } => position.wrapping_sub(bounds.first) >= 0,
         EventLine::Swing { position, .. } => position >= bounds.judged_from,
         _ => !heard.is_given,
     };
-    // What is at the very end may come in the one and not yet in the other; a detection is told some way behind it.
+    // At the very end an event may be in the log and not in the replay, or the other way round. A detection is reported
+    // some distance behind it.
     let is_at_end = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
             bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard)
@@ -56,13 +57,14 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
         }
         _ => false,
     };
-    // What is at the very beginning may be judged in the one and come before that in the other.
+    // At the very beginning an event may be compared in the log and lie before the limit in the replay, or the other
+    // way round.
     let is_at_beginning = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
             bounds.judged_from > i32::MIN
                 && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
         }
-        // Both have it, and only one of them where it is judged.
+        // Both have it, but only one of them within the compared range.
         EventLine::Detection { position, .. } => {
             let is_heard = |heard_there: &[Heard]| heard_there.iter().any(|other| agree(heard, other));
             position.wrapping_sub(bounds.first).saturating_abs() <= DETECTION_TICKS
@@ -114,7 +116,7 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
     }
 }
 
-/// What a replay tells behind something that it tells too, or that another tells at another pace and it does not.
+/// The events after this one in a replay. If the replay lacks it, another pace may have it.
 fn behind<'a>(heard: &'a [Heard], this: &Heard) -> &'a [Heard] {
     let reach = u64::from(swing_ticks(this, this).unsigned_abs());
     let near = heard.iter().take_while(|heard| heard.steps <= this.steps + reach);
@@ -132,7 +134,7 @@ fn behind<'a>(heard: &'a [Heard], this: &Heard) -> &'a [Heard] {
 }
 
 impl Replayed {
-    /// Counts what both agree on.
+    /// Counts an event on which both agree.
     fn count(&mut self, logged: &Heard, replayed: &Heard) {
         match (logged.event, replayed.event) {
             (EventLine::Detection { .. }, _) => self.objects += 1,
@@ -148,12 +150,12 @@ impl Replayed {
     }
 }
 
-/// By how many ticks the places of these swings may differ.
+/// The greatest difference of these swings' positions, in ticks.
 fn swing_ticks(logged: &Heard, replayed: &Heard) -> i32 {
     SWING_TICKS + logged.speed.abs().max(replayed.speed.abs()) * SWING_MS / 1000
 }
 
-/// Whether log and replay tell the same.
+/// Whether log and replay have the same event.
 fn agree(logged: &Heard, replayed: &Heard) -> bool {
     let near = |one: i32, other: i32, ticks: i32| one.wrapping_sub(other).saturating_abs() <= ticks;
     match (logged.event, replayed.event) {

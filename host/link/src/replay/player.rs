@@ -1,4 +1,4 @@
-//! The decisions, driven along a log: the machine's way, the beam's edges, and what was typed.
+//! Drives the decisions along a log: the machine's motion, the beam's edges, and the typed commands.
 
 use super::classifier::{ReplayClassifier, Seen, Witness};
 use super::compare::Heard;
@@ -296,7 +296,7 @@ impl<'a> Player<'a> {
         if is_given {
             // All alarms do the same; this one can be given from outside.
             self.swallows_alarm = true;
-            // What was in the beam begins anew here, give or take what a detection's place may differ by.
+            // A new detection begins here, within the tolerance of a detection's position.
             self.broken =
                 (0..=DETECTION_TICKS).any(|ahead| self.canopies.over(self.position.wrapping_add(ahead)).is_some());
             self.step_behind(Some(Edge::Lost { broken: self.broken }));

@@ -1,39 +1,39 @@
-//! What comes of a replay, how near it has to be to the log, and why there may be none.
+//! The result of a replay, its tolerances, and its errors.
 
 use std::fmt;
 use thiserror::Error;
 
-/// By how many ticks a detection's place and width may differ.
+/// Tolerance of a detection's position and width, in ticks.
 pub const DETECTION_TICKS: i32 = 3;
 
-/// By how many ticks a swing's place may differ, 6 mm at the default wheel, besides [`SWING_MS`].
+/// Tolerance of a swing's position, in ticks: 6 mm at the default wheel. [`SWING_MS`] adds to it.
 pub const SWING_TICKS: i32 = 12;
 
-/// By how much of the machine's way a swing's place may differ, in milliseconds.
+/// Tolerance of a swing's position, as the machine's travel in this time, in milliseconds.
 pub const SWING_MS: i32 = 25;
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    /// There is nothing to replay.
+    /// The log has nothing to replay.
     #[error(
         "the log has no machine in it: `weeder record` and `weeder monitor --log` write one with its settings and status"
     )]
     Nothing,
-    /// A line says what cannot be.
+    /// A line has impossible content.
     #[error("line {line} of the log: {problem}")]
     Line {
         /// The line, counted from 1.
         line: u64,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
 }
 
-/// What log and replay do not agree on.
+/// A difference between log and replay.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// The log's line, where it has one.
+    /// The log's line, if it has one.
     pub line: Option<u64>,
     /// What the log says.
     pub logged: String,
@@ -51,7 +51,7 @@ impl fmt::Display for Difference {
     }
 }
 
-/// What came of a replay.
+/// The result of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Replayed {
     /// Objects on which both agree.
@@ -62,8 +62,8 @@ pub struct Replayed {
     pub alarms: usize,
     /// Greatest distance between a swing of the log and the replay's, in ticks.
     pub farthest_swing: i32,
-    /// The first thing on which they do not.
+    /// The first difference.
     pub difference: Option<Difference>,
-    /// What was left out, and why.
+    /// Notes on skipped parts, with the reasons.
     pub notes: Vec<String>,
 }

@@ -1,5 +1,5 @@
-//! A stretch of a log, from one start of the link to its end: what stands there in its order, and what follows for where the machine
-//! was.
+//! A stretch of a log, from one start of the link to its end: its lines in order, and the machine's positions that
+//! follow from them.
 
 use super::replayed::ReplayError;
 use crate::log::{Entry, Kind};
@@ -11,13 +11,13 @@ use control::say::command::{self, Command};
 use knn::Example;
 use std::collections::VecDeque;
 
-/// What happened at one place of the log.
+/// The content of a log line.
 pub(super) enum Happened<'a> {
     Status(Status),
     Event(EventLine),
     Command {
         line: &'a str,
-        /// Whether the firmware answered by an error, and so did nothing.
+        /// Whether the firmware answered with an error. Then the command had no effect.
         is_refused: bool,
     },
 }
@@ -25,7 +25,7 @@ pub(super) enum Happened<'a> {
 /// A log from one start of the link to its end.
 pub(super) struct Stretch<'a> {
     pub(super) settings: Settings,
-    /// All examples, the built-in ones first, and how many those are.
+    /// All examples, the built-in ones first, and the number of built-in ones.
     pub(super) examples: Vec<Example<{ features::COUNT }>>,
     pub(super) built_in: usize,
     /// The first of its statuses.
@@ -34,12 +34,12 @@ pub(super) struct Stretch<'a> {
 }
 
 impl<'a> Stretch<'a> {
-    /// Reads one; none where the machine said nothing.
+    /// Reads a stretch. `None` if the machine sent nothing.
     pub(super) fn read(entries: &'a [Entry]) -> Result<Option<Self>, ReplayError> {
         let mut settings = Settings::new();
         let (mut examples, mut built_in) = (Vec::new(), 0);
         let mut happened = Vec::new();
-        // Places in `happened` of the commands that are not answered yet. Answers come in their order.
+        // Indices in `happened` of commands without an answer so far. Answers come in the order of commands.
         let mut unanswered = VecDeque::new();
         for entry in entries {
             let wrong = |problem: &str| {
@@ -75,7 +75,7 @@ impl<'a> Stretch<'a> {
                     }
                 }
                 Kind::Connected | Kind::Lost => {}
-                // Where the machine was on the earth changes nothing that it decides.
+                // Satellite positions have no effect on the machine's decisions.
                 Kind::Antenna | Kind::GpsFound | Kind::GpsLost | Kind::Gps | Kind::GpsDamaged | Kind::GpsMark => {}
             }
         }
@@ -86,8 +86,8 @@ impl<'a> Stretch<'a> {
         Ok(first.map(|first| Self { settings, examples, built_in, first, happened }))
     }
 
-    /// Where watching began, as far as the log tells. Where all ground up to the tool had been seen, the log does not: then it is
-    /// where the log begins, or the beginning of what stood in the beam there.
+    /// The position where watching began, if the log shows it. If all ground up to the tool was already seen, it is the
+    /// start of the log, or the beginning of the detection in the beam there.
     pub(super) fn began(&self) -> i32 {
         let first = self.first.position;
         let beam_to_tool_mm = self.settings.get(Setting::BeamToToolMm);
@@ -110,20 +110,20 @@ impl<'a> Stretch<'a> {
         })
     }
 
-    /// From where on the log tells all that the tool's swings rest on. A machine that has just started knows no window yet, and
-    /// the ground that it has seen was bare.
+    /// The first position from which the log has all inputs of the tool's swings. A machine that has just started has
+    /// no zones, and the ground that it has seen was bare.
     pub(super) fn judged_from(&self) -> i32 {
         if self.first.unseen_mm > 0 && self.first.windows == 0 {
             return i32::MIN;
         }
         let first = self.first.position;
-        // The hold has both margins.
+        // The hold includes both margins.
         let behind = self.in_the_beam_at_first().map_or(0, |(_, to)| to.wrapping_sub(first).max(0));
         first.saturating_add(self.settings.ticks(Setting::BeamToToolMm).0).saturating_add(behind)
     }
 
-    /// Where the machine was when a command was typed that changes no state: on its way to the next status, by the host's clock. `start
-    /// now` at work lets the tool into the row where it swings in next.
+    /// The machine's position at a typed command that changes no state: between two statuses, by the PC's clock. `start
+    /// now` at work lets the tool into the row at its next swing in.
     pub(super) fn place_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
         if let Happened::Command { line, .. } = self.happened[place].1
             && matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }))
@@ -141,8 +141,8 @@ impl<'a> Stretch<'a> {
         Some(last.0.position.wrapping_add(way as i32))
     }
 
-    /// Where the state changed that an event tells of: an alarm has its own place, and the swing that follows has it. Where no swing
-    /// follows, the tool was out already: work began as late, and was left as early as the log allows.
+    /// The position of a state change that an event reports. An alarm has its own position. Else the next swing has it.
+    /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows.
     pub(super) fn place_of_change(&self, place: usize) -> Option<i32> {
         let mode = match &self.happened[place].1 {
             Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
@@ -150,7 +150,7 @@ impl<'a> Stretch<'a> {
             _ => return None,
         };
         let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
-        // Behind the next change of state, a swing is that one's.
+        // A swing after the next change of state belongs to that change.
         let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
         match (until_next.find_map(swing_or_status), mode) {
             (Some((position, true)), _) | (Some((position, false)), Mode::Work) => Some(position),
@@ -158,8 +158,8 @@ impl<'a> Stretch<'a> {
         }
     }
 
-    /// Whether an event tells of the change of state that a command brought: it comes behind the answer, and no more than the status
-    /// that was asked for before comes between.
+    /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
+    /// requested status between them.
     pub(super) fn is_told_by_state(&self, place: usize) -> bool {
         let Happened::Command { line, .. } = self.happened[place].1 else { return false };
         let brings = match command::parse(line.as_bytes()) {
@@ -179,7 +179,7 @@ impl<'a> Stretch<'a> {
         told == Some(brings)
     }
 
-    /// Whether a swing belongs to a change of state that was told just before it.
+    /// Whether a swing belongs to a change of state directly before it.
     pub(super) fn follows_change(&self, place: usize) -> bool {
         let before = self.happened[..place].iter().rev().map(|(_, happened)| happened);
         before
@@ -187,7 +187,7 @@ impl<'a> Stretch<'a> {
             .any(|happened| matches!(happened, Happened::Event(EventLine::State { .. })))
     }
 
-    /// The status that comes behind a place.
+    /// The next status after an index.
     pub(super) fn next_status(&self, place: usize) -> Option<&Status> {
         self.happened[place..].iter().find_map(|(_, happened)| match happened {
             Happened::Status(status) => Some(status),
@@ -196,7 +196,7 @@ impl<'a> Stretch<'a> {
     }
 }
 
-/// The place that a swing or a status tells, and whether it is a swing.
+/// The position in a swing or a status, and whether it is a swing.
 fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)> {
     match happened {
         Happened::Event(EventLine::Swing { position, .. }) => Some((*position, true)),
@@ -205,7 +205,7 @@ fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)
     }
 }
 
-/// Whether a line that ends an answer is an error; none where it ends none.
+/// Whether a line that ends an answer is an error. `None` if it ends no answer.
 fn end_of_answer(line: &str) -> Option<bool> {
     match ConsoleLine::parse(line) {
         ConsoleLine::Done => Some(false),
@@ -214,7 +214,7 @@ fn end_of_answer(line: &str) -> Option<bool> {
     }
 }
 
-/// Reads a line of the examples; none where it only counts those that are spoiled.
+/// Parses a line of the examples. `None` for the line that counts damaged ones.
 fn example(line: &str) -> Result<Option<Example<{ features::COUNT }>>, ()> {
     let words: Vec<&str> = line.split(' ').collect();
     match words.as_slice() {

@@ -1,4 +1,4 @@
-//! Rows with firmwares that answer by a script, fall silent, and may be unplugged.
+//! Rows whose firmware answers by a script, stops answering, or is unplugged.
 
 use super::*;
 use crate::settings::{Setting, name};
@@ -6,7 +6,7 @@ use std::io::{self, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// A row's board: whether its cable is plugged in, whether it is silent, and what was typed to it.
+/// A row's board: whether its cable is plugged in, whether it is silent, and the typed lines.
 #[derive(Clone, Default)]
 struct Desk {
     is_there: Arc<AtomicBool>,
@@ -85,7 +85,7 @@ impl Write for Firmware {
     }
 }
 
-/// Hears the rows until this is so.
+/// Reads events of the rows until `is_so` returns true.
 fn until(rows: &Rows, mut is_so: impl FnMut(&Heard) -> bool) {
     for _ in 0..60_000 {
         if rows.next(Duration::from_millis(1)).is_some_and(|heard| is_so(&heard)) {
@@ -154,7 +154,7 @@ fn a_row_that_was_lost_with_a_hold_unanswered_holds_first_when_it_is_back_and_ty
     let desk = Desk::plugged_in();
     let (rows, _) = open(std::slice::from_ref(&desk));
     desk.is_silent.store(true, Ordering::Relaxed);
-    // It goes before the answer to the question for the status, which does not come.
+    // It goes before the pending status request, which is never answered.
     rows.hold(0);
     until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Command(line)) if line == "hold"));
     rows.command(0, "label plant");

@@ -1,4 +1,4 @@
-//! Sessions with a firmware that answers by a script, and may be unplugged.
+//! Sessions with a firmware that answers by a script, and that may be unplugged.
 
 use super::*;
 use rand::{Rng, SeedableRng};
@@ -7,10 +7,10 @@ use std::cell::{Cell, RefCell};
 use std::io::{self, Read, Write};
 use std::rc::Rc;
 
-/// What the machine says by itself, before its next answer.
+/// The machine's unrequested output, sent before its next answer.
 type Says = Rc<RefCell<Vec<u8>>>;
 
-/// A firmware in hold, with the table's own settings, that can be unplugged and be told what to say.
+/// A firmware in HOLD with the table's default settings. The test can unplug it, and set its unrequested output.
 struct Firmware {
     plugged_in: Rc<Cell<bool>>,
     says: Says,
@@ -88,7 +88,7 @@ fn session() -> (Session, Rc<Cell<bool>>, Says) {
     (Session::open(open).unwrap(), plugged_in, says)
 }
 
-/// What happens in a second, the status left out.
+/// The events of one second, without statuses.
 fn second(session: &mut Session, from: Instant) -> Vec<Happening> {
     let turns = (0..50).map(|turn| from + Duration::from_millis(20 * turn));
     let happened = turns.flat_map(|now| session.turn(now)).collect::<Vec<_>>();
@@ -113,7 +113,7 @@ fn commands_are_answered_one_after_the_other_beside_the_status() {
 }
 
 #[test]
-fn events_are_told_whatever_is_being_answered() {
+fn events_are_reported_during_every_answer() {
     let (mut session, _, says) = session();
     let now = Instant::now();
     second(&mut session, now);
@@ -123,7 +123,7 @@ fn events_are_told_whatever_is_being_answered() {
 }
 
 #[test]
-fn settings_are_asked_for_again_whatever_has_changed_them() {
+fn settings_are_asked_for_again_after_every_change() {
     let (mut session, _, says) = session();
     let mut now = Instant::now();
     second(&mut session, now);
@@ -207,7 +207,7 @@ fn hold_is_typed_at_once_and_what_waits_is_dropped() {
     let (mut session, _, says) = session();
     let now = Instant::now();
     second(&mut session, now);
-    // One that is being answered, and two that wait.
+    // One command that is being answered, and two that wait.
     assert!(session.command("silence"));
     session.turn(now + Duration::from_secs(1));
     assert!(session.command("start") && session.command("start now"));
@@ -215,7 +215,7 @@ fn hold_is_typed_at_once_and_what_waits_is_dropped() {
     assert!(!session.is_idle());
     let now = now + Duration::from_secs(1);
     assert_eq!(session.turn(now), [Happening::Command("hold".to_owned())]);
-    // What comes first is the answer to the first one. A second hold is not typed.
+    // The first answer belongs to the first hold. A second hold is not typed.
     let ok = Happening::Answer("ok".to_owned());
     assert_eq!(session.hold(), 0);
     assert_eq!(session.turn(now), std::slice::from_ref(&ok));

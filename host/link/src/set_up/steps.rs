@@ -1,6 +1,6 @@
-//! The steps by which a machine is set up, as the manual's page has them.
+//! The steps of setting up a machine, read from the manual.
 //!
-//! The steps of `docs/set-up.md` are the one list of parts and settings. The terminal, the page and the tests read it here.
+//! `docs/set-up.md` is the only list of parts and settings. The terminal, the page and the tests read its steps here.
 
 use crate::settings::{Setting, name};
 
@@ -14,18 +14,18 @@ pub struct ManualStep {
     pub number: usize,
     /// What it is called.
     pub title: &'static str,
-    /// What is fitted, set or measured; empty where there is nothing to type.
+    /// The parts to fit and the values to set or measure. Empty if there is nothing to type.
     pub tasks: Vec<Task>,
     /// How it is done.
     pub how: &'static str,
 }
 
-/// Something to be done in a step.
+/// A task of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Task {
-    /// Fit a part: the name and value that the simulated field has for it.
+    /// Fit a part: its name and value in the simulated field.
     Fit(&'static str, f64),
-    /// Set a value; that of the page is the one of the simulated machine.
+    /// Set a value. The page has the simulated machine's value.
     Set(Setting, u16),
     /// Time the servo.
     TimeServo,
@@ -36,7 +36,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// What stands between the marks of code in a step.
+    /// Parses the text between the code marks of a step.
     fn parse(code: &'static str) -> Option<Self> {
         let words: Vec<&str> = code.split(' ').collect();
         match words[..] {
@@ -55,7 +55,7 @@ pub fn steps() -> Vec<ManualStep> {
     sections(PAGE).filter_map(step).collect()
 }
 
-/// What stands before each step's number.
+/// The text before each step's number.
 const HEADING: &str = "\n### ";
 
 /// The page's sections that are steps, each from its number on.
@@ -64,7 +64,7 @@ fn sections(page: &'static str) -> impl Iterator<Item = &'static str> {
     steps.map_or("", |(steps, _)| steps).split(HEADING).skip(1)
 }
 
-/// The step of a section: its number and title, a line that says how, and where there is something to type a line of that.
+/// Parses a section: its number and title, a line of instruction, and the lines to type, if there are any.
 fn step(section: &'static str) -> Option<ManualStep> {
     let mut lines = section.lines().filter(|line| !line.is_empty());
     let (number, title) = lines.next()?.split_once(". ")?;

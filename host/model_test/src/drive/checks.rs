@@ -1,6 +1,6 @@
-//! What the machine does with its tool and says of the ground, held against the model.
+//! Checks of the tool and of the events against the model.
 //!
-//! Where the machine may have known something else a moment ago, the model's word does not count, and nothing is checked.
+//! For some turns after a change the machine may still use the earlier state. In these turns nothing is checked.
 
 use super::{Drive, Place};
 use crate::machine::{Checked, Machine};
@@ -33,7 +33,7 @@ impl<M: Machine> Drive<M> {
         }
     }
 
-    /// The tool is not in a plant, whatever the wheel slips and whichever beam has seen it.
+    /// Checks that the tool is not in a plant, for every slip of the wheel, and for either beam that has seen it.
     fn check_plants(&self, plants: &[(i64, i64)], tool: i64) -> Checked {
         let in_row = tool.rem_euclid(self.row[0].len() as i64);
         let is_in = |&&(from, to): &&(i64, i64)| (from + TURN..to - TURN).contains(&in_row);

@@ -1,13 +1,13 @@
-//! The lines that are typed into the machine: each is answered once, and what it changes is remembered for the checks.
+//! The lines that are typed into the machine: each must be answered once, and its effect is stored for the checks.
 //!
-//! What an answer says is not checked here, but that it ends.
+//! The content of an answer is not checked here, only its end.
 
 use super::{Drive, is_alarm, scale};
 use crate::machine::{Attended, Checked, Machine};
 use control::{operate::state::State, settings::Setting};
 use proptest::prelude::*;
 
-/// Turns in which every line is answered, whatever is still to be written to the EEPROM.
+/// Turns in which every line must be answered, also during a write to the EEPROM.
 const PATIENCE: u32 = 20_000;
 
 /// A short line is carried out and answered within this.

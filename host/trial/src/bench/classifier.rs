@@ -1,8 +1,7 @@
 //! The classifier alone: cycles of a classification, from the bench's ELF.
 //!
-//! The bench (`bench/` in the workspace) raises D13 around each call that it measures: the cycles between the edges are
-//! exact. It also compares every answer of the search in flash with a plain search's, and no figure is given where
-//! they differ.
+//! The bench (`bench/` in the workspace) raises D13 around each call, so the cycles between the edges are exact. It
+//! also compares every answer of the search in flash with a plain search. If they differ, no figure is returned.
 
 use super::error::BenchError;
 use field::wiring;
@@ -11,10 +10,10 @@ use std::path::Path;
 use uno::CYCLES_PER_SECOND;
 use uno::Uno;
 
-/// Cycles that D13 is high for longer than the call: those of the instruction that raises it (`sbi`, 2).
+/// Cycles that D13 is high in addition to the call: the instruction that raises it (`sbi`, 2).
 const EDGE_CYCLES: u64 = 2;
 
-/// Longest time that the bench may take: ten times what it does.
+/// Longest time of the bench: ten times its usual time.
 const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
 
 /// Simulated time between two reports of progress.
@@ -51,7 +50,7 @@ pub struct ClassifierCosts {
 /// Runs the bench at `elf`. `progress` is told the share of the calls done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
+/// If the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
 pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts, BenchError> {
     let mut uno = Uno::boot(elf)?;
     variable(&uno, "DIFFERENT_ANSWERS")?;
@@ -63,7 +62,7 @@ pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Classifie
         if calls.len() < expected {
             calls = call_cycles(&uno);
             progress(calls.len() as f64 / expected as f64);
-            // The plain search comes after all that is measured, and needs more stack.
+            // The plain search comes after all measurements, and needs more stack.
             stack = (calls.len() < expected).then(|| uno.deepest_stack() as u16).or(stack);
         } else {
             match variable(&uno, "DIFFERENT_ANSWERS")? {
@@ -76,7 +75,7 @@ pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Classifie
     if calls.len() != expected {
         return Err(BenchError::Unfinished { seen: calls.len(), expected });
     }
-    // The stack grows down from the end of SRAM, and its pointer stands on the first free byte.
+    // The stack grows down from the end of SRAM. Its pointer is at the first free byte.
     let own = 0x8FF - variable(&uno, "STACK_POINTER")?;
     let cycles = calls.chunks(QUERIES).filter_map(Cycles::of);
     Ok(ClassifierCosts { tasks: Task::ALL.into_iter().zip(cycles).collect(), stack: stack.unwrap_or(own) - own })

@@ -1,21 +1,20 @@
-//! How fast the encoder may turn: the highest rate at which the firmware loses no count.
+//! The encoder benchmark: the highest rate at which the firmware loses no count.
 //!
-//! A trial turns the encoder at one rate and then asks the firmware for its position. It is passed where that is exact, where
-//! the firmware knows of no lost count, where it did not start anew, and where its telemetry went on meanwhile: a
-//! trial lasts longer than its heartbeat and its watchdog wait for a loop that gets no time any more.
+//! A trial turns the encoder at one rate and then asks the firmware for its position. It passes under four conditions.
+//! The position is exact. The firmware reports no lost count. The firmware did not restart. Its telemetry continued
+//! meanwhile: a trial lasts longer than the heartbeat and the watchdog wait for a starved loop.
 //!
-//! Each rate has two trials. [`turn`] turns the encoder evenly, or with jitter by chance, and so leaves the loop as little time
-//! as the rate does. But an edge comes at the worst moment there by chance alone, and a function that has moved makes
-//! for another chance. [`turn_at_worst`] sees to it: the edge waits, no shorter than the rate has it, until another interrupt's
-//! handler begins, and then the next two come as soon as they may. The beam's edges and the bytes received, whose
-//! moments the world has in hand, come right before the loop turns interrupts off, so that the edge has to wait for the
-//! critical section as well.
+//! Each rate has two trials. [`turn`] turns the encoder evenly, or with random jitter. This leaves the loop as little
+//! time as the rate allows. But an edge comes at the worst moment only by chance, and each change of the code changes
+//! the chance. [`turn_at_worst`] makes the worst case. The edge waits until another interrupt's handler begins, but
+//! comes no earlier than the rate allows. The next two edges then come as soon as they may. The beam's edges and the
+//! received bytes come directly before the loop turns interrupts off, so the edge also waits for the critical section.
 //!
-//! [`highest_rate`] finds the rate by bisection to [`RESOLUTION`], and then tries rates below it: edges that come in step with
-//! something else may pass at a rate by chance.
+//! [`highest_rate`] finds the rate by bisection to [`RESOLUTION`]. Then it tries rates below it, because edges in step
+//! with other events may pass at one rate by chance.
 //!
-//! The firmware is in HOLD. What weeding adds is less than [`Load::Telemetry`], which asks for more than the serial line can
-//! carry and has the beam flicker as fast as its sensor can.
+//! The firmware is in HOLD. Weeding adds less load than [`Load::Telemetry`], which requests more output than the serial
+//! line can carry, and makes the beam flicker as fast as its sensor can.
 
 use super::error::BenchError;
 use super::load::{EDGE_CYCLES, Telemetry, flicker};
@@ -31,21 +30,21 @@ use uno::{Place, SENT_BYTE_CYCLES, Uno};
 /// Fewest counts of a trial: the count's second byte changes more than a hundred times.
 const FEWEST_COUNTS: f64 = 40_000.0;
 
-/// Shortest trial: twice what the watchdog waits.
+/// Shortest trial: twice the watchdog's timeout.
 const SHORTEST_S: f64 = 0.5;
 
 /// Share of the serial line below which the telemetry counts as silent: some eight lines of status a second.
 const SILENT_SHARE: f64 = 0.1;
 
-/// Relative distance between a rate that was passed and one that was not, at the end of the search.
+/// Relative distance, at the end of the search, between a rate that passed and one that failed.
 pub const RESOLUTION: f64 = 0.01;
 
-/// What else the firmware does.
+/// The firmware's other load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Load {
-    /// What it does by itself: clock, loop and servo.
+    /// No further load: clock, loop and servo.
     Idle,
-    /// Its status is asked for without an end at 115200 baud, and the beam flickers.
+    /// Continuous status requests at 115200 baud, and a flickering beam.
     Telemetry,
 }
 
@@ -58,14 +57,14 @@ pub enum Direction {
     Backward,
 }
 
-/// How the encoder turns, and beside what.
+/// How the encoder turns, and the other load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turning {
-    /// What else the firmware does.
+    /// The other load.
     pub load: Load,
     /// Which way.
     pub direction: Direction,
-    /// Each edge comes early or late by up to this share of the time between two, evenly spread; from 0 to 0.5.
+    /// Each edge comes early or late by up to this share of the time between two, evenly distributed; from 0 to 0.5.
     pub jitter: f64,
 }
 
@@ -75,35 +74,35 @@ pub const JITTER: f64 = 0.3;
 /// What a trial showed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
-    /// What else the firmware did.
+    /// The other load.
     pub load: Load,
     /// Counts that came, net.
     pub true_ticks: i64,
-    /// Counts that the firmware has; `None` where it could not be asked any more.
+    /// The firmware's count. `None` if it no longer answered.
     pub position_ticks: Option<i64>,
-    /// Counts that it knows to have lost.
+    /// Lost counts that the firmware knows of.
     pub lost_ticks: u64,
-    /// How often it started anew.
+    /// Number of restarts.
     pub restarts: usize,
-    /// Share of the serial line's capacity that it used meanwhile, from 0 to 1.
+    /// Share of the serial line's capacity that was used, from 0 to 1.
     pub line_share: f64,
 }
 
 impl Counted {
-    /// Whether nothing was lost and the rest of the firmware went on.
+    /// Whether no count was lost and the rest of the firmware ran on.
     pub fn is_passed(&self) -> bool {
         let is_heard = self.load == Load::Idle || self.line_share >= SILENT_SHARE;
         self.position_ticks == Some(self.true_ticks) && self.lost_ticks == 0 && self.restarts == 0 && is_heard
     }
 }
 
-/// Time from the last edge to the question, in which answers under way come to their end.
+/// Time from the last edge to the question. Pending answers end in this time.
 const SETTLE_MS: u64 = 100;
 
 /// Turns the encoder of the firmware at `elf` for half a second and by 40,000 counts at least.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
@@ -124,7 +123,7 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, 
     counted(&mut uno, turning, counts.into(), line_share)
 }
 
-/// Asks for what the firmware has counted of `counts` edges, once it has come to rest.
+/// Asks the firmware for its count after `counts` edges, once it is idle.
 fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted, BenchError> {
     uno.run_for_ms(SETTLE_MS)?;
     let status = match Status::ask(uno) {
@@ -143,24 +142,24 @@ fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Res
     })
 }
 
-/// Time that the edges have to wait for the worst moments, in cycles.
+/// Time in which edges wait for the worst moments, in cycles.
 const WORST_CYCLES: u64 = (SHORTEST_S * CYCLES_PER_SECOND as f64) as u64;
 
-/// Edges that come one after the other once the first has met its moment, at the least and at the most.
+/// The least and greatest number of successive edges after the first has met its moment.
 const RUN: std::ops::RangeInclusive<u32> = 3..=12;
 
 /// Edges of the run-up, and the cycles between two of them: a tenth of a second at 40,000 a second.
 const RUN_UP: u32 = 4000;
 const RUN_UP_CYCLES: u64 = CYCLES_PER_SECOND / 40_000;
 
-/// Critical sections of the loop that pass between two of which one is made worse, at most: some turns of the loop.
+/// The most critical sections of the loop between two that are made worse: some turns of the loop.
 const SECTIONS_PASSED: u32 = 40;
 
 /// Turns the encoder of the firmware at `elf` for half a second, with edges that wait for the moments at which they have to wait
 /// longest themselves, and are never closer together than `counts_per_s` and the jitter have them.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
@@ -169,10 +168,10 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
     let begin = uno.cycle();
     let end = begin + WORST_CYCLES;
     let mut world = World::new(turning.load, begin);
-    // A first edge at leisure: which way it goes resolves a jump.
+    // A slow first edge. Its direction lets the firmware resolve a jump.
     uno.set(nth_edge(turning.direction, 0).pin, nth_edge(turning.direction, 0).high);
     uno.run_for_ms(1)?;
-    // No wheel is fast from one moment to the next: the firmware would take its jumps for noise until it knows how fast.
+    // A real wheel accelerates gradually. Without a run-up the firmware would take the jumps for noise.
     let run_up = uno.cycle();
     uno.drive((1..=RUN_UP).map(|number| PinChange {
         cycle: run_up + u64::from(number) * RUN_UP_CYCLES,
@@ -191,7 +190,7 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
             uno.drive([PinChange { cycle, ..nth_edge(turning.direction, number) }]);
             number += 1;
         }
-        // Whatever its own shift: the next edge is one that comes late.
+        // An edge's own shift does not matter here: the next edge comes late.
         let next = moment + (f64::from(edges) * step_cycles).ceil() as u64;
         uno.run_until(next)?;
         while uno.place() == Place::InHandler {
@@ -205,12 +204,12 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
     counted(&mut uno, turning, number.into(), line_share)
 }
 
-/// What happens at the firmware's other inputs, with the moments chosen.
+/// The firmware's other inputs, with their chosen moments.
 struct World {
     load: Load,
     telemetry: Telemetry,
     beam: bool,
-    /// When the beam and the serial line may come up with something again.
+    /// When the beam and the serial line may change again.
     beam_after: u64,
     byte_after: u64,
 }
@@ -221,8 +220,9 @@ impl World {
         Self { load, telemetry: Telemetry::default(), beam: true, beam_after: begin, byte_after: line }
     }
 
-    /// Runs until a handler begins or, where nothing comes from outside, until the loop is about to turn interrupts off. Returns
-    /// the cycle of the handler's entry. Something comes from outside once the loop has passed so many critical sections.
+    /// Runs until a handler begins. If no external input comes, it runs until the loop is about to turn interrupts off.
+    /// Returns the cycle of the handler's entry. An external input comes after `sections` critical sections of the
+    /// loop.
     fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64, BenchError> {
         loop {
             let cycle = uno.cycle();
@@ -242,7 +242,7 @@ impl World {
         }
     }
 
-    /// Has the beam change or a byte come in, whichever may.
+    /// Changes the beam or sends a byte, whichever is possible.
     fn act(&mut self, uno: &mut Uno) {
         let cycle = uno.cycle();
         if cycle >= self.beam_after {
@@ -258,7 +258,7 @@ impl World {
     }
 }
 
-/// The encoder's edges without an end, in order of time.
+/// Endless edges of the encoder, in order of time.
 fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iterator<Item = PinChange> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     (0_u32..).map(move |number| {
@@ -288,14 +288,14 @@ pub struct Rate {
     pub line_share: f64,
 }
 
-/// Where the search begins: a rate that is passed in any case, and one that an ATmega328P cannot pass: 20 cycles a count.
+/// The search's limits: a rate that always passes, and one that an ATmega328P cannot follow, with 20 cycles a count.
 const LOWEST_PER_S: f64 = 10_000.0;
 const HIGHEST_PER_S: f64 = 800_000.0;
 
-/// Shares of the rate found that have to be passed as well.
+/// Shares of the found rate that must pass as well.
 const BELOW: [f64; 8] = [0.99, 0.98, 0.97, 0.95, 0.9, 0.8, 0.7, 0.5];
 
-/// Both trials of a rate; `None` where one of them was not passed.
+/// Both trials of a rate. `None` if one of them failed.
 fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate>, BenchError> {
     let mut line_share = 1.0_f64;
     for trial in [turn_at_worst, turn] {
@@ -311,7 +311,7 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
 /// Searches the highest rate of the firmware at `elf`. `progress` is told the share of the search done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate, BenchError> {
     let mut passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
     let mut failed = HIGHEST_PER_S;

@@ -36,10 +36,10 @@ pub enum BenchError {
     /// The search in flash is wrong.
     #[error("{0} answers of the search in flash differ from the plain search's: its cycles mean nothing")]
     Different(u16),
-    /// The ELF has no such variable.
+    /// The ELF lacks this variable.
     #[error("the bench has no variable `{0}`: run the ELF that `cargo bench-firmware` makes")]
     NoVariable(&'static str),
-    /// The firmware did not work when it should have been measured at work.
+    /// The firmware was not at work during the measurement.
     #[error("the firmware's state is `{0}` after `start now`: only one that works can be measured at work")]
     NotAtWork(String),
 }

@@ -1,4 +1,4 @@
-//! The servo's jitter: how much its pulses and its frames differ while the firmware has all hands full.
+//! The servo's jitter: how much its pulses and frames vary under the highest load.
 
 use super::error::BenchError;
 use super::load::{Telemetry, flicker};
@@ -31,7 +31,7 @@ const FRAME_CYCLES: u64 = CYCLES_PER_SECOND / 50;
 /// `progress` is told the share of the time that has passed, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter, BenchError> {
     let mut uno = run::boot(elf, &[])?;
     uno.send(b"events on\n");
@@ -60,7 +60,7 @@ pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter, Bench
     Ok(Jitter { width_cycles: spread(widths), frame_cycles: spread(frames), pulses: pulses.len() })
 }
 
-/// The greatest less the least; 0 of nothing.
+/// The greatest value less the least; 0 without values.
 fn spread(values: impl Iterator<Item = u64> + Clone) -> u64 {
     values.clone().max().unwrap_or(0) - values.min().unwrap_or(0)
 }

@@ -1,7 +1,7 @@
-//! How late the commands to swing come to the servo's pin, over many rows that grow by chance.
+//! The timing error of swing commands at the servo's pin, over many random rows.
 //!
-//! Each row is a trial of its own, from power-up: the real ELF weeds it, and [`field::verdict`] holds each rising edge with a new
-//! width against the place where the swing was due. Rows run in parallel.
+//! Each row is a separate trial, from power-up. The real ELF weeds it. [`field::verdict`] compares each rising edge of
+//! a new width with the position where the swing was due. Rows run in parallel.
 
 use super::error::BenchError;
 use crate::run::run;
@@ -28,7 +28,7 @@ pub struct Rows {
     pub speed_km_h: f64,
     /// Mean spacings of the rows, evenly spread.
     pub spacing_mm: Range<f64>,
-    /// Most tall weeds in a row. A swing that serves a weed taken for a plant and the plant behind it is early for the plant.
+    /// Most tall weeds in a row. A swing for a misclassified weed and the plant behind it is early for the plant.
     pub weeds: usize,
 }
 
@@ -39,16 +39,16 @@ impl Rows {
     }
 }
 
-/// How the swings of all rows came out.
+/// The swings of all rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lateness {
-    /// Each swing's distance from its ideal place in encoder counts, late above 0, in the order of the rows.
+    /// Each swing's error against its ideal position in ticks, positive if late, in the order of rows.
     pub errors_ticks: Vec<f64>,
     /// Encoder counts in a second at the rows' speed.
     pub ticks_per_s: f64,
     /// Plants passed.
     pub plants: usize,
-    /// Plants of which the tool did not keep clear by the margin.
+    /// Plants to which the tool did not keep the margin.
     pub not_kept: usize,
     /// Plants damaged.
     pub damaged: usize,
@@ -57,7 +57,7 @@ pub struct Lateness {
 }
 
 impl Lateness {
-    /// The least and the greatest error: the first is negative where any swing was early.
+    /// The least and the greatest error. The least is negative if a swing was early.
     pub fn span_ticks(&self) -> (f64, f64) {
         let span = (f64::INFINITY, f64::NEG_INFINITY);
         self.errors_ticks.iter().fold(span, |span, &error| (span.0.min(error), span.1.max(error)))
@@ -74,13 +74,13 @@ impl Lateness {
         self.errors_ticks.iter().map(|error| error.abs()).sum::<f64>() / self.errors_ticks.len() as f64
     }
 
-    /// A distance as the time in which the machine rolls it, in milliseconds.
+    /// Converts a distance to the travel time of the machine, in milliseconds.
     pub fn milliseconds(&self, ticks: f64) -> f64 {
         ticks / self.ticks_per_s * 1000.0
     }
 }
 
-/// A short row of its own kind for each seed: three or four plants, with tall weeds between them where there is room.
+/// A short row for each seed: three or four plants, with tall weeds between them if there is room.
 fn planting(seed: u64, rows: &Rows) -> Planting {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let spacing_mm = rng.random_range(rows.spacing_mm.clone());
@@ -107,7 +107,7 @@ const ROOM_FOR_WEED_MM: f64 = 2.0 * WEED_MARGIN_MM + 30.0;
 /// Has the firmware at `elf` weed the rows. `progress` is told the share of the rows done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Result<Lateness, BenchError> {
     let count = rows.seeds.end.saturating_sub(rows.seeds.start) as f64;
     let done = AtomicUsize::new(0);

@@ -1,8 +1,8 @@
-//! The bench's figures as tables for people, beside those of others.
+//! The benchmark's figures as tables, beside published figures.
 //!
-//! The others' figures were measured on the same chip in simavr at 16 MHz, with the 4 cycles of an interrupt's entry added and
-//! a serial line of ten bits a byte: Arduino core 1.8.7 with avr-gcc 5.4 -Os, the Encoder library of PJRC, and encoder
-//! handlers and classifiers written in assembly by hand.
+//! The other figures were measured on the same chip in simavr at 16 MHz, with 4 cycles added for an interrupt's entry,
+//! and a serial line of ten bits a byte: Arduino core 1.8.7 with avr-gcc 5.4 -Os, the Encoder library of PJRC, and
+//! encoder handlers and classifiers in hand-written assembly.
 
 use super::classifier::ClassifierCosts;
 use super::encoder::{Direction, JITTER, Load, Rate, Turning};
@@ -13,14 +13,14 @@ use comfy_table::{CellAlignment, Table, presets};
 use knn_bench::Task;
 use uno::CYCLES_PER_SECOND;
 
-/// Everything that the bench measures.
+/// All results of the benchmark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figures {
     /// The classifier alone.
     pub classifier: ClassifierCosts,
-    /// The firmware while it weeds.
+    /// The firmware at work.
     pub firmware: FirmwareCosts,
-    /// The highest rate of each way of turning the encoder.
+    /// The highest rate for each kind of turning.
     pub rates: Vec<(Turning, Rate)>,
     /// The servo's pulses.
     pub jitter: Jitter,
@@ -50,7 +50,7 @@ impl Figures {
         [self.others(), self.rates(), self.times(), self.interrupts(), self.classifier(), self.memory()]
     }
 
-    /// Ours beside those of others; a ratio above 1 is in our favour.
+    /// This firmware's figures beside others. A ratio above 1 is in its favour.
     fn others(&self) -> Table {
         let header = ["", "this firmware", "Arduino sketch", "best library", "assembly"];
         let mut table = number_table(&header);
@@ -74,7 +74,7 @@ impl Figures {
             table.add_row([name.to_owned(), figure(ours)].into_iter().chain(others));
         };
         if let Some(cycles) = self.encoder_cycles() {
-            // The one in assembly remembers the direction, as ours does; without that it takes 24.
+            // The assembly version stores the direction, as this firmware does. Without that it takes 24 cycles.
             fewer_is_better("cycles of an encoder edge", cycles, 0, [Some(233.0), Some(144.0), Some(41.0)]);
         }
         let classification = self.classifier.tasks.iter().find(|(task, _)| *task == Task::Classify(32));
@@ -106,7 +106,7 @@ impl Figures {
         (count > 0).then(|| total as f64 / count as f64)
     }
 
-    /// A line per load, with the highest rate each way.
+    /// One line a load, with the highest rate in each direction.
     fn rates(&self) -> Table {
         let mut table = number_table(&[
             "highest counts/s without a lost count,\nfor any phase of the edges",
@@ -208,7 +208,7 @@ impl Figures {
     }
 }
 
-/// A table without inner lines whose columns, from the second on, are numbers.
+/// A table without inner lines. Its columns from the second on are numbers.
 fn number_table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header(header.iter().copied());
@@ -218,7 +218,7 @@ fn number_table(header: &[&str]) -> Table {
     table
 }
 
-/// Another's figure with the ratio that it gives.
+/// Another implementation's figure, and the ratio to it.
 fn beside(theirs: String, ratio: f64) -> String {
     format!("{theirs} (x {ratio:.2})")
 }
@@ -239,7 +239,7 @@ fn thousands(number: f64) -> String {
 /// The vectors that the encoder's pins can raise (data sheet, table 12-6): INT0, INT1 and PCINT2.
 const ENCODER_VECTORS: [u8; 3] = [1, 2, 5];
 
-/// What the firmware uses a vector for (data sheet, table 12-6).
+/// The firmware's use of a vector (data sheet, table 12-6).
 fn interrupt_name(vector: u8) -> String {
     match vector {
         1 => "encoder A (INT0)".to_owned(),

@@ -1,4 +1,4 @@
-//! The firmware at work: cycles of its interrupts and of its loop's turns, and the memory it takes, while it weeds a row.
+//! The firmware at work: cycles of its interrupts and of its loop's turns, and its memory, while it weeds a row.
 
 use super::error::BenchError;
 use super::load::Telemetry;
@@ -14,7 +14,7 @@ use uno::CYCLES_PER_SECOND;
 use uno::elf::Size;
 use uno::{InterruptStatistics, Turns};
 
-/// What the firmware costs while it works.
+/// The firmware's costs at work.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirmwareCosts {
     /// Its interrupts.
@@ -50,7 +50,7 @@ const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 /// carries the answers. `progress` is told the share of the motion done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run, or does not go to work.
+/// If the ELF cannot be run, or does not go to work.
 pub fn weeding(elf: &Path, mut progress: impl FnMut(f64)) -> Result<FirmwareCosts, BenchError> {
     let trial = Trial::at_speed(PLANTING.grow(1)?, Machine::default(), Timing::default(), mm_s(SPEED_KM_H));
     let mut uno = run::boot(elf, &[trial.machine.beam_before(&trial.row, &trial.motion)])?;

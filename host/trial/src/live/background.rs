@@ -1,7 +1,7 @@
-//! What runs in a thread of its own until its handle is stopped or dropped: a live Uno, or the rows of a machine.
+//! Runs something in its own thread until its handle is stopped or dropped: a live Uno, or the rows of a machine.
 //!
-//! The handle gives what programs outside need meanwhile, by [`Live::Outside`]: paths of ports, and what may happen to a row. It does
-//! not notice when what it runs fails before; [`Background::stop`] says so.
+//! The handle has the parts that other code needs meanwhile ([`Live::Outside`]): paths of ports, and ways to disturb a
+//! row. The handle does not notice an early failure; [`Background::stop`] returns it.
 
 use std::ops::Deref;
 use std::sync::Arc;
@@ -10,18 +10,18 @@ use std::thread::{self, JoinHandle};
 
 /// What can run in a thread.
 pub trait Live: Sized + Send + 'static {
-    /// What is needed of it from outside while it runs.
+    /// The parts that other code needs while it runs.
     type Outside;
     /// What can end it.
     type Failure: Send;
 
-    /// What is needed of it from outside while it runs.
+    /// Returns the parts that other code needs while it runs.
     fn outside(&self) -> Self::Outside;
 
     /// Runs until `stop` is set.
     ///
     /// # Errors
-    /// What has ended it before.
+    /// The failure that has ended it early.
     fn run_until(&mut self, stop: &AtomicBool) -> Result<(), Self::Failure>;
 
     /// Runs in a thread until the handle is dropped.
@@ -37,7 +37,7 @@ pub trait Live: Sized + Send + 'static {
     }
 }
 
-/// Something that runs in a thread. Dropped, it ends, its terminals and links with it.
+/// A running thread. Dropping it ends the thread and removes its terminals and links.
 pub struct Background<L: Live> {
     outside: L::Outside,
     stop: Arc<AtomicBool>,
@@ -51,7 +51,7 @@ impl<L: Live> Background<L> {
     /// What has ended it before.
     ///
     /// # Panics
-    /// Where its thread did.
+    /// If its thread did.
     pub fn stop(mut self) -> Result<L, L::Failure> {
         self.stop.store(true, Ordering::Relaxed);
         let thread = self.thread.take().expect("it is taken here and by drop alone");
@@ -71,7 +71,7 @@ impl<L: Live> Drop for Background<L> {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // Its user did not ask what became of it.
+            // The result is dropped, because the user did not call `stop`.
             let _ = thread.join();
         }
     }

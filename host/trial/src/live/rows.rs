@@ -1,10 +1,11 @@
-//! Several virtual Unos before one wheel: a machine with several rows, each with an Uno, a pseudo terminal and plants of its own.
+//! Several virtual Unos on one wheel: a machine with several rows. Each row has its own Uno, pseudo terminal and
+//! plants.
 //!
-//! The encoder's edges come to all of them at the same cycle, as over one cable. They run in step, some milliseconds at
-//! a time, in up to as many threads as there are cores; a host that is too slow makes all of them slower together. One
-//! that stops, because its firmware crashes, keeps none of the others from running.
+//! The encoder's edges come to all Unos at the same cycle, as over one cable. The Unos run in step, some milliseconds
+//! at a time, in up to as many threads as there are cores. A slow PC makes all of them slower together. An Uno whose
+//! firmware crashes stops, and the others run on.
 //!
-//! The cable itself is not simulated: no edge is lost on it, and none comes late.
+//! The cable itself is not simulated: it loses and delays no edge.
 
 use super::{Live, LiveError, LiveUno, Pace, SLICE_MS, Setup};
 use rustix::time::{ClockId, clock_gettime};
@@ -16,16 +17,17 @@ use std::thread;
 use std::time::{Duration, Instant};
 use uno::Uno;
 
-/// Rows that one thread has at least: it runs so many in real time by itself, and has nobody to wait for.
+/// The least number of rows for one thread. A single thread can run this many in real time, without waiting for other
+/// threads.
 const ROWS_OF_A_THREAD: usize = 3;
 
-/// Slices after which the threads wait for each other: seldom enough not to matter on a busy host, and less than a person notices.
+/// Slices after which the threads wait for each other: rare enough for a busy PC, and too short for a person to notice.
 const SLICES_IN_STEP: u64 = 5;
 
-/// What may happen to one row.
+/// A fault of one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mishap {
-    /// Its USB cable is pulled. The board has power of its own and works on.
+    /// Its USB cable is unplugged. The board has its own power and works on.
     Unplugged,
     /// The cable is plugged in again.
     PluggedIn,
@@ -47,7 +49,7 @@ pub struct Ran {
     pub simulated: Duration,
     /// By the host's.
     pub took: Duration,
-    /// The host's cores were at work for so long, all together.
+    /// Total working time of all cores.
     pub cores: Duration,
     /// In so many threads.
     pub threads: usize,
@@ -59,14 +61,15 @@ impl Ran {
         self.simulated.as_secs_f64() / self.took.as_secs_f64().max(f64::EPSILON)
     }
 
-    /// How many cores it takes in real time.
+    /// Number of cores for running in real time.
     pub fn cores_in_real_time(&self) -> f64 {
         self.cores.as_secs_f64() / self.simulated.as_secs_f64().max(f64::EPSILON)
     }
 }
 
 impl LiveRows {
-    /// Powers all of them up. Their courses have to be those of one machine; the first says whether they run in real time.
+    /// Powers up all Unos. Their courses must be those of one machine. The first course decides whether they run in
+    /// real time.
     ///
     /// # Errors
     /// As [`LiveUno::start`].
@@ -81,10 +84,10 @@ impl LiveRows {
         self.unos.iter().map(LiveUno::path).collect()
     }
 
-    /// Runs until `stop` is set, or for so long by their own clock.
+    /// Runs until `stop` is set, or for this time of the Unos' clock.
     ///
     /// # Errors
-    /// What has ended one of them, and which, once the others have ended as well.
+    /// The error that has ended one row, and the row's number, once the others have ended as well.
     pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, LiveError)> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let threads = cores.min(self.unos.len() / ROWS_OF_A_THREAD).max(1);
@@ -98,7 +101,7 @@ impl LiveRows {
         let mut slices = 0;
         let failed = thread::scope(|scope| {
             let mut parts = self.unos.chunks_mut(each).enumerate();
-            // This thread leads: it looks at the clock and at whether to stop.
+            // This thread leads: it checks the clock and the stop flag.
             let own = parts.next();
             let others: Vec<_> = parts
                 .map(|(part, unos)| {
@@ -181,7 +184,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// One has stopped: to those at its port it is as if its cable were pulled.
+    /// Stops a row. To programs at its port, the cable seems to be unplugged.
     fn stop(&mut self, place: usize, error: LiveError) {
         let (uno, runs) = &mut self.unos[place];
         uno.unplug();
@@ -189,7 +192,7 @@ impl<'a> Part<'a> {
         self.failed.get_or_insert((self.first + place, error));
     }
 
-    /// Has happen to these rows what is to happen.
+    /// Applies pending faults to these rows.
     fn suffer(&mut self, mishaps: &Mutex<VecDeque<(usize, Mishap)>>) {
         let own = self.first..self.first + self.unos.len();
         let mine: Vec<(usize, Mishap)> = {
@@ -221,7 +224,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Ends them, and says what has stopped one before.
+    /// Ends all rows. Returns the first failure.
     fn end(mut self) -> Option<(usize, LiveError)> {
         for place in 0..self.unos.len() {
             let (uno, runs) = &mut self.unos[place];
@@ -233,7 +236,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// What is reached of rows that run in a thread: their ports, and what may happen to them.
+/// Access to rows that run in a thread: their ports, and their faults.
 pub struct Reached {
     paths: Vec<PathBuf>,
     mishaps: Arc<Mutex<VecDeque<(usize, Mishap)>>>,
@@ -245,7 +248,7 @@ impl Reached {
         &self.paths
     }
 
-    /// Has something happen to a row, within some milliseconds.
+    /// Applies a fault to a row, within some milliseconds.
     pub fn happen(&self, row: usize, mishap: Mishap) {
         self.mishaps.lock().unwrap_or_else(PoisonError::into_inner).push_back((row, mishap));
     }

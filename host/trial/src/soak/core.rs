@@ -177,7 +177,7 @@ struct Field {
     one_channel_lives: bool,
     jumps: u16,
     stack_free: u16,
-    /// Ticks that the count lacks since the firmware last began to see its ground anew.
+    /// Ticks that the count lacks since the firmware last forgot its ground.
     lost_ticks: i64,
     blind_until_turn: u64,
     /// What went wrong last, and at which turn.
@@ -462,8 +462,8 @@ impl Field {
         }
     }
 
-    /// From here on only ground counts that the beam sees anew. If the count was wrong until now, the tool is on its way out
-    /// from where it should not have been.
+    /// From here on only ground counts that the beam sees again as new. If the count was wrong until now, the tool is
+    /// still swinging out of a wrong position.
     fn see_anew(&mut self) {
         if self.is_blind() {
             self.blind_until_turn = self.blind_until_turn.max(self.turns + self.swing_ms() as u64);
@@ -596,7 +596,7 @@ impl Field {
         count(&mut self.tally.faults, fault);
     }
 
-    /// The chip starts anew.
+    /// The chip restarts.
     fn reset(&mut self, cause: Cause) {
         self.memories.iter().for_each(Shared::recover);
         self.weeder = init(&self.memories, self.readings(), self.broken, cause);

@@ -1,9 +1,9 @@
 //! Minutes of the real ELF on the virtual Uno: short rows, with a fault somewhere in each.
 //!
-//! Half of the machines have a second beam, of which either misses a plant now and then, and each wheel slips.
+//! Half of the machines have a second beam, and now and then one of the beams misses a plant. Each wheel slips.
 //!
-//! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row: from there on nothing may be
-//! harmed. Rows whose encoder was made to lie are held only against their alarms.
+//! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row. From there on no plant
+//! may be harmed. Rows with a faulty encoder are checked only for their alarms.
 
 use super::core::MISSED_ONCE_IN;
 use super::tally::{Plan, SoakError, Tally, chance, count, total};
@@ -284,7 +284,7 @@ fn still_out(pulses: &[Pulse], since: u64, time_s: f64, tally: &mut Tally) {
     }
 }
 
-/// Saves, spoils some bytes, and powers the Uno up anew with them.
+/// Saves, damages some bytes, and powers up the Uno again with them.
 fn restart_with_spoiled_eeprom(
     rng: &mut ChaCha8Rng,
     mut uno: Uno,

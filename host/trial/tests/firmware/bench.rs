@@ -1,5 +1,5 @@
-//! The bench itself: the classifier's cycles and memory, and what is no figure. The same sources give the same figures
-//! everywhere.
+//! Tests of the benchmark: the classifier's cycles and memory, and invalid measurements. The same sources give the same
+//! figures on every machine.
 
 use knn_bench::Task;
 use trial::bench::encoder::{Direction, Load, Turning, turn};

@@ -1,4 +1,4 @@
-//! The virtual Uno at its pseudo terminal, as the programs that open it see it.
+//! The live virtual Uno at its pseudo terminal, as other programs see it.
 
 use field::machine::Machine;
 use field::row::{Row, Thing};
@@ -16,7 +16,7 @@ use uno::Uno;
 use uno::hex::Bootloader;
 use uno::pty::Pty;
 
-/// Debian's arduino-core-avr has it here; setup.sh installs it.
+/// Path in Debian's arduino-core-avr, which setup.sh installs.
 const OLD_BOOTLOADER: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex";
 
 fn product() -> Setup {
@@ -52,7 +52,7 @@ fn an_uno_whose_reset_is_cut_runs_on_when_the_port_is_opened() {
     assert_eq!(uno.stop().expect("it ran to the end").uno().resets(), []);
 }
 
-/// Has avrdude do something with the flash through the bootloader, as often as a user would try it.
+/// Runs avrdude on the flash through the bootloader, with a user's number of retries.
 #[track_caller]
 fn avrdude(port: &Path, baud: &str, operation: &str) {
     let mut said = String::new();
@@ -65,7 +65,7 @@ fn avrdude(port: &Path, baud: &str, operation: &str) {
         if output.status.success() {
             return;
         }
-        // On a busy host it may come too late for the bootloader's window.
+        // On a busy PC it may miss the bootloader's time window.
         said = String::from_utf8_lossy(&output.stderr).into_owned();
     }
     panic!("{said}");
@@ -80,7 +80,7 @@ fn avrdude_writes_the_flash_through_the_old_bootloader_and_leaves_that_alone() {
     let folder = tempfile::tempdir().unwrap();
     let hex = folder.path().join("noise.hex");
     std::fs::write(&hex, uno::hex::text(&flash)).unwrap();
-    // It reads back what it wrote, and compares.
+    // avrdude reads back what it wrote, and compares.
     avrdude(uno.path(), "57600", &format!("flash:w:{}:i", hex.display()));
     let uno = uno.stop().expect("it ran to the end");
     assert!(uno.uno().flash().starts_with(&bootloader.behind(&flash).unwrap()));

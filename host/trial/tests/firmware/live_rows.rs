@@ -1,5 +1,5 @@
-//! Virtual Unos before one wheel, as the laptop at their ports finds them: what happens to one of them disturbs no
-//! other, and all of them hold.
+//! Virtual Unos on one wheel, as the laptop at their ports sees them: a fault of one row disturbs no other row, and all
+//! rows hold.
 
 use field::machine::Machine;
 use field::planting::Planting;
@@ -19,7 +19,7 @@ use uno::Uno;
 /// Walking pace.
 const SPEED_MM_S: f64 = 700.0;
 
-/// A row of so many plants of its own.
+/// A row with its own plants.
 fn row(plants: usize, seed: u64) -> Row {
     let planting = Planting {
         plants,
@@ -43,11 +43,11 @@ fn product() -> Setup {
     Setup { elf: Some(firmware::build().expect("the firmware builds")), ..Setup::default() }
 }
 
-/// What the laptop knows of the rows.
+/// The laptop's view of the rows.
 struct Laptop {
     rows: Rows,
     modes: Vec<Option<Mode>>,
-    /// What befell each: lost, connected, and in alarm.
+    /// How often each row was lost, connected, and in alarm.
     lost: Vec<usize>,
     alarms: Vec<usize>,
 }
@@ -87,7 +87,7 @@ impl Laptop {
         panic!("{what} does not come: {:?}, lost {:?}, alarms {:?}", self.modes, self.lost, self.alarms);
     }
 
-    /// Types a command to all, each of which does it.
+    /// Types a command to all rows. Each row executes it.
     #[track_caller]
     fn command(&mut self, command: &str) {
         for row in self.all() {
@@ -103,7 +103,7 @@ impl Laptop {
         });
     }
 
-    /// Has all of them at work: settings saved, the alarm of a new board cleared.
+    /// Puts all rows to work: settings saved, the alarm of a new board cleared.
     #[track_caller]
     fn set_to_work(&mut self) {
         for command in ["save", "clear", "start"] {
@@ -112,7 +112,7 @@ impl Laptop {
         self.until("work", |laptop, _| laptop.modes.iter().all(|mode| *mode == Some(Mode::Work)));
     }
 
-    /// HOLD to all, until nobody is waited for any more.
+    /// Holds all rows, and waits until no row is left to answer.
     #[track_caller]
     fn hold(&mut self, are_there: &[bool]) -> Hold {
         let mut hold = Hold::new(Instant::now(), are_there.iter().copied());
@@ -146,7 +146,7 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
     machine.happen(4, Mishap::Unplugged);
     laptop.until("a loss that is told", |laptop, _| laptop.lost[4] == 1);
     laptop.until("an alarm", |laptop, _| laptop.modes[2] == Some(Mode::Alarm));
-    // The others have not noticed, and still do not: each tells of its plants.
+    // The others have not noticed it: each reports its plants.
     let mut seen = [0; 6];
     laptop.until("plants of the others", |laptop, heard| {
         if let What::Happened(Happening::Event(EventLine::Detection { .. }, _)) = heard.what {
@@ -155,7 +155,7 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
         assert_eq!([0, 3, 5].map(|row| laptop.modes[row]), [Some(Mode::Work); 3]);
         [0, 3, 5].iter().all(|&row| seen[row] >= 3)
     });
-    // The one that was reset may be told of twice: what it was answering is cut.
+    // The row that was reset may be reported twice, because its pending answer was cut.
     assert_eq!([0, 2, 3, 4, 5].map(|row| laptop.lost[row]), [0, 0, 0, 1, 0]);
     assert_eq!(laptop.alarms, [0, 0, 1, 0, 0, 0]);
 
@@ -164,7 +164,7 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
     let summary = hold.summary(&names);
     assert!(summary.starts_with("HOLD 5 of 6 in ") && summary.contains("; NOT THERE: 5; "), "{summary}");
     println!("{summary}");
-    // The one that was lost has worked on. It holds as soon as its cable is in again.
+    // The lost row has worked on. It holds as soon as its cable is plugged in again.
     machine.happen(4, Mishap::PluggedIn);
     laptop.until("the last one's hold", |_, heard| {
         hold.take(heard);
@@ -203,7 +203,7 @@ fn all_rows_count_the_same_ticks_of_the_wheel_that_they_share_and_each_sees_its_
         let word = status[0].split(' ').find_map(|word| word.strip_prefix("pos="));
         word.expect("a status has a position").parse().expect("it is a number")
     };
-    // Each answers in a turn of its own, so that a machine that rolls may be a tick farther: asked until all of them stand.
+    // The rows answer at different turns, so a rolling machine may be a tick farther. So ask until all of them stand.
     let mut positions: Vec<i64> = Vec::new();
     let stand = (0..60).any(|_| {
         unos.iter_mut().for_each(|uno| uno.run_for_ms(250).expect("it runs"));

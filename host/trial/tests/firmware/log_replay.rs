@@ -32,19 +32,19 @@ fn row() -> Row {
     Row::new(things).expect("plants and a weed are a row")
 }
 
-/// The log of a session in which the machine rolls along the row, and was told to start by these commands. The link, the settings
-/// and the start take their time.
+/// The log of a session in which the machine rolls along the row and is started by these commands. The link, the
+/// settings and the start take time.
 fn logged(row: &Row, motion: &Motion, commands: &[&str]) -> Vec<Entry> {
     logged_from(row, motion, commands, 16_000_000)
 }
 
-/// As [`logged`], of a machine that sets off so many cycles after it was switched on, whether or not the session has begun.
+/// As [`logged`], for a machine that sets off a fixed number of cycles after power-up, independent of the session.
 fn logged_from(row: &Row, motion: &Motion, commands: &[&str], sets_off: u64) -> Vec<Entry> {
     let (port, end) = port_along(row, motion, sets_off);
     logged_at(port, None, commands, end)
 }
 
-/// The port of a machine that rolls along the row, and a place in ticks just before its end.
+/// The port of a machine that rolls along the row, and a position in ticks just before its end.
 fn port_along(row: &Row, motion: &Motion, sets_off: u64) -> (HostPort, i64) {
     let machine = Machine::default();
     let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(row, motion)])
@@ -54,7 +54,8 @@ fn port_along(row: &Row, motion: &Motion, sets_off: u64) -> (HostPort, i64) {
     (HostPort::new(uno), machine.ticks(motion, motion.duration_s()) - 10)
 }
 
-/// The log of a session over a port, until the machine has stood for a second behind a place in ticks. Someone may type more by chance.
+/// The log of a session over a port, until the machine has stood for a second behind a position in ticks. `typed` adds
+/// random commands.
 fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], end: i64) -> Vec<Entry> {
     let ms = Arc::clone(&port.ms);
     let mut port = Some(port);
@@ -93,8 +94,8 @@ fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], e
     log::read(&path).expect("the log is one")
 }
 
-/// A virtual Uno as a port, with the time that a host at its other end has. That host may be busy by chance: the machine rolls on
-/// before what it has told is read, or what was typed leaves.
+/// A virtual Uno as a port, with the PC's delays. The PC may be busy at random: the machine rolls on before its output
+/// is read, or before typed text is sent.
 struct HostPort {
     port: UnoPort,
     /// Time by the Uno's clock.
@@ -107,7 +108,7 @@ impl HostPort {
         Self { port: UnoPort::new(uno), ms: Arc::default(), busy: None }
     }
 
-    /// Has the host do something else in one of so many cases.
+    /// Delays the PC in one of `one_in` cases.
     fn pause(&mut self, one_in: u32) -> io::Result<()> {
         if let Some(busy) = &mut self.busy
             && busy.random_ratio(1, one_in)
@@ -160,7 +161,7 @@ fn a_row_at_a_steady_speed_is_decided_the_same_on_the_host() {
     let replayed = assert_same(&log, 9);
     assert!(replayed.farthest_swing <= 12, "{replayed:?}");
 
-    // What was tampered with is found, at its line.
+    // A changed line is found, at its number.
     let mut tampered = log.clone();
     let place = tampered.iter().rposition(|entry| entry.text.starts_with("swing tool=out")).expect("a swing");
     tampered[place].text = "swing tool=out pos=1".to_owned();
@@ -171,7 +172,7 @@ fn a_row_at_a_steady_speed_is_decided_the_same_on_the_host() {
         "{difference}"
     );
 
-    // A window that the log leaves out, as the machine kept to it at any pace.
+    // The log lacks a zone, and the machine kept it at every pace.
     let mut tampered = log.clone();
     for swing in ["swing tool=in", "swing tool=out"] {
         let last = tampered.iter().rposition(|entry| entry.text.starts_with(swing)).expect("a swing");
@@ -179,7 +180,7 @@ fn a_row_at_a_steady_speed_is_decided_the_same_on_the_host() {
     }
     assert!(replay(&tampered).expect("it can be replayed").difference.is_some());
 
-    // With another lead the tool would have left elsewhere.
+    // With another lead the tool would have swung out elsewhere.
     let mut tampered = log.clone();
     let lead = tampered.iter_mut().find(|entry| entry.text.starts_with("lead_out_ms=")).expect("a lead");
     lead.text = "lead_out_ms=80".to_owned();
@@ -205,11 +206,11 @@ fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
     assert_same(&logged(&row(), &motion, &["start"]), 9);
 }
 
-/// Rows by chance, at speeds of which half lie where one speed class ends and the next begins. The session begins before the machine
-/// sets off, while it gains its speed, or while it rolls past plants; whoever sits there types at any moment, and every other host is
-/// busy with something else now and then.
+/// Random rows. Half of their speeds are at the limit between two speed classes. The session begins before the machine
+/// sets off, while it accelerates, or while it rolls past plants. The operator types at random times, and every other
+/// PC is busy now and then.
 #[test]
-fn rows_by_chance_are_decided_the_same_on_the_host_whatever_is_typed_and_whenever_it_is_read() {
+fn random_rows_are_decided_the_same_on_the_host_for_all_commands_and_delays() {
     let rows = cases(20);
     let replayed: Vec<Replayed> = (0..rows)
         .into_par_iter()
@@ -276,7 +277,7 @@ fn an_alarm_that_the_log_cannot_explain_is_given() {
     let alarms =
         [alarm(format!("alarm name=encoder_jumps code=23 pos={position}")), alarm("state is=alarm".to_owned())];
     log.splice(place + 1..place + 1, alarms);
-    // From there on the log has the tool swing, and the replay keeps it out.
+    // From there on the log has a swing in, and the replay keeps the tool out.
     let difference = replay(&log).expect("the log can be replayed").difference.expect("they differ");
     assert!(difference.to_string().contains("the replay none"), "{difference}");
 }
@@ -321,7 +322,7 @@ fn numbers_that_no_machine_gives_are_replayed_or_refused() {
         ];
         assert!(replay(&log).expect("it stands still").difference.is_some(), "{one} {other}");
         let jump = [&log[..2], &[entry(Kind::Status, &status(other))]].concat();
-        // From the greatest place to the least is one step.
+        // From the greatest position to the least is one step.
         assert_eq!(replay(&jump).is_err(), one == 0, "{one} {other}");
     }
 }

@@ -1,7 +1,7 @@
-//! The real firmware in its field: measured, at pseudo terminals, in logs that are replayed, and before a satellite receiver.
+//! Tests of the real firmware in its field: benchmarks, pseudo terminals, replayed logs, and a satellite receiver.
 //!
-//! One file a subject. They are modules of one test program, so that it is linked once, and tests that wait for a machine in real time
-//! leave the processor's cores to those that compute.
+//! Each file has one subject. All are modules of one test program, so that it is linked once. Tests that wait in real
+//! time leave the cores to those that compute.
 
 mod bench;
 mod live;

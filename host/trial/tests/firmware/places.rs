@@ -1,5 +1,5 @@
-//! The real firmware weeds a row, a simulated receiver says where, and the record gives the places back: all of it by
-//! the virtual Uno's clock.
+//! The real firmware weeds a row with a simulated receiver, and the log gives the positions again. All times are the
+//! virtual Uno's.
 
 use field::machine::Machine;
 use field::motion::Motion;
@@ -24,13 +24,13 @@ use uno::CYCLES_PER_SECOND;
 const SPACING_MM: f64 = 500.0;
 const PLANTS: usize = 48;
 
-/// Which of them has not come up.
+/// The number of the missing plant.
 const MISSING: usize = 24;
 
 /// When the machine sets off after the session has begun, in cycles.
 const SETS_OFF: u64 = CYCLES_PER_SECOND;
 
-/// A row of 24 m with one plant missing, and a weed between every tenth and the next.
+/// A row of 24 m with one plant missing, and a weed after every tenth plant.
 fn row() -> Row {
     let plants = (0..PLANTS).filter(|&plant| plant != MISSING);
     let plants = plants.map(|plant| Thing::plant(600.0 + SPACING_MM * plant as f64, 148.0 + (plant % 5) as f64));
@@ -40,7 +40,7 @@ fn row() -> Row {
     Row::new(things).expect("plants and weeds are a row")
 }
 
-/// A port that tells the Uno's time.
+/// A port that also returns the Uno's time.
 struct Clocked {
     port: UnoPort,
     cycle: Rc<Cell<u64>>,
@@ -64,8 +64,8 @@ impl Write for Clocked {
     }
 }
 
-/// The record of a machine with a receiver that weeds the row; at a second it is unplugged, for some seconds, where
-/// that is told.
+/// The log of a machine with a receiver that weeds the row. `unplugged_s` is the time in which the receiver is
+/// unplugged.
 fn recorded(
     row: &Row,
     motion: &Motion,
@@ -89,7 +89,7 @@ fn recorded(
         None => Err(LinkError::Absent("it is gone".to_owned())),
     };
     let mut session = Session::open(open).expect("the firmware answers");
-    // The simulated servo has no load on it, and the tool comes in between any two plants.
+    // The simulated servo has no load, and the tool swings in between any two plants.
     assert!(session.command("set lead_out_ms 180") && session.command("start"));
     let folder = tempfile::tempdir().expect("there is room for a log");
     let path = folder.path().join("log.csv");
@@ -131,21 +131,21 @@ fn recorded(
     log::read(&path).expect("the log is one")
 }
 
-/// The way that the machine rolls: at 0.7 m/s, from where the beam is half a metre ahead of the row.
+/// The machine's motion: at 0.7 m/s, from half a metre before the row.
 fn motion() -> Motion {
     let end_mm = 600.0 + SPACING_MM * PLANTS as f64 + 900.0;
     Motion::steady(0.0, 500.0, 700.0, end_mm).change_speed(0.0, 500.0)
 }
 
-/// How far off the places of the row's plants and weeds are, in metres, with how each was found. Each thing of the row
-/// is in the record.
+/// The position errors of the row's plants and weeds, in metres, and how each position was found. Each thing of the row
+/// is in the log.
 fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
     let truth = SimulatedReceiver::new(setup.clone());
     let objects: Vec<_> = job.things().filter(|thing| matches!(thing.what, What::Object { .. })).collect();
     assert_eq!(objects.len(), row.things().len());
     let error = |(thing, object): (&Thing, &&job::Thing)| {
         let place = truth.place(thing.position_mm / 1000.0, Offset::default());
-        // A plant behind a gap is like nothing that the examples know, and kept.
+        // A plant behind a gap is unlike all examples, and is kept.
         let is_weed = matches!(object.what, What::Object { class: Class::Weed, .. });
         assert_eq!(is_weed, thing.kind == Grown::Weed, "{object:?}");
         let found = object.found.ok()?;
@@ -154,8 +154,8 @@ fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
     row.things().iter().zip(&objects).filter_map(error).collect()
 }
 
-/// The machine and its record add this to the receiver's error at the most, in metres: a status has been on its way for
-/// some 10 ms when it is written down, which is 7 mm of the way, and the beam has a canopy's edges by the tick.
+/// The most that the machine and its log add to the receiver's error, in metres. A status is logged some 10 ms late,
+/// which is 7 mm of travel. The edges of a canopy are exact to a tick.
 const MACHINE_M: f64 = 0.015;
 
 #[test]
@@ -173,9 +173,9 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     assert_eq!(errors.len(), row.things().len(), "all have places");
     let interpolated = errors.iter().filter(|(_, basis)| *basis == Basis::Interpolated).count();
     assert!((10..40).contains(&interpolated), "{interpolated}");
-    // The length of an error that is normal to the east and to the north is beyond four standard deviations once in
-    // 3000 times. A fix's is one part, and the heading's at 0.65 m from the antenna the other; between two fixes it is
-    // less.
+    // An error with normal distributions to the east and to the north exceeds four standard deviations once in 3000
+    // times. The fix's error is one part, and the heading's error at 0.65 m from the antenna is the other. Between two
+    // fixes the error is smaller.
     let sigma_m = (setup.error_mm / 1000.0).hypot(0.02 * 0.65);
     let farthest = errors.iter().map(|(error, _)| *error).fold(0.0, f64::max);
     assert!(farthest < 4.0 * sigma_m + MACHINE_M, "{farthest} {errors:?}");
@@ -183,7 +183,7 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     let mean = errors.iter().map(|(error, _)| error).sum::<f64>() / errors.len() as f64;
     assert!(mean < 1.25 * sigma_m + MACHINE_M, "{mean}");
 
-    // What went wrong stands in the record, in lines of their own, and none of the machine's is lost.
+    // The faults are in the log, in their own lines, and no line of the machine is lost.
     let marks = |begin: &str| log.iter().filter(|it| it.kind == Kind::GpsMark && it.text.starts_with(begin)).count();
     assert!((3..=4).contains(&marks("no fix")), "{}", marks("no fix"));
     assert_eq!(marks("jumped") as u64, job.counts.jumps);
@@ -194,7 +194,7 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     let replayed = replay(&log).expect("the log can be replayed");
     assert_eq!((replayed.difference, replayed.objects), (None, row.things().len()));
 
-    // Its time is the receiver's, and the label lies where the object does.
+    // The time is the receiver's, and the label has the detection's position.
     let label = job.things().find(|thing| thing.what == What::Label(Class::Weed)).expect("it was labelled");
     let weed = job.things().find(|thing| (thing.way_m - label.way_m).abs() < 1e-9).expect("it is an object's");
     assert_eq!((weed.found, label.time_ms > weed.time_ms), (label.found, true));

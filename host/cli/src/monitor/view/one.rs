@@ -1,5 +1,5 @@
-//! One row on the screen: its machine, the ground between beam and tool, its objects, and its console. Where there is no room for all that,
-//! the state and the ground in a few lines.
+//! The screen of one row: its machine, the ground between beam and tool, its detections, and its console. A small
+//! screen shows only the state and the ground, in a few lines.
 
 use super::parts::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, tool_column};
 use crate::monitor::model::{Connection, Model, RowModel, Seen};
@@ -10,7 +10,7 @@ use ratatui::style::{Color, Style, Stylize};
 use ratatui::text::{Line, Span, Text};
 use ratatui::widgets::{Block, Paragraph, Row, Table, Wrap};
 
-/// Columns and lines below which there is no room for all.
+/// The least columns and lines for the whole screen.
 const COLUMNS: u16 = 70;
 const LINES: u16 = 18;
 
@@ -24,7 +24,7 @@ pub fn draw(model: &Model, row: &RowModel, frame: &mut Frame) {
     }
 }
 
-/// The state, with the tool and why it is out; of a machine that is gone, the last that was heard.
+/// The state, with the tool and the reason for its being out. For a lost machine, the last known state.
 fn state(row: &RowModel) -> Line<'static> {
     let status = &row.status;
     if !row.is_there() {
@@ -56,7 +56,7 @@ fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
         (Connection::Up(_), advice) => advice.clone(),
     };
     let wrapped = urgent.as_ref().map_or(0, |text| text.chars().count().div_ceil(usize::from(area.width.max(10)) - 5));
-    // What comes first here is there where there is not room for all.
+    // The first parts in this list have priority if there is not room for all.
     let mut left = area.height;
     let mut take = |wanted: usize| {
         let got = left.min(wanted as u16);
@@ -121,7 +121,7 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
     frame.render_widget(Paragraph::new(vec![state(row), second.into()]).block(block), area);
 }
 
-/// Where the tool and the beam are.
+/// The marks of tool and beam.
 fn marks(row: &RowModel, columns: usize) -> String {
     let tool_at = tool_column(row, columns);
     let tool = match (row.is_there(), row.status.tool_out) {
@@ -140,7 +140,7 @@ fn marks(row: &RowModel, columns: usize) -> String {
     marks.into_iter().collect()
 }
 
-/// The row from a little behind the tool to the beam, as the machine rolls to the right.
+/// The row from a little behind the tool to the beam. The machine rolls to the right.
 fn draw_ground(row: &RowModel, frame: &mut Frame, area: Rect) {
     let block = Block::bordered().title(" row ");
     let inner = block.inner(area);

@@ -1,5 +1,5 @@
-//! What the screen has in common, whether it shows one row or several: the line with the key for HOLD, the ground before a tool, what was
-//! said, and what is being typed.
+//! Common parts of both screens: the line with the key for HOLD, the ground ahead of a tool, the console's output, and
+//! its input.
 
 use crate::monitor::model::{Model, RowModel};
 use link::settings::Setting;
@@ -10,10 +10,10 @@ use ratatui::style::{Color, Style, Stylize};
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 
-/// The key that has every row hold, as the screen says it.
+/// The label of the key that holds all rows.
 pub(super) const HOLD_KEY: &str = "Esc HOLD";
 
-/// A line with the key for HOLD at its end, which is there however narrow the screen is.
+/// A line with the key for HOLD at its end. The key is visible on the narrowest screen too.
 pub(super) fn draw_top(left: Line, frame: &mut Frame, area: Rect) {
     let width = HOLD_KEY.len() as u16;
     let [left_area, key] = Layout::horizontal([Constraint::Min(0), Constraint::Length(width)]).areas(area);
@@ -21,7 +21,7 @@ pub(super) fn draw_top(left: Line, frame: &mut Frame, area: Rect) {
     frame.render_widget(Line::raw(HOLD_KEY).style(hold_style()), key);
 }
 
-/// How the key for HOLD looks.
+/// The style of the key for HOLD.
 pub(super) fn hold_style() -> Style {
     Style::new().fg(Color::White).bg(Color::Red).bold()
 }
@@ -35,7 +35,7 @@ pub(super) fn colour(mode: Mode) -> Color {
     }
 }
 
-/// What stands at a place of the row: what is drawn farther down here wins.
+/// The content of a column. A later variant has priority.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Ground {
     Bare,
@@ -44,7 +44,8 @@ enum Ground {
     Canopy,
 }
 
-/// How far ahead of the tool a column begins, as a column of so many: a quarter of the way from beam to tool stands behind the tool.
+/// The column of a position ahead of the tool, out of `columns`. A quarter of the distance from beam to tool is shown
+/// behind the tool.
 fn column_of(row: &RowModel, columns: usize, ahead_of_tool_mm: f64) -> f64 {
     let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
     let mm_per_column = 1.25 * beam_to_tool / columns.max(1) as f64;
@@ -56,7 +57,7 @@ pub(super) fn tool_column(row: &RowModel, columns: usize) -> usize {
     column_of(row, columns, 0.0).round() as usize
 }
 
-/// The ground from a little behind the tool to the beam, as the machine rolls to the right.
+/// The ground from a little behind the tool to the beam. The machine rolls to the right.
 pub(super) fn ground(row: &RowModel, columns: usize) -> String {
     let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
     let mut ground = vec![Ground::Bare; columns];
@@ -66,7 +67,7 @@ pub(super) fn ground(row: &RowModel, columns: usize) -> String {
         let to = from + row.millimetres(seen.width);
         let mut paint = |from: f64, to: f64, what: Ground| {
             let (from, to) = (column_of(row, columns, from).round(), column_of(row, columns, to).round());
-            // What is narrower than a column is still drawn, and what lies behind the left edge is not.
+            // Draws also what is narrower than a column, and cuts off what is beyond the left edge.
             let to = to.max(from + 1.0).max(0.0) as usize;
             for place in ground.iter_mut().take(to).skip(from.max(0.0) as usize) {
                 *place = what.max(*place);
@@ -91,7 +92,7 @@ fn symbol(ground: &Ground) -> char {
     }
 }
 
-/// What was said on the console, the last lines of it.
+/// The last lines of the console's output.
 pub(super) fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
     let block = Block::bordered().title(" console ");
     let room = usize::from(block.inner(area).height);
@@ -102,7 +103,8 @@ pub(super) fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
     );
 }
 
-/// What is being typed, to whom, and below it what came of HOLD, what the line may become, or which keys there are.
+/// The line that is being typed and its addressee. Below it is the result of HOLD, the completions, or the list of
+/// keys.
 pub(super) fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect) {
     let prompt = format!("{to}> ");
     // A line has at most 80 characters.

@@ -1,5 +1,6 @@
-//! Several rows at a glance: a line for each, with its name, its state, its alarm or the ground before its tool, and what has become of the
-//! last command. Where there is not room for all of them, those that are lost or in alarm come first, and how the rest is is counted.
+//! The overview of several rows. Each row has a line with its name, its state, its alarm or the ground ahead of its
+//! tool, and the state of the last command. If there is not room for all, rows that are lost or in alarm come first,
+//! and the rest are counted by state.
 
 use super::parts::{colour, draw_line, draw_said, draw_top, ground};
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
@@ -10,10 +11,10 @@ use ratatui::style::{Color, Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-/// Lines from which on the console has a frame, and what there is to do about an alarm a line.
+/// The least lines for a frame round the console and a line of advice for an alarm.
 const ROOMY: u16 = 16;
 
-/// Columns of a name where the screen is narrow, and columns from which on it is not.
+/// Columns of a name on a narrow screen, and the least columns of a wide one.
 const NAME: usize = 8;
 const WIDE: u16 = 60;
 
@@ -21,7 +22,8 @@ const WIDE: u16 = 60;
 pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     let area = frame.area();
     let is_roomy = area.height >= ROOMY;
-    // The top, a line of the console, what is typed, and the line below it; the console's frame and the advice where there is room.
+    // The top, a line of the console, the input, and the line below it. If there is room, also the console's frame and
+    // the advice.
     let others = if is_roomy { 3 + 3 + 1 } else { 3 };
     let room = usize::from(area.height.saturating_sub(others)).min(rows.len());
     let [top, list, advice, said, line, hint] = Layout::vertical([
@@ -105,7 +107,7 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
     let room = usize::from(area.height);
     let mut order: Vec<usize> = (0..rows.len()).collect();
     if room < rows.len() {
-        // Where all fit they keep their places, for the eye.
+        // If all rows fit, they keep their order, so that each is easy to find.
         let is_urgent = |row: usize| matches!(Is::of(&rows[row]), Is::Lost | Is::Alarm);
         order.sort_by_key(|&row| (!is_urgent(row), model.target != Some(row)));
     }

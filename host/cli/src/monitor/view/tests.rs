@@ -1,4 +1,4 @@
-//! Snapshots of the screen, from what happened to a machine.
+//! Snapshots of the screen after events of a machine.
 
 use super::*;
 use crate::monitor::model::RowModel;
@@ -11,26 +11,26 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
 use std::time::{Duration, Instant};
 
-/// The screen after all of this.
+/// The screen in this state.
 fn screen(model: &Model) -> String {
     screen_of(model, 90, 22)
 }
 
-/// A screen of so many columns and lines.
+/// A screen of this size.
 fn screen_of(model: &Model, columns: u16, lines: u16) -> String {
     let mut terminal = Terminal::new(TestBackend::new(columns, lines)).unwrap();
     terminal.draw(|frame| draw(model, frame)).unwrap();
     terminal.backend().to_string()
 }
 
-/// A machine that told these lines since it was connected.
+/// A machine after these lines since its connection.
 fn machine(lines: &[&str]) -> Model {
     let mut model = Model::new(vec!["Uno".to_owned()]);
     tell(&mut model, 0, lines);
     model
 }
 
-/// A row connects, and tells these lines.
+/// Connects a row and sends these lines.
 fn tell(model: &mut Model, row: usize, lines: &[&str]) {
     let version = "0.2.0".to_owned();
     model.update(row, Happening::Connected { version, settings: Settings::new(), examples: Vec::new() });
@@ -191,12 +191,12 @@ fn what_is_drawn_follows_the_machine_s_settings() {
     assert_eq!(screen(&model), before);
 }
 
-/// A status of a row at work with these windows, and one of a row in alarm.
+/// A status of a row at work with keep-out zones, and one of a row in alarm.
 const AT_WORK: &str = "state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0";
 const IN_ALARM: &str =
     "state=alarm code=2-2 name=encoder_channel_dead tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400";
 
-/// A machine of so many rows, the third of which is in alarm and the last of which is lost.
+/// A machine with this number of rows. The third row is in alarm, and the last one is lost.
 fn rows(count: usize) -> Model {
     let mut model = Model::new((1..=count).map(|number| format!("row {number}")).collect());
     for row in 0..count {
@@ -210,7 +210,7 @@ fn rows(count: usize) -> Model {
     model
 }
 
-/// A HOLD to all that every row but the last, which is lost, has obeyed.
+/// A HOLD to all. Every row has obeyed except the last, which is lost.
 fn held(model: &mut Model) {
     let since = Instant::now();
     let count = model.rows.len();

@@ -1,5 +1,6 @@
-//! HOLD while other connections attack the server. The attackers have addresses of this computer's loopback, and 1,000 connections
-//! at the most. How long HOLD took is printed, not asserted: `cargo test -p weeder-cli --test command attack -- --nocapture`.
+//! HOLD while other connections attack the server. The attackers use this computer's loopback addresses, and 1,000
+//! connections at most. The time of HOLD is printed, not asserted: `cargo test -p weeder-cli --test command attack --
+//! --nocapture`.
 
 use super::*;
 use std::collections::VecDeque;
@@ -9,10 +10,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Addresses of the attackers.
 const ATTACKERS: [[u8; 4]; 4] = [[127, 0, 0, 3], [127, 0, 0, 4], [127, 0, 0, 5], [127, 0, 0, 6]];
 
-/// Connections that an attack holds at once.
+/// Simultaneous connections of an attack.
 const AT_ONCE: usize = 200;
 
-/// Connections that it opens in all.
+/// Total connections of an attack.
 const IN_ALL: usize = 1000;
 
 /// A connection from an address.
@@ -25,7 +26,7 @@ fn connect_from(source: [u8; 4], host: &str) -> TcpStream {
     socket.into()
 }
 
-/// Whether the server has not closed it.
+/// Whether the server has left it open.
 fn is_open(stream: &TcpStream) -> bool {
     stream.set_nonblocking(true).expect("it may not wait");
     let mut buffer = [0; 4096];
@@ -38,7 +39,7 @@ fn is_open(stream: &TcpStream) -> bool {
     }
 }
 
-/// A client with one connection, which it keeps.
+/// A client that keeps one connection.
 struct Client<'a> {
     stream: BufReader<TcpStream>,
     host: &'a str,
@@ -50,7 +51,7 @@ impl<'a> Client<'a> {
         Self { stream: BufReader::new(connect(host, 0)), host, cookie }
     }
 
-    /// The status, and what came.
+    /// Sends a request. Returns the status and the body.
     fn ask(&mut self, method: &str, path: &str, body: &str) -> (u16, String) {
         let Self { stream, host, cookie } = self;
         let request = request(host, cookie, method, path, &format!("Content-Length: {}\r\n\r\n{body}", body.len()));
@@ -88,7 +89,7 @@ fn answer(stream: &mut impl BufRead) -> (u16, String) {
     (status, String::from_utf8(body).expect("it is text"))
 }
 
-/// An attack that goes on: where the server closes a connection, another one is opened.
+/// A continuous attack: it replaces each connection that the server closes.
 fn attack<'a, T>(host: &'a str, text: &'a str, meanwhile: impl FnOnce() -> T) -> T {
     let is_over = AtomicBool::new(false);
     let (stands, has_begun) = std::sync::mpsc::channel();
@@ -101,7 +102,7 @@ fn attack<'a, T>(host: &'a str, text: &'a str, meanwhile: impl FnOnce() -> T) ->
                     open.pop_front();
                 }
                 let stream = connect_from(ATTACKERS[number % 4], host);
-                // It may be closed at once.
+                // The server may close it at once.
                 let _ = (&stream).write_all(text.as_bytes());
                 open.push_back(stream);
                 if number + 1 == AT_ONCE {
@@ -116,7 +117,7 @@ fn attack<'a, T>(host: &'a str, text: &'a str, meanwhile: impl FnOnce() -> T) ->
             }
             let count = || open.iter().filter(|stream| is_open(stream)).count();
             assert!(count() > 0, "the attack is over");
-            // It has not got more than its share, when the server has taken all of them.
+            // Once the server has accepted all connections, the attacker must have no more than its share.
             for _ in 0..PATIENCE.as_millis() / LOOK.as_millis() {
                 if count() <= 64 {
                     return;
@@ -128,14 +129,14 @@ fn attack<'a, T>(host: &'a str, text: &'a str, meanwhile: impl FnOnce() -> T) ->
         has_begun.recv().expect("the attack stands");
         let came = meanwhile();
         is_over.store(true, Ordering::Relaxed);
-        attackers.join().expect("nobody died");
+        attackers.join().expect("no thread has panicked");
         came
     })
 }
 
-/// Has the machine hold while a text is sent by many connections to each door, from a phone and from the computer, by connections
-/// that are open already and by new ones. The text is made for a host, with the cookie of another paired phone.
-/// An attacker who asks as the computer itself does takes the places of its open connections, if not `keeps_open`.
+/// Holds the machine while many connections send a text to each door. HOLD comes from a phone and from the computer,
+/// over open and new connections. The text is made for a host, with the cookie of another paired phone. An attacker at
+/// the computer itself takes the places of its own open connections, unless `keeps_open`.
 fn hold_is_obeyed_under(name: &str, keeps_open: bool, text: impl Fn(&str, &str) -> String) {
     let folder = folder();
     let (_uno, port) = uno(&folder, "uno", &["--stand"]);
@@ -163,7 +164,7 @@ fn hold_is_obeyed_under(name: &str, keeps_open: bool, text: impl Fn(&str, &str) 
             };
             let open = open.into_iter().filter(|(_, client)| keeps_open || client.host != attacked);
             let new = askers.into_iter().map(|(who, host, cookie)| {
-                // Only now: it is to come while the attack goes on.
+                // Opened only now: it must get through during the attack.
                 (format!("{who}, over a new one"), Client::open(host, cookie))
             });
             open.chain(new).map(&mut hold).collect::<Vec<_>>()
@@ -235,7 +236,7 @@ fn a_request_that_is_malformed_or_has_two_lengths_is_refused_and_does_nothing() 
         ] {
             assert_eq!(send(host, cookie, &format!("{CHUNKED}{chunk}")), 400, "{chunk:?}");
         }
-        // The longest chunk that there may be has not come to its end.
+        // The longest possible chunk, which has not ended.
         assert_eq!(send(host, cookie, &format!("{CHUNKED}ffffffffffffffff\r\nhold\r\n0\r\n\r\n")), 408);
         for lengths in [
             "Content-Length: 4\r\nTransfer-Encoding: chunked",
@@ -252,7 +253,7 @@ fn a_request_that_is_malformed_or_has_two_lengths_is_refused_and_does_nothing() 
         ] {
             let head = format!("{lengths}\r\n\r\n4\r\nhold\r\n0\r\n\r\n");
             assert_eq!(send(host, cookie, &head), 400, "{lengths}");
-            // Behind another request of the same connection, and sent with it.
+            // After another request on the same connection, and sent together with it.
             let mut client = Client::open(host, cookie);
             let twice = request(host, cookie, "GET", "/machines", "\r\n")
                 + &request(host, cookie, "POST", "/machines/0/command", &head);
@@ -277,7 +278,7 @@ fn a_stream_that_reads_nothing_is_closed_before_the_buffers_are_full_and_so_is_o
     let served = serve(&folder, &[&port], &[]);
     served.make_ready(0);
     let phone = served.pair();
-    // As long as all that was asked before is kept for more.
+    // Long enough for the timeouts of all previous requests.
     let mut watching = Events::open(&served.lan, &phone, 0);
     let mut least = files(&served.process);
     for _ in 0..150 {
