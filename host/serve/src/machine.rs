@@ -2,9 +2,10 @@
 //! answers back, and has the hub tell all else. It decides nothing: what may be typed is decided before.
 
 use super::hub::Hub;
+use control::say::command::{Command, parse};
 use link::ConsoleLine;
 use link::rows::Opener;
-use link::session::{Happening, Session};
+use link::session::{HOLD, Happening, Session};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread;
@@ -83,8 +84,8 @@ impl Machine {
 /// A line that the session has and is not answered yet.
 #[derive(Default)]
 struct Asked {
+    line: String,
     askers: Vec<oneshot::Sender<Typed>>,
-    is_hold: bool,
     answer: Vec<String>,
 }
 
@@ -127,17 +128,17 @@ impl Talk {
                 self.hold(&mut session, asker);
             }
             for happening in session.turn(Instant::now()) {
-                self.take(happening);
+                self.take(&mut session, happening);
             }
         }
     }
 
     fn command(&mut self, session: &mut Session, Line { text, asker }: Line) {
-        let asked = Asked { askers: vec![asker], ..Asked::default() };
+        let asked = Asked { line: text, askers: vec![asker], ..Asked::default() };
         // What is typed to a machine that is not there must not wait until it is.
         if !session.is_connected() {
             asked.end(&self.not_there());
-        } else if session.command(&text) {
+        } else if session.command(&asked.line) {
             self.asked.push_back(asked);
         } else {
             asked.end(&Typed::Busy);
@@ -145,7 +146,7 @@ impl Talk {
     }
 
     fn hold(&mut self, session: &mut Session, asker: oneshot::Sender<Typed>) {
-        let asked = Asked { askers: vec![asker], is_hold: true, ..Asked::default() };
+        let asked = Asked { line: HOLD.to_owned(), askers: vec![asker], ..Asked::default() };
         if !session.is_connected() {
             asked.end(&self.not_there());
             return;
@@ -157,7 +158,7 @@ impl Talk {
         }
         match self.asked.back_mut() {
             // One that is under way counts for this one too, as it does for the session.
-            Some(last) if last.is_hold => last.askers.extend(asked.askers),
+            Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
             _ => self.asked.push_back(asked),
         }
     }
@@ -166,10 +167,10 @@ impl Talk {
         Typed::Lost(self.hub.why_lost(self.number).unwrap_or_else(|| "the machine is not there".to_owned()))
     }
 
-    fn take(&mut self, happening: Happening) {
+    fn take(&mut self, session: &mut Session, happening: Happening) {
         match happening {
-            Happening::Connected { version, .. } => {
-                self.hub.there(self.number, &version);
+            Happening::Connected { version, shown, examples, .. } => {
+                self.hub.there(self.number, &version, &shown, &examples);
                 (self.tell)(&format!("{}: weeder {version} is there.", self.name));
             }
             Happening::Lost(why) => {
@@ -179,7 +180,7 @@ impl Talk {
                     asked.end(&Typed::Lost(why.clone()));
                 }
             }
-            Happening::Status(_, line) => self.hub.status(self.number, line),
+            Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
             Happening::Event(_, line) => self.hub.event(self.number, &line),
             Happening::Answer(line) => {
                 let is_end = matches!(ConsoleLine::parse(&line), ConsoleLine::Done | ConsoleLine::Refused(_));
@@ -189,11 +190,16 @@ impl Talk {
                 }
                 if is_end && let Some(mut asked) = self.asked.pop_front() {
                     let answer = std::mem::take(&mut asked.answer);
+                    // The pages live on them.
+                    if parse(asked.line.as_bytes()) == Ok(Command::Events(false)) {
+                        session.turn_events_on();
+                    }
                     asked.end(&Typed::Answered(answer));
                 }
             }
-            // Each page asks for what it needs.
-            Happening::Command(_) | Happening::Settings(_) => {}
+            Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
+            Happening::Examples(lines) => self.hub.know(self.number, "examples", lines.into()),
+            Happening::Command(_) => {}
         }
     }
 }
@@ -203,6 +209,7 @@ mod tests {
     use super::*;
     use link::settings::{Setting, name};
     use link::{Link, LinkError};
+    use serde_json::{Value, json};
     use std::io::{self, Read, Write};
     use std::sync::Mutex;
     use std::sync::atomic::{AtomicBool, Ordering};
@@ -210,10 +217,12 @@ mod tests {
     use tokio::runtime;
     use tokio::time::{sleep, timeout};
 
-    /// What was typed to a firmware for somebody, whether it answers `dump` by now, and whether its cable is plugged in.
+    /// What was typed to a firmware for somebody, whether its events are on, whether it answers `dump` by now, and whether its cable is
+    /// plugged in.
     #[derive(Clone, Default)]
     struct Desk {
         typed: Arc<Mutex<Vec<String>>>,
+        tells_events: Arc<AtomicBool>,
         answers_dump: Arc<AtomicBool>,
         is_there: Arc<AtomicBool>,
     }
@@ -258,13 +267,21 @@ mod tests {
                     continue;
                 }
                 let line = String::from_utf8(std::mem::take(&mut self.line)).unwrap();
-                let setting = |setting: Setting| format!("{}={}\n", name(setting), setting.description().default);
+                let is_set = self.desk.typed().iter().any(|line| line == "set k 5");
+                let setting = |setting: Setting| match name(setting) {
+                    name if name == "k" && is_set => "k=5\n".to_owned(),
+                    name => format!("{name}={}\n", setting.description().default),
+                };
+                if line.starts_with("events ") {
+                    self.desk.tells_events.store(line == "events on", Ordering::Relaxed);
+                }
                 let answer = match line.as_str() {
                     "" => continue,
                     "version" => "weeder 0.2.0\n".to_owned(),
                     "get" => Setting::all().map(setting).collect(),
                     "status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\n".to_owned(),
-                    "examples" | "events on" => String::new(),
+                    "examples" => "built_in 0 plant 1 2 3 4 5\n".to_owned(),
+                    "events on" => String::new(),
                     "dump" => {
                         self.desk.typed.lock().unwrap().push(line);
                         self.owes_dump = true;
@@ -337,6 +354,38 @@ mod tests {
             let (dumped, (), ()) = tokio::join!(machine.command("dump".to_owned()), others, answered_later);
             assert!(matches!(&dumped, Typed::Answered(lines) if *lines == ["dumped", "ok"]), "{dumped:?}");
             assert_eq!(desk.typed(), ["dump", "hold"]);
+        });
+    }
+
+    #[test]
+    fn a_page_is_told_all_at_once_whenever_it_comes_and_what_others_change_after_that() {
+        run(async {
+            let (machine, hub, _) = machine();
+            let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();
+            until(|| there()["status"].is_string()).await;
+            let known = there();
+            assert_eq!((known["is"].as_str(), known["version"].as_str()), (Some("there"), Some("0.2.0")));
+            assert_eq!(known["examples"], json!(["built_in 0 plant 1 2 3 4 5"]));
+            let shows = |known: &Value, line| known["settings"].as_array().unwrap().contains(&json!(line));
+            assert!(shows(&known, "k=3"));
+            let (_, mut early) = hub.listen();
+            let set = machine.command("set k 5".to_owned()).await;
+            assert!(matches!(&set, Typed::Answered(lines) if *lines == ["ok"]), "{set:?}");
+            until(|| shows(&there(), "k=5")).await;
+            let told = std::iter::from_fn(|| early.try_recv().ok());
+            assert!(told.into_iter().any(|message| message.contains(r#""is":"settings""#) && message.contains("k=5")));
+        });
+    }
+
+    #[test]
+    fn events_that_a_client_turns_off_are_turned_on_again_for_the_pages() {
+        run(async {
+            let (machine, hub, desk) = machine();
+            until(|| hub.why_lost(0).is_none()).await;
+            let off = machine.command("events off".to_owned()).await;
+            assert!(matches!(off, Typed::Answered(_)), "{off:?}");
+            until(|| desk.tells_events.load(Ordering::Relaxed)).await;
+            assert_eq!(desk.typed(), ["events off"]);
         });
     }
 
