@@ -34,7 +34,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         onLanguage(label);
         return panel;
     });
-    served.onThere = (machine, wire) => panels[machine]?.connect(wire, performance.now(), false);
+    served.onThere = (machine, link) => panels[machine]?.connect(link, performance.now());
     served.onLost = (machine, why) => {
         const panel = panels[machine];
         if (panel) panel.machine.lost = why;
