@@ -13,12 +13,22 @@ interface Sent {
     lose(): void;
 }
 
+const THERE = {
+    is: "there",
+    version: "0.2.0",
+    settings: ["k=3 from 1 to 15, default 3, not saved"],
+    examples: ["field 0 plant 1 2 3 4 5"],
+    help: { k: "nearest examples that vote" },
+    status: "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400",
+} as const;
+
 let sent: Sent[] = [];
 let happened: Happening[] = [];
 let machine = new ServedMachine(0);
 
 beforeEach(() => {
     [sent, happened, machine] = [[], [], new ServedMachine(1)];
+    machine.tell(THERE);
     machine.onHappening = (happening) => happened.push(happening);
     globalThis.fetch = (path, request) => {
         assert.equal(path, "/machines/1/command");
@@ -101,10 +111,34 @@ test("what is no answer, as where another weeder serve asks for its code, is tol
 test("a machine that is lost answers no command, and says why", async () => {
     const [dump, start] = [machine.ask("dump"), machine.ask("start")];
     await goOn();
-    machine.end("the port is gone");
-    const isGone = (typed: Promise<unknown>) => assert.rejects(typed, new NoMachine("the port is gone"));
-    await Promise.all([dump, start].map(isGone));
-    for (const type of [() => machine.ask("status"), () => machine.hold()]) await isGone(type());
-    assert.deepEqual(lines(), ["dump"]);
+    machine.tell({ is: "lost", why: "the port is gone" });
     assert.deepEqual(happened.at(-1), { is: "lost", why: "the port is gone", forGood: true, isWanted: false });
+    // What waited is not sent when it is back.
+    await Promise.all([
+        assert.rejects(dump, new NoMachine("the port is gone")),
+        assert.rejects(start, new NoMachine("the machine is not there")),
+    ]);
+    for (const type of [() => machine.ask("status"), () => machine.hold()])
+        await assert.rejects(type(), new NoMachine("the machine is not there"));
+    machine.onAbsent = (why) => happened.push({ is: "command", line: why });
+    machine.tell({ is: "lost", why: "there is no port" });
+    assert.deepEqual(happened.at(-1), { is: "command", line: "there is no port" });
+    machine.tell(THERE);
+    machine.ask("clear");
+    await goOn();
+    assert.deepEqual(lines(), ["dump", "clear"]);
+});
+
+test("a machine that is there has told all at once, and tells what others change", () => {
+    machine.tell(THERE);
+    const [connected, help, status] = happened;
+    assert(connected?.is === "connected" && connected.version === "0.2.0");
+    assert.deepEqual([connected.settings[0]?.value, connected.examples], [3, THERE.examples]);
+    assert(help?.is === "help" && help.help.get("k") === THERE.help.k);
+    assert(status?.is === "status" && status.status.mode === "hold");
+    machine.tell({ is: "settings", said: ["k=5 from 1 to 15, default 3, not saved"] });
+    machine.tell({ is: "examples", said: [] });
+    const [settings, examples] = happened.slice(-2);
+    assert(settings?.is === "settings" && settings.settings[0]?.value === 5);
+    assert.deepEqual(examples, { is: "examples", examples: [] });
 });

@@ -25,6 +25,7 @@ const RETRY: Duration = Duration::from_secs(1);
 pub const HOLD: &str = "hold";
 
 /// What the session asks for itself.
+const STATUS: &str = "status";
 const SETTINGS: &str = "get";
 const EXAMPLES: &str = "examples";
 const EVENTS: &str = "events on";
@@ -65,18 +66,11 @@ pub enum Happening {
     Examples(Vec<String>),
 }
 
-/// What the firmware is to answer.
-enum Question {
-    Status,
-    Command,
-    /// One of [`Session::own`], with the lines that have come.
-    Own(&'static str, Vec<String>),
-}
-
-/// A question that was typed, and when.
+/// A line that was typed, and when.
 struct Asked {
-    question: Question,
     line: String,
+    /// Whether the session asks for itself; the lines that have come, then.
+    own: Option<Vec<String>>,
     since: Instant,
 }
 
@@ -93,7 +87,7 @@ pub struct Session {
     /// Whether the machine is to hold before anything else is typed.
     is_to_hold: bool,
     /// What the session asks for itself when nothing else waits. `hold` does not drop it.
-    own: BTreeSet<&'static str>,
+    own: BTreeSet<String>,
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
     /// Whether nobody was told yet why there is no Uno.
@@ -162,13 +156,12 @@ impl Session {
 
     /// Turns the events on, behind all that waits.
     pub fn turn_events_on(&mut self) {
-        self.own.insert(EVENTS);
+        self.own.insert(EVENTS.to_owned());
     }
 
     /// Whether no command waits for its answer.
     pub fn is_idle(&self) -> bool {
-        let is_command = |asked: &Asked| matches!(asked.question, Question::Command);
-        self.waiting.is_empty() && !self.is_to_hold && !self.asked.iter().any(is_command)
+        self.waiting.is_empty() && !self.is_to_hold && self.asked.iter().all(|asked| asked.own.is_some())
     }
 
     /// Whether the Uno is there.
@@ -215,9 +208,7 @@ impl Session {
         link.ask(EVENTS)?;
         self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, shown, examples });
         // Before anything is typed: how the machine was when all began.
-        let status = link.ask("status")?;
-        let status = status.into_iter().find_map(|line| Some((Status::parse(&line)?, line)));
-        self.happened.extend(status.map(|(status, line)| Happening::Status(status, line)));
+        self.happened.extend(told(STATUS, link.ask(STATUS)?)?);
         self.link = Some(link);
         (self.poll_at, self.is_lost_untold) = (None, false);
         Ok(())
@@ -237,27 +228,33 @@ impl Session {
             return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
         }
         if std::mem::take(&mut self.is_to_hold) {
-            self.type_line(&mut link, Question::Command, HOLD.to_owned(), now)?;
+            self.type_line(&mut link, HOLD.to_owned(), None, now)?;
         } else if self.asked.is_empty() {
             if let Some(command) = self.waiting.pop_front() {
-                self.type_line(&mut link, Question::Command, command, now)?;
+                self.type_line(&mut link, command, None, now)?;
             } else if self.poll_at.is_none_or(|at| now >= at) {
                 self.poll_at = Some(now + POLL);
-                self.type_line(&mut link, Question::Status, "status".to_owned(), now)?;
+                self.type_line(&mut link, STATUS.to_owned(), Some(Vec::new()), now)?;
             } else if let Some(own) = self.own.pop_first() {
-                self.type_line(&mut link, Question::Own(own, Vec::new()), own.to_owned(), now)?;
+                self.type_line(&mut link, own, Some(Vec::new()), now)?;
             }
         }
         self.link = Some(link);
         Ok(())
     }
 
-    fn type_line(&mut self, link: &mut Link, question: Question, line: String, now: Instant) -> Result<(), LinkError> {
-        if let Question::Command = question {
+    fn type_line(
+        &mut self,
+        link: &mut Link,
+        line: String,
+        own: Option<Vec<String>>,
+        since: Instant,
+    ) -> Result<(), LinkError> {
+        if own.is_none() {
             self.happened.push_back(Happening::Command(line.clone()));
         }
         link.send(&line)?;
-        self.asked.push_back(Asked { question, line, since: now });
+        self.asked.push_back(Asked { line, own, since });
         Ok(())
     }
 
@@ -266,7 +263,7 @@ impl Session {
         let said = ConsoleLine::parse(&line);
         if let ConsoleLine::Event(event) = said {
             if let EventLine::CalibratedBySwitch { is_set: true, .. } = event {
-                self.own.insert(SETTINGS);
+                self.own.insert(SETTINGS.to_owned());
             }
             self.happened.push_back(Happening::Event(event, line));
             return;
@@ -274,35 +271,19 @@ impl Session {
         let is_end = matches!(said, ConsoleLine::Done | ConsoleLine::Refused(_));
         // The end of an answer that was given up is nobody's.
         let Some(asked) = self.asked.front_mut() else { return };
-        match &mut asked.question {
-            Question::Status => {
-                if let ConsoleLine::Status(status) = said {
-                    self.happened.push_back(Happening::Status(status, line));
-                }
-            }
-            Question::Command => {
+        match &mut asked.own {
+            Some(lines) if is_end => match told(&asked.line, std::mem::take(lines)) {
+                Ok(happening) if said == ConsoleLine::Done => self.happened.extend(happening),
+                // Noise has spoiled a line: once more.
+                _ => drop(self.own.insert(asked.line.clone())),
+            },
+            Some(lines) => lines.push(line),
+            None => {
                 if said == ConsoleLine::Done {
                     self.own.extend(changed_by(&asked.line));
                 }
                 self.happened.push_back(Happening::Answer(line));
             }
-            Question::Own(own, lines) if is_end => {
-                let lines = std::mem::take(lines);
-                let answered = match *own {
-                    _ if said != ConsoleLine::Done => None,
-                    SETTINGS => {
-                        settings::shown_by(&lines).ok().map(|settings| Some(Happening::Settings(settings, lines)))
-                    }
-                    EXAMPLES => Some(Some(Happening::Examples(lines))),
-                    _ => Some(None),
-                };
-                match answered {
-                    Some(happening) => self.happened.extend(happening),
-                    // Noise has spoiled a line: once more.
-                    None => drop(self.own.insert(own)),
-                }
-            }
-            Question::Own(_, lines) => lines.push(line),
         }
         if is_end {
             self.asked.pop_front();
@@ -310,15 +291,28 @@ impl Session {
     }
 }
 
-/// What has to be asked for again behind a command that is answered by `ok`.
-fn changed_by(command: &str) -> Option<&'static str> {
-    match parse(command.as_bytes()).ok()? {
-        Command::Set(..) | Command::Save | Command::Revert | Command::Defaults | Command::Calibrate { .. } => {
-            Some(SETTINGS)
-        }
-        Command::Label { .. } | Command::Teach(_) | Command::Forget(_) | Command::ForgetAll => Some(EXAMPLES),
+/// What the answer to a question of the session's own tells.
+fn told(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
+    Ok(match question {
+        STATUS => answer.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line))),
+        SETTINGS => Some(Happening::Settings(settings::shown_by(&answer)?, answer)),
+        EXAMPLES => Some(Happening::Examples(answer)),
         _ => None,
-    }
+    })
+}
+
+/// What has to be asked for again behind a command that is answered by `ok`.
+fn changed_by(command: &str) -> Option<String> {
+    Some(
+        match parse(command.as_bytes()).ok()? {
+            Command::Set(..) | Command::Save | Command::Revert | Command::Defaults | Command::Calibrate { .. } => {
+                SETTINGS
+            }
+            Command::Label { .. } | Command::Teach(_) | Command::Forget(_) | Command::ForgetAll => EXAMPLES,
+            _ => return None,
+        }
+        .to_owned(),
+    )
 }
 
 #[cfg(test)]

@@ -35,18 +35,19 @@ pub enum Typed {
     Busy,
 }
 
-/// Something to type, and who asks for it.
-struct Line {
-    text: String,
-    asker: oneshot::Sender<Typed>,
+/// A line to type, who ask for it, and its answer.
+struct Asked {
+    line: String,
+    askers: Vec<oneshot::Sender<Typed>>,
+    answer: Vec<String>,
 }
 
 /// A machine, for those who want something of it.
 pub struct Machine {
     /// What the operator calls it.
     pub name: String,
-    commands: mpsc::Sender<Line>,
-    holds: mpsc::Sender<oneshot::Sender<Typed>>,
+    commands: mpsc::Sender<Asked>,
+    holds: mpsc::Sender<Asked>,
 }
 
 impl Machine {
@@ -63,30 +64,22 @@ impl Machine {
     }
 
     /// Types a command when those before it are answered.
-    pub async fn command(&self, text: String) -> Typed {
-        let (asker, answer) = oneshot::channel();
-        match self.commands.try_send(Line { text, asker }) {
-            Ok(()) => answer.await.unwrap_or(Typed::Busy),
-            Err(_) => Typed::Busy,
-        }
+    pub async fn command(&self, line: String) -> Typed {
+        ask(&self.commands, line).await
     }
 
     /// Has it hold, before all that waits.
     pub async fn hold(&self) -> Typed {
-        let (asker, answer) = oneshot::channel();
-        match self.holds.try_send(asker) {
-            Ok(()) => answer.await.unwrap_or(Typed::Busy),
-            Err(_) => Typed::Busy,
-        }
+        ask(&self.holds, HOLD.to_owned()).await
     }
 }
 
-/// A line that the session has and is not answered yet.
-#[derive(Default)]
-struct Asked {
-    line: String,
-    askers: Vec<oneshot::Sender<Typed>>,
-    answer: Vec<String>,
+async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Typed {
+    let (asker, answer) = oneshot::channel();
+    match lines.try_send(Asked { line, askers: vec![asker], answer: Vec::new() }) {
+        Ok(()) => answer.await.unwrap_or(Typed::Busy),
+        Err(_) => Typed::Busy,
+    }
 }
 
 impl Asked {
@@ -103,29 +96,24 @@ struct Talk {
     name: String,
     hub: Arc<Hub>,
     tell: Tell,
-    /// What the session has, in its order.
+    /// What the session has and is not answered yet, in its order.
     asked: VecDeque<Asked>,
 }
 
 impl Talk {
-    fn run(
-        mut self,
-        mut session: Session,
-        mut commands: mpsc::Receiver<Line>,
-        mut holds: mpsc::Receiver<oneshot::Sender<Typed>>,
-    ) {
+    fn run(mut self, mut session: Session, mut commands: mpsc::Receiver<Asked>, mut holds: mpsc::Receiver<Asked>) {
         loop {
             // Before the commands are: whatever was sent before a hold is among those then, and is dropped by it.
             let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
             loop {
                 match commands.try_recv() {
-                    Ok(line) => self.command(&mut session, line),
+                    Ok(asked) => self.order(&mut session, asked),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            for asker in to_hold {
-                self.hold(&mut session, asker);
+            for asked in to_hold {
+                self.order(&mut session, asked);
             }
             for happening in session.turn(Instant::now()) {
                 self.take(&mut session, happening);
@@ -133,38 +121,27 @@ impl Talk {
         }
     }
 
-    fn command(&mut self, session: &mut Session, Line { text, asker }: Line) {
-        let asked = Asked { line: text, askers: vec![asker], ..Asked::default() };
+    fn order(&mut self, session: &mut Session, asked: Asked) {
         // What is typed to a machine that is not there must not wait until it is.
         if !session.is_connected() {
-            asked.end(&self.not_there());
+            let why = self.hub.why_lost(self.number);
+            asked.end(&Typed::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned())));
+        } else if asked.line == HOLD {
+            for _ in 0..session.hold() {
+                if let Some(dropped) = self.asked.pop_back() {
+                    dropped.end(&Typed::Dropped);
+                }
+            }
+            match self.asked.back_mut() {
+                // One that is under way counts for this one too, as it does for the session.
+                Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
+                _ => self.asked.push_back(asked),
+            }
         } else if session.command(&asked.line) {
             self.asked.push_back(asked);
         } else {
             asked.end(&Typed::Busy);
         }
-    }
-
-    fn hold(&mut self, session: &mut Session, asker: oneshot::Sender<Typed>) {
-        let asked = Asked { line: HOLD.to_owned(), askers: vec![asker], ..Asked::default() };
-        if !session.is_connected() {
-            asked.end(&self.not_there());
-            return;
-        }
-        for _ in 0..session.hold() {
-            if let Some(dropped) = self.asked.pop_back() {
-                dropped.end(&Typed::Dropped);
-            }
-        }
-        match self.asked.back_mut() {
-            // One that is under way counts for this one too, as it does for the session.
-            Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
-            _ => self.asked.push_back(asked),
-        }
-    }
-
-    fn not_there(&self) -> Typed {
-        Typed::Lost(self.hub.why_lost(self.number).unwrap_or_else(|| "the machine is not there".to_owned()))
     }
 
     fn take(&mut self, session: &mut Session, happening: Happening) {

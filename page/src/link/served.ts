@@ -36,30 +36,26 @@ export function isServed(): boolean {
     return new URLSearchParams(location.search).has("served");
 }
 
-/** What is told of a machine that is there. Settings and examples are the lines that show them, help is by a setting's name. */
+/** What is told of a machine. Settings and examples are the lines that show them, help is by a setting's name. */
 type About =
     | {
           is: "there";
           version: string;
-          settings: string[];
-          examples: string[];
+          settings: readonly string[];
+          examples: readonly string[];
           help: Record<string, string>;
           status?: string;
       }
+    | { is: "lost"; why: string }
     | { is: "settings" | "examples"; said: string[] }
     | { is: "status" | "event"; said: string };
 
-type Message = ((About | { is: "lost"; why: string }) & { machine: number }) | { is: "beat" | "dropped" };
+type Message = (About & { machine: number }) | { is: "beat" | "dropped" };
 
 export class Served {
-    /** A machine is there. */
-    onThere: (machine: number, link: Link) => void = () => {};
-    /** A machine that was not there is not, and why. */
-    onLost: (machine: number, why: string) => void = () => {};
+    readonly machines: readonly ServedMachine[];
     readonly names: readonly string[];
     readonly allowed: Allowed;
-    /** Those that are there. */
-    readonly #machines: (ServedMachine | undefined)[] = [];
     #events: EventSource | undefined;
     #heardMs = 0;
 
@@ -73,6 +69,7 @@ export class Served {
 
     private constructor(names: readonly string[], allowed: Allowed) {
         [this.names, this.allowed] = [names, allowed];
+        this.machines = names.map((_, number) => new ServedMachine(number));
     }
 
     /** Hears the machines from now on. */
@@ -102,39 +99,15 @@ export class Served {
     }
 
     #take(message: Message): void {
-        switch (message.is) {
-            case "beat":
-                break;
-            case "dropped":
-                this.#lose(english("servedDropped"));
-                break;
-            case "lost":
-                this.#end(message.machine, message.why);
-                break;
-            case "there": {
-                const machine = new ServedMachine(message.machine);
-                this.#machines[message.machine] = machine;
-                this.onThere(message.machine, machine);
-                machine.tell(message);
-                break;
-            }
-            default:
-                this.#machines[message.machine]?.tell(message);
-        }
-    }
-
-    #end(machine: number, why: string): void {
-        const there = this.#machines[machine];
-        this.#machines[machine] = undefined;
-        if (there) there.end(why);
-        else this.onLost(machine, why);
+        if (message.is === "dropped") this.#lose(english("servedDropped"));
+        else if ("machine" in message) this.machines[message.machine]?.tell(message);
     }
 
     #lose(why: string): void {
         if (!this.#events) return;
         this.#events.close();
         this.#events = undefined;
-        for (const machine of this.names.keys()) this.#end(machine, why);
+        for (const machine of this.machines) machine.tell({ is: "lost", why });
         setTimeout(() => void this.#again(), RETRY_MS);
     }
 
@@ -160,13 +133,12 @@ export class Served {
 /** A machine at another computer's port. The session with it is there: what that tells comes by `tell`, and a command is a request. */
 export class ServedMachine implements Link {
     onHappening: (happening: Happening) => void = () => {};
+    /** It was not there, and still is not: why. */
+    onAbsent: (why: string) => void = () => {};
     readonly #number: number;
-    /** Ends the requests under way with the machine, by the reason. */
-    readonly #over = new AbortController();
-    /**
-     * Done when what was asked for before is answered. One request at a time keeps answers behind their commands, and leaves a connection
-     * of the browser's few to HOLD.
-     */
+    /** While it is there: ends the requests under way, with the reason. */
+    #there: AbortController | undefined;
+    /** Done when what was asked before is answered: a browser has few connections to a computer, and HOLD needs one at once. */
     #answered: Promise<unknown> = Promise.resolve();
     #holds = 0;
 
@@ -189,25 +161,17 @@ export class ServedMachine implements Link {
         await this.#type("hold");
     }
 
-    /** Nothing here waits for a time. */
-    turn(): void {}
-
-    async close(): Promise<void> {
-        this.end(english("noneConnected"), true);
-    }
-
     /** Takes what that computer tells of it. */
     tell(message: About): void {
         switch (message.is) {
             case "there":
-                this.onHappening({
-                    is: "connected",
-                    version: message.version,
-                    settings: settingsOf(message.settings),
-                    examples: message.examples,
-                });
+                this.#there = new AbortController();
+                this.onHappening({ ...message, is: "connected", settings: settingsOf(message.settings) });
                 this.onHappening({ is: "help", help: new Map(Object.entries(message.help)) });
                 if (message.status !== undefined) this.#read(message.status);
+                break;
+            case "lost":
+                this.#lose(message.why);
                 break;
             case "settings":
                 this.onHappening({ is: "settings", settings: settingsOf(message.said) });
@@ -220,11 +184,11 @@ export class ServedMachine implements Link {
         }
     }
 
-    /** The machine is gone, and why. */
-    end(why: string, isWanted = false): void {
-        if (this.#over.signal.aborted) return;
-        this.#over.abort(new NoMachine(why));
-        this.onHappening({ is: "lost", why, forGood: true, isWanted });
+    #lose(why: string): void {
+        this.#there?.abort(new NoMachine(why));
+        if (this.#there) this.onHappening({ is: "lost", why, forGood: true, isWanted: false });
+        else this.onAbsent(why);
+        this.#there = undefined;
     }
 
     /** A status, or an event. */
@@ -235,8 +199,8 @@ export class ServedMachine implements Link {
     }
 
     async #type(line: string): Promise<string[]> {
-        const { signal } = this.#over;
-        signal.throwIfAborted();
+        const signal = this.#there?.signal;
+        if (!signal) throw new NoMachine(english("servedNotThere"));
         this.onHappening({ is: "command", line });
         const request = { method: "POST", body: line, signal };
         const answer = await fetch(`/machines/${this.#number}/command`, request)

@@ -64,10 +64,10 @@ export interface Link {
     ask: Ask;
     /** Has the machine hold, before what the operator typed and is not sent yet: that is dropped. Done when it has obeyed. */
     hold(): Promise<void>;
-    /** Goes on, at a time. */
-    turn(now: number): void;
-    /** Lets go of the machine. */
-    close(): Promise<void>;
+    /** Goes on, at a time, if it has a clock. */
+    turn?(now: number): void;
+    /** Lets go of the machine, if it holds it. */
+    close?(): Promise<void>;
 }
 
 interface Question {
@@ -260,7 +260,7 @@ export class Session implements Link {
         }
         if (isTold(said)) {
             this.onHappening({ is: "told", said, line });
-            if (said.is === "calibratedBySwitch" && said.isSet) void this.#readSettings();
+            if (said.is === "calibratedBySwitch" && said.isSet) this.#follow("calibrate").catch(() => {});
             return;
         }
         const [question] = this.#asked;
@@ -276,7 +276,7 @@ export class Session implements Link {
         if (said.error !== undefined) question.failed(new Refused(said.error));
         else {
             question.done(question.answer);
-            if (question.isTyped) this.#follow(question.command);
+            if (question.isTyped) this.#follow(question.command).catch(() => {});
         }
     }
 
@@ -297,21 +297,13 @@ export class Session implements Link {
     }
 
     /** Asks for what a command has changed. */
-    #follow(command: string): void {
-        if (/^\s*(set|defaults|revert|calibrate|save)\b/.test(command)) void this.#readSettings();
-        if (/^\s*(label|teach|forget)\b/.test(command)) void this.#readExamples();
+    async #follow(command: string): Promise<void> {
+        if (/^\s*(set|defaults|revert|calibrate|save)\b/.test(command))
+            this.onHappening({ is: "settings", settings: await this.#settings() });
+        if (/^\s*(label|teach|forget)\b/.test(command))
+            this.onHappening({ is: "examples", examples: await this.#ask("examples", false) });
         // The page lives on them.
-        if (/^\s*events\b/.test(command)) void this.#ask("events on", false).catch(() => {});
-    }
-
-    async #readExamples(): Promise<void> {
-        const examples = await this.#ask("examples", false).catch(() => undefined);
-        if (examples) this.onHappening({ is: "examples", examples });
-    }
-
-    async #readSettings(): Promise<void> {
-        const settings = await this.#settings().catch(() => undefined);
-        if (settings) this.onHappening({ is: "settings", settings });
+        if (/^\s*events\b/.test(command)) await this.#ask("events on", false);
     }
 
     #end(why: string, isWanted = false): void {

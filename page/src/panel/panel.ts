@@ -117,7 +117,7 @@ export class Panel {
 
     /** Lets go of the machine. */
     async disconnect(): Promise<void> {
-        await this.#link?.close();
+        await this.#link?.close?.();
         this.#link = undefined;
     }
 
@@ -136,7 +136,7 @@ export class Panel {
     /** Goes on, at the machine's time. */
     turn(nowMs: number): void {
         this.#now = nowMs;
-        this.#link?.turn(nowMs);
+        this.#link?.turn?.(nowMs);
     }
 
     /** Shows what has changed, and what moves. */

@@ -20,7 +20,8 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     onLanguage(label);
     const overview = served.names.length > 1 ? new Overview(all, served.names, () => served.holdAll()) : undefined;
     if (overview) into.append(all);
-    const panels = served.names.map((name, machine) => {
+    const panels = served.machines.map((link, machine) => {
+        const name = served.names[machine] ?? "";
         const element = make("div", overview ? "panel" : "panel alone");
         const section = make("section", "served", make("h2", "", name), element);
         section.ariaLabel = name;
@@ -32,13 +33,12 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         };
         label();
         onLanguage(label);
+        panel.connect(link, performance.now());
+        link.onAbsent = (why) => {
+            panel.machine.lost = why;
+        };
         return panel;
     });
-    served.onThere = (machine, link) => panels[machine]?.connect(link, performance.now());
-    served.onLost = (machine, why) => {
-        const panel = panels[machine];
-        if (panel) panel.machine.lost = why;
-    };
     setInterval(() => {
         served.watch();
         for (const panel of panels) panel.turn(performance.now());
