@@ -24,10 +24,10 @@ const THERE = {
 
 let sent: Sent[] = [];
 let happened: Happening[] = [];
-let machine = new ServedMachine(0);
+let machine = new ServedMachine(0, "");
 
 beforeEach(() => {
-    [sent, happened, machine] = [[], [], new ServedMachine(1)];
+    [sent, happened, machine] = [[], [], new ServedMachine(1, "right")];
     machine.tell(THERE);
     machine.onHappening = (happening) => happened.push(happening);
     globalThis.fetch = (path, request) => {
@@ -44,7 +44,7 @@ beforeEach(() => {
     };
 });
 
-/** Whoever waits for an answer goes on. */
+/** Lets go on what waits for an answer. */
 const goOn = () => new Promise((done) => setImmediate(done));
 const lines = () => sent.map(({ line }) => line);
 

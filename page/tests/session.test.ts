@@ -142,7 +142,7 @@ test("what was typed and waits is not sent behind a HOLD, and says so", async ()
     assert.equal(machine.mode, "hold");
 });
 
-test("what a command has changed is asked for behind it, whoever typed it on the page", async () => {
+test("what a command has changed is asked for behind it", async () => {
     const machine = new Connected();
     for (let turn = 0; turn < TURNS; turn++) await machine.turn();
     const changed = (is: Happening["is"]) => machine.happened.filter((happening) => happening.is === is);

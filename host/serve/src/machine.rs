@@ -35,7 +35,7 @@ pub enum Typed {
     Busy,
 }
 
-/// A line to type, who ask for it, and its answer.
+/// A line to type, those who ask for it, and its answer.
 struct Asked {
     line: String,
     askers: Vec<oneshot::Sender<Typed>>,

@@ -54,7 +54,6 @@ type Message = (About & { machine: number }) | { is: "beat" | "dropped" };
 
 export class Served {
     readonly machines: readonly ServedMachine[];
-    readonly names: readonly string[];
     readonly allowed: Allowed;
     #events: EventSource | undefined;
     #heardMs = 0;
@@ -68,8 +67,8 @@ export class Served {
     }
 
     private constructor(names: readonly string[], allowed: Allowed) {
-        [this.names, this.allowed] = [names, allowed];
-        this.machines = names.map((_, number) => new ServedMachine(number));
+        this.machines = names.map((name, number) => new ServedMachine(number, name));
+        this.allowed = allowed;
     }
 
     /** Hears the machines from now on. */
@@ -125,7 +124,7 @@ export class Served {
         return (
             mayStart === allowed.mayStart &&
             mayChange === allowed.mayChange &&
-            machines.join("\n") === this.names.join("\n")
+            machines.join("\n") === this.machines.map(({ name }) => name).join("\n")
         );
     }
 }
@@ -133,8 +132,9 @@ export class Served {
 /** A machine at another computer's port. The session with it is there: what that tells comes by `tell`, and a command is a request. */
 export class ServedMachine implements Link {
     onHappening: (happening: Happening) => void = () => {};
-    /** It was not there, and still is not: why. */
+    /** It was not there before, and is not now: why. */
     onAbsent: (why: string) => void = () => {};
+    readonly name: string;
     readonly #number: number;
     /** While it is there: ends the requests under way, with the reason. */
     #there: AbortController | undefined;
@@ -142,8 +142,8 @@ export class ServedMachine implements Link {
     #answered: Promise<unknown> = Promise.resolve();
     #holds = 0;
 
-    constructor(number: number) {
-        this.#number = number;
+    constructor(number: number, name: string) {
+        [this.#number, this.name] = [number, name];
     }
 
     ask(command: string): Promise<string[]> {
