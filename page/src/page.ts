@@ -7,7 +7,7 @@ import { hex } from "./firmware.ts";
 import { Flasher } from "./flasher/flasher.ts";
 import { keepFocus } from "./focus.ts";
 import { isServed } from "./link/served.ts";
-import type { Wire } from "./link/session.ts";
+import { Session, type Wire } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
@@ -84,7 +84,7 @@ const wire: Wire = {
 trial.onText = (text) => wire.onText(text);
 /** The chip's time. Timeouts use it, so that a slow or paused trial causes no timeout. */
 const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
-trialPanel.connect(wire, trialMs(), true);
+trialPanel.connect(new Session(wire, trialMs(), true), trialMs());
 trialPanel.onHappening = (happening) => {
     trial.take(happening);
     // A board without saved settings raises an alarm. Then this machine's settings are sent and saved.

@@ -48,7 +48,7 @@ impl Recorder {
     /// The machine's side of the record.
     pub fn happened(&mut self, time_ms: u64, happening: &Happening) {
         match happening {
-            Happening::Connected { settings, .. } | Happening::Settings(settings) => {
+            Happening::Connected { settings, .. } | Happening::Settings(settings, _) => {
                 let tick_m = tick_mm(settings) / 1000.0;
                 if matches!(happening, Happening::Connected { .. }) || tick_m != self.tick_m {
                     self.wheel_lost();
@@ -65,7 +65,7 @@ impl Recorder {
                 self.wheel = Some((status.position, ticks));
                 self.receiver.rolled(time_ms as f64, ticks as f64 * self.tick_m, f64::from(status.speed_mm_s));
             }
-            Happening::Event(..) | Happening::Command(_) | Happening::Answer(_) => {}
+            Happening::Event(..) | Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
         }
     }
 

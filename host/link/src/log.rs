@@ -169,7 +169,7 @@ impl LogWriter {
     /// If the file cannot be written.
     pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
         match happening {
-            Happening::Connected { version, settings, examples } => {
+            Happening::Connected { version, settings, examples, .. } => {
                 self.line(time_ms, Kind::Connected, version)?;
                 for setting in Setting::all() {
                     let line = format!("{}={}", name(setting), settings.get(setting));
@@ -183,7 +183,7 @@ impl LogWriter {
             Happening::Command(line) => self.line(time_ms, Kind::Command, line),
             Happening::Answer(line) => self.line(time_ms, Kind::Answer, line),
             // They follow from the commands.
-            Happening::Settings(_) => Ok(()),
+            Happening::Settings(..) | Happening::Examples(_) => Ok(()),
         }
     }
 

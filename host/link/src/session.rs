@@ -2,13 +2,14 @@
 //!
 //! [`Session::turn`] is called over and over. It types what was asked of it, one command at a time, asks for the status when
 //! nothing else is under way, and tells what happened. It waits no longer than a read does, except for the Uno to start where
-//! a port is opened. After every start of the Uno it asks for the settings and the examples and turns the events on; after every
-//! command that changes settings it asks for them anew. [`Session::hold`] waits for nobody. Where the Uno is lost, so is every
+//! a port is opened. After every start of the Uno it asks for the settings and the examples and turns the events on. Behind a
+//! command that changes either, it asks for them again. [`Session::hold`] waits for nobody. Where the Uno is lost, so is every
 //! command that was not answered.
 
 use super::settings::{self, Settings, SettingsError};
 use super::{ConsoleLine, EventLine, Link, LinkError, Status, is_greeting};
-use std::collections::VecDeque;
+use control::say::command::{Command, parse};
+use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
 /// Time between two questions for the status.
@@ -21,7 +22,13 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const RETRY: Duration = Duration::from_secs(1);
 
 /// The command that takes the tool out.
-pub(super) const HOLD: &str = "hold";
+pub const HOLD: &str = "hold";
+
+/// What the session asks for itself.
+const STATUS: &str = "status";
+const SETTINGS: &str = "get";
+const EXAMPLES: &str = "examples";
+const EVENTS: &str = "events on";
 
 /// Most lines that are told of in one turn, so that a machine that says much cannot keep it from turning.
 const LINES: usize = 64;
@@ -38,6 +45,8 @@ pub enum Happening {
         version: String,
         /// Its settings.
         settings: Settings,
+        /// The lines that show them.
+        shown: Vec<String>,
         /// Its examples, a line each.
         examples: Vec<String>,
     },
@@ -51,22 +60,17 @@ pub enum Happening {
     Command(String),
     /// A line of the answer to it, the last of which is `ok` or begins with `error:`.
     Answer(String),
-    /// The settings as they are behind a command that has changed some.
-    Settings(Settings),
+    /// The settings behind a command that has changed or saved some, and the lines that show them.
+    Settings(Settings, Vec<String>),
+    /// The examples behind a command that has changed some, a line each.
+    Examples(Vec<String>),
 }
 
-/// What the firmware is to answer.
-enum Question {
-    Status,
-    Command,
-    /// The settings, with the lines that have come.
-    Settings(Vec<String>),
-}
-
-/// A question that was typed, and when.
+/// A line that was typed, and when.
 struct Asked {
-    question: Question,
     line: String,
+    /// Whether the session asks for itself; the lines that have come, then.
+    own: Option<Vec<String>>,
     since: Instant,
 }
 
@@ -82,8 +86,8 @@ pub struct Session {
     waiting: VecDeque<String>,
     /// Whether the machine is to hold before anything else is typed.
     is_to_hold: bool,
-    /// Whether settings have changed since they were asked for.
-    settings_changed: bool,
+    /// What the session asks for itself when nothing else waits. `hold` does not drop it.
+    own: BTreeSet<String>,
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
     /// Whether nobody was told yet why there is no Uno.
@@ -125,7 +129,7 @@ impl Session {
             asked: VecDeque::new(),
             waiting: VecDeque::new(),
             is_to_hold: false,
-            settings_changed: false,
+            own: BTreeSet::new(),
             poll_at: None,
             retry_at: None,
             is_lost_untold: true,
@@ -150,10 +154,14 @@ impl Session {
         self.waiting.drain(..).count()
     }
 
+    /// Turns the events on, behind all that waits.
+    pub fn turn_events_on(&mut self) {
+        self.own.insert(EVENTS.to_owned());
+    }
+
     /// Whether no command waits for its answer.
     pub fn is_idle(&self) -> bool {
-        let is_command = |asked: &Asked| matches!(asked.question, Question::Command);
-        self.waiting.is_empty() && !self.is_to_hold && !self.asked.iter().any(is_command)
+        self.waiting.is_empty() && !self.is_to_hold && self.asked.iter().all(|asked| asked.own.is_some())
     }
 
     /// Whether the Uno is there.
@@ -187,22 +195,22 @@ impl Session {
     fn lose(&mut self, why: String) {
         self.asked.clear();
         self.waiting.clear();
+        self.own.clear();
         (self.is_to_hold, self.is_lost_untold) = (false, false);
         self.happened.push_back(Happening::Lost(why));
     }
 
     /// Takes a link whose firmware has just started.
     fn connect(&mut self, mut link: Link) -> Result<(), SettingsError> {
-        let settings = settings::read(&mut link)?;
-        let examples = link.ask("examples")?;
-        link.ask("events on")?;
-        self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, examples });
+        let shown = link.ask(SETTINGS)?;
+        let settings = settings::shown_by(&shown)?;
+        let examples = link.ask(EXAMPLES)?;
+        link.ask(EVENTS)?;
+        self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, shown, examples });
         // Before anything is typed: how the machine was when all began.
-        let status = link.ask("status")?;
-        let status = status.into_iter().find_map(|line| Some((Status::parse(&line)?, line)));
-        self.happened.extend(status.map(|(status, line)| Happening::Status(status, line)));
+        self.happened.extend(told(STATUS, link.ask(STATUS)?)?);
         self.link = Some(link);
-        (self.poll_at, self.settings_changed, self.is_lost_untold) = (None, false, false);
+        (self.poll_at, self.is_lost_untold) = (None, false);
         Ok(())
     }
 
@@ -220,27 +228,33 @@ impl Session {
             return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
         }
         if std::mem::take(&mut self.is_to_hold) {
-            self.type_line(&mut link, Question::Command, HOLD.to_owned(), now)?;
+            self.type_line(&mut link, HOLD.to_owned(), None, now)?;
         } else if self.asked.is_empty() {
             if let Some(command) = self.waiting.pop_front() {
-                self.type_line(&mut link, Question::Command, command, now)?;
+                self.type_line(&mut link, command, None, now)?;
             } else if self.poll_at.is_none_or(|at| now >= at) {
                 self.poll_at = Some(now + POLL);
-                self.type_line(&mut link, Question::Status, "status".to_owned(), now)?;
-            } else if std::mem::take(&mut self.settings_changed) {
-                self.type_line(&mut link, Question::Settings(Vec::new()), "get".to_owned(), now)?;
+                self.type_line(&mut link, STATUS.to_owned(), Some(Vec::new()), now)?;
+            } else if let Some(own) = self.own.pop_first() {
+                self.type_line(&mut link, own, Some(Vec::new()), now)?;
             }
         }
         self.link = Some(link);
         Ok(())
     }
 
-    fn type_line(&mut self, link: &mut Link, question: Question, line: String, now: Instant) -> Result<(), LinkError> {
-        if let Question::Command = question {
+    fn type_line(
+        &mut self,
+        link: &mut Link,
+        line: String,
+        own: Option<Vec<String>>,
+        since: Instant,
+    ) -> Result<(), LinkError> {
+        if own.is_none() {
             self.happened.push_back(Happening::Command(line.clone()));
         }
         link.send(&line)?;
-        self.asked.push_back(Asked { question, line, since: now });
+        self.asked.push_back(Asked { line, own, since });
         Ok(())
     }
 
@@ -248,29 +262,28 @@ impl Session {
     fn take(&mut self, line: String) {
         let said = ConsoleLine::parse(&line);
         if let ConsoleLine::Event(event) = said {
-            self.settings_changed |= matches!(event, EventLine::CalibratedBySwitch { is_set: true, .. });
+            if let EventLine::CalibratedBySwitch { is_set: true, .. } = event {
+                self.own.insert(SETTINGS.to_owned());
+            }
             self.happened.push_back(Happening::Event(event, line));
             return;
         }
         let is_end = matches!(said, ConsoleLine::Done | ConsoleLine::Refused(_));
         // The end of an answer that was given up is nobody's.
         let Some(asked) = self.asked.front_mut() else { return };
-        match &mut asked.question {
-            Question::Status => {
-                if let ConsoleLine::Status(status) = said {
-                    self.happened.push_back(Happening::Status(status, line));
+        match &mut asked.own {
+            Some(lines) if is_end => match told(&asked.line, std::mem::take(lines)) {
+                Ok(happening) if said == ConsoleLine::Done => self.happened.extend(happening),
+                // Noise has spoiled a line: once more.
+                _ => drop(self.own.insert(asked.line.clone())),
+            },
+            Some(lines) => lines.push(line),
+            None => {
+                if said == ConsoleLine::Done {
+                    self.own.extend(changed_by(&asked.line));
                 }
-            }
-            Question::Command => {
-                self.settings_changed |= said == ConsoleLine::Done && changes_settings(&asked.line);
                 self.happened.push_back(Happening::Answer(line));
             }
-            Question::Settings(lines) if is_end => match settings::shown_by(lines) {
-                Ok(settings) => self.happened.push_back(Happening::Settings(settings)),
-                // Noise has spoiled a line: once more.
-                Err(_) => self.settings_changed = true,
-            },
-            Question::Settings(lines) => lines.push(line),
         }
         if is_end {
             self.asked.pop_front();
@@ -278,9 +291,28 @@ impl Session {
     }
 }
 
-/// Whether a command changes settings where it is answered by `ok`.
-fn changes_settings(command: &str) -> bool {
-    matches!(command.split_whitespace().next(), Some("set" | "defaults" | "revert" | "calibrate"))
+/// What the answer to a question of the session's own tells.
+fn told(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
+    Ok(match question {
+        STATUS => answer.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line))),
+        SETTINGS => Some(Happening::Settings(settings::shown_by(&answer)?, answer)),
+        EXAMPLES => Some(Happening::Examples(answer)),
+        _ => None,
+    })
+}
+
+/// What has to be asked for again behind a command that is answered by `ok`.
+fn changed_by(command: &str) -> Option<String> {
+    Some(
+        match parse(command.as_bytes()).ok()? {
+            Command::Set(..) | Command::Save | Command::Revert | Command::Defaults | Command::Calibrate { .. } => {
+                SETTINGS
+            }
+            Command::Label { .. } | Command::Teach(_) | Command::Forget(_) | Command::ForgetAll => EXAMPLES,
+            _ => return None,
+        }
+        .to_owned(),
+    )
 }
 
 #[cfg(test)]

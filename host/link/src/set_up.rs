@@ -214,7 +214,7 @@ impl SetUp {
     /// Listens to what happened.
     pub fn take(&mut self, happening: &Happening) {
         match happening {
-            Happening::Connected { settings, .. } | Happening::Settings(settings) => self.pulses = pulses(settings),
+            Happening::Connected { settings, .. } | Happening::Settings(settings, _) => self.pulses = pulses(settings),
             Happening::Command(line) => self.take_command(line),
             Happening::Answer(line) => self.take_answer(line),
             Happening::Event(event, _) => self.take_event(event),

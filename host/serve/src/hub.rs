@@ -3,7 +3,9 @@
 //! Machines write and pages read, and no page makes a machine wait: a page that is too slow misses what it did not read, and is told
 //! so. What is kept does not grow with the number of pages.
 
+use link::settings::{Setting, help, name};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::broadcast::{self, Receiver};
 
@@ -13,60 +15,62 @@ const BEHIND: usize = 128;
 /// A message to the pages, as JSON.
 pub type Message = Arc<str>;
 
-/// How a machine is.
-enum State {
-    /// It is there: the firmware's version, and its last status.
-    There { version: String, status: Option<String> },
-    /// It is not, and why.
-    Lost(String),
-}
-
 /// The place where machines and pages meet.
 pub struct Hub {
-    machines: Mutex<Vec<State>>,
+    /// How each machine is: the message that says so to a page that begins.
+    machines: Mutex<Vec<Value>>,
     pages: broadcast::Sender<Message>,
 }
 
 impl Hub {
     /// So many machines, none of which has been heard of.
     pub fn new(machines: usize) -> Self {
-        let unheard = || State::Lost("its port is being opened".to_owned());
         Self {
-            machines: Mutex::new((0..machines).map(|_| unheard()).collect()),
+            machines: Mutex::new((0..machines).map(|machine| lost(machine, "its port is being opened")).collect()),
             pages: broadcast::channel(BEHIND * machines.max(2)).0,
         }
     }
 
-    /// The machine is there.
-    pub fn there(&self, machine: usize, version: &str) {
-        self.change(machine, State::There { version: version.to_owned(), status: None });
+    /// The machine is there: the firmware's version, and the lines that show its settings and examples.
+    pub fn there(&self, machine: usize, version: &str, settings: &[String], examples: &[String]) {
+        let help: BTreeMap<_, _> = Setting::all().map(|setting| (name(setting), help(setting))).collect();
+        self.change(
+            machine,
+            json!({
+                "machine": machine,
+                "is": "there",
+                "version": version,
+                "settings": settings,
+                "examples": examples,
+                "help": help,
+            }),
+        );
     }
 
     /// The machine is not there.
     pub fn lost(&self, machine: usize, why: &str) {
-        self.change(machine, State::Lost(why.to_owned()));
+        self.change(machine, lost(machine, why));
     }
 
-    /// The machine has given its status.
-    pub fn status(&self, machine: usize, line: String) {
+    /// The machine has given its status, a line, or has other settings or examples, their lines.
+    pub fn know(&self, machine: usize, what: &str, said: Value) {
         let mut machines = self.machines();
-        self.send(json!({ "machine": machine, "is": "status", "line": line }));
-        if let Some(State::There { status, .. }) = machines.get_mut(machine) {
-            *status = Some(line);
+        self.send(&json!({ "machine": machine, "is": what, "said": said }));
+        if let Some(known) = machines.get_mut(machine).filter(|known| known["is"] == "there") {
+            known[what] = said;
         }
     }
 
     /// The machine has told an event line.
     pub fn event(&self, machine: usize, line: &str) {
         let _machines = self.machines();
-        self.send(json!({ "machine": machine, "is": "event", "line": line }));
+        self.send(&json!({ "machine": machine, "is": "event", "said": line }));
     }
 
     /// Why a machine is not there; nothing where it is.
     pub fn why_lost(&self, machine: usize) -> Option<String> {
         match self.machines().get(machine) {
-            Some(State::There { .. }) => None,
-            Some(State::Lost(why)) => Some(why.clone()),
+            Some(known) => known["why"].as_str().map(str::to_owned),
             None => Some("there is no such machine".to_owned()),
         }
     }
@@ -74,45 +78,31 @@ impl Hub {
     /// How all machines are now, and where to hear what comes after that.
     pub fn listen(&self) -> (Vec<Message>, Receiver<Message>) {
         let machines = self.machines();
-        let told = machines.iter().enumerate().flat_map(|(machine, state)| {
-            let status = match state {
-                State::There { status: Some(line), .. } => {
-                    Some(json!({ "machine": machine, "is": "status", "line": line }))
-                }
-                _ => None,
-            };
-            [Some(state.message(machine)), status].into_iter().flatten()
-        });
-        (told.map(|message| message.to_string().into()).collect(), self.pages.subscribe())
+        (machines.iter().map(|known| known.to_string().into()).collect(), self.pages.subscribe())
     }
 
-    fn change(&self, machine: usize, state: State) {
+    fn change(&self, machine: usize, message: Value) {
         let mut machines = self.machines();
-        self.send(state.message(machine));
+        self.send(&message);
         if let Some(known) = machines.get_mut(machine) {
-            *known = state;
+            *known = message;
         }
     }
 
     /// Sends while the machines are held, so that nobody hears a change that was in what he began with.
-    fn send(&self, message: Value) {
+    fn send(&self, message: &Value) {
         // Where no page listens nobody misses it.
         let _ = self.pages.send(message.to_string().into());
     }
 
-    fn machines(&self) -> MutexGuard<'_, Vec<State>> {
+    fn machines(&self) -> MutexGuard<'_, Vec<Value>> {
         // Each state is whole by itself, whoever died beside it.
         self.machines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl State {
-    fn message(&self, machine: usize) -> Value {
-        match self {
-            State::There { version, .. } => json!({ "machine": machine, "is": "there", "version": version }),
-            State::Lost(why) => json!({ "machine": machine, "is": "lost", "why": why }),
-        }
-    }
+fn lost(machine: usize, why: &str) -> Value {
+    json!({ "machine": machine, "is": "lost", "why": why })
 }
 
 #[cfg(test)]
@@ -127,13 +117,24 @@ mod tests {
     #[test]
     fn a_page_begins_with_how_all_machines_are_and_hears_what_comes_after() {
         let hub = Hub::new(2);
-        hub.there(0, "0.2.0");
-        hub.status(0, "state=hold".to_owned());
+        hub.there(0, "0.2.0", &["k=5".to_owned()], &["field 0".to_owned()]);
+        hub.know(0, "status", "state=hold".into());
+        hub.know(0, "settings", json!(["k=3"]));
+        // It is not there to be known of.
+        hub.know(1, "status", "state=work".into());
         let (now, mut later) = hub.listen();
-        let now: Vec<Value> = now.iter().map(|message| serde_json::from_str(message).unwrap()).collect();
+        let mut now: Vec<Value> = now.iter().map(|message| serde_json::from_str(message).unwrap()).collect();
+        let help = now[0].as_object_mut().unwrap().remove("help").unwrap();
+        assert_eq!(help["wheel_mm"], "wheel diameter");
         let expected = [
-            json!({ "machine": 0, "is": "there", "version": "0.2.0" }),
-            json!({ "machine": 0, "is": "status", "line": "state=hold" }),
+            json!({
+                "machine": 0,
+                "is": "there",
+                "version": "0.2.0",
+                "settings": ["k=3"],
+                "examples": ["field 0"],
+                "status": "state=hold",
+            }),
             json!({ "machine": 1, "is": "lost", "why": "its port is being opened" }),
         ];
         assert_eq!(now, expected);
@@ -141,7 +142,7 @@ mod tests {
         hub.event(0, "state=work");
         hub.lost(0, "pulled");
         let expected = [
-            json!({ "machine": 0, "is": "event", "line": "state=work" }),
+            json!({ "machine": 0, "is": "event", "said": "state=work" }),
             json!({ "machine": 0, "is": "lost", "why": "pulled" }),
         ];
         assert_eq!(heard(&mut later), expected);

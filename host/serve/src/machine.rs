@@ -2,9 +2,10 @@
 //! answers back, and has the hub tell all else. It decides nothing: what may be typed is decided before.
 
 use super::hub::Hub;
+use control::say::command::{Command, parse};
 use link::ConsoleLine;
 use link::rows::Opener;
-use link::session::{Happening, Session};
+use link::session::{HOLD, Happening, Session};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread;
@@ -34,18 +35,19 @@ pub enum Typed {
     Busy,
 }
 
-/// Something to type, and who asks for it.
-struct Line {
-    text: String,
-    asker: oneshot::Sender<Typed>,
+/// A line to type, those who ask for it, and its answer.
+struct Asked {
+    line: String,
+    askers: Vec<oneshot::Sender<Typed>>,
+    answer: Vec<String>,
 }
 
 /// A machine, for those who want something of it.
 pub struct Machine {
     /// What the operator calls it.
     pub name: String,
-    commands: mpsc::Sender<Line>,
-    holds: mpsc::Sender<oneshot::Sender<Typed>>,
+    commands: mpsc::Sender<Asked>,
+    holds: mpsc::Sender<Asked>,
 }
 
 impl Machine {
@@ -62,30 +64,22 @@ impl Machine {
     }
 
     /// Types a command when those before it are answered.
-    pub async fn command(&self, text: String) -> Typed {
-        let (asker, answer) = oneshot::channel();
-        match self.commands.try_send(Line { text, asker }) {
-            Ok(()) => answer.await.unwrap_or(Typed::Busy),
-            Err(_) => Typed::Busy,
-        }
+    pub async fn command(&self, line: String) -> Typed {
+        ask(&self.commands, line).await
     }
 
     /// Has it hold, before all that waits.
     pub async fn hold(&self) -> Typed {
-        let (asker, answer) = oneshot::channel();
-        match self.holds.try_send(asker) {
-            Ok(()) => answer.await.unwrap_or(Typed::Busy),
-            Err(_) => Typed::Busy,
-        }
+        ask(&self.holds, HOLD.to_owned()).await
     }
 }
 
-/// A line that the session has and is not answered yet.
-#[derive(Default)]
-struct Asked {
-    askers: Vec<oneshot::Sender<Typed>>,
-    is_hold: bool,
-    answer: Vec<String>,
+async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Typed {
+    let (asker, answer) = oneshot::channel();
+    match lines.try_send(Asked { line, askers: vec![asker], answer: Vec::new() }) {
+        Ok(()) => answer.await.unwrap_or(Typed::Busy),
+        Err(_) => Typed::Busy,
+    }
 }
 
 impl Asked {
@@ -102,74 +96,58 @@ struct Talk {
     name: String,
     hub: Arc<Hub>,
     tell: Tell,
-    /// What the session has, in its order.
+    /// What the session has and is not answered yet, in its order.
     asked: VecDeque<Asked>,
 }
 
 impl Talk {
-    fn run(
-        mut self,
-        mut session: Session,
-        mut commands: mpsc::Receiver<Line>,
-        mut holds: mpsc::Receiver<oneshot::Sender<Typed>>,
-    ) {
+    fn run(mut self, mut session: Session, mut commands: mpsc::Receiver<Asked>, mut holds: mpsc::Receiver<Asked>) {
         loop {
             // Before the commands are: whatever was sent before a hold is among those then, and is dropped by it.
             let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
             loop {
                 match commands.try_recv() {
-                    Ok(line) => self.command(&mut session, line),
+                    Ok(asked) => self.order(&mut session, asked),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            for asker in to_hold {
-                self.hold(&mut session, asker);
+            for asked in to_hold {
+                self.order(&mut session, asked);
             }
             for happening in session.turn(Instant::now()) {
-                self.take(happening);
+                self.take(&mut session, happening);
             }
         }
     }
 
-    fn command(&mut self, session: &mut Session, Line { text, asker }: Line) {
-        let asked = Asked { askers: vec![asker], ..Asked::default() };
+    fn order(&mut self, session: &mut Session, asked: Asked) {
         // What is typed to a machine that is not there must not wait until it is.
         if !session.is_connected() {
-            asked.end(&self.not_there());
-        } else if session.command(&text) {
+            let why = self.hub.why_lost(self.number);
+            asked.end(&Typed::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned())));
+        } else if asked.line == HOLD {
+            for _ in 0..session.hold() {
+                if let Some(dropped) = self.asked.pop_back() {
+                    dropped.end(&Typed::Dropped);
+                }
+            }
+            match self.asked.back_mut() {
+                // One that is under way counts for this one too, as it does for the session.
+                Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
+                _ => self.asked.push_back(asked),
+            }
+        } else if session.command(&asked.line) {
             self.asked.push_back(asked);
         } else {
             asked.end(&Typed::Busy);
         }
     }
 
-    fn hold(&mut self, session: &mut Session, asker: oneshot::Sender<Typed>) {
-        let asked = Asked { askers: vec![asker], is_hold: true, ..Asked::default() };
-        if !session.is_connected() {
-            asked.end(&self.not_there());
-            return;
-        }
-        for _ in 0..session.hold() {
-            if let Some(dropped) = self.asked.pop_back() {
-                dropped.end(&Typed::Dropped);
-            }
-        }
-        match self.asked.back_mut() {
-            // One that is under way counts for this one too, as it does for the session.
-            Some(last) if last.is_hold => last.askers.extend(asked.askers),
-            _ => self.asked.push_back(asked),
-        }
-    }
-
-    fn not_there(&self) -> Typed {
-        Typed::Lost(self.hub.why_lost(self.number).unwrap_or_else(|| "the machine is not there".to_owned()))
-    }
-
-    fn take(&mut self, happening: Happening) {
+    fn take(&mut self, session: &mut Session, happening: Happening) {
         match happening {
-            Happening::Connected { version, .. } => {
-                self.hub.there(self.number, &version);
+            Happening::Connected { version, shown, examples, .. } => {
+                self.hub.there(self.number, &version, &shown, &examples);
                 (self.tell)(&format!("{}: weeder {version} is there.", self.name));
             }
             Happening::Lost(why) => {
@@ -179,7 +157,7 @@ impl Talk {
                     asked.end(&Typed::Lost(why.clone()));
                 }
             }
-            Happening::Status(_, line) => self.hub.status(self.number, line),
+            Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
             Happening::Event(_, line) => self.hub.event(self.number, &line),
             Happening::Answer(line) => {
                 let is_end = matches!(ConsoleLine::parse(&line), ConsoleLine::Done | ConsoleLine::Refused(_));
@@ -189,11 +167,16 @@ impl Talk {
                 }
                 if is_end && let Some(mut asked) = self.asked.pop_front() {
                     let answer = std::mem::take(&mut asked.answer);
+                    // The pages live on them.
+                    if parse(asked.line.as_bytes()) == Ok(Command::Events(false)) {
+                        session.turn_events_on();
+                    }
                     asked.end(&Typed::Answered(answer));
                 }
             }
-            // Each page asks for what it needs.
-            Happening::Command(_) | Happening::Settings(_) => {}
+            Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
+            Happening::Examples(lines) => self.hub.know(self.number, "examples", lines.into()),
+            Happening::Command(_) => {}
         }
     }
 }
@@ -203,6 +186,7 @@ mod tests {
     use super::*;
     use link::settings::{Setting, name};
     use link::{Link, LinkError};
+    use serde_json::{Value, json};
     use std::io::{self, Read, Write};
     use std::sync::Mutex;
     use std::sync::atomic::{AtomicBool, Ordering};
@@ -210,10 +194,12 @@ mod tests {
     use tokio::runtime;
     use tokio::time::{sleep, timeout};
 
-    /// What was typed to a firmware for somebody, whether it answers `dump` by now, and whether its cable is plugged in.
+    /// What was typed to a firmware for somebody, whether its events are on, whether it answers `dump` by now, and whether its cable is
+    /// plugged in.
     #[derive(Clone, Default)]
     struct Desk {
         typed: Arc<Mutex<Vec<String>>>,
+        tells_events: Arc<AtomicBool>,
         answers_dump: Arc<AtomicBool>,
         is_there: Arc<AtomicBool>,
     }
@@ -258,13 +244,21 @@ mod tests {
                     continue;
                 }
                 let line = String::from_utf8(std::mem::take(&mut self.line)).unwrap();
-                let setting = |setting: Setting| format!("{}={}\n", name(setting), setting.description().default);
+                let is_set = self.desk.typed().iter().any(|line| line == "set k 5");
+                let setting = |setting: Setting| match name(setting) {
+                    name if name == "k" && is_set => "k=5\n".to_owned(),
+                    name => format!("{name}={}\n", setting.description().default),
+                };
+                if line.starts_with("events ") {
+                    self.desk.tells_events.store(line == "events on", Ordering::Relaxed);
+                }
                 let answer = match line.as_str() {
                     "" => continue,
                     "version" => "weeder 0.2.0\n".to_owned(),
                     "get" => Setting::all().map(setting).collect(),
                     "status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\n".to_owned(),
-                    "examples" | "events on" => String::new(),
+                    "examples" => "built_in 0 plant 1 2 3 4 5\n".to_owned(),
+                    "events on" => String::new(),
                     "dump" => {
                         self.desk.typed.lock().unwrap().push(line);
                         self.owes_dump = true;
@@ -337,6 +331,38 @@ mod tests {
             let (dumped, (), ()) = tokio::join!(machine.command("dump".to_owned()), others, answered_later);
             assert!(matches!(&dumped, Typed::Answered(lines) if *lines == ["dumped", "ok"]), "{dumped:?}");
             assert_eq!(desk.typed(), ["dump", "hold"]);
+        });
+    }
+
+    #[test]
+    fn a_page_is_told_all_at_once_whenever_it_comes_and_what_others_change_after_that() {
+        run(async {
+            let (machine, hub, _) = machine();
+            let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();
+            until(|| there()["status"].is_string()).await;
+            let known = there();
+            assert_eq!((known["is"].as_str(), known["version"].as_str()), (Some("there"), Some("0.2.0")));
+            assert_eq!(known["examples"], json!(["built_in 0 plant 1 2 3 4 5"]));
+            let shows = |known: &Value, line| known["settings"].as_array().unwrap().contains(&json!(line));
+            assert!(shows(&known, "k=3"));
+            let (_, mut early) = hub.listen();
+            let set = machine.command("set k 5".to_owned()).await;
+            assert!(matches!(&set, Typed::Answered(lines) if *lines == ["ok"]), "{set:?}");
+            until(|| shows(&there(), "k=5")).await;
+            let told = std::iter::from_fn(|| early.try_recv().ok());
+            assert!(told.into_iter().any(|message| message.contains(r#""is":"settings""#) && message.contains("k=5")));
+        });
+    }
+
+    #[test]
+    fn events_that_a_client_turns_off_are_turned_on_again_for_the_pages() {
+        run(async {
+            let (machine, hub, desk) = machine();
+            until(|| hub.why_lost(0).is_none()).await;
+            let off = machine.command("events off".to_owned()).await;
+            assert!(matches!(off, Typed::Answered(_)), "{off:?}");
+            until(|| desk.tells_events.load(Ordering::Relaxed)).await;
+            assert_eq!(desk.typed(), ["events off"]);
         });
     }
 

@@ -421,7 +421,7 @@ mod tests {
             let mut page = pin!(heard(&hub));
             assert!(page.next().await.unwrap().contains("lost"));
             assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
-            hub.there(0, "0.2.0");
+            hub.there(0, "0.2.0", &[], &[]);
             assert!(page.next().await.unwrap().contains("there"));
         });
     }

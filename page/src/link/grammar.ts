@@ -62,7 +62,12 @@ export function read(line: string): Said {
     return ask<Said>({ read: line });
 }
 
-/** The order in which values can be sent, or why they cannot be sent. */
+/** The settings that the lines of an answer to `get` show. */
+export function settingsOf(lines: readonly string[]): Setting[] {
+    return lines.map(read).flatMap((said) => (said.is === "setting" ? [said.setting] : []));
+}
+
+/** The order in which values can be sent, or why they cannot be at all. */
 export interface Steps {
     /** The contradiction, and what would be right. */
     readonly contradiction?: string;

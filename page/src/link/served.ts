@@ -1,11 +1,12 @@
-// The machines at another computer's ports, by `weeder serve`: what they say comes as server-sent events, what is typed goes
-// there by POST, and each of them is a wire for a session as a serial port of the browser is.
+// The machines at another computer's ports, by `weeder serve`. That computer has a session with each of them: what it knows comes as
+// server-sent events, and a command is a request that gives back its answer.
 //
 // What may be typed from here is decided there. A computer that falls silent is told as machines that are lost, and asked anew
 // until it answers.
 
 import { english } from "../words/words.ts";
-import type { Wire } from "./session.ts";
+import { isTold, read, settingsOf } from "./grammar.ts";
+import { type Happening, type Link, NoMachine, Refused } from "./session.ts";
 
 /** Time without a word from the computer after which it is taken for gone: it says something twice a second, however still the machines are. */
 const SILENCE_MS = 3000;
@@ -35,21 +36,25 @@ export function isServed(): boolean {
     return new URLSearchParams(location.search).has("served");
 }
 
-type Message =
-    | { is: "there"; machine: number }
-    | { is: "lost"; machine: number; why: string }
-    | { is: "status"; machine: number; line: string }
-    | { is: "event"; machine: number; line: string }
-    | { is: "beat" | "dropped" };
+/** What is told of a machine. Settings and examples are the lines that show them, help is by a setting's name. */
+type About =
+    | {
+          is: "there";
+          version: string;
+          settings: readonly string[];
+          examples: readonly string[];
+          help: Record<string, string>;
+          status?: string;
+      }
+    | { is: "lost"; why: string }
+    | { is: "settings" | "examples"; said: string[] }
+    | { is: "status" | "event"; said: string };
+
+type Message = (About & { machine: number }) | { is: "beat" | "dropped" };
 
 export class Served {
-    /** A machine is there, with its wire. */
-    onThere: (machine: number, wire: Wire) => void = () => {};
-    /** A machine without a wire is not there, and why. */
-    onLost: (machine: number, why: string) => void = () => {};
-    readonly names: readonly string[];
+    readonly machines: readonly ServedMachine[];
     readonly allowed: Allowed;
-    readonly #wires: (ServedWire | undefined)[] = [];
     #events: EventSource | undefined;
     #heardMs = 0;
 
@@ -62,7 +67,8 @@ export class Served {
     }
 
     private constructor(names: readonly string[], allowed: Allowed) {
-        [this.names, this.allowed] = [names, allowed];
+        this.machines = names.map((name, number) => new ServedMachine(number, name));
+        this.allowed = allowed;
     }
 
     /** Hears the machines from now on. */
@@ -92,41 +98,15 @@ export class Served {
     }
 
     #take(message: Message): void {
-        switch (message.is) {
-            case "there": {
-                const wire = new ServedWire(message.machine);
-                this.#wires[message.machine] = wire;
-                this.onThere(message.machine, wire);
-                break;
-            }
-            case "lost":
-                this.#end(message.machine, message.why);
-                break;
-            case "status":
-                this.#wires[message.machine]?.onStatus(message.line);
-                break;
-            case "event":
-                this.#wires[message.machine]?.tell(message.line);
-                break;
-            case "dropped":
-                this.#lose(english("servedDropped"));
-                break;
-            default:
-        }
-    }
-
-    #end(machine: number, why: string): void {
-        const wire = this.#wires[machine];
-        this.#wires[machine] = undefined;
-        if (wire) wire.end(why);
-        else this.onLost(machine, why);
+        if (message.is === "dropped") this.#lose(english("servedDropped"));
+        else if ("machine" in message) this.machines[message.machine]?.tell(message);
     }
 
     #lose(why: string): void {
         if (!this.#events) return;
         this.#events.close();
         this.#events = undefined;
-        for (const machine of this.names.keys()) this.#end(machine, why);
+        for (const machine of this.machines) machine.tell({ is: "lost", why });
         setTimeout(() => void this.#again(), RETRY_MS);
     }
 
@@ -144,63 +124,95 @@ export class Served {
         return (
             mayStart === allowed.mayStart &&
             mayChange === allowed.mayChange &&
-            machines.join("\n") === this.names.join("\n")
+            machines.join("\n") === this.machines.map(({ name }) => name).join("\n")
         );
     }
 }
 
-/** A machine at another computer's port, as a session's wire. */
-class ServedWire implements Wire {
-    onText: (text: string) => void = () => {};
-    onEnd: (why: string) => void = () => {};
-    onStatus: (line: string) => void = () => {};
-    readonly #machine: number;
-    #isOver = false;
-    /** Answers are given in the order of the lines, whichever comes first. */
-    #answered: Promise<void> = Promise.resolve();
+/** A machine at another computer's port. The session with it is there: what that tells comes by `tell`, and a command is a request. */
+export class ServedMachine implements Link {
+    onHappening: (happening: Happening) => void = () => {};
+    /** It was not there before, and is not now: why. */
+    onAbsent: (why: string) => void = () => {};
+    readonly name: string;
+    readonly #number: number;
+    /** While it is there: ends the requests under way, with the reason. */
+    #there: AbortController | undefined;
+    /** Done when what was asked before is answered: a browser has few connections to a computer, and HOLD needs one at once. */
+    #answered: Promise<unknown> = Promise.resolve();
+    #holds = 0;
 
-    constructor(machine: number) {
-        this.#machine = machine;
+    constructor(number: number, name: string) {
+        [this.#number, this.name] = [number, name];
     }
 
-    /** The machine says something by itself. */
-    tell(line: string): void {
-        if (!this.#isOver) this.onText(`${line}\r\n`);
-    }
-
-    /** The machine is gone, and why. */
-    end(why: string): void {
-        if (this.#isOver) return;
-        this.#isOver = true;
-        this.onEnd(why);
-    }
-
-    send(text: string): void {
-        const line = text.trim();
-        // There nobody has left half a line behind.
-        if (line === "" || this.#isOver) return;
-        // It is on its way at once: `hold` waits for nobody.
-        const answer = this.#post(line);
-        this.#answered = this.#answered.then(async () => {
-            const lines = await answer;
-            if (lines !== undefined && !this.#isOver) this.onText(lines);
+    ask(command: string): Promise<string[]> {
+        const holds = this.#holds;
+        const answer = this.#answered.then(() => {
+            if (holds !== this.#holds) throw new Refused(english("holdFirst"));
+            return this.#type(command);
         });
+        this.#answered = answer.catch(() => {});
+        return answer;
     }
 
-    async close(): Promise<void> {
-        this.#isOver = true;
+    async hold(): Promise<void> {
+        this.#holds++;
+        await this.#type("hold");
     }
 
-    /** The answer's lines; nothing where none comes. */
-    async #post(line: string): Promise<string | undefined> {
-        try {
-            const answer = await fetch(`/machines/${this.#machine}/command`, { method: "POST", body: line });
-            const said = await answer.text();
-            if (answer.ok || said.startsWith("error:")) return said;
-            this.end(said.trim());
-        } catch {
-            this.end(SILENT);
+    /** Takes what that computer tells of it. */
+    tell(message: About): void {
+        switch (message.is) {
+            case "there":
+                this.#there = new AbortController();
+                this.onHappening({ ...message, is: "connected", settings: settingsOf(message.settings) });
+                this.onHappening({ is: "help", help: new Map(Object.entries(message.help)) });
+                if (message.status !== undefined) this.#read(message.status);
+                break;
+            case "lost":
+                this.#lose(message.why);
+                break;
+            case "settings":
+                this.onHappening({ is: "settings", settings: settingsOf(message.said) });
+                break;
+            case "examples":
+                this.onHappening({ is: "examples", examples: message.said });
+                break;
+            default:
+                this.#read(message.said);
         }
-        return undefined;
+    }
+
+    #lose(why: string): void {
+        this.#there?.abort(new NoMachine(why));
+        if (this.#there) this.onHappening({ is: "lost", why, forGood: true, isWanted: false });
+        else this.onAbsent(why);
+        this.#there = undefined;
+    }
+
+    /** A status, or an event. */
+    #read(line: string): void {
+        const said = read(line);
+        if (said.is === "status") this.onHappening({ is: "status", status: said.status, line });
+        else if (isTold(said)) this.onHappening({ is: "told", said, line });
+    }
+
+    async #type(line: string): Promise<string[]> {
+        const signal = this.#there?.signal;
+        if (!signal) throw new NoMachine(english("servedNotThere"));
+        this.onHappening({ is: "command", line });
+        const request = { method: "POST", body: line, signal };
+        const answer = await fetch(`/machines/${this.#number}/command`, request)
+            .then((response) => response.text())
+            .catch((error) => {
+                throw error instanceof NoMachine ? error : new NoMachine(SILENT);
+            });
+        const lines = answer.trim().split("\n");
+        const end = read(lines.at(-1) ?? "");
+        if (end.is !== "end") throw new NoMachine(answer.trim());
+        for (const line of lines) this.onHappening({ is: "answer", line });
+        if (end.error !== undefined) throw new Refused(end.error);
+        return lines.slice(0, -1);
     }
 }

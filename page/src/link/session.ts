@@ -6,7 +6,7 @@
 // for nobody. A wire that ended ends its session.
 
 import type { Told } from "./events.ts";
-import { isTold, read, type Setting, type Status } from "./grammar.ts";
+import { isTold, read, type Setting, type Status, settingsOf } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
 /** Types a command, and gives back its answer without the `ok`. Throws what the machine refuses by. */
@@ -18,8 +18,6 @@ export interface Wire {
     onText: (text: string) => void;
     /** The line is gone, and why; never called after `close`. */
     onEnd: (why: string) => void;
-    /** Hears the machine's status, where the wire tells that without being asked. */
-    onStatus?: (line: string) => void;
     send(text: string): void;
     close(): Promise<void>;
 }
@@ -28,16 +26,12 @@ export interface Wire {
 const POLL_MS = 100;
 /** Time after which an answer is given up: the longest, all examples, takes less than a second. */
 const PATIENCE_MS = 2000;
-/** The same where others type to the machine as well, and whoever asks it for all of them gives an answer in any case. */
-const SHARED_PATIENCE_MS = 35_000;
 /** The longest that counts between two turns. A page that was busy, or asleep, has not waited: the answer may lie there unread. */
 const LONGEST_TURN_MS = 200;
 /** Time in which the greeting comes after a reset, behind a bootloader: the old ones wait for two seconds. */
 const BOOT_MS = 3000;
 /** How often a machine whose answers do not come, or come garbled, is asked again from the beginning. */
 const TRIES = 2;
-/** How often a question is asked again where others have it dropped: each HOLD of theirs may. */
-const SHARED_TRIES = 20;
 
 /** Something that happened. */
 export type Happening =
@@ -52,7 +46,8 @@ export type Happening =
     | { is: "told"; said: Told; line: string }
     | { is: "command"; line: string }
     | { is: "answer"; line: string }
-    | { is: "settings"; settings: Setting[] }
+    | { is: "settings"; settings: readonly Setting[] }
+    | { is: "examples"; examples: readonly string[] }
     /** What the settings are, by their names. */
     | { is: "help"; help: Map<string, string> };
 
@@ -61,6 +56,19 @@ export class Refused extends Error {}
 
 /** There is no machine that answers, and what to do. */
 export class NoMachine extends Error {}
+
+/** A machine to talk to: by a session here, or by the session of another computer (served.ts). */
+export interface Link {
+    onHappening: (happening: Happening) => void;
+    /** Types a command for the operator when those before it are answered, and gives back its answer without the `ok`. */
+    ask: Ask;
+    /** Has the machine hold, before what the operator typed and is not sent yet: that is dropped. Done when it has obeyed. */
+    hold(): Promise<void>;
+    /** Goes on, at a time, if it has a clock. */
+    turn?(now: number): void;
+    /** Lets go of the machine, if it holds it. */
+    close?(): Promise<void>;
+}
 
 interface Question {
     readonly command: string;
@@ -72,10 +80,10 @@ interface Question {
     readonly failed: (error: Error) => void;
 }
 
-export class Session {
+export class Session implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Whether the machine is there and has said what it is. */
-    isReady = false;
+    #isReady = false;
     readonly #wire: Wire;
     readonly #lines = new LineReader();
     /** What was typed and is not answered yet, in the order of the answers. */
@@ -87,8 +95,6 @@ export class Session {
     #turnedAt: number;
     #pollAt = Number.POSITIVE_INFINITY;
     #ended = false;
-    /** Whether the wire tells the status by itself, as one does at which there are others. */
-    #isShared = false;
     /** Until when a greeting is waited for. */
     #greetingBy: number;
     /** How often what was asked has been dropped to ask again from the beginning. */
@@ -103,20 +109,13 @@ export class Session {
         this.#greetingBy = resets ? now + BOOT_MS : now;
         wire.onText = (text) => this.#hear(text);
         wire.onEnd = (why) => this.#end(why);
-        if (!wire.onStatus) return;
-        this.#isShared = true;
-        wire.onStatus = (line) => this.#hearStatus(line);
     }
 
-    /** Types a command for the operator when those before it are answered, and gives back its answer without the `ok`. */
     ask(command: string): Promise<string[]> {
         return this.#ask(command, true);
     }
 
-    /**
-     * Has the machine hold, before whatever waits: what the operator typed of that is dropped, what the page asks itself is not.
-     * Done when it has obeyed.
-     */
+    /** What the page asks itself is not dropped. */
     hold(): Promise<void> {
         const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
         this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
@@ -135,7 +134,6 @@ export class Session {
         });
     }
 
-    /** Goes on, at a time. */
     turn(now: number): void {
         this.#now += Math.min(now - this.#turnedAt, LONGEST_TURN_MS);
         this.#turnedAt = now;
@@ -145,10 +143,9 @@ export class Session {
             void this.#begin();
         }
         const [oldest] = this.#asked;
-        if (oldest && this.#now - oldest.since > (this.#isShared ? SHARED_PATIENCE_MS : PATIENCE_MS))
-            this.#giveUp(oldest);
+        if (oldest && this.#now - oldest.since > PATIENCE_MS) this.#giveUp(oldest);
         if (this.#asked.length > 0) return;
-        if (this.#waiting.length === 0 && this.#now >= this.#pollAt && !this.#isShared) {
+        if (this.#waiting.length === 0 && this.#now >= this.#pollAt) {
             this.#pollAt = this.#now + POLL_MS;
             void this.#ask("status", false).catch(() => {});
         }
@@ -156,7 +153,6 @@ export class Session {
         if (next) this.#send({ ...next, since: this.#now });
     }
 
-    /** Ends it, and lets go of the wire, as does a session that ends by itself. */
     async close(): Promise<void> {
         this.#end("No machine is connected.", true);
         await this.#wire.close();
@@ -177,7 +173,7 @@ export class Session {
 
     /** Asks who is there, again where an answer is lost: a computer that is busy, or noise on the wire, takes one now and then. */
     async #begin(): Promise<void> {
-        this.isReady = false;
+        this.#isReady = false;
         this.#pollAt = Number.POSITIVE_INFINITY;
         const beginning = this.#beginnings;
         for (let tries = 0; ; tries++)
@@ -197,36 +193,26 @@ export class Session {
     async #introduce(): Promise<void> {
         const version = await this.#version();
         const settings = await this.#settings();
-        const examples = await this.#insist("examples");
-        await this.#insist("events on");
-        this.isReady = true;
+        const examples = await this.#ask("examples", false);
+        await this.#ask("events on", false);
+        this.#isReady = true;
         this.#strange = "";
         this.onHappening({ is: "connected", version, settings, examples });
         this.#pollAt = this.#now;
-        await this.#insist("status");
+        await this.#ask("status", false);
         const help = new Map<string, string>();
         for (const { name } of settings)
-            for (const line of await this.#insist(`help ${name}`)) {
+            for (const line of await this.#ask(`help ${name}`, false)) {
                 const said = read(line);
                 if (said.is === "help") help.set(said.name, said.help);
             }
         this.onHappening({ is: "help", help });
     }
 
-    /** Asks for the page itself. A HOLD of others drops what waits where they share the machine, so that is asked again. */
-    async #insist(command: string): Promise<string[]> {
-        for (let tries = 0; ; tries++)
-            try {
-                return await this.#ask(command, false);
-            } catch (error) {
-                if (!(error instanceof Refused && this.#isShared && tries < SHARED_TRIES)) throw error;
-            }
-    }
-
     async #version(): Promise<string> {
         // What was typed before ends here, and its answer belongs to no question.
         this.#wire.send("\n");
-        for (const line of await this.#insist("version")) {
+        for (const line of await this.#ask("version", false)) {
             const said = read(line);
             if (said.is === "version") return said.version;
         }
@@ -234,9 +220,7 @@ export class Session {
     }
 
     async #settings(): Promise<Setting[]> {
-        const settings = (await this.#insist("get"))
-            .map(read)
-            .flatMap((said) => (said.is === "setting" ? [said.setting] : []));
+        const settings = settingsOf(await this.#ask("get", false));
         if (settings.length === 0)
             throw new NoMachine("the firmware shows no settings: flash this page's, and try again");
         return settings;
@@ -245,7 +229,7 @@ export class Session {
     /** An answer does not come: a machine that was there is asked for all again. */
     #giveUp(question: Question): void {
         const error = new NoMachine(this.#whoIsThere());
-        if (this.isReady) this.#beginAgain(error, error.message);
+        if (this.#isReady) this.#beginAgain(error, error.message);
         else {
             this.#asked.shift();
             question.failed(error);
@@ -267,11 +251,6 @@ export class Session {
         for (const line of this.#lines.take(text)) this.#take(line);
     }
 
-    #hearStatus(line: string): void {
-        const said = read(line);
-        if (this.isReady && said.is === "status") this.onHappening({ is: "status", status: said.status, line });
-    }
-
     #take(line: string): void {
         if (this.#ended) return;
         const said = read(line);
@@ -281,11 +260,11 @@ export class Session {
         }
         if (isTold(said)) {
             this.onHappening({ is: "told", said, line });
-            if (said.is === "calibratedBySwitch" && said.isSet) void this.#readSettings();
+            if (said.is === "calibratedBySwitch" && said.isSet) this.#follow("calibrate").catch(() => {});
             return;
         }
         const [question] = this.#asked;
-        if (!question || !this.isReady) this.#strange = `${this.#strange} ${line}`.slice(-200);
+        if (!question || !this.#isReady) this.#strange = `${this.#strange} ${line}`.slice(-200);
         if (!question) return;
         if (question.isTyped) this.onHappening({ is: "answer", line });
         if (said.is !== "end") {
@@ -297,11 +276,7 @@ export class Session {
         if (said.error !== undefined) question.failed(new Refused(said.error));
         else {
             question.done(question.answer);
-            if (question.isTyped && /^\s*(set|defaults|revert|calibrate|save)\b/.test(question.command))
-                void this.#readSettings();
-            if (question.isTyped && /^\s*events\b/.test(question.command))
-                // The page lives on them.
-                void this.#insist("events on").catch(() => {});
+            if (question.isTyped) this.#follow(question.command).catch(() => {});
         }
     }
 
@@ -315,21 +290,26 @@ export class Session {
     #beginAgain(error: Error, why: string): void {
         const dropped = [...this.#asked.splice(0), ...this.#waiting.splice(0)];
         this.#beginnings++;
-        if (this.isReady) this.onHappening({ is: "lost", why, forGood: false, isWanted: false });
-        this.isReady = false;
+        if (this.#isReady) this.onHappening({ is: "lost", why, forGood: false, isWanted: false });
+        this.#isReady = false;
         for (const { failed } of dropped) failed(error);
         this.#greetingBy = this.#now;
     }
 
-    async #readSettings(): Promise<void> {
-        const settings = await this.#settings().catch(() => undefined);
-        if (settings) this.onHappening({ is: "settings", settings });
+    /** Asks for what a command has changed. */
+    async #follow(command: string): Promise<void> {
+        if (/^\s*(set|defaults|revert|calibrate|save)\b/.test(command))
+            this.onHappening({ is: "settings", settings: await this.#settings() });
+        if (/^\s*(label|teach|forget)\b/.test(command))
+            this.onHappening({ is: "examples", examples: await this.#ask("examples", false) });
+        // The page lives on them.
+        if (/^\s*events\b/.test(command)) await this.#ask("events on", false);
     }
 
     #end(why: string, isWanted = false): void {
         if (this.#ended) return;
         this.#ended = true;
-        this.isReady = false;
+        this.#isReady = false;
         const error = new NoMachine(why);
         for (const { failed } of [...this.#asked.splice(0), ...this.#waiting.splice(0)]) failed(error);
         this.onHappening({ is: "lost", why, forGood: true, isWanted });

@@ -3,6 +3,7 @@
 
 import type { Parts } from "../dom.ts";
 import { choosePort, PortError, SerialLine, whyNoSerial, wireOf } from "../link/serial.ts";
+import { Session } from "../link/session.ts";
 import { english, say, told } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
 import { Update } from "./update.ts";
@@ -68,7 +69,8 @@ export class Connection {
             await this.disconnect();
             const line = await SerialLine.open(port, BAUD);
             [this.#port, this.#isOpen] = [port, true];
-            this.#panel.connect(wireOf(line), performance.now(), true);
+            const now = performance.now();
+            this.#panel.connect(new Session(wireOf(line), now, true), now);
             this.#say(() => say("waitingForAnswer"));
         } catch (error) {
             if (!(error instanceof PortError)) throw error;

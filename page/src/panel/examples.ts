@@ -70,7 +70,6 @@ export class Examples {
         try {
             await this.#ask(`label ${label}${force}`);
             this.#say(() => say(label === "plant" ? "taughtPlant" : "taughtWeed"));
-            await this.#read();
         } catch (error) {
             this.#say(() => told(error instanceof Error ? error.message : String(error)));
             if (error instanceof Refused && error.message.includes("force")) this.#refused = label;
@@ -83,7 +82,6 @@ export class Examples {
     async #forget(which: string): Promise<void> {
         try {
             await this.#ask(`forget ${which}`);
-            await this.#read();
         } catch (error) {
             this.#say(() => told(error instanceof Error ? error.message : String(error)));
         }

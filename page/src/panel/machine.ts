@@ -79,6 +79,9 @@ export class Machine {
             case "settings":
                 this.settings = happening.settings;
                 break;
+            case "examples":
+                this.examples = happening.examples;
+                break;
             case "help":
                 this.help = happening.help;
                 break;

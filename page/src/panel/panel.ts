@@ -6,7 +6,7 @@
 import { download, Parts } from "../dom.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
-import { type Ask, type Happening, NoMachine, Session, type Wire } from "../link/session.ts";
+import { type Ask, type Happening, type Link, NoMachine } from "../link/session.ts";
 import { signal } from "../signals.ts";
 import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
 import { Calibration } from "./calibration.ts";
@@ -44,7 +44,7 @@ export class Panel {
     #heard = { text: "", state: "", sinceMs: 0 };
     /** Whether the next state follows this page's own HOLD, whose answer is already signalled. */
     #isHolding = false;
-    #session: Session | undefined;
+    #link: Link | undefined;
     #now = 0;
 
     /**
@@ -96,36 +96,34 @@ export class Panel {
 
     /** Holds the machine, before all waiting commands. */
     hold(): void {
-        const session = this.#session;
-        if (!session || this.machine.version === undefined) return;
+        const link = this.#link;
+        if (!link || this.machine.version === undefined) return;
         this.#isHolding = this.machine.mode === "work";
-        session.hold().then(
+        link.hold().then(
             () => signal("held"),
-            // A lost machine has reported it.
-            () => {},
+            (error) => this.#say(error),
         );
     }
 
-    /** Talks to the machine at the other end of a wire from now on. */
-    connect(wire: Wire, nowMs: number, resets: boolean): void {
+    /** Talks to this machine from now on. */
+    connect(link: Link, nowMs: number): void {
         this.#now = nowMs;
         this.machine.lost = english("waitingForMachine");
-        const session = new Session(wire, nowMs, resets);
-        session.onHappening = (happening) => {
-            if (session === this.#session) this.#take(happening);
+        link.onHappening = (happening) => {
+            if (link === this.#link) this.#take(happening);
         };
-        this.#session = session;
+        this.#link = link;
     }
 
     /** Disconnects the machine. */
     async disconnect(): Promise<void> {
-        await this.#session?.close();
-        this.#session = undefined;
+        await this.#link?.close?.();
+        this.#link = undefined;
     }
 
     ask(command: string): Promise<string[]> {
-        if (!this.#session) return Promise.reject(new NoMachine(english("noneConnected")));
-        return this.#session.ask(command);
+        if (!this.#link) return Promise.reject(new NoMachine(english("noneConnected")));
+        return this.#link.ask(command);
     }
 
     /** Saves these settings on the machine, and clears the alarm for lost ones. Returns whether it has accepted all. */
@@ -135,10 +133,10 @@ export class Panel {
         return true;
     }
 
-    /** Advances to the wire's time. */
+    /** Goes on, at the machine's time. */
     turn(nowMs: number): void {
         this.#now = nowMs;
-        this.#session?.turn(nowMs);
+        this.#link?.turn?.(nowMs);
     }
 
     /** Shows changes and moving parts. */
@@ -194,6 +192,9 @@ export class Panel {
             case "lost":
                 this.#console.add(happening.why, "happened");
                 this.#showConnected();
+                break;
+            case "examples":
+                this.#examples.showExamples();
                 break;
             case "settings":
             case "help":

@@ -19,27 +19,28 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     };
     label();
     onLanguage(label);
-    const overview = served.names.length > 1 ? new Overview(all, served.names, () => served.holdAll()) : undefined;
+    const names = served.machines.map(({ name }) => name);
+    const overview = names.length > 1 ? new Overview(all, names, () => served.holdAll()) : undefined;
     if (overview) into.append(all);
-    const panels = served.names.map((name, machine) => {
+    const panels = served.machines.map((machine, number) => {
+        const { name } = machine;
         const element = make("div", overview ? "panel" : "panel alone");
         const section = make("section", "served", make("h2", "", name), element);
         section.ariaLabel = name;
         into.append(section);
-        const panel = new Panel(element, `served-${machine}`, served.allowed, overview ? name : "");
-        // A screen reader says the row's name with each part.
+        const panel = new Panel(element, `served-${number}`, served.allowed, overview ? name : "");
+        // Read out, they say whose parts they are.
         const label = () => {
             for (const part of element.querySelectorAll("section")) part.ariaLabel = `${name}: ${part.ariaLabel}`;
         };
         label();
         onLanguage(label);
+        panel.connect(machine, performance.now());
+        machine.onAbsent = (why) => {
+            panel.machine.lost = why;
+        };
         return panel;
     });
-    served.onThere = (machine, wire) => panels[machine]?.connect(wire, performance.now(), false);
-    served.onLost = (machine, why) => {
-        const panel = panels[machine];
-        if (panel) panel.machine.lost = why;
-    };
     setInterval(() => {
         served.watch();
         for (const panel of panels) panel.turn(performance.now());

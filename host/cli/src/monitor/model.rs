@@ -205,7 +205,7 @@ impl Model {
             Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
             Happening::Command(line) => (!self.are_several()).then(|| format!("> {line}")),
             Happening::Answer(line) => Some(line.clone()),
-            Happening::Status(..) | Happening::Settings(_) => None,
+            Happening::Status(..) | Happening::Settings(..) | Happening::Examples(_) => None,
         };
         if let Happening::Answer(line) = &happening
             && let Some(head) = self.rows.get_mut(number).and_then(|row| row.heading.before(line))
@@ -308,8 +308,8 @@ impl RowModel {
             }
             Happening::Status(status, _) => self.take_status(status),
             Happening::Event(event, _) => self.take_event(event),
-            Happening::Settings(settings) => self.settings = settings,
-            Happening::Command(_) | Happening::Answer(_) => {}
+            Happening::Settings(settings, _) => self.settings = settings,
+            Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
         }
     }
 

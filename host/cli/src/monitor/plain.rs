@@ -140,7 +140,7 @@ impl Talk<'_> {
         }
         match &heard.what {
             What::Happened(Happening::Connected { .. }) => standing.is_there = true,
-            What::Happened(Happening::Settings(_) | Happening::Command(_)) => {}
+            What::Happened(Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_)) => {}
             What::Happened(Happening::Status(..)) => standing.statuses += 1,
             What::Happened(Happening::Lost(why)) => {
                 let was_idle = standing.unanswered == 0;

@@ -155,8 +155,12 @@ mod tests {
             String::from_utf8(written).expect("a bell is ASCII")
         };
         let event = |line: &str| Happening::Event(EventLine::parse(line).expect("it is one"), line.to_owned());
-        let connected =
-            || Happening::Connected { version: "1".to_owned(), settings: Settings::new(), examples: Vec::new() };
+        let connected = || Happening::Connected {
+            version: "1".to_owned(),
+            settings: Settings::new(),
+            shown: Vec::new(),
+            examples: Vec::new(),
+        };
         assert_eq!(rung(Happening::Lost("it is not there".to_owned())), "", "it never was there");
         assert_eq!(rung(connected()), "");
         assert_eq!(rung(event("state is=work")), "");

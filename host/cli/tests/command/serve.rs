@@ -183,7 +183,7 @@ impl Served {
             let (status, said) = self.post(&self.here, &format!("/machines/{machine}/command"), "", line);
             assert_eq!((status, said.as_str()), (200, "ok\n"), "{line}");
         }
-        events.wait_for(|message| message["machine"] == machine && has(message, "line", "state=hold"));
+        events.wait_for(|message| message["machine"] == machine && has(message, "said", "state=hold"));
     }
 }
 
@@ -291,13 +291,13 @@ fn without_the_code_a_phone_sees_nothing_and_does_nothing() {
         assert!(status == 403 && said.contains("Tries left: ") && cookie.is_none(), "{code}: {status} {said}");
     }
     let mut events = Events::open(&served.here, "", 0);
-    events.wait_for(|message| message["is"] == "status" && has(message, "line", "state=work"));
+    events.wait_for(|message| message["is"] == "status" && has(message, "said", "state=work"));
 
     let phone = served.pair();
     assert!(served.get(&served.lan, "/?served", &phone).1.contains("the page"));
     assert_eq!(served.get(&served.lan, "/page.css", &format!("other=1; {phone}")).1, "p{}");
     assert_eq!(served.command(&served.lan, &phone, "hold"), (200, "ok\n".to_owned()));
-    events.wait_for(|message| has(message, "line", "state=hold"));
+    events.wait_for(|message| has(message, "said", "state=hold"));
 }
 
 #[test]
@@ -402,10 +402,10 @@ fn a_paired_phone_watches_and_holds_and_nothing_else_unless_the_operator_allowed
             assert!(status == 403 && said.contains("have `weeder serve` started with --allow-start"), "{said}");
             assert_eq!(served.command(&served.here, "", "start"), (200, "ok\n".to_owned()));
         }
-        events.wait_for(|message| message["is"] == "event" && has(message, "line", "state is=work"));
-        // A phone that did not start the machine may hold it.
+        events.wait_for(|message| message["is"] == "event" && has(message, "said", "state is=work"));
+        // Whoever did not start it may hold it.
         assert_eq!(served.command(&served.lan, &other, "hold"), (200, "ok\n".to_owned()));
-        events.wait_for(|message| message["is"] == "event" && has(message, "line", "state is=hold"));
+        events.wait_for(|message| message["is"] == "event" && has(message, "said", "state is=hold"));
         served.process.interrupt();
     }
 }
@@ -503,7 +503,7 @@ fn a_port_that_is_pulled_is_told_and_opened_again_and_the_machine_beside_it_work
         assert!(status == 200 && obeyed == machines && said["lastMs"].is_u64(), "{status} {said}");
     };
     held(&[true, true]);
-    events.wait_for(|message| message["machine"] == 1 && has(message, "line", "state=hold"));
+    events.wait_for(|message| message["machine"] == 1 && has(message, "said", "state=hold"));
     assert_eq!(served.post(&served.lan, "/machines/1/command", &phone, "start"), (200, "ok\n".to_owned()));
 
     left.interrupt();
@@ -522,9 +522,9 @@ fn a_port_that_is_pulled_is_told_and_opened_again_and_the_machine_beside_it_work
     let (_left, _) = uno(&folder, "left", &["--stand"]);
     events.wait_for(|message| message["machine"] == 0 && message["is"] == "there");
     events
-        .wait_for(|message| message["machine"] == 0 && has(message, "line", "state=alarm code=5-1 name=settings_lost"));
+        .wait_for(|message| message["machine"] == 0 && has(message, "said", "state=alarm code=5-1 name=settings_lost"));
     assert_eq!(served.command(&served.lan, &phone, "hold"), (200, "ok\n".to_owned()));
-    events.wait_for(|message| message["machine"] == 1 && has(message, "line", "state=work"));
+    events.wait_for(|message| message["machine"] == 1 && has(message, "said", "state=work"));
     assert_eq!(served.post(&served.lan, "/machines/2/command", &phone, "hold").0, 404);
 }
 

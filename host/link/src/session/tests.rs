@@ -127,19 +127,51 @@ fn settings_are_asked_for_again_after_every_change() {
     let (mut session, _, says) = session();
     let mut now = Instant::now();
     second(&mut session, now);
-    for (command, wheel_mm) in [("set wheel_mm 405", 405), ("defaults", 400), ("revert", 405)] {
+    for (command, wheel_mm) in [("set wheel_mm 405", 405), ("save", 405), ("defaults", 400), ("revert", 405)] {
         now += Duration::from_secs(1);
         assert!(session.command(command));
         let happened = second(&mut session, now);
-        let Some(Happening::Settings(settings)) = happened.last() else { panic!("{command}: {happened:?}") };
+        let Some(Happening::Settings(settings, shown)) = happened.last() else { panic!("{command}: {happened:?}") };
         assert_eq!(settings.get(settings::Setting::WheelMm), wheel_mm, "{command}");
+        assert!(shown.contains(&format!("wheel_mm={wheel_mm} and more")), "{shown:?}");
     }
     says.borrow_mut().extend(b"calibrated lead_out_ms=150 lead_in_ms=40 set=yes\r\n");
     let happened = second(&mut session, now + Duration::from_secs(1));
-    assert!(matches!(happened.as_slice(), [Happening::Event(..), Happening::Settings(_)]), "{happened:?}");
+    assert!(matches!(happened.as_slice(), [Happening::Event(..), Happening::Settings(..)]), "{happened:?}");
     assert!(session.command("set wheel_mm 9"));
     let happened = second(&mut session, now + Duration::from_secs(2));
     assert!(matches!(happened.as_slice(), [Happening::Command(_), Happening::Answer(_)]), "{happened:?}");
+}
+
+#[test]
+fn examples_are_asked_for_again_behind_a_command_that_changes_them() {
+    let (mut session, _, _) = session();
+    let mut now = Instant::now();
+    second(&mut session, now);
+    for command in ["label plant", "label weed force", "teach plant", "forget 3", "forget all"] {
+        now += Duration::from_secs(1);
+        assert!(session.command(command));
+        let happened = second(&mut session, now);
+        assert!(matches!(happened.last(), Some(Happening::Examples(lines)) if lines.is_empty()), "{command}");
+    }
+}
+
+#[test]
+fn hold_drops_nothing_that_the_session_asks_for_itself() {
+    let (mut session, _, _) = session();
+    let now = Instant::now();
+    second(&mut session, now);
+    assert!(session.command("set wheel_mm 405"));
+    session.turn_events_on();
+    assert_eq!(session.turn(now + Duration::from_secs(1)), [Happening::Command("set wheel_mm 405".to_owned())]);
+    session.hold();
+    let happened = second(&mut session, now + Duration::from_secs(2));
+    let ok = Happening::Answer("ok".to_owned());
+    let held = [ok.clone(), Happening::Command("hold".to_owned()), ok];
+    assert!(
+        matches!(happened.split_last(), Some((Happening::Settings(..), before)) if *before == held),
+        "{happened:?}"
+    );
 }
 
 #[test]

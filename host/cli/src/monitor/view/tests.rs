@@ -33,7 +33,10 @@ fn machine(lines: &[&str]) -> Model {
 /// Connects a row and sends these lines.
 fn tell(model: &mut Model, row: usize, lines: &[&str]) {
     let version = "0.2.0".to_owned();
-    model.update(row, Happening::Connected { version, settings: Settings::new(), examples: Vec::new() });
+    model.update(
+        row,
+        Happening::Connected { version, settings: Settings::new(), shown: Vec::new(), examples: Vec::new() },
+    );
     for line in lines {
         let line = (*line).to_owned();
         model.update(
@@ -89,8 +92,8 @@ fn a_margin_that_nothing_was_measured_for_is_warned_of_once() {
     model.update(0, Happening::Command("set margin_mm 13".to_owned()));
     let mut settings = Settings::new();
     settings.set(Setting::MarginMm, 13).expect("it is in its range");
-    model.update(0, Happening::Settings(settings.clone()));
-    model.update(0, Happening::Settings(settings));
+    model.update(0, Happening::Settings(settings.clone(), Vec::new()));
+    model.update(0, Happening::Settings(settings, Vec::new()));
     let warnings: Vec<&String> = model.lines.iter().filter(|line| line.starts_with("-- warning: ")).collect();
     assert_eq!(
         warnings,
@@ -185,9 +188,9 @@ fn what_is_drawn_follows_the_machine_s_settings() {
     let mut settings = Settings::new();
     settings.set(Setting::BeamToToolMm, 800).unwrap();
     let before = screen(&model);
-    model.update(0, Happening::Settings(settings));
+    model.update(0, Happening::Settings(settings, Vec::new()));
     assert_ne!(screen(&model), before);
-    model.update(0, Happening::Settings(Settings::new()));
+    model.update(0, Happening::Settings(Settings::new(), Vec::new()));
     assert_eq!(screen(&model), before);
 }
 

@@ -159,7 +159,7 @@ fn hold_is_obeyed_under(name: &str, keeps_open: bool, text: impl Fn(&str, &str) 
                 let begun = Instant::now();
                 assert_eq!(client.command("hold"), (200, "ok\n".to_owned()), "{name}: {who}");
                 let time = begun.elapsed();
-                watching.wait_for(|message| message["is"] == "event" && has(message, "line", "state is=hold"));
+                watching.wait_for(|message| message["is"] == "event" && has(message, "said", "state is=hold"));
                 (who, time)
             };
             let open = open.into_iter().filter(|(_, client)| keeps_open || client.host != attacked);

@@ -1,0 +1,144 @@
+// A machine that `weeder serve` has, as the page talks to it: requests that are answered when a test says so.
+
+import assert from "node:assert/strict";
+import test, { beforeEach } from "node:test";
+import { ServedMachine } from "../src/link/served.ts";
+import { type Happening, NoMachine, Refused } from "../src/link/session.ts";
+
+/** A command on its way. */
+interface Sent {
+    readonly line: string;
+    answer(text: string): void;
+    /** Its answer is lost on the way back. */
+    lose(): void;
+}
+
+const THERE = {
+    is: "there",
+    version: "0.2.0",
+    settings: ["k=3 from 1 to 15, default 3, not saved"],
+    examples: ["field 0 plant 1 2 3 4 5"],
+    help: { k: "nearest examples that vote" },
+    status: "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400",
+} as const;
+
+let sent: Sent[] = [];
+let happened: Happening[] = [];
+let machine = new ServedMachine(0, "");
+
+beforeEach(() => {
+    [sent, happened, machine] = [[], [], new ServedMachine(1, "right")];
+    machine.tell(THERE);
+    machine.onHappening = (happening) => happened.push(happening);
+    globalThis.fetch = (path, request) => {
+        assert.equal(path, "/machines/1/command");
+        return new Promise((done, failed) => {
+            const { body, signal } = request as { body: string; signal: AbortSignal };
+            signal.addEventListener("abort", () => failed(signal.reason));
+            sent.push({
+                line: body,
+                answer: (text) => done(new Response(text)),
+                lose: () => failed(new TypeError("Failed to fetch")),
+            });
+        });
+    };
+});
+
+/** Lets go on what waits for an answer. */
+const goOn = () => new Promise((done) => setImmediate(done));
+const lines = () => sent.map(({ line }) => line);
+
+test("a command is a request, and its answer is told behind it", async () => {
+    const [status, start] = [machine.ask("status"), machine.ask("start")];
+    await goOn();
+    assert.deepEqual(lines(), ["status"]);
+    sent[0]?.answer("state=hold\nlost=0\nok\n");
+    assert.deepEqual(await status, ["state=hold", "lost=0"]);
+    await goOn();
+    sent[1]?.answer("error: an alarm is latched\n");
+    await assert.rejects(start, new Refused("an alarm is latched"));
+    const told = happened.map((happening) => ("line" in happening ? `${happening.is} ${happening.line}` : ""));
+    assert.deepEqual(told, [
+        "command status",
+        "answer state=hold",
+        "answer lost=0",
+        "answer ok",
+        "command start",
+        "answer error: an alarm is latched",
+    ]);
+});
+
+test("HOLD is sent at once, and what was typed before it and is not sent yet is dropped", async () => {
+    const [dump, start] = [machine.ask("dump"), machine.ask("start")];
+    await goOn();
+    const held = machine.hold();
+    const status = machine.ask("status");
+    assert.deepEqual(lines(), ["dump", "hold"]);
+    sent[1]?.answer("ok\n");
+    await held;
+    sent[0]?.answer("ok\n");
+    await dump;
+    await assert.rejects(start, new Refused("hold came first, so this was not sent"));
+    await goOn();
+    assert.deepEqual(lines(), ["dump", "hold", "status"]);
+    sent[2]?.answer("ok\n");
+    await status;
+});
+
+test("a lost answer is an error, and neither that of HOLD nor another ends the page's machine", async () => {
+    for (const type of [() => machine.ask("clear"), () => machine.hold()]) {
+        const answer = type();
+        await goOn();
+        sent.pop()?.lose();
+        await assert.rejects(answer, (error) => error instanceof NoMachine && /does not answer/.test(error.message));
+    }
+    assert(!happened.some(({ is }) => is === "lost"));
+    machine.tell({ is: "event", said: "state is=work" });
+    assert.deepEqual(happened.at(-1), { is: "told", said: { is: "state", mode: "work" }, line: "state is=work" });
+    const answer = machine.ask("start");
+    await goOn();
+    sent.pop()?.answer("ok\n");
+    assert.deepEqual(await answer, []);
+});
+
+test("what is no answer, as where another weeder serve asks for its code, is told as it is", async () => {
+    const answer = machine.ask("start");
+    await goOn();
+    sent.pop()?.answer("this phone is not paired\n");
+    await assert.rejects(answer, new NoMachine("this phone is not paired"));
+});
+
+test("a machine that is lost answers no command, and says why", async () => {
+    const [dump, start] = [machine.ask("dump"), machine.ask("start")];
+    await goOn();
+    machine.tell({ is: "lost", why: "the port is gone" });
+    assert.deepEqual(happened.at(-1), { is: "lost", why: "the port is gone", forGood: true, isWanted: false });
+    // What waited is not sent when it is back.
+    await Promise.all([
+        assert.rejects(dump, new NoMachine("the port is gone")),
+        assert.rejects(start, new NoMachine("the machine is not there")),
+    ]);
+    for (const type of [() => machine.ask("status"), () => machine.hold()])
+        await assert.rejects(type(), new NoMachine("the machine is not there"));
+    machine.onAbsent = (why) => happened.push({ is: "command", line: why });
+    machine.tell({ is: "lost", why: "there is no port" });
+    assert.deepEqual(happened.at(-1), { is: "command", line: "there is no port" });
+    machine.tell(THERE);
+    machine.ask("clear");
+    await goOn();
+    assert.deepEqual(lines(), ["dump", "clear"]);
+});
+
+test("a machine that is there has told all at once, and tells what others change", () => {
+    machine.tell(THERE);
+    const [connected, help, status] = happened;
+    assert(connected?.is === "connected" && connected.version === "0.2.0");
+    assert.deepEqual([connected.settings[0]?.value, connected.examples], [3, THERE.examples]);
+    assert(help?.is === "help" && help.help.get("k") === THERE.help.k);
+    assert(status?.is === "status" && status.status.mode === "hold");
+    machine.tell({ is: "settings", said: ["k=5 from 1 to 15, default 3, not saved"] });
+    machine.tell({ is: "examples", said: [] });
+    const [settings, examples] = happened.slice(-2);
+    assert(settings?.is === "settings" && settings.settings[0]?.value === 5);
+    assert.deepEqual(examples, { is: "examples", examples: [] });
+});
