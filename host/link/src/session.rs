@@ -3,7 +3,7 @@
 //! [`Session::turn`] is called over and over. It types what was asked of it, one command at a time, asks for the status when
 //! nothing else is under way, and tells what happened. It waits no longer than a read does, except for the Uno to start where
 //! a port is opened. After every start of the Uno it asks for the settings and the examples and turns the events on. Behind a
-//! command that changes either, it asks for them again. [`Session::hold`] waits for nobody. Where the Uno is lost, so is every
+//! command that changes either, it asks for them again. [`Session::hold`] does not wait. Where the Uno is lost, so is every
 //! command that was not answered.
 
 use super::settings::{self, Settings, SettingsError};
@@ -39,7 +39,7 @@ const WAITING: usize = 256;
 /// Something that happened in a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Happening {
-    /// The Uno is there, or has started anew.
+    /// The Uno is connected, or has restarted.
     Connected {
         /// The firmware's version.
         version: String,
@@ -58,7 +58,7 @@ pub enum Happening {
     Event(EventLine, String),
     /// A command was typed.
     Command(String),
-    /// A line of the answer to it, the last of which is `ok` or begins with `error:`.
+    /// A line of the answer to it. The last one is `ok` or begins with `error:`.
     Answer(String),
     /// The settings behind a command that has changed or saved some, and the lines that show them.
     Settings(Settings, Vec<String>),
@@ -90,13 +90,13 @@ pub struct Session {
     own: BTreeSet<String>,
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
-    /// Whether nobody was told yet why there is no Uno.
+    /// Whether the reason for the missing Uno was not reported yet.
     is_lost_untold: bool,
     happened: VecDeque<Happening>,
 }
 
 impl Session {
-    /// Opens a link by `open`, which is called again whenever it is lost.
+    /// Opens a link by `open`, which is called again each time that the link is lost.
     ///
     /// # Errors
     /// Where the first link fails.
@@ -176,7 +176,7 @@ impl Session {
             None if self.retry_at.is_none_or(|at| now >= at) => {
                 self.retry_at = Some(now + RETRY);
                 let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
-                // Whatever is wrong with it now was said when it was lost.
+                // The reason was reported when it was lost.
                 if self.is_lost_untold { opened } else { Ok(()) }
             }
             None => {
@@ -191,7 +191,7 @@ impl Session {
         self.happened.drain(..).collect()
     }
 
-    /// The Uno is gone, or has started anew: nothing that was asked will be answered.
+    /// The Uno is gone, or has restarted: pending commands will not be answered.
     fn lose(&mut self, why: String) {
         self.asked.clear();
         self.waiting.clear();
@@ -269,7 +269,7 @@ impl Session {
             return;
         }
         let is_end = matches!(said, ConsoleLine::Done | ConsoleLine::Refused(_));
-        // The end of an answer that was given up is nobody's.
+        // The end of an abandoned answer is ignored.
         let Some(asked) = self.asked.front_mut() else { return };
         match &mut asked.own {
             Some(lines) if is_end => match told(&asked.line, std::mem::take(lines)) {

@@ -23,7 +23,7 @@ pub struct Hub {
 }
 
 impl Hub {
-    /// So many machines, none of which has been heard of.
+    /// This number of machines, before any message.
     pub fn new(machines: usize) -> Self {
         Self {
             machines: Mutex::new((0..machines).map(|machine| lost(machine, "its port is being opened")).collect()),
@@ -89,14 +89,14 @@ impl Hub {
         }
     }
 
-    /// Sends while the machines are held, so that nobody hears a change that was in what he began with.
+    /// Sends while the lock is held, so that a page does not get a change twice: its first state may already include it.
     fn send(&self, message: &Value) {
-        // Where no page listens nobody misses it.
+        // An error means that no page listens.
         let _ = self.pages.send(message.to_string().into());
     }
 
     fn machines(&self) -> MutexGuard<'_, Vec<Value>> {
-        // Each state is whole by itself, whoever died beside it.
+        // No panic can leave a state half changed.
         self.machines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_that_does_not_read_keeps_nobody_waiting_and_learns_that_it_has_missed_something() {
+    fn a_page_that_does_not_read_delays_no_other_and_learns_that_it_has_missed_something() {
         let hub = Hub::new(1);
         let (_, mut page) = hub.listen();
         for number in 0..20 * BEHIND {

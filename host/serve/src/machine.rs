@@ -1,4 +1,4 @@
-//! A machine at a serial port, in a thread of its own: it types what it is asked to, one line after the other whoever asks, gives the
+//! A machine at a serial port, in a thread of its own: it types what it is asked to, one line after the other for all clients, gives the
 //! answers back, and has the hub tell all else. It decides nothing: what may be typed is decided before.
 
 use super::hub::Hub;
@@ -27,7 +27,7 @@ const LINES: usize = 1000;
 pub enum Typed {
     /// The machine's answer; its last line is `ok`, or begins with `error:`.
     Answered(Vec<String>),
-    /// Somebody had the machine hold first.
+    /// A client held the machine first.
     Dropped,
     /// The machine was lost before it had answered.
     Lost(String),
@@ -103,7 +103,7 @@ struct Talk {
 impl Talk {
     fn run(mut self, mut session: Session, mut commands: mpsc::Receiver<Asked>, mut holds: mpsc::Receiver<Asked>) {
         loop {
-            // Before the commands are: whatever was sent before a hold is among those then, and is dropped by it.
+            // Read before the commands: so all commands that were sent before a hold are here, and are dropped by it.
             let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
             loop {
                 match commands.try_recv() {
@@ -194,7 +194,7 @@ mod tests {
     use tokio::runtime;
     use tokio::time::{sleep, timeout};
 
-    /// What was typed to a firmware for somebody, whether its events are on, whether it answers `dump` by now, and whether its cable is
+    /// The lines typed to a firmware, whether its events are on, whether it answers `dump` by now, and whether its cable is
     /// plugged in.
     #[derive(Clone, Default)]
     struct Desk {

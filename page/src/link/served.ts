@@ -1,7 +1,7 @@
 // The machines at another computer's ports, by `weeder serve`. That computer has a session with each of them: what it knows comes as
 // server-sent events, and a command is a request that gives back its answer.
 //
-// What may be typed from here is decided there. A computer that falls silent is told as machines that are lost, and asked anew
+// What may be typed from here is decided there. A computer that falls silent is reported as lost machines, and asked again
 // until it answers.
 
 import { english } from "../words/words.ts";

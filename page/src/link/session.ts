@@ -2,8 +2,8 @@
 // the status in between, and tells what happened.
 //
 // It has no clock of its own: `turn` is called over and over with the wire's time, which for the page's own Uno is the
-// chip's. After every start of the Uno it asks who is there, for settings and examples, and turns the events on. `hold` waits
-// for nobody. A wire that ended ends its session.
+// chip's. After every start of the Uno it asks who is there, for settings and examples, and turns the events on. `hold` does
+// not wait. A wire that ended ends its session.
 
 import type { Told } from "./events.ts";
 import { isTold, read, type Setting, type Status, settingsOf } from "./grammar.ts";
@@ -39,7 +39,7 @@ export type Happening =
     | { is: "started"; line: string }
     /** The machine is there, and has shown its settings and examples. */
     | { is: "connected"; version: string; settings: readonly Setting[]; examples: readonly string[] }
-    /** The machine is gone: for good, because the operator wanted it or not, or until it has started anew. */
+    /** The machine is gone: for good, by the operator's wish or not, or until it has restarted. */
     | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
     | { is: "status"; status: Status; line: string }
     /** The machine told something by itself. */
