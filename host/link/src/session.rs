@@ -227,34 +227,26 @@ impl Session {
         if let Some(Asked { line, .. }) = self.asked.front().filter(is_old) {
             return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
         }
-        if std::mem::take(&mut self.is_to_hold) {
-            self.type_line(&mut link, HOLD.to_owned(), None, now)?;
-        } else if self.asked.is_empty() {
-            if let Some(command) = self.waiting.pop_front() {
-                self.type_line(&mut link, command, None, now)?;
-            } else if self.poll_at.is_none_or(|at| now >= at) {
-                self.poll_at = Some(now + POLL);
-                self.type_line(&mut link, STATUS.to_owned(), Some(Vec::new()), now)?;
-            } else if let Some(own) = self.own.pop_first() {
-                self.type_line(&mut link, own, Some(Vec::new()), now)?;
+        let next = if std::mem::take(&mut self.is_to_hold) {
+            Some((HOLD.to_owned(), None))
+        } else if !self.asked.is_empty() {
+            None
+        } else if let Some(command) = self.waiting.pop_front() {
+            Some((command, None))
+        } else if self.poll_at.is_none_or(|at| now >= at) {
+            self.poll_at = Some(now + POLL);
+            Some((STATUS.to_owned(), Some(Vec::new())))
+        } else {
+            self.own.pop_first().map(|own| (own, Some(Vec::new())))
+        };
+        if let Some((line, own)) = next {
+            if own.is_none() {
+                self.happened.push_back(Happening::Command(line.clone()));
             }
+            link.send(&line)?;
+            self.asked.push_back(Asked { line, own, since: now });
         }
         self.link = Some(link);
-        Ok(())
-    }
-
-    fn type_line(
-        &mut self,
-        link: &mut Link,
-        line: String,
-        own: Option<Vec<String>>,
-        since: Instant,
-    ) -> Result<(), LinkError> {
-        if own.is_none() {
-            self.happened.push_back(Happening::Command(line.clone()));
-        }
-        link.send(&line)?;
-        self.asked.push_back(Asked { line, own, since });
         Ok(())
     }
 

@@ -116,22 +116,11 @@ export class Session implements Link {
     }
 
     /** What the page asks itself is not dropped. */
-    hold(): Promise<void> {
+    async hold(): Promise<void> {
         const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
         this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
         for (const { failed } of dropped) failed(new Refused("hold came first, so this was not sent"));
-        return new Promise((done, failed) => {
-            if (this.#ended) failed(new NoMachine("no machine is connected"));
-            else
-                this.#send({
-                    command: "hold",
-                    isTyped: true,
-                    since: this.#now,
-                    answer: [],
-                    done: () => done(),
-                    failed,
-                });
-        });
+        await this.#ask("hold", true, (question) => this.#send(question));
     }
 
     turn(now: number): void {
@@ -158,10 +147,15 @@ export class Session implements Link {
         await this.#wire.close();
     }
 
-    #ask(command: string, isTyped: boolean): Promise<string[]> {
+    /** `take` sends the question, or has it wait. */
+    #ask(
+        command: string,
+        isTyped: boolean,
+        take: (question: Question) => unknown = (question) => this.#waiting.push(question),
+    ): Promise<string[]> {
         return new Promise((done, failed) => {
             if (this.#ended) failed(new NoMachine("no machine is connected"));
-            else this.#waiting.push({ command, isTyped, since: this.#now, answer: [], done, failed });
+            else take({ command, isTyped, since: this.#now, answer: [], done, failed });
         });
     }
 
