@@ -1,10 +1,9 @@
 //! What the firmware can take and what it costs, counted on the virtual Uno; the same sources give the same figures on
 //! every machine.
 //!
-//! Each file beside this one measures one subject: [`classifier()`] the classifier's cycles, [`weeding()`] the interrupts,
-//! the loop's turns and the memory while a row is weeded, [`encoder`] the highest rate without a lost count, [`servo`] the jitter of
-//! the pulses, [`swings`] how late the commands of many rows come to the pin. [`table`] shows them to people, beside
-//! those of others.
+//! Each file beside this one measures one subject: [`classifier()`] the classifier's cycles, [`encoder`] the highest rate without a
+//! lost count, [`servo`] the jitter of the pulses, [`swings`] how late the commands of many rows come to the pin. [`table`] shows
+//! them to people, beside those of others. `weeder bounds` proves the most that an interrupt and the stack take.
 
 mod classifier;
 pub mod encoder;
@@ -13,8 +12,6 @@ mod load;
 pub mod servo;
 pub mod swings;
 pub mod table;
-mod weeding;
 
 pub use self::classifier::{ClassifierCosts, Cycles, classifier};
 pub use self::error::BenchError;
-pub use self::weeding::{FirmwareCosts, weeding};

@@ -7,6 +7,7 @@
 use super::error::BenchError;
 use field::wiring;
 use knn_bench::{QUERIES, Task};
+use serde::Serialize;
 use std::path::Path;
 use uno::CYCLES_PER_SECOND;
 use uno::Uno;
@@ -21,7 +22,7 @@ const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
 /// Cycles of the calls of one task.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Cycles {
     /// The fastest call.
     pub fewest: u64,

@@ -24,6 +24,7 @@ use crate::run;
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use std::path::Path;
 use uno::{CYCLES_PER_SECOND, PinChange};
 use uno::{Place, SENT_BYTE_CYCLES, Uno};
@@ -41,7 +42,8 @@ const SILENT_SHARE: f64 = 0.1;
 pub const RESOLUTION: f64 = 0.01;
 
 /// What else the firmware does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Load {
     /// What it does by itself: clock, loop and servo.
     Idle,
@@ -50,7 +52,8 @@ pub enum Load {
 }
 
 /// Which way the encoder turns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Direction {
     /// AB = 00, 10, 11, 01.
     Forward,
@@ -59,7 +62,7 @@ pub enum Direction {
 }
 
 /// How the encoder turns, and beside what.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Turning {
     /// What else the firmware does.
     pub load: Load,
@@ -280,8 +283,11 @@ fn nth_edge(direction: Direction, number: u32) -> PinChange {
 }
 
 /// The highest rate without a lost count.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
+    /// How the encoder turns.
+    #[serde(flatten)]
+    pub turning: Turning,
     /// Counts a second.
     pub counts_per_s: f64,
     /// Share of the serial line's capacity that the firmware used at that rate, from 0 to 1.
@@ -305,7 +311,7 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
         }
         line_share = line_share.min(counted.line_share);
     }
-    Ok(Some(Rate { counts_per_s, line_share }))
+    Ok(Some(Rate { turning, counts_per_s, line_share }))
 }
 
 /// Searches the highest rate of the firmware at `elf`. `progress` is told the share of the search done, from 0 to 1.
@@ -313,7 +319,7 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
 /// # Errors
 /// Where the ELF cannot be run.
 pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate, BenchError> {
-    let mut passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
+    let mut passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
     let mut failed = HIGHEST_PER_S;
     let bisections = ((HIGHEST_PER_S / LOWEST_PER_S).ln() / RESOLUTION.ln_1p()).log2().ceil();
     let trials = bisections + BELOW.len() as f64;
@@ -340,7 +346,7 @@ pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64))
         match chance {
             Some(rate) => {
                 failed = rate;
-                passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
+                passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
             }
             None => return Ok(passed),
         }

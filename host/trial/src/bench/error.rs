@@ -39,7 +39,4 @@ pub enum BenchError {
     /// The ELF has no such variable.
     #[error("the bench has no variable `{0}`: run the ELF that `cargo bench-firmware` makes")]
     NoVariable(&'static str),
-    /// The firmware did not work when it should have been measured at work.
-    #[error("the firmware's state is `{0}` after `start now`: only one that works can be measured at work")]
-    NotAtWork(String),
 }
