@@ -10,7 +10,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use thiserror::Error;
 use uno::CYCLES_PER_SECOND;
-use uno::pty::{Pty, PtyError};
+use uno::FileError;
+use uno::pty::Pty;
 
 /// Bytes that may be on their way to a board. More are left to the terminal.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
@@ -23,7 +24,7 @@ pub enum DeskError {
     Pair(#[from] PairError),
     /// A pseudo terminal failed.
     #[error(transparent)]
-    Pty(#[from] PtyError),
+    Pty(#[from] FileError),
     /// The thread could not be started, or panicked.
     #[error("the virtual Unos do not run")]
     Thread(#[source] io::Error),

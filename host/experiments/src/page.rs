@@ -15,13 +15,12 @@ pub use self::comparison::{Comparison, ControllerCurve, ControllerPoint, Work};
 
 use crate::evaluation::published::{MACHINES, PublishedMachine};
 use crate::evaluation::{Analysis, Performance, PlotRecord, Response};
+use anyhow::{Context, Result, bail};
 use askama::Template;
-use chart::DrawingError;
 use figure::Figure;
 use losses::Losses;
 use response::Chapter;
 use table::{Table, fixed, short};
-use thiserror::Error;
 
 /// One row drawn along the ground, as [`trial::picture::draw`] draws it.
 #[derive(Debug, Clone)]
@@ -51,33 +50,12 @@ pub struct Page<'a> {
     pub row: Option<&'a RowPicture>,
 }
 
-/// A page cannot be made.
-#[derive(Debug, Error)]
-pub enum PageError {
-    /// There is a figure that is none.
-    #[error("{what} is {value} at {speed_km_h} km/h: a report shows finite figures only")]
-    NotFinite {
-        /// Whose figure.
-        what: String,
-        /// Where it stands.
-        speed_km_h: f64,
-        /// What it is.
-        value: f64,
-    },
-    /// A chart.
-    #[error("a chart cannot be drawn")]
-    Drawing(#[from] DrawingError),
-    /// The page itself.
-    #[error("the page cannot be put together")]
-    Template(#[from] askama::Error),
-}
-
 impl Page<'_> {
     /// The page as HTML, to be written to a file as it is.
     ///
     /// # Errors
     /// Where a figure of the comparison is not finite, or plotters cannot draw.
-    pub fn html(&self) -> Result<String, PageError> {
+    pub fn html(&self) -> Result<String> {
         let comparison = self.comparison.map(Headline::of).transpose()?;
         let analysis = self.analysis;
         let figures = Response::ALL.map(|response| figure::response(analysis, response));
@@ -86,14 +64,14 @@ impl Page<'_> {
             summary: &self.summary,
             command: self.command,
             comparison,
-            figures: figures.into_iter().collect::<Result<_, _>>()?,
+            figures: figures.into_iter().collect::<Result<_>>()?,
             row: self.row.map(|row| (row.drawing.clone(), row.caption.as_str())),
-            chapters: analysis.responses.iter().map(|of| Chapter::of(analysis, of)).collect::<Result<_, _>>()?,
+            chapters: analysis.responses.iter().map(|of| Chapter::of(analysis, of)).collect::<Result<_>>()?,
             means: means(analysis),
             plots: plots(analysis),
             parameters: parameters(self.parameters),
         };
-        Ok(sheet.render()?)
+        sheet.render().context("the page cannot be put together")
     }
 }
 
@@ -122,7 +100,7 @@ struct Headline {
 }
 
 impl Headline {
-    fn of(comparison: &Comparison) -> Result<Self, PageError> {
+    fn of(comparison: &Comparison) -> Result<Self> {
         comparison.check()?;
         let of_controllers = |value: fn(&ControllerPoint) -> f64| {
             let curve = move |controller: &ControllerCurve| {
@@ -152,7 +130,7 @@ impl Headline {
 
 impl Comparison {
     /// Every figure that is shown, with whose it is and at which speed.
-    fn check(&self) -> Result<(), PageError> {
+    fn check(&self) -> Result<()> {
         let of_controllers = self.controllers.iter().flat_map(|controller| {
             controller.points.iter().flat_map(|point| {
                 let figures = [point.plant_damage_percent, point.zones_reached_percent, point.in_row_weeding_percent];
@@ -161,9 +139,10 @@ impl Comparison {
         });
         let of_bound = self.bound.iter().map(|&(speed_km_h, value)| ("the bound", speed_km_h, value));
         let wrong = of_controllers.chain(of_bound).find(|(_, speed, value)| !(speed + value).is_finite());
-        wrong.map_or(Ok(()), |(what, speed_km_h, value)| {
-            Err(PageError::NotFinite { what: what.to_owned(), speed_km_h, value })
-        })
+        if let Some((what, speed_km_h, value)) = wrong {
+            bail!("{what} is {value} at {speed_km_h} km/h: a report shows finite figures only");
+        }
+        Ok(())
     }
 }
 

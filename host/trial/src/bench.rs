@@ -7,11 +7,9 @@
 
 mod classifier;
 pub mod encoder;
-mod error;
 mod load;
 pub mod servo;
 pub mod swings;
 pub mod table;
 
 pub use self::classifier::{ClassifierCosts, Cycles, classifier};
-pub use self::error::BenchError;

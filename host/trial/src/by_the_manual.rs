@@ -4,36 +4,21 @@
 //! user would. The servo is timed by the firmware's own code with an end switch, the wheel by its encoder over a stretch with the
 //! field's slip, and the slip by a second beam along a row. The margin is the one that [`link::set_up`] calculates of that, or stays.
 
+use anyhow::Result;
 use control::operate::calibration::{Outcome, SwingTimes, Swings};
 use control::settings::{Setting, Settings};
 use control::units::{Instant, Interval};
-use field::conditions::{Conditions, WrongValue};
+use field::conditions::Conditions;
 use field::driving::drive;
 use field::motion::{Motion, mm_s};
-use field::native::{self, Refused, Sensors};
-use field::row::Problem;
+use field::native::{self, Sensors};
 use field::stand::Stand;
 use field::trial::{Start, Trial};
 use link::set_up::{ManualStep, SetUp, Step, Task};
 use link::settings::name;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, Pulse};
-
-/// Why a step cannot be done.
-#[derive(Debug, Error)]
-pub enum ManualError {
-    /// The field does not know a part, or a value is out of its range.
-    #[error(transparent)]
-    WrongValue(#[from] WrongValue),
-    /// The row along which the slip is measured does not grow.
-    #[error(transparent)]
-    Row(#[from] Problem),
-    /// The firmware refuses its settings.
-    #[error(transparent)]
-    Refused(#[from] Refused),
-}
 
 /// Times that the manual has the servo timed and the wheel measured.
 const TIMINGS: u64 = 2;
@@ -71,11 +56,11 @@ impl Novice {
     ///
     /// # Errors
     /// Where the simulated field does not know what the step is about.
-    pub fn follow(&mut self, step: &ManualStep) -> Result<(), ManualError> {
+    pub fn follow(&mut self, step: &ManualStep) -> Result<()> {
         step.tasks.iter().try_for_each(|&task| self.follow_task(task))
     }
 
-    fn follow_task(&mut self, task: Task) -> Result<(), ManualError> {
+    fn follow_task(&mut self, task: Task) -> Result<()> {
         match task {
             Task::Fit(part, value) => self.conditions.set(part, value)?,
             Task::Set(setting, value) => self.set(setting, value)?,
@@ -117,8 +102,8 @@ impl Novice {
         Ok(())
     }
 
-    fn set(&mut self, setting: Setting, value: u16) -> Result<(), WrongValue> {
-        self.conditions.set(&name(setting), value.into())
+    fn set(&mut self, setting: Setting, value: u16) -> Result<()> {
+        Ok(self.conditions.set(&name(setting), value.into())?)
     }
 
     /// The settings as they are.
@@ -184,7 +169,7 @@ impl Novice {
     }
 
     /// The slip that a second beam tells along a row, plant by plant; none without one.
-    fn pass_plants(&self) -> Result<Vec<i16>, ManualError> {
+    fn pass_plants(&self) -> Result<Vec<i16>> {
         let conditions = &self.conditions;
         if conditions.machine.second_beam_mm == 0.0 {
             return Ok(Vec::new());

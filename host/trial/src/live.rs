@@ -18,24 +18,24 @@
 //! - **EEPROM.** It is read from a file at the start, where there is one, and written to it whenever it has changed.
 
 use crate::receiver::{ReceiverSetup, SimulatedReceiver};
+use anyhow::{Context, Error, Result, bail};
 use field::machine::{Machine, cycle_at, time_at_s};
 use field::motion::Motion;
 use field::row::Row;
 use field::servo::{Servo, Stroke};
 use field::wiring;
 use std::collections::VecDeque;
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
-use thiserror::Error;
+use uno::Uno;
 use uno::elf::EEPROM_BYTES;
 use uno::hex::Bootloader;
-use uno::pty::{Pty, PtyError};
+use uno::pty::Pty;
 use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
-use uno::{Uno, UnoError};
 
 mod background;
 pub mod rows;
@@ -75,36 +75,6 @@ pub struct Course {
     slip: f64,
     /// Time for which it stands before it rolls for the first time, in seconds.
     stands_first_s: u64,
-}
-
-/// Why a live Uno could not start, or stopped.
-#[derive(Debug, Error)]
-pub enum LiveError {
-    /// There is neither a firmware nor a bootloader.
-    #[error("there is nothing to run: give a firmware's ELF, a bootloader, or both")]
-    NothingToRun,
-    /// The virtual Uno stopped.
-    #[error(transparent)]
-    Uno(#[from] UnoError),
-    /// The pseudo terminal failed.
-    #[error(transparent)]
-    Pty(#[from] PtyError),
-    /// The EEPROM's file cannot be read or written.
-    #[error("the EEPROM's file {path} cannot be read or written")]
-    Eeprom {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: io::Error,
-    },
-    /// The EEPROM's file is another one.
-    #[error("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")]
-    NotEeprom {
-        /// The file.
-        path: PathBuf,
-        /// Its length.
-        bytes: usize,
-    },
 }
 
 /// Chip time between two looks at the terminal and at the host's clock.
@@ -215,7 +185,7 @@ struct Receiver {
 }
 
 impl Receiver {
-    fn start((setup, link): (ReceiverSetup, Option<PathBuf>)) -> Result<Self, LiveError> {
+    fn start((setup, link): (ReceiverSetup, Option<PathBuf>)) -> Result<Self> {
         let mut pty = Pty::open()?;
         if let Some(link) = &link {
             pty.link(link)?;
@@ -224,7 +194,7 @@ impl Receiver {
     }
 
     /// Passes on what it has said by now.
-    fn serve(&mut self, time_s: f64, way: &Way) -> Result<(), LiveError> {
+    fn serve(&mut self, time_s: f64, way: &Way) -> Result<()> {
         // It talks whether or not anybody listens, and takes no commands.
         if self.pty.was_opened()? {
             self.unread.clear();
@@ -236,7 +206,7 @@ impl Receiver {
 }
 
 /// Gives a program what waits for it, as far as it has room, and forgets what is too much.
-fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<(), LiveError> {
+fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<()> {
     let written = pty.write(unread.make_contiguous())?;
     unread.drain(..written);
     let too_many = unread.len().saturating_sub(MOST_BYTES_UNREAD);
@@ -328,13 +298,13 @@ impl LiveUno {
     ///
     /// # Errors
     /// Where there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
-    pub fn start(setup: Setup) -> Result<LiveUno, LiveError> {
+    pub fn start(setup: Setup) -> Result<LiveUno> {
         let eeprom = setup.eeprom.map(EepromFile::open).transpose()?;
         let content = eeprom.as_ref().map_or(&[][..], |file| &file.content);
         let mut uno = match (&setup.bootloader, &setup.elf) {
             (Some(bootloader), elf) => Uno::boot_with_bootloader(bootloader, elf.as_deref(), content)?,
             (None, Some(elf)) => Uno::boot_with_eeprom(elf, content)?,
-            (None, None) => return Err(LiveError::NothingToRun),
+            (None, None) => bail!("there is nothing to run: give a firmware's ELF, a bootloader, or both"),
         };
         uno = uno.wired(&wiring::WIRES);
         uno.follow_baud();
@@ -371,7 +341,7 @@ impl LiveUno {
     ///
     /// # Errors
     /// Where the firmware crashes or halts, or the terminal or the EEPROM's file fails.
-    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<()> {
         let mut pace = (!self.fast).then(Pace::new);
         while !stop.load(Ordering::Relaxed) {
             self.slice()?;
@@ -383,7 +353,7 @@ impl LiveUno {
     }
 
     /// Runs for a slice.
-    fn slice(&mut self) -> Result<(), LiveError> {
+    fn slice(&mut self) -> Result<()> {
         self.serve_terminal()?;
         self.serve_receiver()?;
         self.roll();
@@ -401,7 +371,7 @@ impl LiveUno {
     }
 
     /// Passes on what is left.
-    fn end(&mut self) -> Result<(), LiveError> {
+    fn end(&mut self) -> Result<()> {
         self.serve_terminal()?;
         self.serve_receiver()?;
         self.keep_eeprom()
@@ -413,7 +383,7 @@ impl LiveUno {
     }
 
     /// Plugs the cable in again.
-    fn plug_in(&mut self) -> Result<(), LiveError> {
+    fn plug_in(&mut self) -> Result<()> {
         let pty = terminal(self.link.as_deref())?;
         self.path = pty.path().to_owned();
         self.pty = Some(pty);
@@ -426,7 +396,7 @@ impl LiveUno {
     }
 
     /// Resets the chip where a program has opened the port, and passes bytes both ways.
-    fn serve_terminal(&mut self) -> Result<(), LiveError> {
+    fn serve_terminal(&mut self) -> Result<()> {
         let Some(pty) = &mut self.pty else {
             // What it says is heard by nobody.
             self.uno.received_bytes();
@@ -449,7 +419,7 @@ impl LiveUno {
     }
 
     /// Has the satellite receiver say what it has to say by now.
-    fn serve_receiver(&mut self) -> Result<(), LiveError> {
+    fn serve_receiver(&mut self) -> Result<()> {
         match &mut self.receiver {
             Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),
             None => Ok(()),
@@ -470,7 +440,7 @@ impl LiveUno {
         }
     }
 
-    fn keep_eeprom(&mut self) -> Result<(), LiveError> {
+    fn keep_eeprom(&mut self) -> Result<()> {
         match &mut self.eeprom {
             Some(file) => file.keep(self.uno.eeprom()),
             None => Ok(()),
@@ -479,7 +449,7 @@ impl LiveUno {
 }
 
 /// A pseudo terminal, with a link to it where one is wanted.
-fn terminal(link: Option<&Path>) -> Result<Pty, LiveError> {
+fn terminal(link: Option<&Path>) -> Result<Pty> {
     let mut pty = Pty::open()?;
     if let Some(link) = link {
         pty.link(link)?;
@@ -529,13 +499,13 @@ impl Ports {
 
 impl Live for LiveUno {
     type Outside = Ports;
-    type Failure = LiveError;
+    type Failure = Error;
 
     fn outside(&self) -> Ports {
         Ports { path: self.path().to_owned(), receiver_path: self.receiver_path().map(Path::to_owned) }
     }
 
-    fn run_until(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
+    fn run_until(&mut self, stop: &AtomicBool) -> Result<()> {
         self.run(stop)
     }
 }
@@ -548,27 +518,33 @@ struct EepromFile {
 
 impl EepromFile {
     /// Reads it; a file that does not exist yet is an erased EEPROM.
-    fn open(path: PathBuf) -> Result<EepromFile, LiveError> {
+    fn open(path: PathBuf) -> Result<EepromFile> {
         match std::fs::read(&path) {
             Ok(content) if content.len() == EEPROM_BYTES => Ok(EepromFile { path, content }),
-            Ok(content) => Err(LiveError::NotEeprom { path, bytes: content.len() }),
+            Ok(content) => {
+                let (path, bytes) = (path.display(), content.len());
+                bail!("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")
+            }
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 let mut file = EepromFile { path, content: Vec::new() };
                 // A file that cannot be written is better known now.
                 file.keep(vec![0xFF; EEPROM_BYTES])?;
                 Ok(file)
             }
-            Err(source) => Err(LiveError::Eeprom { path, source }),
+            Err(error) => Err(error).with_context(|| unusable(&path)),
         }
     }
 
     /// Writes it where the content has changed.
-    fn keep(&mut self, content: Vec<u8>) -> Result<(), LiveError> {
+    fn keep(&mut self, content: Vec<u8>) -> Result<()> {
         if content != self.content {
-            std::fs::write(&self.path, &content)
-                .map_err(|source| LiveError::Eeprom { path: self.path.clone(), source })?;
+            std::fs::write(&self.path, &content).with_context(|| unusable(&self.path))?;
             self.content = content;
         }
         Ok(())
     }
+}
+
+fn unusable(path: &Path) -> String {
+    format!("the EEPROM's file {} cannot be read or written", path.display())
 }

@@ -3,7 +3,7 @@
 //! # Who knows whom
 //!
 //! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`, `turns` beside them -> `recorder`,
-//! which owns what simavr calls back with -> `core`, which runs it -> `terminal` -> `board`, which has the [`Uno`]. The files: `elf` -> `hex`, `core` -> `board`.
+//! which owns what simavr calls back with -> `core`, which runs it -> `terminal` -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `capture`, `pty` -> `hex`, `core` -> `board`.
 //! `pins` knows none of these and is known to all; `capture`, `waveform` and `pty` know only `pins`.
 
 #[cfg(feature = "simavr")]
@@ -48,7 +48,7 @@ pub use self::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 #[cfg(feature = "simavr")]
 pub use self::{
     board::Uno,
-    error::UnoError,
+    error::{FileError, UnoError},
     interrupts::{HandlerCycles, InterruptStatistics, Place},
     recorder::{ReceivedByte, Reset, ResetCause},
     terminal::{BAUD, SENT_BYTE_CYCLES},

@@ -10,6 +10,7 @@
 //! The system's calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one and
 //! do not tell who opens it.
 
+use crate::error::FileError;
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};
 use rustix::io::Errno;
@@ -20,53 +21,12 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::mem::MaybeUninit;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Bits in a second that the terminal says it has, to programs that ask and do not set it.
 const BAUD: u32 = 115_200;
 
 /// Where the system keeps the programs' sides.
 const TERMINALS: &str = "/dev/pts";
-
-/// Why a pseudo terminal does not work.
-#[derive(Debug, Error)]
-pub enum PtyError {
-    /// The system has none to give.
-    #[error("no pseudo terminal can be opened: is /dev/pts mounted?")]
-    Open(#[source] io::Error),
-    /// It stopped working.
-    #[error("the pseudo terminal {path} has failed")]
-    Failed {
-        /// Its path.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: io::Error,
-    },
-    /// Something else is where the link should be.
-    #[error("{0} exists already and is no link to a pseudo terminal: name another link, or remove it")]
-    LinkExists(PathBuf),
-    /// The link leads to a pseudo terminal that somebody uses.
-    #[error(
-        "{} leads to {}, which {holder} has: end it, or name another link; if it is none of your virtual Unos, remove the link",
-        path.display(), target.display()
-    )]
-    LinkInUse {
-        /// The link.
-        path: PathBuf,
-        /// Where it leads.
-        target: PathBuf,
-        /// Which process has the device's side of it.
-        holder: String,
-    },
-    /// The link cannot be made.
-    #[error("{path} cannot be made a link to the pseudo terminal")]
-    Link {
-        /// Where the link should be.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: io::Error,
-    },
-}
 
 /// The device's side of a pseudo terminal. Dropped, it is gone for those who have the other side open, as an Uno whose cable is
 /// pulled.
@@ -89,7 +49,7 @@ impl Pty {
     ///
     /// # Errors
     /// Where the system has none to give.
-    pub fn open() -> Result<Pty, PtyError> {
+    pub fn open() -> Result<Pty, FileError> {
         let open = || -> io::Result<Pty> {
             let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
             grantpt(&device)?;
@@ -106,7 +66,8 @@ impl Pty {
             inotify::add_watch(&watch, &path, inotify::WatchFlags::OPEN | inotify::WatchFlags::CLOSE)?;
             Ok(Pty { device: device.into(), other_side, watch, is_open: false, path, link: None })
         };
-        open().map_err(PtyError::Open)
+        let problem = "has no pseudo terminal to give: is it mounted?";
+        open().map_err(|source| FileError::failed(Path::new(TERMINALS), problem, source))
     }
 
     /// The path under which programs open it.
@@ -119,12 +80,14 @@ impl Pty {
     ///
     /// # Errors
     /// Where something else is there, somebody uses it, or the folder cannot be written to.
-    pub fn link(&mut self, path: &Path) -> Result<(), PtyError> {
+    pub fn link(&mut self, path: &Path) -> Result<(), FileError> {
         let target = std::fs::read_link(path).ok().filter(|target| target.starts_with(TERMINALS));
         // What was left over may lead to this very one: the system gives the numbers away again.
         if let Some(target) = target.as_ref().filter(|&target| *target != self.path && target.exists()) {
             let holder = holder(target);
-            return Err(PtyError::LinkInUse { path: path.into(), target: target.clone(), holder });
+            let target = target.display();
+            let right = "end it, or name another link; if it is none of your virtual Unos, remove the link";
+            return Err(FileError::new(path, format_args!("leads to {target}, which {holder} has: {right}")));
         }
         let is_left_over = target.is_some();
         let linked = match is_left_over {
@@ -136,8 +99,11 @@ impl Pty {
                 self.link = Some(path.into());
                 Ok(())
             }
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(PtyError::LinkExists(path.into())),
-            Err(source) => Err(PtyError::Link { path: path.into(), source }),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(FileError::new(
+                path,
+                "exists already and is no link to a pseudo terminal: name another link, or remove it",
+            )),
+            Err(source) => Err(FileError::failed(path, "cannot be made a link to the pseudo terminal", source)),
         }
     }
 
@@ -146,7 +112,7 @@ impl Pty {
     ///
     /// # Errors
     /// Where it has failed.
-    pub fn was_opened(&mut self) -> Result<bool, PtyError> {
+    pub fn was_opened(&mut self) -> Result<bool, FileError> {
         let mut opened = false;
         let mut buffer = [MaybeUninit::uninit(); 1024];
         let mut events = inotify::Reader::new(&self.watch, &mut buffer);
@@ -176,7 +142,7 @@ impl Pty {
     ///
     /// # Errors
     /// Where it has failed.
-    pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, PtyError> {
+    pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, FileError> {
         self.count(|mut device| device.read(buffer))
     }
 
@@ -184,11 +150,11 @@ impl Pty {
     ///
     /// # Errors
     /// Where it has failed.
-    pub fn write(&mut self, bytes: &[u8]) -> Result<usize, PtyError> {
+    pub fn write(&mut self, bytes: &[u8]) -> Result<usize, FileError> {
         self.count(|mut device| device.write(bytes))
     }
 
-    fn count(&self, transfer: impl FnOnce(&File) -> io::Result<usize>) -> Result<usize, PtyError> {
+    fn count(&self, transfer: impl FnOnce(&File) -> io::Result<usize>) -> Result<usize, FileError> {
         match transfer(&self.device) {
             Ok(count) => Ok(count),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
@@ -196,8 +162,8 @@ impl Pty {
         }
     }
 
-    fn failed(&self, source: io::Error) -> PtyError {
-        PtyError::Failed { path: self.path.clone(), source }
+    fn failed(&self, source: io::Error) -> FileError {
+        FileError::failed(&self.path, "has failed", source)
     }
 }
 

@@ -1,11 +1,11 @@
 //! A chapter of the page: what the plots together say of one measure, with what the paper printed of it beside.
 
-use super::chart::DrawingError;
 use super::figure::{Figure, residuals};
 use super::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use crate::evaluation::published::{Coefficients, Published};
 use crate::evaluation::{Analysis, ResponseAnalysis};
 use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
+use anyhow::Result;
 
 /// What the page says of one measure.
 pub struct Chapter {
@@ -38,7 +38,7 @@ impl Chapter {
     ///
     /// # Errors
     /// Where plotters cannot draw the residuals.
-    pub fn of(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Self, DrawingError> {
+    pub fn of(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Self> {
         let (model, variance) = (of.model.as_ref(), of.variance.as_ref());
         let name = of.response.title().to_lowercase();
 

@@ -12,6 +12,7 @@
 //! that the spacing of the next one is counted from a plant.
 
 use super::labelled::Labelled;
+use anyhow::{Result, ensure};
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
 use control::measure::quadrature::{Quadrature, Step};
@@ -24,15 +25,14 @@ use control::{
 };
 use field::machine::Machine;
 use field::motion::Motion;
-use field::planting::{Planting, PlantingError};
-use field::row::{Kind, Problem, Row, Thing};
+use field::planting::Planting;
+use field::row::{Kind, Row, Thing};
 use field::wiring;
 use knn::Example;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
-use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// How a crop stands, and which weeds outgrow the beam beside it.
@@ -132,30 +132,11 @@ const LOOP_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
 /// The Uno's cycles in a step of the firmware's clock.
 const CYCLES_PER_STEP: u64 = CYCLES_PER_SECOND / Interval::STEPS_PER_SECOND as u64;
 
-/// Why there is no field.
-#[derive(Debug, Error, PartialEq)]
-pub enum SyntheticError {
-    /// The plants do not fit.
-    #[error(transparent)]
-    Planting(#[from] PlantingError),
-    /// The row is not one.
-    #[error(transparent)]
-    Row(#[from] Problem),
-    /// The beam did not see the row as it was planted, so that nothing can be labelled.
-    #[error("the beam saw {seen} objects on a row of {planted}: it has to see each as one")]
-    Miscounted {
-        /// Objects that the controller classified.
-        seen: usize,
-        /// Plants and weeds in the row.
-        planted: usize,
-    },
-}
-
 /// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
 ///
 /// # Errors
 /// Where rows cannot grow or be seen as they should.
-pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
+pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut objects = Vec::new();
     for pass in 0..crop.passes {
@@ -173,13 +154,7 @@ pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> 
 }
 
 /// A row with missing plants, and weeds on its bare ground.
-fn grow(
-    crop: &Crop,
-    spacing_mm: f64,
-    headland_mm: f64,
-    ragged: bool,
-    rng: &mut impl Rng,
-) -> Result<Row, SyntheticError> {
+fn grow(crop: &Crop, spacing_mm: f64, headland_mm: f64, ragged: bool, rng: &mut impl Rng) -> Result<Row> {
     let planting = Planting {
         plants: PLANTS,
         spacing_mm,
@@ -270,7 +245,7 @@ impl Classifier for &Recorder<'_> {
 }
 
 /// What the controller sees of a row.
-fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, SyntheticError> {
+fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>> {
     let standard = Machine::default();
     // The firmware knows the wheel; the wheel that slips goes farther in a turn than it knows.
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
@@ -300,7 +275,12 @@ fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<
 
     let seen = recorder.seen.into_inner();
     let planted = row.things().len();
-    if seen.len() == planted { Ok(seen) } else { Err(SyntheticError::Miscounted { seen: seen.len(), planted }) }
+    ensure!(
+        seen.len() == planted,
+        "the beam saw {} objects on a row of {planted}: it has to see each as one",
+        seen.len()
+    );
+    Ok(seen)
 }
 
 fn readings(cycle: u64, position: Position) -> Readings {

@@ -4,7 +4,7 @@
 //! exact. It also compares every answer of the search in flash with a plain search's, and no figure is given where
 //! they differ.
 
-use super::error::BenchError;
+use anyhow::{Context, Result, bail, ensure};
 use field::wiring;
 use knn_bench::{QUERIES, Task};
 use serde::Serialize;
@@ -17,6 +17,9 @@ const EDGE_CYCLES: u64 = 2;
 
 /// Longest time that the bench may take: ten times what it does.
 const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
+
+/// What to do if the ELF is not the bench's.
+const RIGHT_ELF: &str = "run the ELF that `cargo bench-firmware` makes";
 
 /// Simulated time between two reports of progress.
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
@@ -53,7 +56,7 @@ pub struct ClassifierCosts {
 ///
 /// # Errors
 /// Where the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
-pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts, BenchError> {
+pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts> {
     let mut uno = Uno::boot(elf)?;
     variable(&uno, "DIFFERENT_ANSWERS")?;
     let expected = Task::ALL.len() * QUERIES;
@@ -70,13 +73,14 @@ pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Classifie
             match variable(&uno, "DIFFERENT_ANSWERS")? {
                 u16::MAX => {}
                 0 => break,
-                different => return Err(BenchError::Different(different)),
+                different => bail!(
+                    "{different} answers of the search in flash differ from the plain search's: its cycles mean nothing"
+                ),
             }
         }
     }
-    if calls.len() != expected {
-        return Err(BenchError::Unfinished { seen: calls.len(), expected });
-    }
+    let seen = calls.len();
+    ensure!(seen == expected, "the bench showed {seen} of {expected} calls on D13: {RIGHT_ELF}");
     // The stack grows down from the end of SRAM, and its pointer stands on the first free byte.
     let own = 0x8FF - variable(&uno, "STACK_POINTER")?;
     let cycles = calls.chunks(QUERIES).filter_map(Cycles::of);
@@ -89,7 +93,7 @@ fn call_cycles(uno: &Uno) -> Vec<u64> {
     edges.chunks_exact(2).map(|edges| edges[1].cycle - edges[0].cycle - EDGE_CYCLES).collect()
 }
 
-fn variable(uno: &Uno, name: &'static str) -> Result<u16, BenchError> {
+fn variable(uno: &Uno, name: &'static str) -> Result<u16> {
     let bytes = uno.read(name).and_then(|bytes| bytes.try_into().ok());
-    bytes.map(u16::from_le_bytes).ok_or(BenchError::NoVariable(name))
+    bytes.map(u16::from_le_bytes).with_context(|| format!("the bench has no variable `{name}`: {RIGHT_ELF}"))
 }

@@ -17,10 +17,10 @@
 //! The firmware is in HOLD. What weeding adds is less than [`Load::Telemetry`], which asks for more than the serial line can
 //! carry and has the beam flicker as fast as its sensor can.
 
-use super::error::BenchError;
 use super::load::{EDGE_CYCLES, Telemetry, flicker};
 use crate::console::{ConsoleError, Status, ask};
 use crate::run;
+use anyhow::Result;
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -107,7 +107,7 @@ const SETTLE_MS: u64 = 100;
 ///
 /// # Errors
 /// Where the ELF cannot be run.
-pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
+pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
     let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
@@ -128,7 +128,7 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, 
 }
 
 /// Asks for what the firmware has counted of `counts` edges, once it has come to rest.
-fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted, BenchError> {
+fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted> {
     uno.run_for_ms(SETTLE_MS)?;
     let status = match Status::ask(uno) {
         Ok(status) => Some(status),
@@ -164,7 +164,7 @@ const SECTIONS_PASSED: u32 = 40;
 ///
 /// # Errors
 /// Where the ELF cannot be run.
-pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
+pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -226,7 +226,7 @@ impl World {
 
     /// Runs until a handler begins or, where nothing comes from outside, until the loop is about to turn interrupts off. Returns
     /// the cycle of the handler's entry. Something comes from outside once the loop has passed so many critical sections.
-    fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64, BenchError> {
+    fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64> {
         loop {
             let cycle = uno.cycle();
             if uno.place() == Place::BeforeCriticalSection {
@@ -302,7 +302,7 @@ const HIGHEST_PER_S: f64 = 800_000.0;
 const BELOW: [f64; 8] = [0.99, 0.98, 0.97, 0.95, 0.9, 0.8, 0.7, 0.5];
 
 /// Both trials of a rate; `None` where one of them was not passed.
-fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate>, BenchError> {
+fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate>> {
     let mut line_share = 1.0_f64;
     for trial in [turn_at_worst, turn] {
         let counted = trial(elf, turning, counts_per_s)?;
@@ -318,7 +318,7 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
 ///
 /// # Errors
 /// Where the ELF cannot be run.
-pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate, BenchError> {
+pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate> {
     let mut passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
     let mut failed = HIGHEST_PER_S;
     let bisections = ((HIGHEST_PER_S / LOWEST_PER_S).ln() / RESOLUTION.ln_1p()).log2().ceil();

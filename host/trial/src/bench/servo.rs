@@ -1,8 +1,8 @@
 //! The servo's jitter: how much its pulses and its frames differ while the firmware has all hands full.
 
-use super::error::BenchError;
 use super::load::{Telemetry, flicker};
 use crate::run;
+use anyhow::Result;
 use field::wiring;
 use serde::Serialize;
 use std::path::Path;
@@ -38,7 +38,7 @@ const FRAME_CYCLES: u64 = CYCLES_PER_SECOND / 50;
 ///
 /// # Errors
 /// Where the ELF cannot be run.
-pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter, BenchError> {
+pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter> {
     let mut uno = run::boot(elf, &[])?;
     uno.send(b"events on\n");
     uno.measure_interrupts();

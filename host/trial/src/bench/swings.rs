@@ -3,8 +3,8 @@
 //! Each row is a trial of its own, from power-up: the real ELF weeds it, and [`field::verdict`] holds each rising edge with a new
 //! width against the place where the swing was due. Rows run in parallel.
 
-use super::error::BenchError;
 use crate::run::run;
+use anyhow::Result;
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::{Planting, WEED_MARGIN_MM};
@@ -108,7 +108,7 @@ const ROOM_FOR_WEED_MM: f64 = 2.0 * WEED_MARGIN_MM + 30.0;
 ///
 /// # Errors
 /// Where the ELF cannot be run.
-pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Result<Lateness, BenchError> {
+pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Result<Lateness> {
     let count = rows.seeds.end.saturating_sub(rows.seeds.start) as f64;
     let done = AtomicUsize::new(0);
     let outcomes: Vec<_> = rows
@@ -122,7 +122,7 @@ pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Resul
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count);
             Ok(outcome)
         })
-        .collect::<Result<_, BenchError>>()?;
+        .collect::<Result<_>>()?;
 
     let judgements = || outcomes.iter().map(|outcome| &outcome.judgement);
     let plants: usize = judgements().map(|judgement| judgement.plants.len()).sum();

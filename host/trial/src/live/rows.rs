@@ -6,7 +6,8 @@
 //!
 //! The cable itself is not simulated: no edge is lost on it, and none comes late.
 
-use super::{Live, LiveError, LiveUno, Pace, SLICE_MS, Setup};
+use super::{Live, LiveUno, Pace, SLICE_MS, Setup};
+use anyhow::{Error, Result};
 use rustix::time::{ClockId, clock_gettime};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -70,7 +71,7 @@ impl LiveRows {
     ///
     /// # Errors
     /// As [`LiveUno::start`].
-    pub fn start(setups: Vec<Setup>) -> Result<Self, LiveError> {
+    pub fn start(setups: Vec<Setup>) -> Result<Self> {
         let fast = setups.first().is_some_and(|setup| setup.fast);
         let unos = setups.into_iter().map(LiveUno::start).collect::<Result<_, _>>()?;
         Ok(Self { unos, mishaps: Arc::default(), fast })
@@ -85,7 +86,7 @@ impl LiveRows {
     ///
     /// # Errors
     /// What has ended one of them, and which, once the others have ended as well.
-    pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, LiveError)> {
+    pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, Error)> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let threads = cores.min(self.unos.len() / ROWS_OF_A_THREAD).max(1);
         let each = self.unos.len().div_ceil(threads).max(1);
@@ -160,7 +161,7 @@ fn worked() -> Duration {
 struct Part<'a> {
     first: usize,
     unos: Vec<(&'a mut LiveUno, bool)>,
-    failed: Option<(usize, LiveError)>,
+    failed: Option<(usize, Error)>,
 }
 
 impl<'a> Part<'a> {
@@ -182,7 +183,7 @@ impl<'a> Part<'a> {
     }
 
     /// One has stopped: to those at its port it is as if its cable were pulled.
-    fn stop(&mut self, place: usize, error: LiveError) {
+    fn stop(&mut self, place: usize, error: Error) {
         let (uno, runs) = &mut self.unos[place];
         uno.unplug();
         *runs = false;
@@ -222,7 +223,7 @@ impl<'a> Part<'a> {
     }
 
     /// Ends them, and says what has stopped one before.
-    fn end(mut self) -> Option<(usize, LiveError)> {
+    fn end(mut self) -> Option<(usize, Error)> {
         for place in 0..self.unos.len() {
             let (uno, runs) = &mut self.unos[place];
             if *runs && let Err(error) = uno.end() {
@@ -254,7 +255,7 @@ impl Reached {
 impl Live for LiveRows {
     type Outside = Reached;
     /// Which row has ended, and why.
-    type Failure = (usize, LiveError);
+    type Failure = (usize, Error);
 
     fn outside(&self) -> Reached {
         let paths = self.paths().into_iter().map(Path::to_owned).collect();
