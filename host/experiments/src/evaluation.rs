@@ -8,7 +8,7 @@
 mod findings;
 mod plot;
 pub mod published;
-mod report;
+pub(crate) mod report;
 mod response;
 pub mod table;
 
@@ -18,7 +18,7 @@ pub use self::table::{FileError, read_csv, write_csv};
 
 use self::published::Published;
 use crate::statistics::{AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, anyhow, ensure};
 use serde::Serialize;
 
 /// What follows from all plots of a trial.
@@ -76,7 +76,7 @@ impl Analysis {
     pub fn of(records: Vec<PlotRecord>) -> Result<Self> {
         ensure!(!records.is_empty(), "a trial has at least one plot");
         for (index, record) in records.iter().enumerate() {
-            record.check().with_context(|| format!("plot {}", index + 1))?;
+            record.check().map_err(|problem| anyhow!("plot {}: {problem}", index + 1))?;
         }
         let performances: Vec<Performance> = records.iter().map(PlotRecord::performance).collect();
         let design = Design::new(records.iter().map(|record| (record.speed_km_h, record.spacing_cm)))

@@ -2,9 +2,9 @@
 
 use super::chart::{Chart, Look, Series, key, range_of};
 use super::comparison::{Comparison, ControllerPoint};
-use super::table::{fixed, short};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::statistics::LinearModel;
+use crate::table::{fixed, short};
 use anyhow::Result;
 
 /// A chart with all that belongs to it.

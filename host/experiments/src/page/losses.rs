@@ -1,7 +1,7 @@
 //! Where the row's ground went, as bars of parts that fill them, and the same as a table.
 
 use super::comparison::Work;
-use super::table::{Table, fixed, short};
+use crate::table::{Table, fixed, short};
 use field::budget::Part;
 
 /// Parts narrower than this, in tenths of a percent, have no room for their figure.

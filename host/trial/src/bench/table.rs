@@ -8,7 +8,8 @@ use super::classifier::ClassifierCosts;
 use super::encoder::{Direction, JITTER, Load, Rate, Turning};
 use super::servo::Jitter;
 use super::swings::Lateness;
-use comfy_table::{CellAlignment, Table, presets};
+use crate::report::number_table;
+use comfy_table::Table;
 use knn_bench::Task;
 use uno::CYCLES_PER_SECOND;
 use uno::elf::Size;
@@ -53,7 +54,7 @@ impl Figures {
     /// Ours beside those of others; a ratio above 1 is in our favour.
     fn others(&self) -> Table {
         let header = ["", "this firmware", "Arduino sketch", "best library", "assembly"];
-        let mut table = number_table(&header);
+        let mut table = number_table(header, 1);
         let idle = self.lowest_rate(Load::Idle);
         let busy = self.lowest_rate(Load::Telemetry);
         for (name, ours, others) in [
@@ -99,14 +100,15 @@ impl Figures {
 
     /// A line per load, with the highest rate each way.
     fn rates(&self) -> Table {
-        let mut table = number_table(&[
+        let header = [
             "highest counts/s without a lost count,\nfor any phase of the edges",
             "forward",
             "backward",
             "30 % jitter,\nforward",
             "30 % jitter,\nbackward",
             "serial line\nin use",
-        ]);
+        ];
+        let mut table = number_table(header, 1);
         for (name, load) in [("idle", Load::Idle), ("status streaming, beam flickering", Load::Telemetry)] {
             let rates: Vec<&Rate> = self.rates.iter().filter(|rate| rate.turning.load == load).collect();
             let least_share = rates.iter().map(|rate| rate.line_share).fold(1.0, f64::min);
@@ -118,7 +120,7 @@ impl Figures {
 
     /// A line per task of the classifier.
     fn classifier(&self) -> Table {
-        let mut table = number_table(&["classifier", "fewest\ncycles", "mean", "most"]);
+        let mut table = number_table(["classifier", "fewest\ncycles", "mean", "most"], 1);
         for (task, cycles) in &self.classifier.tasks {
             let name = match task {
                 Task::Quantise => "scale five features to bytes".to_owned(),
@@ -129,16 +131,6 @@ impl Figures {
         }
         table
     }
-}
-
-/// A table without inner lines whose columns, from the second on, are numbers.
-fn number_table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(header.iter().copied());
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }
 
 /// Another's figure with the ratio that it gives.
