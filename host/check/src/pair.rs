@@ -5,14 +5,14 @@
 //! and distances are right. [`Wiring`] can be wrong on purpose, for tests of the check.
 
 use crate::second::SecondUno;
+use anyhow::{Context, Result};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use tester_core::pins::Line;
-use thiserror::Error;
-use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno, UnoError};
+use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno};
 
 /// Cycles between two looks at the wires: 1 us.
 pub const STEP: u64 = 16;
@@ -80,16 +80,8 @@ impl Wiring {
     }
 }
 
-/// Why the boards stopped.
-#[derive(Debug, Error)]
-pub enum PairError {
-    /// A virtual Uno stopped.
-    #[error(transparent)]
-    Uno(#[from] UnoError),
-    /// The second simulator did.
-    #[error("the second simulator")]
-    Second(#[from] io::Error),
-}
+/// What is said to have stopped.
+const SECOND: &str = "the second simulator";
 
 /// The weeder's virtual Uno: of this project's simulator, or of another one.
 enum WeederUno {
@@ -105,10 +97,10 @@ impl WeederUno {
         }
     }
 
-    fn run_until(&mut self, cycle: u64) -> Result<(), PairError> {
+    fn run_until(&mut self, cycle: u64) -> Result<()> {
         match self {
             Self::Own(uno) => uno.run_until(cycle)?,
-            Self::Second(uno) => uno.run_until(cycle)?,
+            Self::Second(uno) => uno.run_until(cycle).context(SECOND)?,
         }
         Ok(())
     }
@@ -134,10 +126,10 @@ impl WeederUno {
         }
     }
 
-    fn reset(&mut self) -> Result<(), PairError> {
+    fn reset(&mut self) -> Result<()> {
         match self {
             Self::Own(uno) => uno.reset(),
-            Self::Second(uno) => uno.reset()?,
+            Self::Second(uno) => uno.reset().context(SECOND)?,
         }
         Ok(())
     }
@@ -163,7 +155,7 @@ impl Pair {
     ///
     /// # Errors
     /// If an ELF cannot be run.
-    pub fn power_up(tester: &Path, weeder: &Path, eeprom: &[u8], wiring: Wiring) -> Result<Self, UnoError> {
+    pub fn power_up(tester: &Path, weeder: &Path, eeprom: &[u8], wiring: Wiring) -> Result<Self> {
         let weeder_uno = Uno::boot_with_eeprom(weeder, eeprom)?.wired(&field::wiring::WIRES);
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
     }
@@ -172,8 +164,8 @@ impl Pair {
     ///
     /// # Errors
     /// If an ELF cannot be run, or the other simulator.
-    pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self, PairError> {
-        let second = SecondUno::power_up(program, weeder)?;
+    pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self> {
+        let second = SecondUno::power_up(program, weeder).context(SECOND)?;
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Second(second), weeder, Wiring::right()))
     }
 
@@ -208,7 +200,7 @@ impl Pair {
     ///
     /// # Errors
     /// If one of them stops.
-    pub fn run_for(&mut self, cycles: u64) -> Result<(), PairError> {
+    pub fn run_for(&mut self, cycles: u64) -> Result<()> {
         let end = self.tester.cycle() + cycles;
         while self.tester.cycle() < end {
             self.step()?;
@@ -218,7 +210,7 @@ impl Pair {
         Ok(())
     }
 
-    fn step(&mut self) -> Result<(), PairError> {
+    fn step(&mut self) -> Result<()> {
         let until = self.tester.cycle() + STEP;
         self.tester.run_until(until)?;
         for change in self.tester.take_changes() {
@@ -239,7 +231,7 @@ impl Pair {
     }
 
     /// While the reset is pulled, the weeder's clock stands still, and both are counted from there on.
-    fn look_at_reset(&mut self) -> Result<(), PairError> {
+    fn look_at_reset(&mut self) -> Result<()> {
         if self.is_reset_pulled {
             self.shared = (self.tester.cycle(), self.weeder.cycle());
         }
@@ -265,7 +257,7 @@ impl Pair {
     ///
     /// # Errors
     /// If the second simulator has ended.
-    pub fn reset(&mut self, side: Side) -> Result<(), PairError> {
+    pub fn reset(&mut self, side: Side) -> Result<()> {
         self.resets += 1;
         match side {
             Side::Tester => self.tester.reset(),
