@@ -3,7 +3,6 @@
 use crate::common::{ask, elf, encoder_steps, number, run_for_ms, status, woken_up};
 use field::wiring;
 use std::path::Path;
-use trial::bench::BenchError;
 use trial::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
 use uno::{CYCLES_PER_SECOND, PinChange};
 
@@ -28,7 +27,7 @@ fn assert_no_count_is_lost(counts_per_s: f64, jitter: f64) {
     }
 }
 
-type Trial = fn(&Path, Turning, f64) -> Result<Counted, BenchError>;
+type Trial = fn(&Path, Turning, f64) -> anyhow::Result<Counted>;
 
 #[test]
 fn no_count_is_lost_at_the_full_rate_beside_telemetry_and_a_flickering_beam() {

@@ -2,37 +2,25 @@
 //!
 //! They run at full speed. Opening a port resets its board, as the modem line DTR does on a real one.
 
-use crate::pair::{Pair, PairError, Side, Wiring};
-use std::io;
+use crate::pair::{Pair, Side, Wiring};
+use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
-use thiserror::Error;
 use uno::CYCLES_PER_SECOND;
-use uno::pty::{Pty, PtyError};
+use uno::pty::Pty;
 
 /// Greatest number of bytes on their way to a board. Others stay in the terminal.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
 
-/// Why the desk could not be set up, or stopped.
-#[derive(Debug, Error)]
-pub enum DeskError {
-    /// A virtual Uno stopped.
-    #[error(transparent)]
-    Pair(#[from] PairError),
-    /// A pseudo terminal failed.
-    #[error(transparent)]
-    Pty(#[from] PtyError),
-    /// The thread could not be started, or panicked.
-    #[error("the virtual Unos do not run")]
-    Thread(#[source] io::Error),
-}
+/// What is said if their thread could not be started, or panicked.
+const STOPPED: &str = "the virtual Unos do not run";
 
 /// Two virtual Unos. Dropped, they stop.
 pub struct Desk {
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Result<(), DeskError>>>,
+    thread: Option<JoinHandle<Result<()>>>,
     tester: PathBuf,
     weeder: PathBuf,
 }
@@ -41,8 +29,8 @@ impl Desk {
     /// Powers both up. `second` is the program of another simulator that replaces the weeder's, if it is given.
     ///
     /// # Errors
-    /// If an ELF cannot be run, or no pseudo terminal is available.
-    pub fn start(tester_elf: &Path, weeder_elf: &Path, second: Option<&Path>) -> Result<Self, DeskError> {
+    /// If an ELF cannot be run, or no pseudo terminal is to be had.
+    pub fn start(tester_elf: &Path, weeder_elf: &Path, second: Option<&Path>) -> Result<Self> {
         let (tester_pty, weeder_pty) = (Pty::open()?, Pty::open()?);
         let (tester, weeder) = (tester_pty.path().to_owned(), weeder_pty.path().to_owned());
         let stop = Arc::new(AtomicBool::new(false));
@@ -52,7 +40,7 @@ impl Desk {
         let run = move || {
             let mut pair = match second {
                 Some(program) => Pair::with_second_simulator(&elves.0, &elves.1, &program)?,
-                None => Pair::power_up(&elves.0, &elves.1, &[], Wiring::right()).map_err(PairError::from)?,
+                None => Pair::power_up(&elves.0, &elves.1, &[], Wiring::right())?,
             };
             let mut ptys = [(Side::Tester, tester_pty), (Side::Weeder, weeder_pty)];
             while !is_to_stop.load(Ordering::Relaxed) {
@@ -63,7 +51,7 @@ impl Desk {
             }
             Ok(())
         };
-        let thread = thread::Builder::new().name("desk".to_owned()).spawn(run).map_err(DeskError::Thread)?;
+        let thread = thread::Builder::new().name("desk".to_owned()).spawn(run).context(STOPPED)?;
         Ok(Self { stop, thread: Some(thread), tester, weeder })
     }
 
@@ -80,10 +68,10 @@ impl Desk {
     /// Stops both.
     ///
     /// # Errors
-    /// If one of them had already stopped.
-    pub fn stop(mut self) -> Result<(), DeskError> {
+    /// If one of them had stopped by itself.
+    pub fn stop(mut self) -> Result<()> {
         self.stop.store(true, Ordering::Relaxed);
-        let panicked = |_| Err(DeskError::Thread(io::Error::other("the thread panicked")));
+        let panicked = |_| Err(anyhow!("{STOPPED}: the thread panicked"));
         self.thread.take().map_or(Ok(()), |thread| thread.join().unwrap_or_else(panicked))
     }
 }
@@ -95,7 +83,7 @@ impl Drop for Desk {
 }
 
 /// Moves bytes between a board and its terminal.
-fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<(), DeskError> {
+fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<()> {
     if pty.was_opened()? {
         // Output to a closed port is dropped.
         pair.received(side).clear();

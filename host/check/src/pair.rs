@@ -6,14 +6,14 @@
 //! on purpose.
 
 use crate::second::SecondUno;
+use anyhow::{Context, Result};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use tester_core::pins::Line;
-use thiserror::Error;
-use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno, UnoError};
+use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno};
 
 /// Cycles between two checks of the wires: 1 us.
 pub const STEP: u64 = 16;
@@ -81,16 +81,8 @@ impl Wiring {
     }
 }
 
-/// Why the boards stopped.
-#[derive(Debug, Error)]
-pub enum PairError {
-    /// A virtual Uno stopped.
-    #[error(transparent)]
-    Uno(#[from] UnoError),
-    /// The second simulator did.
-    #[error("the second simulator")]
-    Second(#[from] io::Error),
-}
+/// What is said to have stopped.
+const SECOND: &str = "the second simulator";
 
 /// The weeder's virtual Uno, of this project's simulator or of another one.
 enum WeederUno {
@@ -106,10 +98,10 @@ impl WeederUno {
         }
     }
 
-    fn run_until(&mut self, cycle: u64) -> Result<(), PairError> {
+    fn run_until(&mut self, cycle: u64) -> Result<()> {
         match self {
             Self::Own(uno) => uno.run_until(cycle)?,
-            Self::Second(uno) => uno.run_until(cycle)?,
+            Self::Second(uno) => uno.run_until(cycle).context(SECOND)?,
         }
         Ok(())
     }
@@ -135,10 +127,10 @@ impl WeederUno {
         }
     }
 
-    fn reset(&mut self) -> Result<(), PairError> {
+    fn reset(&mut self) -> Result<()> {
         match self {
             Self::Own(uno) => uno.reset(),
-            Self::Second(uno) => uno.reset()?,
+            Self::Second(uno) => uno.reset().context(SECOND)?,
         }
         Ok(())
     }
@@ -164,7 +156,7 @@ impl Pair {
     ///
     /// # Errors
     /// If an ELF cannot be run.
-    pub fn power_up(tester: &Path, weeder: &Path, eeprom: &[u8], wiring: Wiring) -> Result<Self, UnoError> {
+    pub fn power_up(tester: &Path, weeder: &Path, eeprom: &[u8], wiring: Wiring) -> Result<Self> {
         let weeder_uno = Uno::boot_with_eeprom(weeder, eeprom)?.wired(&field::wiring::WIRES);
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
     }
@@ -173,8 +165,8 @@ impl Pair {
     ///
     /// # Errors
     /// If an ELF cannot be run, or the other simulator.
-    pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self, PairError> {
-        let second = SecondUno::power_up(program, weeder)?;
+    pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self> {
+        let second = SecondUno::power_up(program, weeder).context(SECOND)?;
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Second(second), weeder, Wiring::right()))
     }
 
@@ -209,7 +201,7 @@ impl Pair {
     ///
     /// # Errors
     /// If one of them stops.
-    pub fn run_for(&mut self, cycles: u64) -> Result<(), PairError> {
+    pub fn run_for(&mut self, cycles: u64) -> Result<()> {
         let end = self.tester.cycle() + cycles;
         while self.tester.cycle() < end {
             self.step()?;
@@ -219,7 +211,7 @@ impl Pair {
         Ok(())
     }
 
-    fn step(&mut self) -> Result<(), PairError> {
+    fn step(&mut self) -> Result<()> {
         let until = self.tester.cycle() + STEP;
         self.tester.run_until(until)?;
         for change in self.tester.take_changes() {
@@ -239,8 +231,8 @@ impl Pair {
         Ok(())
     }
 
-    /// While the reset is pulled, the weeder's clock stands still. Afterwards both clocks are counted from that moment.
-    fn look_at_reset(&mut self) -> Result<(), PairError> {
+    /// While the reset is pulled, the weeder's clock stands still, and both are counted from there on.
+    fn look_at_reset(&mut self) -> Result<()> {
         if self.is_reset_pulled {
             self.shared = (self.tester.cycle(), self.weeder.cycle());
         }
@@ -266,7 +258,7 @@ impl Pair {
     ///
     /// # Errors
     /// If the second simulator has ended.
-    pub fn reset(&mut self, side: Side) -> Result<(), PairError> {
+    pub fn reset(&mut self, side: Side) -> Result<()> {
         self.resets += 1;
         match side {
             Side::Tester => self.tester.reset(),

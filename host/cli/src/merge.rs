@@ -7,7 +7,7 @@ use crate::finding::Finding;
 use crate::{part, soak, sweep, trial};
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, builder::PossibleValuesParser};
-use experiments::shard::{self, Header, PartError};
+use experiments::shard::{self, Header};
 use experiments::sweep::Results;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -87,12 +87,11 @@ fn name(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn open(path: &Path) -> Result<BufReader<File>, PartError> {
-    let opened = File::open(path).map_err(|problem| PartError::Unreadable { name: name(path), problem });
-    Ok(BufReader::new(opened?))
+fn open(path: &Path) -> Result<BufReader<File>> {
+    Ok(BufReader::new(File::open(path).with_context(|| format!("{} cannot be read", name(path)))?))
 }
 
-fn header(path: &Path) -> Result<Header, PartError> {
+fn header(path: &Path) -> Result<Header> {
     shard::read_header(&name(path), &mut open(path)?)
 }
 
@@ -103,7 +102,7 @@ fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
         let header = shard::read_header(&name(path), &mut file)?;
         shard::read_outcomes(&name(path), header, &mut file)
     };
-    Ok(shard::outcomes(parts.iter().map(read).collect::<Result<_, PartError>>()?))
+    Ok(shard::outcomes(parts.iter().map(read).collect::<Result<_>>()?))
 }
 
 fn read<T: DeserializeOwned>(settings: Value) -> Result<T> {

@@ -9,7 +9,7 @@ use crate::source::{self, offering};
 use anyhow::Result;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use experiments::experiment::{PlotOutcome, Treatment};
 use experiments::shard::Shard;
 use experiments::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
@@ -19,6 +19,7 @@ use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::fs;
 use std::sync::LazyLock;
+use trial::report::number_table;
 
 /// The name of the command in its parts.
 pub const COMMAND: &str = "sweep";
@@ -264,33 +265,22 @@ fn shown(value: f64, point: &Point) -> String {
 /// A line a value of the second axis, a column a value of the first.
 fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
     let result = Results::NAMES.iter().position(|name| *name == result).unwrap_or(0);
-    let mut table = table([String::new()].into_iter().chain(sweep.x.values.iter().map(f64::to_string)));
+    let mut table = number_table([String::new()].into_iter().chain(sweep.x.values.iter().map(f64::to_string)), 0);
     for (value, line) in y.values.iter().zip(points.chunks(sweep.x.values.len())) {
         let results = line.iter().map(|point| shown(point.results.values()[result], point));
         table.add_row([value.to_string()].into_iter().chain(results));
     }
-    right(table)
+    table
 }
 
 /// A line a value of the only axis, a column a result.
 fn list(sweep: &Sweep, points: &[Point]) -> Table {
     let names = Results::NAMES.iter().map(|name| name.replace('_', " "));
-    let mut table = table([sweep.x.parameter.clone()].into_iter().chain(names));
+    let mut table = number_table([sweep.x.parameter.clone()].into_iter().chain(names), 0);
     for point in points {
         let results = point.results.values().map(|value| shown(value, point));
         table.add_row([point.x.to_string()].into_iter().chain(results));
     }
-    right(table)
-}
-
-fn table(header: impl Iterator<Item = String>) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(header);
-    table
-}
-
-fn right(mut table: Table) -> Table {
-    table.column_iter_mut().for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     table
 }
 

@@ -155,7 +155,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 impl Arguments {
     fn objects(&self) -> Result<Vec<Labelled>> {
         if self.synthetic {
-            return Ok(synthetic::objects(self.crop, self.seed)?);
+            return synthetic::objects(self.crop, self.seed);
         }
         let lesson = table::read_labelled(&self.files)?;
         if lesson.unlabelled > 0 {

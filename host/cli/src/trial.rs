@@ -10,13 +10,14 @@ use crate::progress::Progress;
 use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Command, FromArgMatches, ValueEnum};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table};
 use experiments::evaluation::{Analysis, published};
 use experiments::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
 use experiments::page::{Page, RowPicture};
 use experiments::shard::{Numbered, Shard};
 use experiments::statistics::Share;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use experiments::table::in_two_lines;
 use field::budget;
 use field::conditions::{Conditions, presets};
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
@@ -26,6 +27,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
+use trial::report::number_table;
 use trial::{firmware, picture};
 
 /// The name of the command in its parts.
@@ -398,14 +400,11 @@ fn name(controller: Treatment) -> &'static str {
 /// A table of a trial, which is at most 110 characters wide.
 fn by_speed(totals: &[Total], contents: Contents) -> Table {
     let columns = || COLUMNS.iter().filter(|(_, _, tables)| tables.contains(&contents));
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(columns().map(|(heading, _, _)| heading));
+    let mut table = number_table(columns().map(|(heading, _, _)| heading), 0);
     for total in totals {
         table.add_row(columns().map(|(_, cell, _)| cell(total)));
     }
-    for (index, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if index == 1 { CellAlignment::Left } else { CellAlignment::Right });
-    }
+    table.column_iter_mut().skip(1).take(1).for_each(|column| column.set_cell_alignment(CellAlignment::Left));
     table
 }
 
@@ -414,20 +413,12 @@ const WHERE_IT_GOES: &str = "Where the row's ground goes with this firmware, %";
 
 /// The firmware's loss budget, a line a speed: each adds up to 100 %.
 fn where_it_goes(totals: &[Total]) -> Table {
-    let mut table = Table::new();
-    let heading = |part: budget::Part| {
-        let title = part.title();
-        let off_middle = |(at, _): &(usize, &str)| at.abs_diff(title.len() / 2);
-        let at = title.match_indices(' ').min_by_key(off_middle).map_or(title.len(), |(at, _)| at);
-        format!("{}\n{}", &title[..at], title[at..].trim_start())
-    };
-    table.load_style(presets::UTF8_BORDERS_ONLY);
-    table.set_header(std::iter::once("km/h".to_owned()).chain(budget::Part::ALL.map(heading)));
+    let headings = budget::Part::ALL.map(|part| in_two_lines(part.title()));
+    let mut table = number_table(std::iter::once("km/h".to_owned()).chain(headings), 0);
     for total in of(totals, Treatment::Firmware) {
         let shares = total.budget.tenths().map(|(_, tenths)| format!("{:.1}", f64::from(tenths) / 10.0));
         table.add_row(std::iter::once(total.speed_km_h.to_string()).chain(shares));
     }
-    table.column_iter_mut().for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     table
 }
 

@@ -15,7 +15,8 @@ use trial::firmware;
 use trial::live::rows::{LiveRows, Ran};
 use trial::live::{Course, Setup};
 use trial::receiver::{ReceiverSetup, Trouble};
-use uno::hex::{Bootloader, HexError};
+use uno::FileError;
+use uno::hex::Bootloader;
 
 /// The arguments.
 #[derive(Args)]
@@ -95,7 +96,7 @@ pub struct Arguments {
 }
 
 /// The bootloader of that name, or in that file.
-fn bootloader(name: &Path) -> Result<Bootloader, HexError> {
+fn bootloader(name: &Path) -> Result<Bootloader, FileError> {
     if name == Path::new("optiboot") { Bootloader::optiboot() } else { Bootloader::read(name) }
 }
 

@@ -9,34 +9,18 @@
 mod findings;
 mod plot;
 pub mod published;
-mod report;
+pub(crate) mod report;
 mod response;
 pub mod table;
 
-pub use self::plot::{Implausible, Performance, PlotRecord};
+pub use self::plot::{Performance, PlotRecord};
 pub use self::response::Response;
 pub use self::table::{FileError, read_csv, write_csv};
 
 use self::published::Published;
 use crate::statistics::{AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share};
+use anyhow::{Result, anyhow, ensure};
 use serde::Serialize;
-use thiserror::Error;
-
-/// A trial cannot be analysed.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum AnalysisError {
-    /// Nothing was written down.
-    #[error("a trial has at least one plot")]
-    NoPlots,
-    /// A plot that cannot be.
-    #[error("plot {plot}: {problem}")]
-    Plot {
-        /// The plot, counted from 1.
-        plot: usize,
-        /// The problem.
-        problem: Implausible,
-    },
-}
 
 /// The analysis of all plots of a trial.
 #[derive(Clone, Debug)]
@@ -89,13 +73,11 @@ impl Analysis {
     /// Analyses the plots of a trial.
     ///
     /// # Errors
-    /// If there is no plot, or one that cannot be. What a single measure has no model for is said in its place.
-    pub fn of(records: Vec<PlotRecord>) -> Result<Self, AnalysisError> {
-        if records.is_empty() {
-            return Err(AnalysisError::NoPlots);
-        }
+    /// Where there is no plot, or one that cannot be. What a single measure has no model for is said in its place.
+    pub fn of(records: Vec<PlotRecord>) -> Result<Self> {
+        ensure!(!records.is_empty(), "a trial has at least one plot");
         for (index, record) in records.iter().enumerate() {
-            record.check().map_err(|problem| AnalysisError::Plot { plot: index + 1, problem })?;
+            record.check().map_err(|problem| anyhow!("plot {}: {problem}", index + 1))?;
         }
         let performances: Vec<Performance> = records.iter().map(PlotRecord::performance).collect();
         let design = Design::new(records.iter().map(|record| (record.speed_km_h, record.spacing_cm)))

@@ -14,13 +14,14 @@ pub mod total;
 
 use crate::evaluation::PlotRecord;
 use crate::shard::{Numbered, Shard};
+use anyhow::{Result, anyhow};
 use control::ground::features;
 use control::operate::state::State;
 use field::baselines;
 use field::budget::{Budget, Reason};
 use field::conditions::Conditions;
 use field::driving::{Drive, drive};
-use field::native::{self, Refused, Sensors};
+use field::native::{self, Sensors};
 use field::optimum::undamaged_share;
 use field::row::{MAX_WIDTH_MM, Problem, Row};
 use field::stand::Stand;
@@ -36,8 +37,6 @@ use std::cell::LazyCell;
 use std::ops::AddAssign;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use thiserror::Error;
-use trial::TrialError;
 use uno::Pulse;
 
 pub use table::write_csv;
@@ -147,38 +146,7 @@ impl AddAssign for Zones {
     }
 }
 
-/// Why an experiment had no outcome.
-#[derive(Debug, Error)]
-pub enum ExperimentError {
-    /// The plants close up.
-    #[error(
-        "plants {spacing_cm} cm apart grow together to more than {MAX_WIDTH_MM} mm: \
-         ask for a larger spacing or narrower canopies"
-    )]
-    TooClose {
-        /// The spacing.
-        spacing_cm: f64,
-    },
-    /// There is no plant, or no visible one.
-    #[error(
-        "nothing for the beam stands in a row of {row_m} m with plants {spacing_cm} cm apart: \
-         ask for a longer row or a smaller spacing"
-    )]
-    TooShort {
-        /// The row's length.
-        row_m: f64,
-        /// The spacing.
-        spacing_cm: f64,
-    },
-    /// The decisions refuse their settings.
-    #[error(transparent)]
-    Refused(#[from] Refused),
-    /// The virtual Uno failed.
-    #[error(transparent)]
-    Trial(#[from] TrialError),
-}
-
-/// A plot's position in the experiment.
+/// A plot's place in the experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Plot {
     index: u64,
@@ -253,8 +221,8 @@ impl Experiment {
     /// `progress` gets the completed share of rows, from 0 to 1.
     ///
     /// # Errors
-    /// The first error in a row.
-    pub fn run(&self, engine: &Engine, progress: impl Fn(f64) + Sync) -> Result<Vec<PlotOutcome>, ExperimentError> {
+    /// The first that a row meets.
+    pub fn run(&self, engine: &Engine, progress: impl Fn(f64) + Sync) -> Result<Vec<PlotOutcome>> {
         let of_plots = self.run_shard(Shard::WHOLE, engine, progress)?;
         Ok(of_plots.into_iter().flat_map(|plot| plot.outcome).collect())
     }
@@ -269,7 +237,7 @@ impl Experiment {
         shard: Shard,
         engine: &Engine,
         progress: impl Fn(f64) + Sync,
-    ) -> Result<Vec<Numbered<Vec<PlotOutcome>>>, ExperimentError> {
+    ) -> Result<Vec<Numbered<Vec<PlotOutcome>>>> {
         let plots = self.plots();
         let mine: Vec<&Plot> = shard.numbers(self.size()).map(|number| &plots[number as usize]).collect();
         let (done, all) = (AtomicUsize::new(0), (mine.len() * self.conditions.plot.rows as usize) as f64);
@@ -285,7 +253,7 @@ impl Experiment {
     ///
     /// # Errors
     /// As [`Experiment::run`].
-    pub fn example(&self, engine: &Engine) -> Result<Option<(Row, Judgement)>, ExperimentError> {
+    pub fn example(&self, engine: &Engine) -> Result<Option<(Row, Judgement)>> {
         let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
         let Some(plot) = fastest else { return Ok(None) };
         let (stand, _, trial) = self.grow(&plot, 0)?;
@@ -295,12 +263,7 @@ impl Experiment {
         Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
     }
 
-    fn weed_plot(
-        &self,
-        plot: &Plot,
-        engine: &Engine,
-        row_done: &(impl Fn() + Sync),
-    ) -> Result<Vec<PlotOutcome>, ExperimentError> {
+    fn weed_plot(&self, plot: &Plot, engine: &Engine, row_done: &(impl Fn() + Sync)) -> Result<Vec<PlotOutcome>> {
         let rows = self.conditions.plot.rows;
         let mut outcomes: Vec<PlotOutcome> =
             self.controllers.iter().map(|&controller| self.untouched(plot, controller)).collect();
@@ -313,7 +276,7 @@ impl Experiment {
                     row_done();
                     Ok(outcomes)
                 })
-                .collect::<Result<_, ExperimentError>>()?;
+                .collect::<Result<_>>()?;
             for by_controller in weeded {
                 for (outcome, row) in outcomes.iter_mut().zip(by_controller) {
                     outcome.add(&row, rows);
@@ -354,8 +317,8 @@ impl Experiment {
         }
     }
 
-    /// The results of all controllers in one row.
-    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>, ExperimentError> {
+    /// What every controller does in the same row.
+    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>> {
         let (stand, drive, trial) = self.grow(plot, row)?;
         let sensors = sensors(&trial);
         let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
@@ -391,9 +354,9 @@ impl Experiment {
         self.controllers.iter().map(outcome).collect()
     }
 
-    /// A grown row, its drive, and both as a trial for the firmware.
-    fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial), ExperimentError> {
-        // Growth, drive and machine have separate random numbers.
+    /// A row that has grown, how it is driven, and both as a trial for the firmware.
+    fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial)> {
+        // What grows, how it is driven and what the machine is like have a chance of their own each.
         let chance = |of: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
             rng.set_stream(plot.index << 34 | u64::from(row) << 2 | of);
@@ -402,8 +365,15 @@ impl Experiment {
         let spacing_cm = plot.spacing_cm;
         let stand =
             Stand::grow(&self.conditions, spacing_cm * 10.0, &mut chance(0)).map_err(|problem| match problem {
-                Problem::Empty => ExperimentError::TooShort { row_m: self.conditions.plot.row_m, spacing_cm },
-                _ => ExperimentError::TooClose { spacing_cm },
+                Problem::Empty => anyhow!(
+                    "nothing for the beam stands in a row of {} m with plants {spacing_cm} cm apart: \
+                     ask for a longer row or a smaller spacing",
+                    self.conditions.plot.row_m
+                ),
+                _ => anyhow!(
+                    "plants {spacing_cm} cm apart grow together to more than {MAX_WIDTH_MM} mm: \
+                     ask for a larger spacing or narrower canopies"
+                ),
             })?;
         let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut chance(1));
         let trial = Trial {
@@ -439,7 +409,7 @@ fn weed(
     stand: &Stand,
     controller: Treatment,
     engine: &Engine,
-) -> Result<Weeded, ExperimentError> {
+) -> Result<Weeded> {
     let firmware = |trial: &Trial| {
         // The ELF does not report why it swings. Its native run makes the same decisions, within a servo's frame.
         let native::Weeded { pulses, state, reasons } = native::weed(trial, sensors)?;

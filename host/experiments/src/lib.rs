@@ -16,6 +16,7 @@ pub mod plan;
 pub mod shard;
 pub mod statistics;
 pub mod sweep;
+pub mod table;
 pub mod training;
 
 pub use evaluation::{Analysis, PlotRecord};

@@ -9,19 +9,17 @@ mod comparison;
 mod figure;
 mod losses;
 mod response;
-mod table;
 
 pub use self::comparison::{Comparison, ControllerCurve, ControllerPoint, Work};
 
 use crate::evaluation::published::{MACHINES, PublishedMachine};
-use crate::evaluation::{Analysis, Performance, PlotRecord, Response};
+use crate::evaluation::{Analysis, Response};
+use crate::table::{Table, fixed, optional, short};
+use anyhow::{Context, Result, bail};
 use askama::Template;
-use chart::DrawingError;
 use figure::Figure;
 use losses::Losses;
 use response::Chapter;
-use table::{Table, fixed, short};
-use thiserror::Error;
 
 /// A picture of one row along the ground, by [`trial::picture::draw`].
 #[derive(Debug, Clone)]
@@ -51,33 +49,12 @@ pub struct Page<'a> {
     pub row: Option<&'a RowPicture>,
 }
 
-/// A page cannot be made.
-#[derive(Debug, Error)]
-pub enum PageError {
-    /// A figure is not finite.
-    #[error("{what} is {value} at {speed_km_h} km/h: a report shows finite figures only")]
-    NotFinite {
-        /// Whose figure.
-        what: String,
-        /// Where it stands.
-        speed_km_h: f64,
-        /// What it is.
-        value: f64,
-    },
-    /// A chart.
-    #[error("a chart cannot be drawn")]
-    Drawing(#[from] DrawingError),
-    /// The page itself.
-    #[error("the page cannot be put together")]
-    Template(#[from] askama::Error),
-}
-
 impl Page<'_> {
     /// The page as HTML, to be written to a file as it is.
     ///
     /// # Errors
-    /// If a figure of the comparison is not finite, or plotters cannot draw.
-    pub fn html(&self) -> Result<String, PageError> {
+    /// Where a figure of the comparison is not finite, or plotters cannot draw.
+    pub fn html(&self) -> Result<String> {
         let comparison = self.comparison.map(Headline::of).transpose()?;
         let analysis = self.analysis;
         let figures = Response::ALL.map(|response| figure::response(analysis, response));
@@ -86,14 +63,14 @@ impl Page<'_> {
             summary: &self.summary,
             command: self.command,
             comparison,
-            figures: figures.into_iter().collect::<Result<_, _>>()?,
+            figures: figures.into_iter().collect::<Result<_>>()?,
             row: self.row.map(|row| (row.drawing.clone(), row.caption.as_str())),
-            chapters: analysis.responses.iter().map(|of| Chapter::of(analysis, of)).collect::<Result<_, _>>()?,
-            means: means(analysis),
-            plots: plots(analysis),
+            chapters: analysis.responses.iter().map(|of| Chapter::of(analysis, of)).collect::<Result<_>>()?,
+            means: analysis.means(),
+            plots: analysis.plots(),
             parameters: parameters(self.parameters),
         };
-        Ok(sheet.render()?)
+        sheet.render().context("the page cannot be put together")
     }
 }
 
@@ -122,7 +99,7 @@ struct Headline {
 }
 
 impl Headline {
-    fn of(comparison: &Comparison) -> Result<Self, PageError> {
+    fn of(comparison: &Comparison) -> Result<Self> {
         comparison.check()?;
         let of_controllers = |value: fn(&ControllerPoint) -> f64| {
             let curve = move |controller: &ControllerCurve| {
@@ -151,8 +128,8 @@ impl Headline {
 }
 
 impl Comparison {
-    /// Checks every figure on the page, with its controller and speed.
-    fn check(&self) -> Result<(), PageError> {
+    /// Every figure that is shown, with whose it is and at which speed.
+    fn check(&self) -> Result<()> {
         let of_controllers = self.controllers.iter().flat_map(|controller| {
             controller.points.iter().flat_map(|point| {
                 let figures = [point.plant_damage_percent, point.zones_reached_percent, point.in_row_weeding_percent];
@@ -161,9 +138,10 @@ impl Comparison {
         });
         let of_bound = self.bound.iter().map(|&(speed_km_h, value)| ("the bound", speed_km_h, value));
         let wrong = of_controllers.chain(of_bound).find(|(_, speed, value)| !(speed + value).is_finite());
-        wrong.map_or(Ok(()), |(what, speed_km_h, value)| {
-            Err(PageError::NotFinite { what: what.to_owned(), speed_km_h, value })
-        })
+        if let Some((what, speed_km_h, value)) = wrong {
+            bail!("{what} is {value} at {speed_km_h} km/h: a report shows finite figures only");
+        }
+        Ok(())
     }
 }
 
@@ -176,7 +154,7 @@ fn by_speed(caption: &str, curves: &[(String, Vec<(f64, f64)>)]) -> Table {
     let mut table = Table::new(caption, ["speed"].into_iter().chain(names));
     for speed in speeds {
         let at_speed = |points: &[(f64, f64)]| points.iter().find(|point| point.0 == speed).map(|point| point.1);
-        let cells = curves.iter().map(|(_, points)| table::optional(at_speed(points), |value| fixed(value, 1)));
+        let cells = curves.iter().map(|(_, points)| optional(at_speed(points), |value| fixed(value, 1)));
         table.rows.push([format!("{} km/h", short(speed))].into_iter().chain(cells).collect());
     }
     table
@@ -187,7 +165,7 @@ fn beside_others(work: &[Work]) -> Table {
     let columns = ["machine", "crop", "sees by", "speed, km/h", "weeds gone, %", "plants damaged, %", "source"];
     let mut table = Table { is_prose: true, ..Table::new("This machine, simulated, and machines in fields", columns) };
     for at in work {
-        let gone = |percent: Option<f64>| table::optional(percent, |percent| fixed(percent, 1));
+        let gone = |percent: Option<f64>| optional(percent, |percent| fixed(percent, 1));
         table.rows.push(vec![
             "this firmware, SIMULATED".to_owned(),
             "the simulated field's".to_owned(),
@@ -205,84 +183,6 @@ fn beside_others(work: &[Work]) -> Table {
     };
     table.rows.extend(MACHINES.iter().map(published));
     table
-}
-
-/// The measures of a plot or a treatment, as column headings.
-const MEASURES: [&str; 6] = [
-    "plant damage, %",
-    "weeding efficiency, %",
-    "theoretical capacity, ha/h",
-    "effective capacity, ha/h",
-    "field efficiency, %",
-    "performance index",
-];
-
-fn measures(performance: &Performance) -> [String; 6] {
-    [
-        fixed(performance.plant_damage_percent, 2),
-        fixed(performance.weeding_efficiency_percent, 2),
-        fixed(performance.theoretical_capacity_ha_h, 4),
-        fixed(performance.effective_capacity_ha_h, 4),
-        fixed(performance.field_efficiency_percent, 2),
-        fixed(performance.performance_index, 2),
-    ]
-}
-
-/// The means by treatment.
-fn means(analysis: &Analysis) -> Table {
-    let columns = ["treatment", "plots"].into_iter().chain(MEASURES);
-    let mut table = Table::new("Means of the plots of each treatment", columns);
-    for treatment in analysis.treatments() {
-        let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
-        let [damage, weeding, others @ ..] = measures(&treatment.mean);
-        let damage = format!("{damage} ({})", treatment.damaged);
-        let weeding =
-            treatment.weeding_efficiency.within.map_or(weeding.clone(), |it| format!("{weeding} ± {}", fixed(it, 2)));
-        let cells = [name, treatment.plots.to_string(), damage, weeding];
-        table.rows.push(cells.into_iter().chain(others).collect());
-    }
-    table
-}
-
-/// Each plot, with its record and its measures.
-fn plots(analysis: &Analysis) -> Table {
-    let written_down = [
-        "plot",
-        "replication",
-        "speed, km/h",
-        "spacing, cm",
-        "weeds before",
-        "weeds after",
-        "plants",
-        "damaged",
-        "area, m²",
-        "time, s",
-        "width, m",
-        "power, hp",
-    ];
-    let mut table =
-        Table::new("Each plot, counted and measured, and what follows", written_down.into_iter().chain(MEASURES));
-    for (index, (record, performance)) in analysis.records.iter().zip(&analysis.performances).enumerate() {
-        let cells = [(index + 1).to_string()].into_iter().chain(counted(record)).chain(measures(performance));
-        table.rows.push(cells.collect());
-    }
-    table
-}
-
-fn counted(record: &PlotRecord) -> [String; 11] {
-    [
-        record.replication.to_string(),
-        short(record.speed_km_h),
-        short(record.spacing_cm),
-        record.weeds_before.to_string(),
-        record.weeds_after.to_string(),
-        record.plants.to_string(),
-        record.damaged.to_string(),
-        fixed(record.area_m2, 2),
-        fixed(record.time_s, 1),
-        fixed(record.width_m, 2),
-        fixed(record.power_hp, 2),
-    ]
 }
 
 fn parameters(parameters: &[(String, String)]) -> Table {

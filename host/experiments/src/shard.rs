@@ -8,13 +8,13 @@
 //!
 //! This module computes nothing, opens no files and starts no programs: the user's scheduler runs the shards.
 
+use anyhow::{Context, Error, Result, anyhow, bail, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
 use std::io::{self, BufRead, Write};
 use std::str::FromStr;
-use thiserror::Error;
 
 /// The format version of a part. A change of the format increments it.
 const FORM: u32 = 1;
@@ -34,11 +34,6 @@ pub struct Shard {
     of: u64,
 }
 
-/// A text is no shard.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("it has to be I/N, such as 2/4 for the second of four, with I from 1 to N and N at most {MOST_SHARDS}")]
-pub struct NoShard;
-
 impl Shard {
     /// All of a study.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
@@ -49,16 +44,24 @@ impl Shard {
         // A range of u64 does not know its length.
         (0..usize::try_from(count).unwrap_or(usize::MAX)).map(move |turn| self.number - 1 + turn as u64 * self.of)
     }
+
+    fn check(self) -> Result<Self> {
+        ensure!(
+            (1..=self.of).contains(&self.number) && self.of <= MOST_SHARDS,
+            "it has to be I/N, such as 2/4 for the second of four, with I from 1 to N and N at most {MOST_SHARDS}"
+        );
+        Ok(self)
+    }
 }
 
 impl FromStr for Shard {
-    type Err = NoShard;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self, NoShard> {
-        let (number, of) = text.split_once('/').ok_or(NoShard)?;
-        let whole = |text: &str| text.trim().parse::<u64>().map_err(|_| NoShard);
-        let shard = Self { number: whole(number)?, of: whole(of)? };
-        if (1..=shard.of).contains(&shard.number) && shard.of <= MOST_SHARDS { Ok(shard) } else { Err(NoShard) }
+    fn from_str(text: &str) -> Result<Self> {
+        let whole = |text: &str| text.trim().parse::<u64>().ok();
+        let numbers = text.split_once('/').and_then(|(number, of)| Some((whole(number)?, whole(of)?)));
+        let (number, of) = numbers.unwrap_or_default();
+        Self { number, of }.check()
     }
 }
 
@@ -114,81 +117,6 @@ pub struct Numbered<T> {
     pub outcome: T,
 }
 
-/// Parts make no study. Each names the part in question.
-#[derive(Debug, Error)]
-pub enum PartError {
-    /// It cannot be read.
-    #[error("{name} cannot be read: {problem}")]
-    Unreadable {
-        /// The part.
-        name: String,
-        /// Why.
-        problem: io::Error,
-    },
-    /// It is something else.
-    #[error("{name} is no part of a study, as `weeder trial --shard 1/4 --out {name}` would write it: {problem}")]
-    NoPart {
-        /// The file.
-        name: String,
-        /// The problem of its first line.
-        problem: String,
-    },
-    /// Another program wrote it.
-    #[error(
-        "{name} is of weeder {theirs}, and this is weeder {ours}: put parts together with the very program that computed them"
-    )]
-    OtherProgram {
-        /// The part.
-        name: String,
-        /// Version and build of its program.
-        theirs: String,
-        /// Version and build of this program.
-        ours: String,
-    },
-    /// It belongs to another study.
-    #[error("{name} is of another study than {other}: its {what} is {theirs}, and there it is {ours}")]
-    OtherStudy {
-        /// The part.
-        name: String,
-        /// The first part.
-        other: String,
-        /// Which of the settings differs.
-        what: String,
-        /// Its value in the part.
-        theirs: String,
-        /// Its value in the first part.
-        ours: String,
-    },
-    /// A shard is there twice.
-    #[error("{name} and {other} are both part {shard}: name each part once")]
-    Doubled {
-        /// A part.
-        name: String,
-        /// The one before it.
-        other: String,
-        /// What both are.
-        shard: Shard,
-    },
-    /// Shards are not there.
-    #[error("{missing} missing: name all parts of the study, or compute what is missing by --shard")]
-    Missing {
-        /// The missing parts, with a verb.
-        missing: String,
-    },
-    /// A line of it is wrong.
-    #[error("{name}, line {line}: {problem}; compute part {shard} again, with --force")]
-    Spoiled {
-        /// The part.
-        name: String,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: String,
-        /// What it is.
-        shard: Shard,
-    },
-}
-
 impl fmt::Display for Program {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} (build {})", self.version, self.build)
@@ -223,12 +151,14 @@ pub fn write<T: Serialize>(
 /// Reads the first line of a part, called `name`.
 ///
 /// # Errors
-/// If it cannot be read, or is something else.
-pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header, PartError> {
-    let no_part = |problem: String| PartError::NoPart { name: name.to_owned(), problem };
+/// Where it cannot be read, or is something else.
+pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header> {
+    let no_part = |problem: String| {
+        anyhow!("{name} is no part of a study, as `weeder trial --shard 1/4 --out {name}` would write it: {problem}")
+    };
     let mut line = Vec::new();
     let read = io::Read::take(from, MOST_HEADER).read_until(b'\n', &mut line);
-    read.map_err(|problem| PartError::Unreadable { name: name.to_owned(), problem })?;
+    read.with_context(|| unreadable(name))?;
     if line.is_empty() {
         return Err(no_part("it is empty".to_owned()));
     }
@@ -241,32 +171,31 @@ pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header, PartErr
         None => return Err(no_part("line 1 has no `weeder_part`".to_owned())),
     }
     let header: Header = serde_json::from_value(value).map_err(|error| no_part(format!("line 1: {error}")))?;
-    let Shard { number, of } = header.shard;
-    if number == 0 || number > of || of > MOST_SHARDS {
-        return Err(no_part(format!("line 1: shard {}: {NoShard}", header.shard)));
-    }
+    header.shard.check().map_err(|error| no_part(format!("line 1: shard {}: {error}", header.shard)))?;
     Ok(header)
 }
 
-/// Longest header, in bytes: a file that is no part may have an endless line.
+fn unreadable(name: &str) -> String {
+    format!("{name} cannot be read")
+}
+
+/// Longest header that is read, in bytes: what is no part may have no end of a line.
 const MOST_HEADER: u64 = 1 << 24;
 
 /// Reads the outcomes of a part behind its header: all of them, in the order of their numbers.
 ///
 /// # Errors
-/// If it cannot be read, a line is wrong, or one is missing or too many.
-pub fn read_outcomes<T: DeserializeOwned>(
-    name: &str,
-    header: Header,
-    from: &mut dyn BufRead,
-) -> Result<Part<T>, PartError> {
+/// Where it cannot be read, a line is wrong, or one is missing or too many.
+pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut dyn BufRead) -> Result<Part<T>> {
     let shard = header.shard;
-    let spoiled = |line: usize, problem: String| PartError::Spoiled { name: name.to_owned(), line, problem, shard };
+    let spoiled = |line: usize, problem: String| {
+        anyhow!("{name}, line {line}: {problem}; compute part {shard} again, with --force")
+    };
     let mut expected = shard.numbers(header.all);
     let mut outcomes = Vec::new();
     let mut last = 1;
     for (line, text) in (2..).zip(from.lines()) {
-        let text = text.map_err(|problem| PartError::Unreadable { name: name.to_owned(), problem })?;
+        let text = text.with_context(|| unreadable(name))?;
         let outcome: Numbered<T> = serde_json::from_str(&text)
             .map_err(|_| spoiled(line, "this is not an outcome of this study, or was cut".to_owned()))?;
         match expected.next() {
@@ -287,16 +216,18 @@ pub fn read_outcomes<T: DeserializeOwned>(
 /// Checks that parts, each with its name, make one whole study that this program computed.
 ///
 /// # Errors
-/// The first problem: a part of another program or another study, a part that occurs twice, or missing parts.
-pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<(), PartError> {
-    let Some((first_name, first)) = parts.first() else {
-        return Err(PartError::Missing { missing: "all parts are".to_owned() });
-    };
+/// The first thing that is wrong: a part of another program, of another study, one that is there twice, or those that are
+/// missing.
+pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
+    let missing =
+        |which: String| anyhow!("{which} missing: name all parts of the study, or compute what is missing by --shard");
+    let (other, first) = parts.first().ok_or_else(|| missing("all parts are".to_owned()))?;
     for (name, header) in parts {
-        if header.program != *ours {
-            let (theirs, ours) = (header.program.to_string(), ours.to_string());
-            return Err(PartError::OtherProgram { name: name.clone(), theirs, ours });
-        }
+        let theirs = &header.program;
+        ensure!(
+            theirs == ours,
+            "{name} is of weeder {theirs}, and this is weeder {ours}: put parts together with the very program that computed them"
+        );
         let theirs = [("command", header.command.clone().into()), ("settings", header.settings.clone())];
         let ours = [("command", first.command.clone().into()), ("settings", first.settings.clone())];
         let counts = |header: &Header| [("number of parts", header.shard.of.into()), ("size", header.all.into())];
@@ -304,29 +235,27 @@ pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<(), PartEr
         let ours = ours.into_iter().chain(counts(first));
         let differs = theirs.zip(ours).find_map(|((what, theirs), (_, ours))| difference(what, &theirs, &ours));
         if let Some((what, theirs, ours)) = differs {
-            return Err(PartError::OtherStudy { name: name.clone(), other: first_name.clone(), what, theirs, ours });
+            bail!("{name} is of another study than {other}: its {what} is {theirs}, and there it is {ours}");
         }
     }
     let mut holders: Vec<Option<&str>> = vec![None; first.shard.of as usize];
     for (name, header) in parts {
         let holder = &mut holders[header.shard.number as usize - 1];
         if let Some(other) = holder.replace(name.as_str()) {
-            return Err(PartError::Doubled { name: name.clone(), other: other.to_owned(), shard: header.shard });
+            bail!("{name} and {other} are both part {}: name each part once", header.shard);
         }
     }
-    let missing = (1..).zip(&holders).filter(|(_, holder)| holder.is_none());
-    let missing: Vec<String> = missing.map(|(number, _)| Shard { number, of: first.shard.of }.to_string()).collect();
-    match missing.as_slice() {
-        [] => Ok(()),
-        [one] => Err(PartError::Missing { missing: format!("part {one} is") }),
-        [named @ .., last] if named.len() < MOST_NAMED => {
-            Err(PartError::Missing { missing: format!("parts {} and {last} are", named.join(", ")) })
-        }
+    let absent = (1..).zip(&holders).filter(|(_, holder)| holder.is_none());
+    let absent: Vec<String> = absent.map(|(number, _)| Shard { number, of: first.shard.of }.to_string()).collect();
+    Err(missing(match absent.as_slice() {
+        [] => return Ok(()),
+        [one] => format!("part {one} is"),
+        [named @ .., last] if named.len() < MOST_NAMED => format!("parts {} and {last} are", named.join(", ")),
         _ => {
-            let (named, rest) = missing.split_at(MOST_NAMED);
-            Err(PartError::Missing { missing: format!("parts {} and {} more are", named.join(", "), rest.len()) })
+            let (named, rest) = absent.split_at(MOST_NAMED);
+            format!("parts {} and {} more are", named.join(", "), rest.len())
         }
-    }
+    }))
 }
 
 /// All outcomes in the order of their numbers. The parts must have passed [`together`].

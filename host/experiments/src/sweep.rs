@@ -4,14 +4,14 @@
 //! ([`Axis`]). At each point the firmware's native run weeds a plot. The ground is always the same for the same
 //! conditions.
 
-use crate::experiment::{Engine, Experiment, ExperimentError, PlotOutcome, Treatment};
+use crate::experiment::{Engine, Experiment, PlotOutcome, Treatment};
 use crate::shard::{Numbered, Shard};
-use field::conditions::{Conditions, WrongValue};
+use anyhow::{Context, Error, Result, ensure};
+use field::conditions::Conditions;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use thiserror::Error;
 
 /// Forward speeds that are tried, least and greatest, in km/h.
 pub const SPEEDS_KM_H: (f64, f64) = (0.1, 8.0);
@@ -31,21 +31,10 @@ pub struct Axis {
     pub values: Vec<f64>,
 }
 
-/// A text is no axis.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum AxisError {
-    /// It has another form.
-    #[error("`{0}` has to be NAME=FROM..TO:STEP, as lead_out_ms=0..300:20")]
-    Form(String),
-    /// It does not ascend, or has too many values.
-    #[error("`{0}` has to go up, in steps above 0, with at most {MOST_VALUES} values")]
-    Range(String),
-}
-
 impl FromStr for Axis {
-    type Err = AxisError;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self, AxisError> {
+    fn from_str(text: &str) -> Result<Self> {
         let parts = || {
             let (parameter, range) = text.split_once('=')?;
             let (from, rest) = range.split_once("..")?;
@@ -53,13 +42,15 @@ impl FromStr for Axis {
             let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
             Some((parameter.trim().to_owned(), number(from)?, number(to)?, number(step)?))
         };
-        let (parameter, from, to, step) = parts().ok_or_else(|| AxisError::Form(text.to_owned()))?;
+        let (parameter, from, to, step) =
+            parts().with_context(|| format!("`{text}` has to be NAME=FROM..TO:STEP, as lead_out_ms=0..300:20"))?;
         // A step more or less by rounding does not lose the last value.
         let steps = (to - from) / step + 1e-9;
-        if step <= 0.0 || !(0.0..MOST_VALUES as f64).contains(&steps) {
-            return Err(AxisError::Range(text.to_owned()));
-        }
-        // Rounded to three decimals, so that 0.1 + 0.2 is 0.3.
+        ensure!(
+            step > 0.0 && (0.0..MOST_VALUES as f64).contains(&steps),
+            "`{text}` has to go up, in steps above 0, with at most {MOST_VALUES} values"
+        );
+        // Three decimals are kept, so that 0.1 + 0.2 is 0.3.
         let values = (0..=steps as u32).map(|index| ((from + f64::from(index) * step) * 1e3).round() / 1e3).collect();
         Ok(Self { parameter, values })
     }
@@ -165,45 +156,12 @@ struct Place {
     experiment: Experiment,
 }
 
-/// Why a sweep had no outcome.
-#[derive(Debug, Error)]
-pub enum SweepError {
-    /// An axis has a value that cannot be.
-    #[error(transparent)]
-    Value(#[from] WrongValue),
-    /// Both axes have the same parameter.
-    #[error("both axes are `{0}`: the second one needs a parameter of its own")]
-    Twice(String),
-    /// Speed or spacing is out of range.
-    #[error("{name} is {value}, but has to be {least} to {greatest} {unit}")]
-    Treatment {
-        /// Which of both.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least value.
-        least: f64,
-        /// The greatest value.
-        greatest: f64,
-        /// Its unit.
-        unit: &'static str,
-    },
-    /// A point's plot could not be weeded.
-    #[error("at {place}: {problem}")]
-    Point {
-        /// The point.
-        place: String,
-        /// What went wrong.
-        problem: ExperimentError,
-    },
-}
-
 impl Sweep {
     /// Weeds a plot at each point. The first axis varies fastest. `progress` gets the completed share, from 0 to 1.
     ///
     /// # Errors
-    /// A wrong value of an axis, before anything is weeded; else the first error in a plot.
-    pub fn run(&self, progress: impl Fn(f64) + Sync) -> Result<Vec<Point>, SweepError> {
+    /// Before anything is weeded where an axis has a value that cannot be; else the first that a plot meets.
+    pub fn run(&self, progress: impl Fn(f64) + Sync) -> Result<Vec<Point>> {
         let outcomes = self.run_shard(Shard::WHOLE, progress)?;
         self.points(&outcomes.into_iter().map(|point| point.outcome).collect::<Vec<_>>())
     }
@@ -217,30 +175,26 @@ impl Sweep {
     ///
     /// # Errors
     /// As [`Sweep::run`].
-    pub fn run_shard(
-        &self,
-        shard: Shard,
-        progress: impl Fn(f64) + Sync,
-    ) -> Result<Vec<Numbered<PlotOutcome>>, SweepError> {
+    pub fn run_shard(&self, shard: Shard, progress: impl Fn(f64) + Sync) -> Result<Vec<Numbered<PlotOutcome>>> {
         let places = self.places()?;
         let mine: Vec<(u64, &Place)> =
             shard.numbers(self.size()).map(|number| (number, &places[number as usize])).collect();
         let done = AtomicUsize::new(0);
         let weed = |&(number, place): &(u64, &Place)| {
             let outcomes = place.experiment.run(&Engine::Native, |_| ());
-            let outcomes = outcomes.map_err(|problem| SweepError::Point { place: self.describe(place), problem })?;
+            let outcomes = outcomes.with_context(|| format!("at {}", self.describe(place)))?;
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / mine.len() as f64);
             // One speed, one spacing, one replication and one controller: one plot.
             Ok(outcomes.into_iter().map(move |outcome| Numbered { number, outcome }).collect::<Vec<_>>())
         };
-        mine.par_iter().map(weed).collect::<Result<Vec<_>, SweepError>>().map(|outcomes| outcomes.concat())
+        mine.par_iter().map(weed).collect::<Result<Vec<_>>>().map(|outcomes| outcomes.concat())
     }
 
     /// The points, of what came of all their plots.
     ///
     /// # Errors
-    /// If an axis has a value that cannot be.
-    pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>, SweepError> {
+    /// Where an axis has a value that cannot be.
+    pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>> {
         let point = |(place, outcome): (&Place, &PlotOutcome)| {
             let results = Results::of(outcome, place.experiment.conditions.plot.rows);
             Point { x: place.x, y: place.y, results }
@@ -248,11 +202,13 @@ impl Sweep {
         Ok(self.places()?.iter().zip(outcomes).map(point).collect())
     }
 
-    /// All points. The first axis varies fastest.
-    fn places(&self) -> Result<Vec<Place>, SweepError> {
-        if let Some(y) = self.y.as_ref().filter(|y| y.parameter == self.x.parameter) {
-            return Err(SweepError::Twice(y.parameter.clone()));
-        }
+    /// Where all points are, the first axis running fastest.
+    fn places(&self) -> Result<Vec<Place>> {
+        let x = &self.x.parameter;
+        ensure!(
+            self.y.as_ref().is_none_or(|y| y.parameter != *x),
+            "both axes are `{x}`: the second one needs a parameter of its own"
+        );
         let ys: Vec<Option<f64>> =
             self.y.as_ref().map_or(vec![None], |y| y.values.iter().map(|&value| Some(value)).collect());
         let places = ys.iter().flat_map(|&y| self.x.values.iter().map(move |&x| (x, y)));
@@ -266,7 +222,7 @@ impl Sweep {
     }
 
     /// The experiment at a point.
-    fn at(&self, x: f64, y: Option<f64>) -> Result<Experiment, SweepError> {
+    fn at(&self, x: f64, y: Option<f64>) -> Result<Experiment> {
         let mut experiment = Experiment {
             speeds_km_h: vec![self.speed_km_h],
             spacings_cm: vec![self.spacing_cm],
@@ -289,9 +245,8 @@ impl Sweep {
             ("spacing", experiment.spacings_cm[0], SPACINGS_CM, "cm"),
         ];
         for (name, value, (least, greatest), unit) in treatment {
-            if !(least..=greatest).contains(&value) {
-                return Err(SweepError::Treatment { name, value, least, greatest, unit });
-            }
+            let can_be = (least..=greatest).contains(&value);
+            ensure!(can_be, "{name} is {value}, but has to be {least} to {greatest} {unit}");
         }
         Ok(experiment)
     }
@@ -326,11 +281,12 @@ mod tests {
 
     #[test]
     fn what_is_no_axis_says_what_would_be_right() {
+        let error = |text: &str| text.parse::<Axis>().unwrap_err().to_string();
         for text in ["lead_out_ms", "lead_out_ms=0..300", "=", "speed=a..b:c", "speed=0..inf:1"] {
-            assert_eq!(text.parse::<Axis>(), Err(AxisError::Form(text.to_owned())));
+            assert!(error(text).contains("has to be NAME=FROM..TO:STEP"), "{text}");
         }
         for text in ["speed=4..1:1", "speed=1..4:0", "speed=1..4:-1", "speed=0..1000000:1"] {
-            assert_eq!(text.parse::<Axis>(), Err(AxisError::Range(text.to_owned())));
+            assert!(error(text).contains("has to go up"), "{text}");
         }
     }
 

@@ -21,13 +21,11 @@ pub use self::labelled::{Labelled, label_of};
 pub use self::model::{Model, class_of};
 pub use knn::MAX_K;
 
-use self::condense::TooMany;
 use self::model::{answer_of_others, quantised};
+use anyhow::{Context, Result, bail, ensure};
 use control::ground::{class::Class, examples, features::COUNT};
 use field::counted;
-use field::row::Kind;
 use knn::{Example, Range, Scale, squared_distance};
-use thiserror::Error;
 
 /// Most examples that the firmware's flash budget has room for.
 pub const MOST_EXAMPLES: usize = examples::CAPACITY;
@@ -62,41 +60,7 @@ impl Training {
     }
 }
 
-/// Why no training is possible, and what would help.
-#[derive(Debug, Error, PartialEq)]
-pub enum TrainingError {
-    /// No objects at all.
-    #[error("there are no objects to learn from: label some plants and some weeds")]
-    NoObjects,
-    /// Only plants, or only weeds.
-    #[error("all objects are of the class {0}: label some of the other class too")]
-    OneClass(Kind),
-    /// k examples cannot vote among so few.
-    #[error("there are {objects} objects, too few for a vote of {k}: label more, or choose a smaller --k")]
-    TooFew {
-        /// Objects given.
-        objects: usize,
-        /// Number of voting examples.
-        k: u8,
-    },
-    /// k is out of the classifier's range.
-    #[error("k is {0}: it has to be 1 to {MAX_K}")]
-    KOutOfRange(u8),
-    /// The few examples would cut plants that all detections together spare.
-    #[error(
-        "with a vote of {k}, so few examples cut {} that all objects together spare: choose a smaller --k",
-        counted(plants, "plant")
-    )]
-    Outvoted {
-        /// Examples that vote.
-        k: u8,
-        /// Plants cut by the table, in addition to those that all detections cut.
-        plants: usize,
-    },
-    /// The table would not fit.
-    #[error(transparent)]
-    TooMany(#[from] TooMany),
-}
+const NO_OBJECTS: &str = "there are no objects to learn from: label some plants and some weeds";
 
 /// A detection is a stranger if it is farther from every example than nearly all detections are from their nearest
 /// neighbour of the same class. These are the share that is nearly all, and the factor of the squared distance (twice
@@ -122,24 +86,21 @@ const ENEMY_DIVISOR: u32 = 4;
 /// - **Examples**: see [`condense`].
 ///
 /// # Errors
-/// [`TrainingError`].
-pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Training, TrainingError> {
-    let Some(first) = objects.first() else {
-        return Err(TrainingError::NoObjects);
-    };
-    if objects.iter().all(|object| object.kind == first.kind) {
-        return Err(TrainingError::OneClass(first.kind));
-    }
-    if let Some(k) = k.filter(|k| !(1..=MAX_K).contains(k)) {
-        return Err(TrainingError::KOutOfRange(k));
-    }
+/// Where there is nothing to be learned, with what would help.
+pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Training> {
+    let first = objects.first().context(NO_OBJECTS)?;
+    let is_mixed = objects.iter().any(|object| object.kind != first.kind);
+    ensure!(is_mixed, "all objects are of the class {}: label some of the other class too", first.kind);
     let fewest = k.unwrap_or(1);
-    if objects.len() <= usize::from(fewest) {
-        return Err(TrainingError::TooFew { objects: objects.len(), k: fewest });
-    }
+    ensure!((1..=MAX_K).contains(&fewest), "k is {fewest}: it has to be 1 to {MAX_K}");
+    ensure!(
+        objects.len() > usize::from(fewest),
+        "there are {} objects, too few for a vote of {fewest}: label more, or choose a smaller --k",
+        objects.len()
+    );
 
     let values: Vec<[i32; COUNT]> = objects.iter().map(|object| object.features.values()).collect();
-    let ranges = Scale::learn_ranges(&values).ok_or(TrainingError::NoObjects)?;
+    let ranges = Scale::learn_ranges(&values).context(NO_OBJECTS)?;
     let examples = quantised(&Scale::new(ranges), objects);
     let edited = condense::edit(&examples);
     let radius = learn_radius(&examples, &edited);
@@ -153,7 +114,7 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
             .filter(|&k| usize::from(k) < objects.len())
             .map(|k| (k, left_out(k)))
             .min_by_key(|(_, confusion)| confusion.harm())
-            .ok_or(TrainingError::TooFew { objects: objects.len(), k: 1 })?,
+            .context(NO_OBJECTS)?,
     };
     let kept = condense::condense(&examples, &edited, k, radius, most)?;
     let mut training = Training {
@@ -168,7 +129,10 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     training.by_table = training.model().classify(objects);
     match training.by_table.plants_taken_for_weeds().saturating_sub(leave_one_out.plants_taken_for_weeds()) {
         0 => Ok(training),
-        plants => Err(TrainingError::Outvoted { k, plants }),
+        plants => bail!(
+            "with a vote of {k}, so few examples cut {} that all objects together spare: choose a smaller --k",
+            counted(plants, "plant")
+        ),
     }
 }
 
@@ -188,11 +152,9 @@ pub struct Beside {
 /// ([`condense::beside`]).
 ///
 /// # Errors
-/// [`TrainingError::NoObjects`] and [`TrainingError::TooMany`].
-pub fn beside(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Beside, TrainingError> {
-    if objects.is_empty() {
-        return Err(TrainingError::NoObjects);
-    }
+/// Where there is no object, or more would be needed.
+pub fn beside(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Beside> {
+    ensure!(!objects.is_empty(), NO_OBJECTS);
     let mut model = Model::built_in();
     let before = model.classify(objects);
     model.k = k.unwrap_or(model.k);

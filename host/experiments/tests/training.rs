@@ -10,7 +10,7 @@ use control::memory::Volatile;
 use experiments::training::synthetic::CROPS;
 use experiments::training::table::{read, read_labelled};
 use experiments::training::{
-    DEFAULT_MOST_EXAMPLES, Labelled, Model, TrainingError, beside, label_of, listing, regions, synthetic, train,
+    DEFAULT_MOST_EXAMPLES, Labelled, Model, beside, label_of, listing, regions, synthetic, train,
 };
 use field::row::Kind;
 use knn::Example;
@@ -139,7 +139,7 @@ fn a_table_that_cuts_plants_which_all_objects_together_spare_is_refused() {
     let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let few = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap().kept;
     let error = train(&few, Some(15), DEFAULT_MOST_EXAMPLES).unwrap_err();
-    assert!(matches!(error, TrainingError::Outvoted { k: 15, .. }), "{error}");
+    assert!(error.to_string().starts_with("with a vote of 15, so few examples cut "), "{error}");
 }
 
 #[test]
@@ -152,18 +152,18 @@ fn as_many_examples_are_kept_as_vote() {
 #[test]
 fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() {
     let error = train(&synthetic::objects(&CROPS[0], 1).unwrap(), None, 10).unwrap_err();
-    assert!(matches!(error, TrainingError::TooMany(_)));
     assert!(error.to_string().starts_with("too many examples for the flash budget: "), "{error}");
 }
 
 #[test]
 fn no_objects_and_objects_of_one_class_are_refused() {
-    assert_eq!(train(&[], None, 64).unwrap_err(), TrainingError::NoObjects);
+    let said = |objects: &[Labelled], k| train(objects, k, 64).unwrap_err().to_string();
+    assert!(said(&[], None).starts_with("there are no objects to learn from"));
     let weeds: Vec<Labelled> = clear_case().into_iter().filter(|object| object.kind == Kind::Weed).collect();
-    assert_eq!(train(&weeds, None, 64).unwrap_err(), TrainingError::OneClass(Kind::Weed));
+    assert!(said(&weeds, None).starts_with("all objects are of the class weed"));
     let few = [labelled(Kind::Plant, 556, 500, 150), labelled(Kind::Weed, 556, 300, 15)];
-    assert_eq!(train(&few, Some(3), 64).unwrap_err(), TrainingError::TooFew { objects: 2, k: 3 });
-    assert_eq!(train(&few, Some(16), 64).unwrap_err(), TrainingError::KOutOfRange(16));
+    assert!(said(&few, Some(3)).starts_with("there are 2 objects, too few for a vote of 3"));
+    assert_eq!(said(&few, Some(16)), "k is 16: it has to be 1 to 15");
 }
 
 #[test]
@@ -316,5 +316,5 @@ fn what_is_taught_beside_the_built_in_table_spares_the_plants_of_another_field_t
 #[test]
 fn what_cannot_be_spared_beside_the_built_in_table_is_refused() {
     let error = beside(&synthetic::objects(&CROPS[2], 1).unwrap(), None, 5).unwrap_err();
-    assert!(matches!(error, TrainingError::TooMany(_)), "{error}");
+    assert!(error.to_string().starts_with("too many examples for the flash budget: "), "{error}");
 }

@@ -15,8 +15,9 @@ use crate::machine::{Dirt, Machine};
 use crate::servo::{Scatter, Servo};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
-pub use errors::{ConditionsError, WrongValue};
-use errors::{explain, line, line_at};
+pub use errors::WrongValue;
+use errors::explain;
+use files::FileError;
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use presets::PRESETS;
 pub use presets::presets;
@@ -27,65 +28,51 @@ impl Conditions {
     /// The conditions of a preset, or of a file. `read` returns the file's text.
     ///
     /// # Errors
-    /// If the name is neither a preset nor a readable file, or if the file is wrong; then with the line.
-    pub fn load(preset_or_file: &str, read: impl FnOnce(&Path) -> io::Result<String>) -> Result<Self, ConditionsError> {
+    /// Where it is neither, or something in the file is wrong: with the line.
+    pub fn load(preset_or_file: &str, read: impl FnOnce(&Path) -> io::Result<String>) -> Result<Self, FileError> {
         let path = Path::new(preset_or_file);
         match Self::preset(preset_or_file) {
             Some(conditions) => conditions,
             None => {
-                let text =
-                    read(path).map_err(|source| ConditionsError::Unreadable { path: path.to_owned(), source })?;
-                Self::parse(path, &text)
+                let presets = presets().collect::<Vec<_>>().join(", ");
+                let problem = format!("is none of the presets ({presets}), and as a file it cannot be read");
+                Self::parse(path, &read(path).map_err(|source| FileError::unusable(path, problem, source))?)
             }
         }
     }
 
-    /// The conditions of a preset. `None` if there is no such preset.
-    pub fn preset(name: &str) -> Option<Result<Self, ConditionsError>> {
+    /// Those of a preset; none where it has another name.
+    pub fn preset(name: &str) -> Option<Result<Self, FileError>> {
         let (preset, text) = PRESETS.iter().find(|(preset, _)| *preset == name)?;
         Some(Self::parse(Path::new(preset), text))
     }
 
-    fn parse(path: &Path, text: &str) -> Result<Self, ConditionsError> {
-        let not_understood = |error: toml::de::Error| ConditionsError::NotUnderstood {
-            path: path.to_owned(),
-            line: line_at(text, error.span().map_or(0, |span| span.start)),
-            problem: explain(text, &error),
-        };
-        let conditions: Self = toml::from_str(text).map_err(not_understood)?;
-        conditions.check().map_err(|problem| match line(text, problem.name()) {
-            Some(line) => ConditionsError::AtLine { path: path.to_owned(), line, problem },
-            None => problem.into(),
+    fn parse(path: &Path, text: &str) -> Result<Self, FileError> {
+        let conditions: Self = toml::from_str(text).map_err(|error| {
+            let byte = error.span().map_or(0, |span| span.start);
+            FileError::at_byte(path, text, byte, explain(text, byte, &error))
         })?;
+        conditions.check().map_err(|wrong| FileError::at_key(path, text, &wrong.name, wrong.to_string()))?;
         Ok(conditions)
     }
 
     /// Whether every value is in its range, and the sweeps keep off the crop.
     fn check(&self) -> Result<(), WrongValue> {
-        let parameters = self.values().map(|(parameter, value)| {
-            let &Parameter { name, meaning, least, greatest, .. } = parameter;
-            (name.to_owned(), value, least, greatest, meaning.to_owned())
-        });
-        for (name, value, least, greatest, meaning) in parameters {
-            // NaN is in no range.
+        for (&Parameter { name, meaning, least, greatest, .. }, value) in self.values() {
+            // A number that is none is in no range.
             if !(least..=greatest).contains(&value) {
-                return Err(WrongValue::OutOfRange { name, value, least, greatest, meaning });
+                return Err(WrongValue::out_of_range(name, value, (least, greatest), meaning));
             }
         }
         self.check_sweeps()?;
         self.check_beams()?;
         for (key, &value) in &self.settings {
-            let setting =
-                Setting::find(key.as_bytes()).ok_or_else(|| WrongValue::Unknown(format!("settings.{key}")))?;
+            let name = format!("settings.{key}");
+            let Some(setting) = Setting::find(key.as_bytes()) else { return Err(WrongValue::unknown(name)) };
             let range = setting.description();
             if !(range.least..=range.greatest).contains(&value) {
-                return Err(WrongValue::OutOfRange {
-                    name: format!("settings.{key}"),
-                    value: value.into(),
-                    least: range.least.into(),
-                    greatest: range.greatest.into(),
-                    meaning: setting.help().to_string(),
-                });
+                let range = (range.least.into(), range.greatest.into());
+                return Err(WrongValue::out_of_range(name, value.into(), range, setting.help()));
             }
         }
         Ok(())
@@ -106,12 +93,11 @@ impl Conditions {
         } else {
             return Ok(());
         };
-        Err(WrongValue::Sweeps { from_mm, why })
+        Err(WrongValue::new("machine.sweep_from_mm", format!("is {from_mm}, but {why}")))
     }
 
     /// Whether the second beam stands where the firmware takes one.
     fn check_beams(&self) -> Result<(), WrongValue> {
-        const NAME: &str = "machine.second_beam_mm";
         let Mechanism { beam_to_tool_mm, second_beam_mm, .. } = self.machine;
         let least = f64::from(SECOND_BEAM_LEAST_MM);
         let is_too_far = beam_to_tool_mm.round() > f64::from(SLIPPING_BEAM_TO_TOOL_MM);
@@ -122,7 +108,7 @@ impl Conditions {
         let meaning = format!(
             "0 for none, so far behind the first beam and ahead of the tool, which may be {SLIPPING_BEAM_TO_TOOL_MM} mm behind the first then"
         );
-        Err(WrongValue::OutOfRange { name: NAME.to_owned(), value: second_beam_mm, least, greatest, meaning })
+        Err(WrongValue::out_of_range("machine.second_beam_mm", second_beam_mm, (least, greatest), meaning))
     }
 
     /// Changes a parameter, named `table.key`, or a setting of the firmware, by the firmware's name.
@@ -131,14 +117,14 @@ impl Conditions {
     /// If the name is unknown, or the value is out of range.
     pub fn set(&mut self, parameter: &str, value: f64) -> Result<(), WrongValue> {
         let whole = || {
-            let not_whole = || WrongValue::NotWhole { name: parameter.to_owned(), value };
-            if value.fract() == 0.0 && value.abs() < f64::from(u32::MAX) { Ok(value as i64) } else { Err(not_whole()) }
+            let is_whole = value.fract() == 0.0 && value.abs() < f64::from(u32::MAX);
+            is_whole.then_some(value as i64).ok_or_else(|| WrongValue::not_whole(parameter, value))
         };
         let mut changed = self.clone();
         if Setting::find(parameter.as_bytes()).is_some() {
             changed.settings.insert(parameter.to_owned(), u16::try_from(whole()?).unwrap_or(u16::MAX));
         } else {
-            let unknown = || WrongValue::Unknown(parameter.to_owned());
+            let unknown = || WrongValue::unknown(parameter);
             let mut tables = toml::Table::try_from(&*self).map_err(|_| unknown())?;
             let entry = parameter
                 .split_once('.')
@@ -146,7 +132,7 @@ impl Conditions {
                 .filter(|_| PARAMETERS.iter().any(|known| known.name == parameter))
                 .ok_or_else(unknown)?;
             *entry = if entry.is_integer() { toml::Value::Integer(whole()?) } else { toml::Value::Float(value) };
-            changed = tables.try_into().map_err(|_| WrongValue::NotWhole { name: parameter.to_owned(), value })?;
+            changed = tables.try_into().map_err(|_| WrongValue::not_whole(parameter, value))?;
         }
         changed.check()?;
         *self = changed;

@@ -3,6 +3,7 @@
 //! The caller describes the problem. This module adds the place, and keeps the message in one line, because quoted text
 //! may contain any characters.
 
+use crate::toml_entry::find;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -11,21 +12,21 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum FileError {
     /// The file itself.
-    #[error("{path} cannot be {done}")]
+    #[error("{path} {problem}")]
     File {
         /// The file.
         path: PathBuf,
-        /// `read` or `written`.
-        done: &'static str,
+        /// What is wrong, behind its name.
+        problem: String,
         /// What the system says.
         source: io::Error,
     },
     /// A line of it.
-    #[error("{path}, line {line}: {}", in_a_line(problem))]
+    #[error("{path}{}: {}", at(*line), in_a_line(problem))]
     Line {
         /// The file.
         path: PathBuf,
-        /// The line, counted from 1.
+        /// The line, counted from 1; 0 if it is about none of them.
         line: u64,
         /// The problem, and what would be right.
         problem: String,
@@ -33,14 +34,19 @@ pub enum FileError {
 }
 
 impl FileError {
+    /// The system does not let it be used; `problem` follows its name.
+    pub fn unusable(path: &Path, problem: impl Into<String>, source: io::Error) -> Self {
+        Self::File { path: path.into(), problem: problem.into(), source }
+    }
+
     /// The system cannot read it.
     pub fn unread(path: &Path, source: io::Error) -> Self {
-        Self::File { path: path.into(), done: "read", source }
+        Self::unusable(path, "cannot be read", source)
     }
 
     /// The system cannot write it.
     pub fn unwritten(path: &Path, source: io::Error) -> Self {
-        Self::File { path: path.into(), done: "written", source }
+        Self::unusable(path, "cannot be written", source)
     }
 
     /// An error in the line with this byte of the file's text.
@@ -48,6 +54,18 @@ impl FileError {
         let ends = text.bytes().take(byte).filter(|&byte| byte == b'\n').count();
         Self::Line { path: path.into(), line: 1 + ends as u64, problem: problem.into() }
     }
+
+    /// Something is wrong with the key `table.key` of a TOML file, which may have left it out.
+    pub fn at_key(path: &Path, text: &str, name: &str, problem: impl Into<String>) -> Self {
+        match find(text, name) {
+            Some(entry) => Self::at_byte(path, text, entry.span.start, problem),
+            None => Self::Line { path: path.into(), line: 0, problem: problem.into() },
+        }
+    }
+}
+
+fn at(line: u64) -> String {
+    if line == 0 { String::new() } else { format!(", line {line}") }
 }
 
 /// Quotes the text of a file or a machine for a message. Control characters and line ends are escaped, so that it stays

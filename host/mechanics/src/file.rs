@@ -4,120 +4,38 @@
 //! most likely a misspelt key.
 
 use crate::machine::{Input, Machine};
-use std::fmt::Write;
+use files::{FileError, toml_entry};
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-use toml::de::{DeTable, DeValue};
-
-/// Why a file makes no machine.
-#[derive(Debug, Error)]
-pub enum FileError {
-    /// The file cannot be read.
-    #[error("{} cannot be read", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// An error in the file.
-    #[error("{}{}: {message}", path.display(), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
-    Wrong {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1. `None` if the wrong value is not in the file.
-        line: Option<usize>,
-        /// The problem, and what would be right.
-        message: String,
-    },
-}
+use std::path::Path;
 
 /// Reads a machine and checks it.
 ///
 /// # Errors
 /// If the file cannot be read, is no TOML, has unknown keys or units, or makes no machine that could be calculated.
 pub fn read(path: &Path) -> Result<Machine, FileError> {
-    let text = fs::read_to_string(path).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
-    parse(&text).map_err(|Mistake { line, message }| FileError::Wrong { path: path.to_owned(), line, message })
+    parse(path, &fs::read_to_string(path).map_err(|source| FileError::unread(path, source))?)
 }
 
-/// The problem of a text, and its place.
-#[derive(Debug, PartialEq, Eq)]
-struct Mistake {
-    line: Option<usize>,
-    message: String,
-}
-
-fn parse(text: &str) -> Result<Machine, Mistake> {
-    let machine: Machine = toml::from_str(text).map_err(|error| unreadable(text, &error))?;
+fn parse(path: &Path, text: &str) -> Result<Machine, FileError> {
+    let machine: Machine = toml::from_str(text).map_err(|error| {
+        let byte = error.span().map_or(0, |span| span.start);
+        FileError::at_byte(path, text, byte, explain(text, byte, error.message()))
+    })?;
     machine.check().map_err(|error| {
         let (section, key) = error.place();
-        let entry =
-            entries(text).into_iter().find(|entry| entry.section == section && entry.key.as_deref() == Some(key));
-        Mistake { line: entry.map(|entry| line(text, entry.start)), message: error.to_string() }
+        FileError::at_key(path, text, &format!("{section}.{key}"), error.to_string())
     })?;
     Ok(machine)
 }
 
-/// Converts an error of the TOML reader, with the key of the error and that key's value on the paper's machine.
-fn unreadable(text: &str, error: &toml::de::Error) -> Mistake {
-    let Some(span) = error.span() else { return Mistake { line: None, message: error.message().to_owned() } };
-    let mut message = String::new();
-    // A section may span its entries, and others' too if its keys are scattered.
-    let around = entries(text).into_iter().filter(|entry| (entry.start..entry.end).contains(&span.start));
-    let entry = around.min_by_key(|entry| entry.end - entry.start);
-    if let Some(entry) = entry {
-        let dotted = entry.key.as_ref().map(|key| format!(".{key}")).unwrap_or_default();
-        // Writing to a String cannot fail.
-        let _ = write!(message, "{}{dotted}: {}", entry.section, error.message());
-        if let Some(input) = entry.input() {
-            let _ = write!(message, "; the paper's machine has {} = {}", input.key, input.written());
-        }
-    } else {
-        message.push_str(error.message());
-    }
-    Mistake { line: Some(line(text, span.start)), message }
-}
-
-fn line(text: &str, byte: usize) -> usize {
-    text.bytes().take(byte).filter(|byte| *byte == b'\n').count() + 1
-}
-
-/// A section, or a key with its value, and its bytes in the text.
-struct Entry {
-    section: String,
-    key: Option<String>,
-    start: usize,
-    end: usize,
-}
-
-impl Entry {
-    /// The input with that name, if there is one.
-    fn input(&self) -> Option<Input> {
-        let inputs = Machine::default().inputs();
-        inputs.into_iter().find(|input| self.section == input.section && self.key.as_deref() == Some(input.key))
-    }
-}
-
-/// All entries of a text, each section before its keys. Empty if the text is no TOML.
-fn entries(text: &str) -> Vec<Entry> {
-    let mut entries = Vec::new();
-    let Ok(document) = DeTable::parse(text) else { return entries };
-    for (section, value) in document.get_ref() {
-        let name = section.get_ref().to_string();
-        let (start, end) = (section.span().start, value.span().end);
-        entries.push(Entry { section: name.clone(), key: None, start, end });
-        let DeValue::Table(table) = value.get_ref() else { continue };
-        entries.extend(table.iter().map(|(key, value)| Entry {
-            section: name.clone(),
-            key: Some(key.get_ref().to_string()),
-            start: key.span().start,
-            end: value.span().end,
-        }));
-    }
-    entries
+/// What the TOML reader found wrong at a byte, with the key there and what the paper's machine has there.
+fn explain(text: &str, byte: usize, message: &str) -> String {
+    let message = message.trim().replace('\n', ", ");
+    let Some(entry) = toml_entry::around(text, byte) else { return message };
+    let is_here = |input: &Input| entry.name == format!("{}.{}", input.section, input.key);
+    let right = Machine::default().inputs().into_iter().find(is_here);
+    let right = right.map(|input| format!("; the paper's machine has {} = {}", input.key, input.written()));
+    format!("{}: {message}{}", entry.name, right.unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -127,23 +45,23 @@ mod tests {
 
     #[track_caller]
     fn assert_refused(text: &str, line: usize, words: &str) {
-        let mistake = parse(text).unwrap_err();
-        assert_eq!(mistake.line, Some(line), "{}", mistake.message);
-        assert!(mistake.message.contains(words), "{}", mistake.message);
+        let said = parse(Path::new("my.toml"), text).unwrap_err().to_string();
+        assert!(said.starts_with(&format!("my.toml, line {line}: ")) && said.contains(words), "{said}");
     }
 
     #[test]
     fn what_is_left_out_is_as_on_the_papers_machine() {
-        assert_eq!(parse("").unwrap(), Machine::default());
+        let parse = |text| parse(Path::new("my.toml"), text).unwrap();
+        assert_eq!(parse(""), Machine::default());
         let mut larger = Machine::default();
         larger.wheel.diameter = MM.of(500.0);
-        assert_eq!(parse("[wheel]\ndiameter = \"500 mm\"").unwrap(), larger);
+        assert_eq!(parse("[wheel]\ndiameter = \"500 mm\""), larger);
     }
 
     #[test]
     fn the_printed_machine_is_read_back_as_it_was() {
         let machine = Machine::default();
-        let read = parse(&machine.to_toml()).unwrap();
+        let read = parse(Path::new("my.toml"), &machine.to_toml()).unwrap();
         for (read, printed) in read.inputs().into_iter().zip(machine.inputs()) {
             assert_eq!(read.written(), printed.written(), "{}.{}", read.section, read.key);
         }
@@ -196,7 +114,8 @@ mod tests {
         assert_refused("[crop]\nrow_spacing = \"100 mm\"", 2, "leaves no room for a sweep");
         let thick = "[wheel]\ndiameter = \"80 mm\"\nrim_thickness = \"40 mm\"";
         assert_refused(thick, 3, "it has to be less than half of wheel.diameter, 80 mm");
-        assert_eq!(parse("[crop]\nprotection_zone = \"140 mm\"").unwrap_err().line, None);
+        let elsewhere = parse(Path::new("my.toml"), "[crop]\nprotection_zone = \"140 mm\"").unwrap_err().to_string();
+        assert!(elsewhere.starts_with("my.toml: crop.row_spacing leaves no room"), "{elsewhere}");
     }
 
     #[test]

@@ -5,36 +5,21 @@
 //! with the field's slip, and a second beam measures the slip along a row. [`link::set_up`] calculates the margin.
 //! Without its measurements the margin is not changed.
 
+use anyhow::Result;
 use control::operate::calibration::{Outcome, SwingTimes, Swings};
 use control::settings::{Setting, Settings};
 use control::units::{Instant, Interval};
-use field::conditions::{Conditions, WrongValue};
+use field::conditions::Conditions;
 use field::driving::drive;
 use field::motion::{Motion, mm_s};
-use field::native::{self, Refused, Sensors};
-use field::row::Problem;
+use field::native::{self, Sensors};
 use field::stand::Stand;
 use field::trial::{Start, Trial};
 use link::set_up::{ManualStep, SetUp, Step, Task};
 use link::settings::name;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, Pulse};
-
-/// Why a step cannot be done.
-#[derive(Debug, Error)]
-pub enum ManualError {
-    /// The field does not know a part, or a value is out of range.
-    #[error(transparent)]
-    WrongValue(#[from] WrongValue),
-    /// The row along which the slip is measured does not grow.
-    #[error(transparent)]
-    Row(#[from] Problem),
-    /// The firmware refuses its settings.
-    #[error(transparent)]
-    Refused(#[from] Refused),
-}
 
 /// Times that the manual has the servo timed and the wheel measured.
 const TIMINGS: u64 = 2;
@@ -71,12 +56,12 @@ impl Novice {
     /// Does a step of the manual.
     ///
     /// # Errors
-    /// If the simulated field does not know what the step is about.
-    pub fn follow(&mut self, step: &ManualStep) -> Result<(), ManualError> {
+    /// Where the simulated field does not know what the step is about.
+    pub fn follow(&mut self, step: &ManualStep) -> Result<()> {
         step.tasks.iter().try_for_each(|&task| self.follow_task(task))
     }
 
-    fn follow_task(&mut self, task: Task) -> Result<(), ManualError> {
+    fn follow_task(&mut self, task: Task) -> Result<()> {
         match task {
             Task::Fit(part, value) => self.conditions.set(part, value)?,
             Task::Set(setting, value) => self.set(setting, value)?,
@@ -118,8 +103,8 @@ impl Novice {
         Ok(())
     }
 
-    fn set(&mut self, setting: Setting, value: u16) -> Result<(), WrongValue> {
-        self.conditions.set(&name(setting), value.into())
+    fn set(&mut self, setting: Setting, value: u16) -> Result<()> {
+        Ok(self.conditions.set(&name(setting), value.into())?)
     }
 
     /// The settings as they are.
@@ -184,8 +169,8 @@ impl Novice {
         (ticks as f64 * 1000.0 / length_mm).round() as u16
     }
 
-    /// The slip that a second beam measures along a row, plant by plant. `None` without a second beam.
-    fn pass_plants(&self) -> Result<Vec<i16>, ManualError> {
+    /// The slip that a second beam tells along a row, plant by plant; none without one.
+    fn pass_plants(&self) -> Result<Vec<i16>> {
         let conditions = &self.conditions;
         if conditions.machine.second_beam_mm == 0.0 {
             return Ok(Vec::new());

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
+use anyhow::{Context, Error, Result, ensure};
 use cargo_metadata::Message;
 
 /// A program for the chip: its package, which is also its binary's name, and the alias that builds it.
@@ -38,23 +39,6 @@ const FOREIGN_SETTINGS: [&str; 9] = [
     "WEEDER_COMMIT",
 ];
 
-/// Why the firmware could not be built.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum BuildError {
-    /// Cargo could not be started.
-    #[error("cargo could not be started ({0}): put it on PATH, ./setup.sh says how")]
-    Start(String),
-    /// Cargo's messages could not be read.
-    #[error("cargo's messages could not be read: {0}")]
-    Messages(String),
-    /// Cargo ran and failed.
-    #[error("`cargo {0}` failed ({1}): its own messages stand above; where a tool is missing, run ./setup.sh")]
-    Failed(&'static str, String),
-    /// Cargo succeeded, but made no ELF.
-    #[error("no ELF was made: the package `{0}` should have a binary of that name")]
-    NoElf(&'static str),
-}
-
 /// Builds the firmware of this workspace and returns the path of its ELF.
 ///
 /// Cargo runs at most once a process; later calls return the first one's answer. Its progress and the compiler's
@@ -62,10 +46,10 @@ pub enum BuildError {
 ///
 /// # Errors
 ///
-/// If cargo cannot be started, fails, or makes no ELF.
-pub fn build() -> Result<PathBuf, BuildError> {
-    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
-    BUILT.get_or_init(|| FIRMWARE.build()).clone()
+/// Where cargo cannot be started, fails, or makes no ELF.
+pub fn build() -> Result<PathBuf> {
+    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    FIRMWARE.build_once(&BUILT)
 }
 
 /// Builds the classifier's bench, which [`bench`](mod@crate::bench) runs, and returns the path of its ELF.
@@ -73,9 +57,9 @@ pub fn build() -> Result<PathBuf, BuildError> {
 /// # Errors
 ///
 /// As [`build`].
-pub fn build_bench() -> Result<PathBuf, BuildError> {
-    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
-    BUILT.get_or_init(|| BENCH.build()).clone()
+pub fn build_bench() -> Result<PathBuf> {
+    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    BENCH.build_once(&BUILT)
 }
 
 /// Builds the firmware of the tester, the Uno that checks another one. Returns the path of its ELF.
@@ -83,13 +67,17 @@ pub fn build_bench() -> Result<PathBuf, BuildError> {
 /// # Errors
 ///
 /// As [`build`].
-pub fn build_tester() -> Result<PathBuf, BuildError> {
-    static BUILT: OnceLock<Result<PathBuf, BuildError>> = OnceLock::new();
-    BUILT.get_or_init(|| TESTER.build()).clone()
+pub fn build_tester() -> Result<PathBuf> {
+    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    TESTER.build_once(&BUILT)
 }
 
 impl Program {
-    fn build(&self) -> Result<PathBuf, BuildError> {
+    fn build_once(&self, built: &OnceLock<Result<PathBuf, String>>) -> Result<PathBuf> {
+        built.get_or_init(|| self.build().map_err(|error| format!("{error:#}"))).clone().map_err(Error::msg)
+    }
+
+    fn build(&self) -> Result<PathBuf> {
         let mut command = Command::new("cargo");
         command
             .args([self.alias, "--message-format", "json-render-diagnostics"])
@@ -101,12 +89,13 @@ impl Program {
         for name in FOREIGN_SETTINGS {
             command.env_remove(name);
         }
-        let mut cargo = command.spawn().map_err(|error| BuildError::Start(error.to_string()))?;
+        const START: &str = "cargo could not be started: put it on PATH, ./setup.sh says how";
+        let mut cargo = command.spawn().context(START)?;
 
         let mut elf = None;
         if let Some(messages) = cargo.stdout.take() {
             for message in Message::parse_stream(BufReader::new(messages)) {
-                match message.map_err(|error| BuildError::Messages(error.to_string()))? {
+                match message.context("cargo's messages could not be read")? {
                     Message::CompilerArtifact(artifact) if artifact.target.name == self.package => {
                         elf = artifact.executable.map(PathBuf::from).or(elf);
                     }
@@ -114,11 +103,15 @@ impl Program {
                 }
             }
         }
-        let status = cargo.wait().map_err(|error| BuildError::Start(error.to_string()))?;
-        if !status.success() {
-            return Err(BuildError::Failed(self.alias, status.to_string()));
-        }
-        elf.ok_or(BuildError::NoElf(self.package))
+        let status = cargo.wait().context(START)?;
+        ensure!(
+            status.success(),
+            "`cargo {}` failed ({status}): its own messages stand above; where a tool is missing, run ./setup.sh",
+            self.alias
+        );
+        elf.with_context(|| {
+            format!("no ELF was made: the package `{}` should have a binary of that name", self.package)
+        })
     }
 }
 

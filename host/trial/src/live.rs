@@ -19,24 +19,24 @@
 //! - **EEPROM.** It is read from a file at the start, if there is one, and written to it after each change.
 
 use crate::receiver::{ReceiverSetup, SimulatedReceiver};
+use anyhow::{Context, Error, Result, bail};
 use field::machine::{Machine, cycle_at, time_at_s};
 use field::motion::Motion;
 use field::row::Row;
 use field::servo::{Servo, Stroke};
 use field::wiring;
 use std::collections::VecDeque;
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
-use thiserror::Error;
+use uno::Uno;
 use uno::elf::EEPROM_BYTES;
 use uno::hex::Bootloader;
-use uno::pty::{Pty, PtyError};
+use uno::pty::Pty;
 use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
-use uno::{Uno, UnoError};
 
 mod background;
 pub mod rows;
@@ -78,37 +78,7 @@ pub struct Course {
     stands_first_s: u64,
 }
 
-/// Why a live Uno could not start, or stopped.
-#[derive(Debug, Error)]
-pub enum LiveError {
-    /// There is neither a firmware nor a bootloader.
-    #[error("there is nothing to run: give a firmware's ELF, a bootloader, or both")]
-    NothingToRun,
-    /// The virtual Uno stopped.
-    #[error(transparent)]
-    Uno(#[from] UnoError),
-    /// The pseudo terminal failed.
-    #[error(transparent)]
-    Pty(#[from] PtyError),
-    /// The EEPROM's file cannot be read or written.
-    #[error("the EEPROM's file {path} cannot be read or written")]
-    Eeprom {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: io::Error,
-    },
-    /// The file is no EEPROM file.
-    #[error("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")]
-    NotEeprom {
-        /// The file.
-        path: PathBuf,
-        /// Its length.
-        bytes: usize,
-    },
-}
-
-/// Chip time between two checks of the terminal and of the PC's clock.
+/// Chip time between two looks at the terminal and at the host's clock.
 const SLICE_MS: u64 = 1;
 
 /// Slices between two checks of the EEPROM.
@@ -219,7 +189,7 @@ struct Receiver {
 }
 
 impl Receiver {
-    fn start((setup, link): (ReceiverSetup, Option<PathBuf>)) -> Result<Self, LiveError> {
+    fn start((setup, link): (ReceiverSetup, Option<PathBuf>)) -> Result<Self> {
         let mut pty = Pty::open()?;
         if let Some(link) = &link {
             pty.link(link)?;
@@ -227,9 +197,9 @@ impl Receiver {
         Ok(Self { simulated: SimulatedReceiver::new(setup), pty, unread: VecDeque::new() })
     }
 
-    /// Passes on the output up to this time.
-    fn serve(&mut self, time_s: f64, way: &Way) -> Result<(), LiveError> {
-        // It sends at all times, and takes no commands.
+    /// Passes on what it has said by now.
+    fn serve(&mut self, time_s: f64, way: &Way) -> Result<()> {
+        // It talks whether or not anybody listens, and takes no commands.
         if self.pty.was_opened()? {
             self.unread.clear();
         }
@@ -239,8 +209,8 @@ impl Receiver {
     }
 }
 
-/// Writes waiting bytes to the program, as far as there is room, and drops the oldest if there are too many.
-fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<(), LiveError> {
+/// Gives a program what waits for it, as far as it has room, and forgets what is too much.
+fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<()> {
     let written = pty.write(unread.make_contiguous())?;
     unread.drain(..written);
     let too_many = unread.len().saturating_sub(MOST_BYTES_UNREAD);
@@ -331,14 +301,14 @@ impl LiveUno {
     /// Powers it up. Its clock stands until it runs.
     ///
     /// # Errors
-    /// If there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
-    pub fn start(setup: Setup) -> Result<LiveUno, LiveError> {
+    /// Where there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
+    pub fn start(setup: Setup) -> Result<LiveUno> {
         let eeprom = setup.eeprom.map(EepromFile::open).transpose()?;
         let content = eeprom.as_ref().map_or(&[][..], |file| &file.content);
         let mut uno = match (&setup.bootloader, &setup.elf) {
             (Some(bootloader), elf) => Uno::boot_with_bootloader(bootloader, elf.as_deref(), content)?,
             (None, Some(elf)) => Uno::boot_with_eeprom(elf, content)?,
-            (None, None) => return Err(LiveError::NothingToRun),
+            (None, None) => bail!("there is nothing to run: give a firmware's ELF, a bootloader, or both"),
         };
         uno = uno.wired(&wiring::WIRES);
         uno.follow_baud();
@@ -374,8 +344,8 @@ impl LiveUno {
     /// Runs until `stop` is set.
     ///
     /// # Errors
-    /// If the firmware crashes or halts, or the terminal or the EEPROM's file fails.
-    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
+    /// Where the firmware crashes or halts, or the terminal or the EEPROM's file fails.
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<()> {
         let mut pace = (!self.fast).then(Pace::new);
         while !stop.load(Ordering::Relaxed) {
             self.slice()?;
@@ -387,7 +357,7 @@ impl LiveUno {
     }
 
     /// Runs for a slice.
-    fn slice(&mut self) -> Result<(), LiveError> {
+    fn slice(&mut self) -> Result<()> {
         self.serve_terminal()?;
         self.serve_receiver()?;
         self.roll();
@@ -405,8 +375,8 @@ impl LiveUno {
         if self.slices.is_multiple_of(EEPROM_SLICES) { self.keep_eeprom() } else { Ok(()) }
     }
 
-    /// Passes on the rest of the output.
-    fn end(&mut self) -> Result<(), LiveError> {
+    /// Passes on what is left.
+    fn end(&mut self) -> Result<()> {
         self.serve_terminal()?;
         self.serve_receiver()?;
         self.keep_eeprom()
@@ -418,7 +388,7 @@ impl LiveUno {
     }
 
     /// Plugs the cable in again.
-    fn plug_in(&mut self) -> Result<(), LiveError> {
+    fn plug_in(&mut self) -> Result<()> {
         let pty = terminal(self.link.as_deref())?;
         self.path = pty.path().to_owned();
         self.pty = Some(pty);
@@ -430,8 +400,8 @@ impl LiveUno {
         &self.uno
     }
 
-    /// Resets the chip when a program opens the port, and passes bytes both ways.
-    fn serve_terminal(&mut self) -> Result<(), LiveError> {
+    /// Resets the chip where a program has opened the port, and passes bytes both ways.
+    fn serve_terminal(&mut self) -> Result<()> {
         let Some(pty) = &mut self.pty else {
             // Discards the output: no program is connected.
             self.uno.received_bytes();
@@ -453,8 +423,8 @@ impl LiveUno {
         give(pty, &mut self.unread)
     }
 
-    /// Sends the receiver's output up to now.
-    fn serve_receiver(&mut self) -> Result<(), LiveError> {
+    /// Has the satellite receiver say what it has to say by now.
+    fn serve_receiver(&mut self) -> Result<()> {
         match &mut self.receiver {
             Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),
             None => Ok(()),
@@ -476,7 +446,7 @@ impl LiveUno {
         }
     }
 
-    fn keep_eeprom(&mut self) -> Result<(), LiveError> {
+    fn keep_eeprom(&mut self) -> Result<()> {
         match &mut self.eeprom {
             Some(file) => file.keep(self.uno.eeprom()),
             None => Ok(()),
@@ -484,8 +454,8 @@ impl LiveUno {
     }
 }
 
-/// A pseudo terminal, with a link to it if `link` is given.
-fn terminal(link: Option<&Path>) -> Result<Pty, LiveError> {
+/// A pseudo terminal, with a link to it where one is wanted.
+fn terminal(link: Option<&Path>) -> Result<Pty> {
     let mut pty = Pty::open()?;
     if let Some(link) = link {
         pty.link(link)?;
@@ -535,13 +505,13 @@ impl Ports {
 
 impl Live for LiveUno {
     type Outside = Ports;
-    type Failure = LiveError;
+    type Failure = Error;
 
     fn outside(&self) -> Ports {
         Ports { path: self.path().to_owned(), receiver_path: self.receiver_path().map(Path::to_owned) }
     }
 
-    fn run_until(&mut self, stop: &AtomicBool) -> Result<(), LiveError> {
+    fn run_until(&mut self, stop: &AtomicBool) -> Result<()> {
         self.run(stop)
     }
 }
@@ -553,28 +523,34 @@ struct EepromFile {
 }
 
 impl EepromFile {
-    /// Reads it. A missing file is an erased EEPROM.
-    fn open(path: PathBuf) -> Result<EepromFile, LiveError> {
+    /// Reads it; a file that does not exist yet is an erased EEPROM.
+    fn open(path: PathBuf) -> Result<EepromFile> {
         match std::fs::read(&path) {
             Ok(content) if content.len() == EEPROM_BYTES => Ok(EepromFile { path, content }),
-            Ok(content) => Err(LiveError::NotEeprom { path, bytes: content.len() }),
+            Ok(content) => {
+                let (path, bytes) = (path.display(), content.len());
+                bail!("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")
+            }
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 let mut file = EepromFile { path, content: Vec::new() };
                 // A file that cannot be written is better known now.
                 file.keep(vec![0xFF; EEPROM_BYTES])?;
                 Ok(file)
             }
-            Err(source) => Err(LiveError::Eeprom { path, source }),
+            Err(error) => Err(error).with_context(|| unusable(&path)),
         }
     }
 
-    /// Writes it if the content has changed.
-    fn keep(&mut self, content: Vec<u8>) -> Result<(), LiveError> {
+    /// Writes it where the content has changed.
+    fn keep(&mut self, content: Vec<u8>) -> Result<()> {
         if content != self.content {
-            std::fs::write(&self.path, &content)
-                .map_err(|source| LiveError::Eeprom { path: self.path.clone(), source })?;
+            std::fs::write(&self.path, &content).with_context(|| unusable(&self.path))?;
             self.content = content;
         }
         Ok(())
     }
+}
+
+fn unusable(path: &Path) -> String {
+    format!("the EEPROM's file {} cannot be read or written", path.display())
 }

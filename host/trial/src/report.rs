@@ -4,11 +4,11 @@
 
 use crate::console::Status;
 use crate::run::Outcome;
-use comfy_table::{Attribute, Cell, CellAlignment, Color, Table, presets};
+use comfy_table::{Attribute, Cell, CellAlignment, Color, Row, Table, presets};
 use field::counted;
 use field::machine::Machine;
 use field::motion::Motion;
-use field::row::Row;
+use field::row;
 use field::trial::Trial;
 use field::verdict::{PlantOutcome, Verdict, WeedOutcome};
 use serde::Serialize;
@@ -23,11 +23,19 @@ const WORKING_WIDTH_MM: f64 = 400.0;
 const FLASH_BYTES: u64 = 32_768 - 512;
 const SRAM_BYTES: u64 = 2048;
 
-/// One line for each plant: its position, the positions where the tool was clear of the row and came back, and the
-/// verdict.
-pub fn table(outcome: &Outcome) -> Table {
+/// A table without inner lines. Its columns from this one on are numbers, and stand to the right.
+pub fn number_table(header: impl Into<Row>, from: usize) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
+    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(header);
+    for column in table.column_iter_mut().skip(from) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// One line per plant: where it stood, where the tool was clear of the row and where it came back, and the verdict.
+pub fn table(outcome: &Outcome) -> Table {
+    let header = [
         "plant",
         "place\nmm",
         "canopy\nmm",
@@ -39,7 +47,9 @@ pub fn table(outcome: &Outcome) -> Table {
         "in late\nticks",
         "swings",
         "verdict",
-    ]);
+    ];
+    let mut table = number_table(header, 0);
+    table.column_iter_mut().skip(10).for_each(|column| column.set_cell_alignment(CellAlignment::Left));
     for (index, plant) in outcome.judgement.plants.iter().enumerate() {
         let whole = |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| format!("{value:.0}"));
         let tenths = |value: Option<f64>| value.map_or("shared".to_owned(), |value| format!("{value:+.1}"));
@@ -56,10 +66,6 @@ pub fn table(outcome: &Outcome) -> Table {
             Cell::new(plant.swings),
             verdict_cell(plant.verdict),
         ]);
-    }
-    let columns = table.column_iter_mut();
-    for column in columns.take(10) {
-        column.set_cell_alignment(CellAlignment::Right);
     }
     table
 }
@@ -259,8 +265,8 @@ fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::
     Ok(())
 }
 
-/// The trial's parameters, in a line.
-pub fn introduction(row: &Row, machine: &Machine, motion: &Motion) -> String {
+/// What is about to be tried, in a line.
+pub fn introduction(row: &row::Row, machine: &Machine, motion: &Motion) -> String {
     let span = row.span_mm();
     format!(
         "{} and {} on {:.2} m of row, beam {:.0} mm ahead of the tool, {:.0} s on the field",
@@ -283,7 +289,8 @@ pub(crate) mod tests {
     /// A trial in which the tool stayed in the row from one second on, and its outcome.
     pub fn ruined_row() -> (Trial, Outcome) {
         let row =
-            Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(750.0, 15.0), Thing::plant(1000.0, 150.0)]).unwrap();
+            row::Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(750.0, 15.0), Thing::plant(1000.0, 150.0)])
+                .unwrap();
         let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(1.0));
         let frame = |rise, width_us: u64| Pulse { rise, fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000 };
         let pulses = vec![frame(0, 2000), frame(CYCLES_PER_SECOND, 1500)];

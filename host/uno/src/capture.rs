@@ -7,104 +7,14 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use vcd::{Command, IdCode, Parser, Scope, ScopeItem, TimescaleUnit, Value, Var};
 
+use crate::error::FileError;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange};
 
-/// Why a recording cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum CaptureError {
-    /// The file could not be read.
-    #[error("the recording {path} could not be read")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The error. For a file that is no VCD, it includes the line.
-        source: std::io::Error,
-    },
-    /// The file has no time unit.
-    #[error("{path} has no $timescale: export the recording as VCD once more")]
-    NoTimescale {
-        /// The file.
-        path: PathBuf,
-    },
-    /// There is no channel of that name.
-    #[error("{path} has no channel `{name}`; it has {}", known.join(", "))]
-    UnknownChannel {
-        /// The file.
-        path: PathBuf,
-        /// The name asked for.
-        name: String,
-        /// The names there are.
-        known: Vec<String>,
-    },
-    /// Several channels have that name.
-    #[error("{path} has several channels `{name}`: write one of {}", known.join(", "))]
-    AmbiguousChannel {
-        /// The file.
-        path: PathBuf,
-        /// The name asked for.
-        name: String,
-        /// Their full names.
-        known: Vec<String>,
-    },
-    /// A channel was chosen twice.
-    #[error("channel `{name}` is given for two signals: each needs its own")]
-    SharedChannel {
-        /// The name.
-        name: String,
-    },
-    /// The channel is more than one wire.
-    #[error("channel `{name}` of {path} is {width} bits wide: a single wire is needed")]
-    NotOneWire {
-        /// The file.
-        path: PathBuf,
-        /// The channel.
-        name: String,
-        /// Its width in bits.
-        width: u32,
-    },
-    /// The channel is neither high nor low.
-    #[error("channel `{name}` of {path} is `{value}` at line {line}: only 0 and 1 are levels")]
-    NoLevel {
-        /// The file.
-        path: PathBuf,
-        /// The channel.
-        name: String,
-        /// What the file says.
-        value: String,
-        /// Where.
-        line: u64,
-    },
-    /// The times do not rise.
-    #[error("{path} goes back in time at line {line}")]
-    BackInTime {
-        /// The file.
-        path: PathBuf,
-        /// Where.
-        line: u64,
-    },
-    /// The recording is too long.
-    #[error("{path} goes on beyond {MOST_HOURS} h at line {line}: cut the recording, or look at its $timescale")]
-    TooLong {
-        /// The file.
-        path: PathBuf,
-        /// Where.
-        line: u64,
-    },
-    /// The channel has no level.
-    #[error("{path} holds no samples of channel `{name}`")]
-    NoSamples {
-        /// The file.
-        path: PathBuf,
-        /// The channel.
-        name: String,
-    },
-}
-
-/// Longest recording, in hours. Playing a longer one takes too long to be useful.
+/// Longest recording, in hours. Nobody waits for the firmware to play a longer one.
 const MOST_HOURS: u64 = 24;
 
 /// Greatest nesting of scopes. An analyser writes one or two, and each uses the reader's stack.
@@ -134,19 +44,22 @@ impl Capture {
     ///
     /// # Errors
     ///
-    /// If the file is no VCD, lacks a channel, or leaves a level undefined.
-    pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, CaptureError> {
-        let file = File::open(path).map_err(|source| CaptureError::Read { path: path.into(), source })?;
+    /// Where the file is no VCD, has no such channels, or leaves their levels open.
+    pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, FileError> {
+        let file = File::open(path).map_err(|source| FileError::unread(path, source))?;
         Capture::parse(path, BufReader::new(file), channels)
     }
 
-    fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Capture, CaptureError> {
-        let read_error = |source| CaptureError::Read { path: path.into(), source };
+    fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Capture, FileError> {
+        let read_error = |source| FileError::unread(path, source);
+        let wrong = |problem: String| FileError::new(path, problem);
         let mut file = file;
         let head = head(&mut file).map_err(read_error)?;
         let mut parser = Parser::new(head.chain(file));
         let header = parser.parse_header().map_err(read_error)?;
-        let timescale = header.timescale.ok_or_else(|| CaptureError::NoTimescale { path: path.into() })?;
+        let timescale = header
+            .timescale
+            .ok_or_else(|| wrong("has no $timescale: export the recording as VCD once more".to_owned()))?;
 
         let mut known = Vec::new();
         list_channels("", &header.items, &mut known);
@@ -154,7 +67,7 @@ impl Capture {
         for &(pin, name) in channels {
             let channel = Channel { pin, name: name.to_owned(), level: None };
             if wires.insert(find_channel(path, name, &known)?, channel).is_some() {
-                return Err(CaptureError::SharedChannel { name: name.to_owned() });
+                return Err(wrong(format!("has channel `{name}` given for two signals: each needs its own")));
             }
         }
 
@@ -163,7 +76,7 @@ impl Capture {
         while let Some(command) = parser.next().transpose().map_err(read_error)? {
             match command {
                 Command::Timestamp(later) if later < time => {
-                    return Err(CaptureError::BackInTime { path: path.into(), line: parser.line() });
+                    return Err(wrong(format!("goes back in time at line {}", parser.line())));
                 }
                 Command::Timestamp(later) => time = later,
                 Command::ChangeScalar(wire, value) => {
@@ -172,18 +85,20 @@ impl Capture {
                         Value::V0 => false,
                         Value::V1 => true,
                         Value::X | Value::Z => {
-                            return Err(CaptureError::NoLevel {
-                                path: path.into(),
-                                name: channel.name.clone(),
-                                value: value.to_string(),
-                                line: parser.line(),
-                            });
+                            return Err(wrong(format!(
+                                "has `{value}` on channel `{}` at line {}: only 0 and 1 are levels",
+                                channel.name,
+                                parser.line()
+                            )));
                         }
                     };
                     if channel.level.replace(high) != Some(high) {
                         let cycle = to_cycles(time, timescale);
                         if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
-                            return Err(CaptureError::TooLong { path: path.into(), line: parser.line() });
+                            return Err(wrong(format!(
+                                "goes on beyond {MOST_HOURS} h at line {}: cut the recording, or look at its $timescale",
+                                parser.line()
+                            )));
                         }
                         changes.push(PinChange { cycle, pin: channel.pin, high });
                     }
@@ -192,7 +107,7 @@ impl Capture {
             }
         }
         match wires.into_values().find(|channel| channel.level.is_none()) {
-            Some(Channel { name, .. }) => Err(CaptureError::NoSamples { path: path.into(), name }),
+            Some(Channel { name, .. }) => Err(wrong(format!("holds no samples of channel `{name}`"))),
             None => Ok(Capture { changes }),
         }
     }
@@ -256,25 +171,23 @@ fn list_channels<'a>(scope: &str, items: &'a [ScopeItem], known: &mut Vec<(Strin
 }
 
 /// The wire of the channel `name`.
-fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdCode, CaptureError> {
+fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdCode, FileError> {
     let matching: Vec<_> =
         known.iter().filter(|(full_name, channel)| full_name == name || channel.reference == name).collect();
-    match matching[..] {
-        [(_, channel)] if channel.size == 1 => Ok(channel.code),
-        [(_, channel)] => {
-            Err(CaptureError::NotOneWire { path: path.into(), name: name.to_owned(), width: channel.size })
+    let list = |names: Vec<&str>| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let problem = match matching[..] {
+        [(_, channel)] if channel.size == 1 => return Ok(channel.code),
+        [(_, channel)] => format!("has channel `{name}` {} bits wide: a single wire is needed", channel.size),
+        [] => {
+            let known = known.iter().map(|(_, channel)| channel.reference.as_str()).collect();
+            format!("has no channel `{name}`; it has {}", list(known))
         }
-        [] => Err(CaptureError::UnknownChannel {
-            path: path.into(),
-            name: name.to_owned(),
-            known: known.iter().map(|(_, channel)| format!("`{}`", channel.reference)).collect(),
-        }),
-        _ => Err(CaptureError::AmbiguousChannel {
-            path: path.into(),
-            name: name.to_owned(),
-            known: matching.iter().map(|(full_name, _)| format!("`{full_name}`")).collect(),
-        }),
-    }
+        _ => {
+            let full = matching.iter().map(|(full_name, _)| full_name.as_str()).collect();
+            format!("has several channels `{name}`: write one of {}", list(full))
+        }
+    };
+    Err(FileError::new(path, problem))
 }
 
 #[cfg(test)]
@@ -343,12 +256,12 @@ mod tests {
     fn a_recording_that_leaves_levels_open_is_refused() {
         let error = |file: &str| parse(file, &CHANNELS).unwrap_err();
         let open = error(&recording("1 us", "#0 0! 0\"\n#5 x!"));
-        assert!(open.contains("channel `A` of pins.vcd is `x` at line 9"), "{open}");
+        assert!(open.contains("pins.vcd has `x` on channel `A` at line 9"), "{open}");
         assert!(error(&recording("1 us", "#0 0!")).contains("no samples of channel `B`"));
         assert!(error(&recording("1 us", "#5 0! 0\" #4 1!")).contains("back in time"));
         assert!(error(&recording("1 us", "").replace("$timescale 1 us $end", "")).contains("no $timescale"));
-        assert!(error("").contains("pins.vcd could not be read"));
-        assert!(error("position,width\n").contains("pins.vcd could not be read"));
+        assert!(error("").contains("pins.vcd cannot be read"));
+        assert!(error("position,width\n").contains("pins.vcd cannot be read"));
     }
 
     #[test]

@@ -4,8 +4,9 @@
 //! This module neither builds nor runs the firmware; [`Uno`](crate::Uno) runs it.
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::error::FileError;
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf,
@@ -36,55 +37,14 @@ impl Size {
     ///
     /// # Errors
     ///
-    /// If the file cannot be read or is no ELF for AVR.
-    pub fn read(path: &Path) -> Result<Size, ImageError> {
+    /// Where the file cannot be read or is no ELF for AVR.
+    pub fn read(path: &Path) -> Result<Size, FileError> {
         let bytes = read_bytes(path)?;
         parse(path, &bytes).map(|file| size(&file))
     }
 }
 
-/// Why an ELF could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum ImageError {
-    /// The file could not be read.
-    #[error("{path} could not be read")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: std::io::Error,
-    },
-    /// The file is no ELF, or damaged.
-    #[error("{path} is not a readable ELF file ({reason})")]
-    NotElf {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        reason: object::Error,
-    },
-    /// The file was made for another processor.
-    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed")]
-    NotAvr {
-        /// The file.
-        path: PathBuf,
-        /// Its target.
-        architecture: Architecture,
-    },
-    /// The file has more bytes than the chip's memory.
-    #[error("{path} has {end} bytes for the {memory}: the ATmega328P holds {limit}")]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// Which memory.
-        memory: &'static str,
-        /// Address behind the last byte.
-        end: u64,
-        /// The memory's size.
-        limit: usize,
-    },
-}
-
-/// A variable's address in SRAM.
+/// A variable's place in SRAM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Variable {
     /// Address in the data space.
@@ -113,8 +73,8 @@ impl Image {
     ///
     /// # Errors
     ///
-    /// If the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
-    pub fn read(path: &Path) -> Result<Image, ImageError> {
+    /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
+    pub fn read(path: &Path) -> Result<Image, FileError> {
         let bytes = read_bytes(path)?;
         let file = parse(path, &bytes)?;
         let mut flash = Vec::new();
@@ -133,7 +93,8 @@ impl Image {
             };
             let end = start + content.len() as u64;
             if end > limit as u64 {
-                return Err(ImageError::TooLarge { path: path.into(), memory: name, end, limit });
+                let problem = format!("has {end} bytes for the {name}: the ATmega328P holds {limit}");
+                return Err(FileError::new(path, problem));
             }
             let (start, end) = (start as usize, end as usize);
             if memory.len() < end {
@@ -147,16 +108,16 @@ impl Image {
     }
 }
 
-fn read_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
-    std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })
+fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
+    std::fs::read(path).map_err(|source| FileError::unread(path, source))
 }
 
 /// Takes the content of the file at `path` for an ELF for AVR.
-fn parse<'data>(path: &Path, bytes: &'data [u8]) -> Result<ElfFile32<'data, LittleEndian>, ImageError> {
-    let not_elf = |reason| ImageError::NotElf { path: path.into(), reason };
+fn parse<'data>(path: &Path, bytes: &'data [u8]) -> Result<ElfFile32<'data, LittleEndian>, FileError> {
+    let not_elf = |reason| FileError::new(path, format_args!("is not a readable ELF file ({reason})"));
     let architecture = object::File::parse(bytes).map_err(not_elf)?.architecture();
     if architecture != Architecture::Avr {
-        return Err(ImageError::NotAvr { path: path.into(), architecture });
+        return Err(FileError::new(path, format_args!("was made for {architecture:?}: an ELF for AVR is needed")));
     }
     ElfFile32::parse(bytes).map_err(not_elf)
 }

@@ -1,17 +1,47 @@
 //! The errors of a virtual Uno: it could not start, it stopped, or a wait timed out.
 
-use crate::elf::{EEPROM_BYTES, ImageError};
-use crate::hex::HexError;
+use crate::elf::EEPROM_BYTES;
+use std::fmt::Display;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file that cannot be used, and why.
+#[derive(Debug, thiserror::Error)]
+#[error("{} {problem}", path.display())]
+pub struct FileError {
+    path: PathBuf,
+    problem: String,
+    source: Option<io::Error>,
+}
+
+impl FileError {
+    pub(crate) fn new(path: &Path, problem: impl Display) -> Self {
+        Self { path: path.into(), problem: problem.to_string(), source: None }
+    }
+
+    pub(crate) fn unread(path: &Path, source: io::Error) -> Self {
+        Self::failed(path, "cannot be read", source)
+    }
+
+    pub(crate) fn failed(path: &Path, problem: impl Display, source: io::Error) -> Self {
+        Self { source: Some(source), ..Self::new(path, problem) }
+    }
+}
 
 /// Why a virtual Uno could not start, or stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum UnoError {
-    /// The ELF cannot be run.
+    /// The ELF or the bootloader cannot be used.
     #[error(transparent)]
-    Image(#[from] ImageError),
+    File(#[from] FileError),
     /// The firmware reaches into the bootloader.
-    #[error(transparent)]
-    Hex(#[from] HexError),
+    #[error("the firmware takes {bytes} bytes of flash: the bootloader leaves {available}")]
+    NoRoom {
+        /// The firmware's size.
+        bytes: usize,
+        /// What there is.
+        available: usize,
+    },
     /// The EEPROM content does not fit.
     #[error("{0} bytes of EEPROM content were given: the ATmega328P holds {EEPROM_BYTES}")]
     EepromTooLarge(usize),

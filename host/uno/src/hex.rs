@@ -4,12 +4,12 @@
 //! that, otherwise it starts the present firmware. Its address limits the flash for the firmware. This module does not
 //! run a bootloader; [`Uno`](crate::Uno) does.
 
-use crate::elf::{FLASH_BYTES, Image, ImageError};
+use crate::elf::{FLASH_BYTES, Image};
+use crate::error::{FileError, UnoError};
 use ihex::{Reader, ReaderError, Record};
-use std::io;
-use std::path::{Path, PathBuf};
+use std::fmt::Display;
+use std::path::Path;
 use std::process::{Command, Stdio};
-use thiserror::Error;
 
 /// Sizes of the boot section in bytes, selected by the fuses (data sheet, boot size configuration).
 const BOOT_SECTION_BYTES: [usize; 4] = [512, 1024, 2048, 4096];
@@ -23,59 +23,6 @@ const OPTIBOOT_START: u16 = 0x7E00;
 /// Bytes of data in a line, as in the files of most tools.
 const LINE_BYTES: usize = 16;
 
-/// An error in a file, or a firmware that does not fit beside a bootloader.
-#[derive(Debug, Error)]
-pub enum HexError {
-    /// The file could not be read.
-    #[error("{path} cannot be read")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: io::Error,
-    },
-    /// The file is not Intel HEX.
-    #[error("{path} is no Intel HEX file: {reason}; take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex")]
-    NotHex {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        reason: ReaderError,
-    },
-    /// The file's data are not at a bootloader's address.
-    #[error(
-        "{path} is no bootloader for the ATmega328P: it fills flash from {start:#06x} to {end:#06x}, and should begin at \
-         0x7000, 0x7800, 0x7c00 or 0x7e00 and end by 0x8000"
-    )]
-    NotABootloader {
-        /// The file.
-        path: PathBuf,
-        /// Address of its first byte.
-        start: usize,
-        /// Address behind its last byte.
-        end: usize,
-    },
-    /// The file has no data.
-    #[error("{0} is empty: take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex")]
-    Empty(PathBuf),
-    /// Optiboot could not be compiled.
-    #[error(
-        "optiboot cannot be compiled ({0}): it takes avr-gcc and {OPTIBOOT_SOURCE}, which Debian has as gcc-avr and arduino-core-avr"
-    )]
-    NotCompiled(String),
-    /// The compiled bootloader is not a readable ELF.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// The firmware overlaps the bootloader.
-    #[error("the firmware takes {bytes} bytes of flash: the bootloader leaves {available}")]
-    NoRoom {
-        /// The firmware's size.
-        bytes: usize,
-        /// What there is.
-        available: usize,
-    },
-}
-
 /// A bootloader for the ATmega328P.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bootloader {
@@ -87,16 +34,21 @@ impl Bootloader {
     /// Reads a bootloader's Intel HEX file.
     ///
     /// # Errors
-    /// If it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
-    pub fn read(path: &Path) -> Result<Bootloader, HexError> {
-        let text = std::fs::read_to_string(path).map_err(|source| HexError::Read { path: path.into(), source })?;
-        let pieces = pieces(&text).map_err(|reason| HexError::NotHex { path: path.into(), reason })?;
+    /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
+    pub fn read(path: &Path) -> Result<Bootloader, FileError> {
+        let wrong = |problem: String| FileError::new(path, problem);
+        let right = "take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex";
+        let text = std::fs::read_to_string(path).map_err(|source| FileError::unread(path, source))?;
+        let pieces = pieces(&text).map_err(|reason| wrong(format!("is no Intel HEX file: {reason}; {right}")))?;
         let start = pieces.iter().map(|(address, _)| *address).min();
-        let start = start.ok_or_else(|| HexError::Empty(path.into()))?;
+        let start = start.ok_or_else(|| wrong(format!("is empty: {right}")))?;
         let end = pieces.iter().map(|(address, bytes)| address + bytes.len()).max().unwrap_or(start);
         let fits = end <= FLASH_BYTES && BOOT_SECTION_BYTES.contains(&FLASH_BYTES.wrapping_sub(start));
         let Some(start_address) = u16::try_from(start).ok().filter(|_| fits) else {
-            return Err(HexError::NotABootloader { path: path.into(), start, end });
+            return Err(wrong(format!(
+                "is no bootloader for the ATmega328P: it fills flash from {start:#06x} to {end:#06x}, and should begin at \
+                 0x7000, 0x7800, 0x7c00 or 0x7e00 and end by 0x8000"
+            )));
         };
         let mut code = vec![0xFF; end - start];
         for (address, bytes) in pieces {
@@ -108,9 +60,12 @@ impl Bootloader {
     /// Compiles Optiboot, the Uno's own bootloader. The file of it that Debian has ready is longer than its boot section.
     ///
     /// # Errors
-    /// If avr-gcc or the source is missing.
-    pub fn optiboot() -> Result<Bootloader, HexError> {
-        let not_compiled = |reason: &dyn ToString| HexError::NotCompiled(reason.to_string());
+    /// Where avr-gcc or the source is missing.
+    pub fn optiboot() -> Result<Bootloader, FileError> {
+        let not_compiled = |reason: &dyn Display| {
+            let needs = "it takes avr-gcc and the source, which Debian has as gcc-avr and arduino-core-avr";
+            FileError::new(Path::new(OPTIBOOT_SOURCE), format_args!("cannot be compiled ({reason}): {needs}"))
+        };
         let elf = tempfile::NamedTempFile::new().map_err(|error| not_compiled(&error))?;
         let status = Command::new("avr-gcc")
             .args(["-mmcu=atmega328p", "-DF_CPU=16000000L", "-DBAUD_RATE=115200", "-w", "-Os", "-mrelax", "-nostdlib"])
@@ -136,8 +91,8 @@ impl Bootloader {
     /// All that goes into flash: the firmware, then erased flash, then the bootloader.
     ///
     /// # Errors
-    /// If the firmware reaches into the bootloader.
-    pub fn behind(&self, firmware: &[u8]) -> Result<Vec<u8>, HexError> {
+    /// Where the firmware reaches into the bootloader.
+    pub fn behind(&self, firmware: &[u8]) -> Result<Vec<u8>, UnoError> {
         check_room(firmware.len(), self.start.into())?;
         let mut flash = firmware.to_vec();
         flash.resize(self.start.into(), 0xFF);
@@ -149,9 +104,9 @@ impl Bootloader {
 /// Checks that a firmware of so many bytes fits into the flash that a bootloader leaves.
 ///
 /// # Errors
-/// If it does not.
-pub fn check_room(bytes: usize, available: usize) -> Result<(), HexError> {
-    if bytes <= available { Ok(()) } else { Err(HexError::NoRoom { bytes, available }) }
+/// Where it does not.
+pub fn check_room(bytes: usize, available: usize) -> Result<(), UnoError> {
+    if bytes <= available { Ok(()) } else { Err(UnoError::NoRoom { bytes, available }) }
 }
 
 /// What goes into flash from address 0 on as Intel HEX.

@@ -1,10 +1,11 @@
 #![doc = include_str!("../README.md")]
 //! # Imports
 //!
-//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`,
-//! `turns` beside them -> `recorder`, which owns the state of simavr's callbacks -> `core`, which runs it -> `terminal`
-//! -> `board`, which has the [`Uno`]. The files: `elf` -> `hex`, `core` -> `board`. All modules import `pins`, and it
-//! imports none. `capture`, `waveform` and `pty` import only `pins`.
+//! # Who knows whom
+//!
+//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`, `turns` beside them -> `recorder`,
+//! which owns what simavr calls back with -> `core`, which runs it -> `terminal` -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `capture`, `pty` -> `hex`, `core` -> `board`.
+//! `pins` knows none of these and is known to all; `capture`, `waveform` and `pty` know only `pins`.
 
 #[cfg(feature = "simavr")]
 mod adc;
@@ -48,7 +49,7 @@ pub use self::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 #[cfg(feature = "simavr")]
 pub use self::{
     board::Uno,
-    error::UnoError,
+    error::{FileError, UnoError},
     interrupts::{HandlerCycles, InterruptStatistics, Place},
     recorder::{ReceivedByte, Reset, ResetCause},
     terminal::{BAUD, SENT_BYTE_CYCLES},

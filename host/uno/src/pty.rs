@@ -10,6 +10,7 @@
 //! The system calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one,
 //! and do not report who opens it.
 
+use crate::error::FileError;
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};
 use rustix::io::Errno;
@@ -20,7 +21,6 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::mem::MaybeUninit;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// The terminal's default baud rate, for programs that read it and do not set it.
 const BAUD: u32 = 115_200;
@@ -28,48 +28,8 @@ const BAUD: u32 = 115_200;
 /// The system's folder for the programs' sides.
 const TERMINALS: &str = "/dev/pts";
 
-/// Why a pseudo terminal does not work.
-#[derive(Debug, Error)]
-pub enum PtyError {
-    /// The system has no more pseudo terminals.
-    #[error("no pseudo terminal can be opened: is /dev/pts mounted?")]
-    Open(#[source] io::Error),
-    /// It stopped working.
-    #[error("the pseudo terminal {path} has failed")]
-    Failed {
-        /// Its path.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: io::Error,
-    },
-    /// The link's path exists and is no link.
-    #[error("{0} exists already and is no link to a pseudo terminal: name another link, or remove it")]
-    LinkExists(PathBuf),
-    /// The link leads to a pseudo terminal that another process uses.
-    #[error(
-        "{} leads to {}, which {holder} has: end it, or name another link; if it is none of your virtual Unos, remove the link",
-        path.display(), target.display()
-    )]
-    LinkInUse {
-        /// The link.
-        path: PathBuf,
-        /// Where it leads.
-        target: PathBuf,
-        /// The process that has the device's side.
-        holder: String,
-    },
-    /// The link cannot be made.
-    #[error("{path} cannot be made a link to the pseudo terminal")]
-    Link {
-        /// The link's path.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: io::Error,
-    },
-}
-
-/// The device's side of a pseudo terminal. Dropping it closes the terminal for the programs, like unplugging an Uno's
-/// cable.
+/// The device's side of a pseudo terminal. Dropped, it is gone for those who have the other side open, as an Uno whose cable is
+/// pulled.
 #[derive(Debug)]
 pub struct Pty {
     device: File,
@@ -88,8 +48,8 @@ impl Pty {
     /// Opens one.
     ///
     /// # Errors
-    /// If the system has none to give.
-    pub fn open() -> Result<Pty, PtyError> {
+    /// Where the system has none to give.
+    pub fn open() -> Result<Pty, FileError> {
         let open = || -> io::Result<Pty> {
             let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
             grantpt(&device)?;
@@ -106,7 +66,8 @@ impl Pty {
             inotify::add_watch(&watch, &path, inotify::WatchFlags::OPEN | inotify::WatchFlags::CLOSE)?;
             Ok(Pty { device: device.into(), other_side, watch, is_open: false, path, link: None })
         };
-        open().map_err(PtyError::Open)
+        let problem = "has no pseudo terminal to give: is it mounted?";
+        open().map_err(|source| FileError::failed(Path::new(TERMINALS), problem, source))
     }
 
     /// The path for programs.
@@ -118,14 +79,15 @@ impl Pty {
     /// process uses that terminal. Killed processes leave such links.
     ///
     /// # Errors
-    /// If the path is something else than a link, another process uses the terminal, or the folder cannot be written
-    /// to.
-    pub fn link(&mut self, path: &Path) -> Result<(), PtyError> {
+    /// If something else is there or uses it, or the folder cannot be written to.
+    pub fn link(&mut self, path: &Path) -> Result<(), FileError> {
         let target = std::fs::read_link(path).ok().filter(|target| target.starts_with(TERMINALS));
         // A leftover link may point to this very terminal: the system reuses the numbers.
         if let Some(target) = target.as_ref().filter(|&target| *target != self.path && target.exists()) {
             let holder = holder(target);
-            return Err(PtyError::LinkInUse { path: path.into(), target: target.clone(), holder });
+            let target = target.display();
+            let right = "end it, or name another link; if it is none of your virtual Unos, remove the link";
+            return Err(FileError::new(path, format_args!("leads to {target}, which {holder} has: {right}")));
         }
         let is_left_over = target.is_some();
         let linked = match is_left_over {
@@ -137,8 +99,11 @@ impl Pty {
                 self.link = Some(path.into());
                 Ok(())
             }
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(PtyError::LinkExists(path.into())),
-            Err(source) => Err(PtyError::Link { path: path.into(), source }),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(FileError::new(
+                path,
+                "exists already and is no link to a pseudo terminal: name another link, or remove it",
+            )),
+            Err(source) => Err(FileError::failed(path, "cannot be made a link to the pseudo terminal", source)),
         }
     }
 
@@ -146,8 +111,8 @@ impl Pty {
     /// that is gone.
     ///
     /// # Errors
-    /// If it has failed.
-    pub fn was_opened(&mut self) -> Result<bool, PtyError> {
+    /// Where it has failed.
+    pub fn was_opened(&mut self) -> Result<bool, FileError> {
         let mut opened = false;
         let mut buffer = [MaybeUninit::uninit(); 1024];
         let mut events = inotify::Reader::new(&self.watch, &mut buffer);
@@ -176,20 +141,20 @@ impl Pty {
     /// Takes what programs have written, up to `buffer`'s length; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// If it has failed.
-    pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, PtyError> {
+    /// Where it has failed.
+    pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, FileError> {
         self.count(|mut device| device.read(buffer))
     }
 
     /// Hands over bytes to the program that reads, as many as it has room for; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// If it has failed.
-    pub fn write(&mut self, bytes: &[u8]) -> Result<usize, PtyError> {
+    /// Where it has failed.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<usize, FileError> {
         self.count(|mut device| device.write(bytes))
     }
 
-    fn count(&self, transfer: impl FnOnce(&File) -> io::Result<usize>) -> Result<usize, PtyError> {
+    fn count(&self, transfer: impl FnOnce(&File) -> io::Result<usize>) -> Result<usize, FileError> {
         match transfer(&self.device) {
             Ok(count) => Ok(count),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
@@ -197,8 +162,8 @@ impl Pty {
         }
     }
 
-    fn failed(&self, source: io::Error) -> PtyError {
-        PtyError::Failed { path: self.path.clone(), source }
+    fn failed(&self, source: io::Error) -> FileError {
+        FileError::failed(&self.path, "has failed", source)
     }
 }
 

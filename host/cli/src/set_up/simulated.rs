@@ -1,11 +1,12 @@
 //! The effect of each step of the manual in the simulated field.
 
 use anyhow::Result;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table};
 use experiments::experiment::{Engine, Experiment, Treatment, totals};
 use field::conditions::Conditions;
 use link::set_up::steps;
 use trial::by_the_manual::Novice;
+use trial::report::number_table;
 
 /// Plots of each spacing.
 const REPLICATIONS: u32 = 10;
@@ -15,9 +16,9 @@ const SEED: u64 = 1;
 
 /// A line for the machine from the box, and one after each step. The steps add up.
 pub fn table() -> Result<Table> {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY);
-    table.set_header(["step", "", "ground of the\nrow weeded, %", "plants\ndamaged, %", "zones\nreached, %"]);
+    let header = ["step", "", "ground of the\nrow weeded, %", "plants\ndamaged, %", "zones\nreached, %"];
+    let mut table = number_table(header, 0);
+    table.column_iter_mut().skip(1).take(1).for_each(|column| column.set_cell_alignment(CellAlignment::Left));
     let mut novice = Novice::new(Conditions::default(), SEED);
     let mut line = |number: String, title: &str, conditions: &Conditions| {
         let experiment = Experiment {
@@ -41,9 +42,6 @@ pub fn table() -> Result<Table> {
     for step in steps() {
         novice.follow(&step)?;
         line(step.number.to_string(), step.title, &novice.conditions)?;
-    }
-    for (index, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if index == 1 { CellAlignment::Left } else { CellAlignment::Right });
     }
     Ok(table)
 }

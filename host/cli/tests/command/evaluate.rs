@@ -97,7 +97,7 @@ fn a_trial_without_damage_and_without_replications_is_judged_as_far_as_it_goes()
         "None of 220 plants was damaged: in truth below 1.35 %.",
         "Plant damage has no model: it is 0 in every plot",
         "No analysis of variance: it is 0 in every plot",
-        "Note: no treatment was repeated",
+        "Note: No treatment was repeated",
     ] {
         assert!(said.contains(line), "{line:?} is not in\n{said}");
     }

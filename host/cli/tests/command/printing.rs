@@ -125,7 +125,7 @@ fn dash_is_standard_input_wherever_a_file_is_read() {
         (&["sweep", "--x", "k=1..2:1", "--field", "-"], "line 1"),
         (&["settings", "push", "-"], "line 1"),
         (&["settings", "diff", "-"], "line 1"),
-        (&["sim", "--capture", "-", "--channel-a", "A", "--channel-b", "B"], "could not be read"),
+        (&["sim", "--capture", "-", "--channel-a", "A", "--channel-b", "B"], "cannot be read"),
     ] {
         let (status, said) = run(arguments, "nonsense\n1\n");
         assert_eq!(status, Some(2), "{arguments:?}: {said}");

@@ -1,7 +1,7 @@
 //! A plot's counts and measurements, and its measures by the paper's Eq. 22 to 27.
 
+use anyhow::{Result, anyhow};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// Square metres in a hectare.
 const M2_PER_HA: f64 = 10_000.0;
@@ -54,24 +54,12 @@ pub struct Performance {
     pub performance_index: f64,
 }
 
-/// A plot has impossible values.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[error("{column} is {value}: {right}")]
-pub struct Implausible {
-    /// The column, which is the field of [`PlotRecord`].
-    pub column: &'static str,
-    /// What stands there.
-    pub value: f64,
-    /// What would be right.
-    pub right: &'static str,
-}
-
 impl PlotRecord {
     /// Checks that a plot's values are possible.
     ///
     /// # Errors
     /// Names the first quantity that is out of its range or contradicts another.
-    pub fn check(&self) -> Result<(), Implausible> {
+    pub fn check(&self) -> Result<()> {
         let within = |value: f64, lowest: f64, highest: f64| (lowest..=highest).contains(&value);
         let checks = [
             ("speed_km_h", self.speed_km_h, within(self.speed_km_h, 0.1, 15.0), "it has to be from 0.1 to 15 km/h"),
@@ -96,7 +84,7 @@ impl PlotRecord {
             ("power_hp", self.power_hp, within(self.power_hp, 0.001, 1000.0), "it has to be from 0.001 to 1000 hp"),
         ];
         let wrong = checks.into_iter().find(|(_, _, fits, _)| !fits);
-        wrong.map_or(Ok(()), |(column, value, _, right)| Err(Implausible { column, value, right }))
+        wrong.map_or(Ok(()), |(column, value, _, right)| Err(anyhow!("{column} is {value}: {right}")))
     }
 
     /// The plot's measures by Eq. 22 to 27. They are finite if [`PlotRecord::check`] succeeds.

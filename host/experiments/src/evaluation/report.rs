@@ -1,22 +1,13 @@
-//! A trial's analysis for people at a terminal: findings in plain words, then the tables that they rest on.
+//! A trial's analysis as tables, which the page has too, and for people at a terminal: findings in plain words, then the tables that they
+//! rest on.
 
-use super::findings::probability;
-use super::{Analysis, Performance, ResponseAnalysis};
-use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel, Remark};
-use comfy_table::{CellAlignment, Table, presets};
+use super::published::Published;
+use super::{Analysis, Performance, PlotRecord, ResponseAnalysis};
+use crate::statistics::{AnalysisOfVariance, BinomialModel};
+use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use std::fmt::{self, Display, Formatter};
 
-/// Heads of the columns that [`measures`] fills.
-const MEASURES: [&str; 6] = [
-    "plant\ndamage %",
-    "weeding\nefficiency %",
-    "theoretical\ncapacity ha/h",
-    "effective\ncapacity ha/h",
-    "field\nefficiency %",
-    "performance\nindex",
-];
-
-/// The legend of p-values and the index.
+/// What the probabilities and the index mean.
 const LEGEND: &str = "\
 p is how probable it is that chance alone makes an effect as large: below 0.05 it is taken for one.
 Capacities are by Eq. 25 and 26 of the paper, field efficiency by Eq. 24. The performance index (Eq. 27) is
@@ -25,13 +16,15 @@ Weeding efficiency is of the weeds that were counted: over a whole plot it is hi
 Behind damage stands its exact 95 % interval over all plants of the treatment, behind weeding that of a mean of plots.
 ";
 
+/// Columns of [`Analysis::plots`] that stand in the trial's own table already.
+const COUNTED: std::ops::Range<usize> = 4..12;
+
 impl Display for Analysis {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         for finding in self.findings() {
             writeln!(f, "{finding}")?;
         }
-        writeln!(f, "\nPlots\n{}", self.plots())?;
-        writeln!(f, "\nMeans of the treatments\n{}", self.means())?;
+        writeln!(f, "\n{}\n\n{}", self.plots().without(COUNTED), self.means())?;
         for response in &self.responses {
             write!(f, "\n{response}")?;
         }
@@ -39,216 +32,242 @@ impl Display for Analysis {
     }
 }
 
-impl Analysis {
-    /// Every plot and its measures.
-    fn plots(&self) -> Table {
-        let mut table = table(["plot", "replication", "speed\nkm/h", "spacing\ncm"].into_iter().chain(MEASURES));
-        for (index, (record, performance)) in self.records.iter().zip(&self.performances).enumerate() {
-            let place = [
-                (index + 1).to_string(),
-                record.replication.to_string(),
-                record.speed_km_h.to_string(),
-                record.spacing_cm.to_string(),
-            ];
-            table.add_row(place.into_iter().chain(measures(performance)));
-        }
-        right(table, 0)
-    }
-
-    /// The means of each treatment.
-    fn means(&self) -> Table {
-        let mut table = table(["speed\nkm/h", "spacing\ncm", "plots"].into_iter().chain(MEASURES));
-        for treatment in self.treatments() {
-            let place =
-                [treatment.speed_km_h.to_string(), treatment.spacing_cm.to_string(), treatment.plots.to_string()];
-            let [damage, weeding, others @ ..] = measures(&treatment.mean);
-            let damage = format!("{damage} ({})", treatment.damaged);
-            let weeding = match treatment.weeding_efficiency.within {
-                Some(within) => format!("{weeding} ± {within:.2}"),
-                None => weeding,
-            };
-            table.add_row(place.into_iter().chain([damage, weeding]).chain(others));
-        }
-        right(table, 0)
-    }
-}
-
 impl Display for ResponseAnalysis {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         writeln!(f, "{}, {}", self.response.title().to_uppercase(), self.response.unit())?;
-        match &self.model {
-            Ok(model) => write!(f, "\nLinear model\n{model}")?,
-            Err(reason) => writeln!(f, "\nNo linear model: {reason}.")?,
+        if let Err(reason) = &self.model {
+            writeln!(f, "\nNo linear model: {reason}.")?;
         }
-        for sentence in self.checked() {
-            writeln!(f, "Residuals: {sentence}")?;
-        }
+        writeln!(f, "\n{}\n\n{}", self.terms(), self.fit())?;
         match &self.binomial {
-            Some(Ok(model)) => write!(f, "\nBinomial model of the counts\n{model}")?,
+            Some(Ok(model)) => {
+                writeln!(f, "\n{}", odds(model))?;
+                writeln!(
+                    f,
+                    "deviance {:.3} with {} degrees of freedom, of {:.3} without speed and spacing; dispersion {:.2}",
+                    model.deviance, model.degrees_of_freedom, model.null_deviance, model.dispersion
+                )?;
+            }
             Some(Err(reason)) => writeln!(f, "\nNo binomial model: {reason}.")?,
             None => {}
         }
         match &self.variance {
-            Ok(variance) => write!(f, "\nAnalysis of variance\n{variance}")?,
+            Ok(variance) => writeln!(f, "\n{}", sources(variance))?,
             Err(reason) => writeln!(f, "\nNo analysis of variance: {reason}.")?,
         }
-        writeln!(f, "\nBeside the paper\n{}", self.beside_the_paper())?;
-        for contradiction in self.published.contradictions {
-            writeln!(f, "- {contradiction}")?;
-        }
-        Ok(())
+        self.remarks().iter().try_for_each(|remark| writeln!(f, "Note: {remark}"))?;
+        self.published.contradictions.iter().try_for_each(|contradiction| writeln!(f, "- {contradiction}"))
     }
 }
 
-impl ResponseAnalysis {
-    /// This trial's model, the paper's equation, and the paper's text.
-    fn beside_the_paper(&self) -> Table {
-        let published = self.published;
-        let equation = format!("paper,\nEq. {}", published.equation_number);
-        let mut table = table(["", "this trial", &equation, "paper,\ntext"]);
-        let model = self.model.as_ref().ok();
-        let ours = |name| coefficient(model.and_then(|model| model.term(name)).map(|term| term.estimate));
-        let rows = [
-            ("constant", ours("constant"), published.equation.constant, published.text.constant),
-            ("for each km/h", ours("speed"), published.equation.per_km_h, published.text.per_km_h),
-            ("for each cm", ours("spacing"), published.equation.per_cm, published.text.per_cm),
-        ];
-        for (name, ours, equation, text) in rows {
-            table.add_row([name.to_owned(), ours, coefficient(equation), coefficient(text)]);
-        }
-        let percent = |share: Option<f64>| share.map_or_else(dash, |share| format!("{:.2} %", share * 100.0));
-        let fits = [
-            ("R2", model.map(|model| model.r_squared), Some(published.r_squared)),
-            ("adjusted R2", model.map(|model| model.adjusted_r_squared), published.adjusted_r_squared),
-        ];
-        for (name, ours, theirs) in fits {
-            table.add_row([name.to_owned(), percent(ours), dash(), percent(theirs)]);
-        }
-        let range = |(lowest, highest): (f64, f64)| format!("{lowest:.2} to {highest:.2}");
-        let printed: Vec<String> = published.ranges.iter().copied().map(range).collect();
-        table.add_row(["lowest to highest".to_owned(), range(self.range), dash(), printed.join("\n")]);
-        right(table, 1)
-    }
-}
+/// The measures of a plot or of a treatment, and what stands above them.
+const MEASURES: [&str; 6] = [
+    "plant damage, %",
+    "weeding efficiency, %",
+    "theoretical capacity, ha/h",
+    "effective capacity, ha/h",
+    "field efficiency, %",
+    "performance index",
+];
 
-impl Display for LinearModel {
-    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let mut table = table(["term", "estimate", "standard\nerror", "t", "p"]);
-        for term in &self.terms {
-            table.add_row([
-                term_name(term.name).to_owned(),
-                format!("{:+.4}", term.estimate),
-                format!("{:.4}", term.standard_error),
-                term.t.map_or_else(dash, |t| format!("{t:.3}")),
-                chance(term.p),
-            ]);
-        }
-        writeln!(f, "{}", right(table, 1))?;
-        writeln!(
-            f,
-            "R2 {:.2} %, adjusted {:.2} %; residual standard error {:.4} with {} degrees of freedom",
-            self.r_squared * 100.0,
-            self.adjusted_r_squared * 100.0,
-            self.residual_standard_error,
-            self.degrees_of_freedom
-        )?;
-        remarks(f, &self.remarks)
-    }
-}
-
-impl Display for BinomialModel {
-    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let mut table = table(["term", "log odds", "standard\nerror", "z", "p", "odds\ntimes", "95 %"]);
-        for term in &self.terms {
-            let (times, least, greatest) = term.odds_ratio();
-            let is_slope = term.name != "constant";
-            table.add_row([
-                term_name(term.name).to_owned(),
-                format!("{:+.4}", term.estimate),
-                format!("{:.4}", term.standard_error),
-                format!("{:.3}", term.z),
-                chance(Some(term.p)),
-                if is_slope { format!("{times:.3}") } else { dash() },
-                if is_slope { format!("{least:.3} to {greatest:.3}") } else { dash() },
-            ]);
-        }
-        writeln!(f, "{}", right(table, 1))?;
-        writeln!(
-            f,
-            "deviance {:.3} with {} degrees of freedom, of {:.3} without speed and spacing; dispersion {:.2}",
-            self.deviance, self.degrees_of_freedom, self.null_deviance, self.dispersion
-        )?;
-        remarks(f, &self.remarks)
-    }
-}
-
-/// A term's name in a table.
-fn term_name(name: &'static str) -> &'static str {
-    match name {
-        "speed" => "speed, for each km/h",
-        "spacing" => "spacing, for each cm",
-        name => name,
-    }
-}
-
-impl Display for AnalysisOfVariance {
-    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let mut table = table(["source", "degrees of\nfreedom", "sum of\nsquares", "mean\nsquare", "F", "p"]);
-        for source in &self.sources {
-            table.add_row([
-                source.name.to_owned(),
-                source.degrees_of_freedom.to_string(),
-                format!("{:.4}", source.sum_of_squares),
-                format!("{:.4}", source.mean_square),
-                source.f.map_or_else(dash, |f| format!("{f:.3}")),
-                chance(source.p),
-            ]);
-        }
-        writeln!(f, "{}", right(table, 1))?;
-        remarks(f, &self.remarks)
-    }
-}
-
-fn remarks(f: &mut Formatter, remarks: &[Remark]) -> fmt::Result {
-    remarks.iter().try_for_each(|remark| writeln!(f, "Note: {remark}."))
-}
-
-/// A plot's measures, or their means, in the order of [`MEASURES`].
 fn measures(performance: &Performance) -> [String; 6] {
     [
-        format!("{:.2}", performance.plant_damage_percent),
-        format!("{:.2}", performance.weeding_efficiency_percent),
-        format!("{:.4}", performance.theoretical_capacity_ha_h),
-        format!("{:.4}", performance.effective_capacity_ha_h),
-        format!("{:.2}", performance.field_efficiency_percent),
-        format!("{:.2}", performance.performance_index),
+        fixed(performance.plant_damage_percent, 2),
+        fixed(performance.weeding_efficiency_percent, 2),
+        fixed(performance.theoretical_capacity_ha_h, 4),
+        fixed(performance.effective_capacity_ha_h, 4),
+        fixed(performance.field_efficiency_percent, 2),
+        fixed(performance.performance_index, 2),
     ]
 }
 
-fn coefficient(value: Option<f64>) -> String {
-    value.map_or_else(dash, |value| format!("{value:+.4}"))
+impl Analysis {
+    /// The means by treatment.
+    pub(crate) fn means(&self) -> Table {
+        let columns = ["treatment", "plots"].into_iter().chain(MEASURES);
+        let mut table = Table::new("Means of the plots of each treatment", columns);
+        for treatment in self.treatments() {
+            let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
+            let [damage, weeding, others @ ..] = measures(&treatment.mean);
+            let damage = format!("{damage} ({})", treatment.damaged);
+            let weeding = treatment
+                .weeding_efficiency
+                .within
+                .map_or(weeding.clone(), |it| format!("{weeding} ± {}", fixed(it, 2)));
+            let cells = [name, treatment.plots.to_string(), damage, weeding];
+            table.rows.push(cells.into_iter().chain(others).collect());
+        }
+        table
+    }
+
+    /// Each plot, as it was written down and what follows from it.
+    pub(crate) fn plots(&self) -> Table {
+        let written_down = [
+            "plot",
+            "replication",
+            "speed, km/h",
+            "spacing, cm",
+            "weeds before",
+            "weeds after",
+            "plants",
+            "damaged",
+            "area, m²",
+            "time, s",
+            "width, m",
+            "power, hp",
+        ];
+        let mut table =
+            Table::new("Each plot, counted and measured, and what follows", written_down.into_iter().chain(MEASURES));
+        for (index, (record, performance)) in self.records.iter().zip(&self.performances).enumerate() {
+            let cells = [(index + 1).to_string()].into_iter().chain(counted(record)).chain(measures(performance));
+            table.rows.push(cells.collect());
+        }
+        table
+    }
 }
 
-/// A probability in a column that is headed p.
-fn chance(p: Option<f64>) -> String {
-    p.map_or_else(dash, |p| probability(p).trim_start_matches("p ").trim_start_matches("= ").to_owned())
+fn counted(record: &PlotRecord) -> [String; 11] {
+    [
+        record.replication.to_string(),
+        short(record.speed_km_h),
+        short(record.spacing_cm),
+        record.weeds_before.to_string(),
+        record.weeds_after.to_string(),
+        record.plants.to_string(),
+        record.damaged.to_string(),
+        fixed(record.area_m2, 2),
+        fixed(record.time_s, 1),
+        fixed(record.width_m, 2),
+        fixed(record.power_hp, 2),
+    ]
 }
 
-/// Where nothing is known.
-fn dash() -> String {
-    "-".to_owned()
+impl ResponseAnalysis {
+    /// The coefficients with what chance may have done to them, beside the paper's.
+    pub(crate) fn terms(&self) -> Table {
+        let Published { equation, text, equation_number, .. } = self.published;
+        let mut table = Table::new(
+            "Linear model",
+            [
+                "term",
+                "estimate",
+                "standard error",
+                "t",
+                "p",
+                &format!("paper, Eq. {equation_number}"),
+                "paper, in its text",
+            ],
+        );
+        let rows = [
+            ("constant", "constant", equation.constant, text.constant),
+            ("speed", "for each km/h", equation.per_km_h, text.per_km_h),
+            ("spacing", "for each cm of spacing", equation.per_cm, text.per_cm),
+        ];
+        for (name, meaning, equation, text) in rows {
+            let term = self.model.as_ref().ok().and_then(|model| model.term(name));
+            table.rows.push(vec![
+                meaning.to_owned(),
+                optional(term.map(|term| term.estimate), significant),
+                optional(term.map(|term| term.standard_error), significant),
+                optional(term.and_then(|term| term.t), |t| fixed(t, 2)),
+                optional(term.and_then(|term| term.p), probability),
+                optional(equation, short),
+                optional(text, short),
+            ]);
+        }
+        table
+    }
+
+    /// How well the model fits, and over which range, beside the paper's.
+    pub(crate) fn fit(&self) -> Table {
+        let model = self.model.as_ref().ok();
+        let range = |&(low, high): &(f64, f64)| format!("{} to {}", fixed(low, 2), fixed(high, 2));
+        let published: Vec<String> = self.published.ranges.iter().map(range).collect();
+        let share = |value| fixed(value, 4);
+        let row = |what: &str, ours: String, paper: String| vec![what.to_owned(), ours, paper];
+        let mut table = Table::new("Fit and range", ["", "this trial", "paper"]);
+        table.rows = vec![
+            row("R²", optional(model.map(|model| model.r_squared), share), share(self.published.r_squared)),
+            row(
+                "adjusted R²",
+                optional(model.map(|model| model.adjusted_r_squared), share),
+                optional(self.published.adjusted_r_squared, share),
+            ),
+            row(
+                "residual standard error",
+                optional(model.map(|model| model.residual_standard_error), significant),
+                NOTHING.to_owned(),
+            ),
+            row(
+                "degrees of freedom",
+                optional(model.map(|model| model.degrees_of_freedom as f64), short),
+                NOTHING.to_owned(),
+            ),
+            row(&format!("range, {}", self.response.unit()), range(&self.range), published.join(",\n")),
+        ];
+        table
+    }
+
+    /// What has to be known of the models, and what the residuals say; each sentence once.
+    pub(crate) fn remarks(&self) -> Vec<String> {
+        let of_model = self.model.iter().flat_map(|model| &model.remarks);
+        let of_counts = self.binomial.iter().flatten().flat_map(|model| &model.remarks);
+        let of_variance = self.variance.iter().flat_map(|variance| &variance.remarks);
+        let mut remarks = Vec::new();
+        for remark in of_model.chain(of_counts).chain(of_variance) {
+            let remark = sentence(&remark.to_string());
+            if !remarks.contains(&remark) {
+                remarks.push(remark);
+            }
+        }
+        remarks.extend(self.checked());
+        remarks
+    }
 }
 
-fn table<'a>(header: impl IntoIterator<Item = &'a str>) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(header);
-    table
-}
-
-/// The table with its columns aligned right from column `from` on.
-fn right(mut table: Table, from: usize) -> Table {
-    for column in table.column_iter_mut().skip(from) {
-        column.set_cell_alignment(CellAlignment::Right);
+/// What speed and spacing do to the odds of what was counted.
+pub(crate) fn odds(model: &BinomialModel) -> Table {
+    let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
+    let mut table = Table::new("Binomial model of the counts", columns);
+    for term in &model.terms {
+        let (times, least, greatest) = term.odds_ratio();
+        let (name, times) = match term.name {
+            "speed" => {
+                ("for each km/h", format!("{} ({} to {})", fixed(times, 2), fixed(least, 2), fixed(greatest, 2)))
+            }
+            "spacing" => (
+                "for each cm of spacing",
+                format!("{} ({} to {})", fixed(times, 3), fixed(least, 3), fixed(greatest, 3)),
+            ),
+            name => (name, NOTHING.to_owned()),
+        };
+        let cells =
+            [significant(term.estimate), significant(term.standard_error), fixed(term.z, 2), probability(term.p)];
+        table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());
     }
     table
+}
+
+/// How much of the variation goes with each factor.
+pub(crate) fn sources(variance: &AnalysisOfVariance) -> Table {
+    let mut table =
+        Table::new("Analysis of variance", ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"]);
+    for source in &variance.sources {
+        table.rows.push(vec![
+            source.name.replace(" x ", " × "),
+            source.degrees_of_freedom.to_string(),
+            significant(source.sum_of_squares),
+            significant(source.mean_square),
+            optional(source.f, |f| fixed(f, 2)),
+            optional(source.p, probability),
+        ]);
+    }
+    table
+}
+
+/// Words with a capital letter in front and a full stop behind.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
 }

@@ -1,45 +1,47 @@
 //! An experiment's plots as a CSV table.
 
 use super::{PlotOutcome, Treatment};
-use crate::evaluation::PlotRecord;
 use field::budget::Part;
-use serde::Serialize;
 use std::io;
 
-/// A line of [`write_csv`]: a [`PlotRecord`], and values that only a simulated field has.
-#[derive(Serialize)]
-struct Line {
-    controller: &'static str,
-    replication: u32,
-    speed_km_h: f64,
-    spacing_cm: f64,
-    weeds_before: u32,
-    weeds_after: u32,
-    plants: u32,
-    damaged: u32,
-    area_m2: f64,
-    time_s: f64,
-    width_m: f64,
-    power_hp: f64,
-    zones: u32,
-    zones_reached: u32,
-    margins_cut: u32,
-    in_row_weeds_before: u64,
-    in_row_weeds_after: u64,
-    in_row_weeded_percent: f64,
-    in_row_bound_percent: f64,
-    undamaged_bound_percent: f64,
-    damaged_by_tool: u32,
-    damaged_unseen: u32,
-    damaged_by_sweeps: u32,
-    damaged_in_next_row: u32,
-    lost_to_plants_percent: f64,
-    lost_to_margins_percent: f64,
-    lost_to_weeds_percent: f64,
-    lost_to_guarded_percent: f64,
-    lost_to_swings_percent: f64,
-    lost_to_closed_percent: f64,
-    alarms: u32,
+/// A line of [`write_csv`]: a [`PlotRecord`](crate::PlotRecord), and what only a simulated field can tell; each cell behind its column's name.
+fn line(outcome: &PlotOutcome) -> [(&'static str, String); 31] {
+    let PlotOutcome { record, zones, effect, .. } = outcome;
+    let percent = |share: f64| thousandth(100.0 * share).to_string();
+    let lost = |part| percent(outcome.budget[part]);
+    [
+        ("controller", outcome.controller.title().to_owned()),
+        ("replication", record.replication.to_string()),
+        ("speed_km_h", record.speed_km_h.to_string()),
+        ("spacing_cm", record.spacing_cm.to_string()),
+        ("weeds_before", record.weeds_before.to_string()),
+        ("weeds_after", record.weeds_after.to_string()),
+        ("plants", record.plants.to_string()),
+        ("damaged", record.damaged.to_string()),
+        ("area_m2", record.area_m2.to_string()),
+        ("time_s", thousandth(record.time_s).to_string()),
+        ("width_m", record.width_m.to_string()),
+        ("power_hp", record.power_hp.to_string()),
+        ("zones", zones.all.to_string()),
+        ("zones_reached", zones.reached.to_string()),
+        ("margins_cut", zones.margins_cut.to_string()),
+        ("in_row_weeds_before", effect.in_row.before.to_string()),
+        ("in_row_weeds_after", effect.in_row.after.to_string()),
+        ("in_row_weeded_percent", percent(outcome.weeded_share)),
+        ("in_row_bound_percent", percent(outcome.weedable_share)),
+        ("undamaged_bound_percent", percent(outcome.undamaged_share)),
+        ("damaged_by_tool", effect.damaged.to_string()),
+        ("damaged_unseen", effect.unseen.to_string()),
+        ("damaged_by_sweeps", effect.swept.to_string()),
+        ("damaged_in_next_row", effect.neighbours.to_string()),
+        ("lost_to_plants_percent", lost(Part::Plants)),
+        ("lost_to_margins_percent", lost(Part::Margins)),
+        ("lost_to_weeds_percent", lost(Part::Weeds)),
+        ("lost_to_guarded_percent", lost(Part::Guarded)),
+        ("lost_to_swings_percent", lost(Part::Swings)),
+        ("lost_to_closed_percent", lost(Part::Closed)),
+        ("alarms", outcome.alarms.to_string()),
+    ]
 }
 
 /// Writes the results of some controllers as CSV, one line a plot. [`crate::evaluation::read_csv`] can read a table of
@@ -49,44 +51,12 @@ struct Line {
 /// The errors of the writer.
 pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Treatment], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
-    for outcome in outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)) {
-        let PlotRecord { replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged, .. } =
-            outcome.record;
-        let PlotRecord { area_m2, time_s, width_m, power_hp, .. } = outcome.record;
-        let lost = |part| thousandth(100.0 * outcome.budget[part]);
-        writer.serialize(Line {
-            controller: outcome.controller.title(),
-            replication,
-            speed_km_h,
-            spacing_cm,
-            weeds_before,
-            weeds_after,
-            plants,
-            damaged,
-            area_m2,
-            time_s: thousandth(time_s),
-            width_m,
-            power_hp,
-            zones: outcome.zones.all,
-            zones_reached: outcome.zones.reached,
-            margins_cut: outcome.zones.margins_cut,
-            in_row_weeds_before: outcome.effect.in_row.before,
-            in_row_weeds_after: outcome.effect.in_row.after,
-            in_row_weeded_percent: thousandth(100.0 * outcome.weeded_share),
-            in_row_bound_percent: thousandth(100.0 * outcome.weedable_share),
-            undamaged_bound_percent: thousandth(100.0 * outcome.undamaged_share),
-            damaged_by_tool: outcome.effect.damaged,
-            damaged_unseen: outcome.effect.unseen,
-            damaged_by_sweeps: outcome.effect.swept,
-            damaged_in_next_row: outcome.effect.neighbours,
-            lost_to_plants_percent: lost(Part::Plants),
-            lost_to_margins_percent: lost(Part::Margins),
-            lost_to_weeds_percent: lost(Part::Weeds),
-            lost_to_guarded_percent: lost(Part::Guarded),
-            lost_to_swings_percent: lost(Part::Swings),
-            lost_to_closed_percent: lost(Part::Closed),
-            alarms: outcome.alarms,
-        })?;
+    let lines = outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)).map(line);
+    for (number, line) in lines.enumerate() {
+        if number == 0 {
+            writer.write_record(line.each_ref().map(|(name, _)| *name))?;
+        }
+        writer.write_record(line.map(|(_, cell)| cell))?;
     }
     writer.flush()?;
     Ok(())

@@ -4,14 +4,12 @@
 //! the page's style sheet replaces them for dark paper, and dashes the lines. Charts are drawn at twice their usual
 //! size on the page, because plotters works in whole pixels. Legends and titles are part of the page.
 
+use anyhow::{Context, Result};
 use plotters::coord::Shift;
 use plotters::element::{DynElement, IntoDynElement};
 use plotters::prelude::*;
 use std::io;
 use std::ops::Range;
-
-/// plotters' error.
-pub type DrawingError = DrawingAreaErrorKind<io::Error>;
 
 /// Size of a chart, and of a series' mark in a legend, in pixels.
 const CHART_SIZE: (u32, u32) = (840, 572);
@@ -89,8 +87,8 @@ impl Chart<'_> {
     /// Draws it.
     ///
     /// # Errors
-    /// If plotters cannot draw it, as for a range without extent.
-    pub fn svg(&self) -> Result<String, DrawingError> {
+    /// Where plotters cannot draw it, as for a range without extent.
+    pub fn svg(&self) -> Result<String> {
         svg(CHART_SIZE, |area| {
             let mut chart = ChartBuilder::on(area)
                 .margin(6)
@@ -136,8 +134,8 @@ impl Chart<'_> {
 /// Draws the mark of a series in a legend, on a piece of its line where it has one.
 ///
 /// # Errors
-/// If plotters cannot draw it.
-pub fn key(look: Look, has_line: bool) -> Result<String, DrawingError> {
+/// Where plotters cannot draw it.
+pub fn key(look: Look, has_line: bool) -> Result<String> {
     let (width, height) = (KEY_SIZE.0 as i32, KEY_SIZE.1 as i32);
     svg(KEY_SIZE, |area| {
         if has_line {
@@ -193,13 +191,12 @@ fn tick(value: f64) -> String {
 /// An SVG of this size with the drawing.
 fn svg(
     size: (u32, u32),
-    draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Result<(), DrawingError>,
-) -> Result<String, DrawingError> {
+    draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Result<(), DrawingAreaErrorKind<io::Error>>,
+) -> Result<String> {
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        draw(&area)?;
-        area.present()?;
+        draw(&area).and_then(|()| area.present()).context("a chart cannot be drawn")?;
     }
     Ok(svg)
 }

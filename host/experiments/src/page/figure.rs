@@ -1,10 +1,11 @@
 //! The page's figures: their charts and legends, and texts for readers who cannot see the charts.
 
-use super::chart::{Chart, DrawingError, Look, Series, key, range_of};
+use super::chart::{Chart, Look, Series, key, range_of};
 use super::comparison::{Comparison, ControllerPoint};
-use super::table::{fixed, short};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::statistics::LinearModel;
+use crate::table::{fixed, short};
+use anyhow::Result;
 
 /// A chart with its texts.
 pub struct Figure {
@@ -36,22 +37,22 @@ const SPEED: &str = "speed, km/h";
 pub const BOUND: &str = "most with every zone and margin kept";
 
 /// Plant damage of each controller against speed.
-pub fn damage(comparison: &Comparison) -> Result<Figure, DrawingError> {
+pub fn damage(comparison: &Comparison) -> Result<Figure> {
     let title = ("Plant damage", "% of the plants");
     let caption = "Plants in whose zone round the stem the tool was, of all in the rows. Lower is better.";
     curves(comparison, title, caption, |point| point.plant_damage_percent, &[])
 }
 
 /// Weeding in the row of each controller against speed.
-pub fn weeding(comparison: &Comparison) -> Result<Figure, DrawingError> {
+pub fn weeding(comparison: &Comparison) -> Result<Figure> {
     let title = ("In-row weeding", "% of the row's ground");
     let caption = "Ground of the row that the tool worked. Higher is better, but what is above the line is paid for with \
                    margins or zones.";
     curves(comparison, title, caption, |point| point.in_row_weeding_percent, &comparison.bound)
 }
 
-/// Plants whose zone each controller's tool reached, against speed.
-pub fn zones(comparison: &Comparison) -> Result<Figure, DrawingError> {
+/// Plants whose zone each controller's tool reached against speed.
+pub fn zones(comparison: &Comparison) -> Result<Figure> {
     let title = ("Zones reached", "% of the plants' zones");
     let caption = "Zones over which the tool was not fully out, of all in the rows: what the firmware keeps of a plant, less the margin. Lower is better.";
     curves(comparison, title, caption, |point| point.zones_reached_percent, &[])
@@ -63,7 +64,7 @@ fn curves(
     caption: &str,
     value: fn(&ControllerPoint) -> f64,
     limit: &[(f64, f64)],
-) -> Result<Figure, DrawingError> {
+) -> Result<Figure> {
     let mut series = Vec::new();
     let mut legend = Vec::new();
     let mut words = format!("{title} in {unit} against speed.");
@@ -91,8 +92,8 @@ fn curves(
     Ok(Figure { title: title.into(), unit: unit.into(), svg: chart.svg()?, legend, words, caption: caption.into() })
 }
 
-/// One measure of a trial against speed: for each spacing a line through the means, with the plots around it.
-pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, DrawingError> {
+/// One measure of a trial against speed, a line a spacing through the means, with the plots around them.
+pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
     let treatments = analysis.treatments();
     let spacings = spacings_cm(analysis);
     let x = range_of(analysis.records.iter().map(|record| record.speed_km_h), false);
@@ -136,8 +137,8 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure, Drawi
     })
 }
 
-/// The residuals of a model against its fitted values.
-pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel) -> Result<Figure, DrawingError> {
+/// What a model leaves of each plot, against what it says of it.
+pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel) -> Result<Figure> {
     let x = range_of(model.fitted.iter().copied(), false);
     let mut series = vec![Series { look: Look::LIMIT, line: vec![(x.start, 0.0), (x.end, 0.0)], cloud: Vec::new() }];
     let mut legend = Vec::new();

@@ -1,7 +1,7 @@
 //! The loss budget as stacked bars, and as a table.
 
 use super::comparison::Work;
-use super::table::{Table, fixed, short};
+use crate::table::{Table, fixed, short};
 use field::budget::Part;
 
 /// Parts narrower than this, in tenths of a percent, have no room for their figure.

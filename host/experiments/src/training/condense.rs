@@ -13,25 +13,22 @@
 //! Among equals the first in the list is chosen.
 
 use super::model::{answer_of_others, class_of};
+use anyhow::{Result, ensure};
 use control::ground::{
     class::{Class, label},
     features::COUNT,
 };
 use knn::{Example, Kind, classify, squared_distance};
 use std::collections::HashSet;
-use thiserror::Error;
 
-/// The examples do not fit.
-#[derive(Debug, Error, PartialEq, Eq)]
-#[error(
-    "too many examples for the flash budget: these objects cannot be told apart with fewer than {needed} examples, \
-     and there is room for {most}: take out objects with a wrong label, or objects that are like no other"
-)]
-pub struct TooMany {
-    /// Examples wanted so far.
-    pub needed: usize,
-    /// Room for examples.
-    pub most: usize,
+/// Checks that so many examples are not more than there is room for.
+fn check_room(needed: usize, most: usize) -> Result<()> {
+    ensure!(
+        needed <= most,
+        "too many examples for the flash budget: these objects cannot be told apart with fewer than {needed} examples, \
+         and there is room for {most}: take out objects with a wrong label, or objects that are like no other"
+    );
+    Ok(())
 }
 
 /// Neighbours that vote whether a detection is noise, as in Wilson's paper.
@@ -50,14 +47,8 @@ pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
 /// indices, in the order of choice.
 ///
 /// # Errors
-/// [`TooMany`], if more are needed.
-pub fn condense(
-    examples: &[Example<COUNT>],
-    edited: &[usize],
-    k: u8,
-    radius: u32,
-    most: usize,
-) -> Result<Vec<usize>, TooMany> {
+/// Where more are needed.
+pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u32, most: usize) -> Result<Vec<usize>> {
     let half = radius / 2;
     let is_mistreated = |index: usize, kept: &[Example<COUNT>]| {
         let is_weed = examples[index].label == label::WEED;
@@ -67,11 +58,7 @@ pub fn condense(
     };
     let mut kept = Vec::new();
     keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
-    let fits = |kept: &[usize]| match kept.len().max(usize::from(k)) {
-        needed if needed > most => Err(TooMany { needed, most }),
-        _ => Ok(()),
-    };
-    fits(&kept)?;
+    check_room(kept.len().max(usize::from(k)), most)?;
     let is_stranger = |index: usize, kept: &[Example<COUNT>]| {
         kept.iter().all(|example| !are_fellows(example, &examples[index], radius))
     };
@@ -80,7 +67,7 @@ pub fn condense(
     kept.extend(others.iter().take(usize::from(k).saturating_sub(kept.len())));
     // A plant that is no longer a stranger can be outvoted by the weeds around it, and so can a weed.
     keep_most_needed(examples, edited, &mut kept, usize::MAX, half, is_mistreated);
-    fits(&kept)?;
+    check_room(kept.len().max(usize::from(k)), most)?;
     Ok(kept)
 }
 
@@ -89,14 +76,14 @@ pub fn condense(
 /// examples are equal.
 ///
 /// # Errors
-/// [`TooMany`], if with that many a plant is still classified as a weed.
+/// Where that many leave a plant that is taken for a weed.
 pub fn beside(
     given: &[Example<COUNT>],
     examples: &[Example<COUNT>],
     k: u8,
     radius: u32,
     most: usize,
-) -> Result<Vec<usize>, TooMany> {
+) -> Result<Vec<usize>> {
     let all = [given, examples].concat();
     let mut seen = HashSet::new();
     let mut of = |wanted: u8| -> Vec<usize> {
@@ -119,7 +106,8 @@ pub fn beside(
         !is_taken_for_a_weed(index, kept) && costs_no_plant(index, kept)
     });
     let chosen: Vec<usize> = kept.drain(given.len()..).map(|index| index - given.len()).collect();
-    if chosen.len() > most { Err(TooMany { needed: chosen.len(), most }) } else { Ok(chosen) }
+    check_room(chosen.len(), most)?;
+    Ok(chosen)
 }
 
 /// Repeats while fewer than `most` are chosen and some of `candidates` need more examples, as `needs` decides. Each

@@ -3,10 +3,10 @@
 //! Unknown detections are treated as plants. So there are two kinds of error: a plant classified as a weed is cut, and
 //! a weed classified as a plant or unknown is left.
 
-use comfy_table::{CellAlignment, Table, presets};
 use control::ground::class::Class;
 use field::row::Kind;
 use std::fmt;
+use trial::report::number_table;
 
 /// How many detections of each kind were classified as each class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,19 +89,10 @@ impl Confusion {
 
 impl fmt::Display for Confusion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = Table::new();
-        table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
-            "",
-            "taken for\nplant",
-            "\nunknown",
-            "taken for\nweed",
-        ]);
+        let mut table = number_table(["", "taken for\nplant", "\nunknown", "taken for\nweed"], 1);
         for (name, counts) in [("plants", self.plants), ("weeds", self.weeds)] {
             let counts = [counts.taken_for_plant, counts.unknown, counts.taken_for_weed];
             table.add_row([name.to_owned()].into_iter().chain(counts.map(|count| count.to_string())));
-        }
-        for column in table.column_iter_mut().skip(1) {
-            column.set_cell_alignment(CellAlignment::Right);
         }
         writeln!(f, "{table}")?;
         let percent = |part: usize, total: usize| format!("{part} of {total}, {:.2} %", 100.0 * share(part, total));

@@ -12,28 +12,28 @@
 //! is counted from a plant.
 
 use super::labelled::Labelled;
+use anyhow::{Result, ensure};
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
-use control::measure::quadrature::{Quadrature, Step};
 use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::units::{Instant, Interval, Position, Ticks};
+use control::units::{Instant, Interval, Position};
 use control::{
     measure::readings::{Edge, Readings, Startup},
     weeder::Controller,
 };
 use field::machine::Machine;
 use field::motion::Motion;
-use field::planting::{Planting, PlantingError};
-use field::row::{Kind, Problem, Row, Thing};
-use field::wiring;
+use field::native::{Levels, Sensors, TURN_S};
+use field::planting::Planting;
+use field::row::{Kind, Row, Thing};
+use field::trial::Trial;
+use field::verdict::Timing;
 use knn::Example;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
-use thiserror::Error;
-use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// A crop, and the weeds that outgrow the beam.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,36 +127,11 @@ const SLIP: RangeInclusive<f64> = -0.03..=0.03;
 /// The machine rolls from the start: it reaches its speed within a fraction of a millisecond.
 const ACCELERATION_MM_S2: f64 = 1e6;
 
-/// How often the firmware's main loop reads its inputs here. The chip reads them more often.
-const LOOP_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
-
-/// The Uno's cycles in a step of the firmware's clock.
-const CYCLES_PER_STEP: u64 = CYCLES_PER_SECOND / Interval::STEPS_PER_SECOND as u64;
-
-/// Why there is no field.
-#[derive(Debug, Error, PartialEq)]
-pub enum SyntheticError {
-    /// The plants do not fit.
-    #[error(transparent)]
-    Planting(#[from] PlantingError),
-    /// The row is invalid.
-    #[error(transparent)]
-    Row(#[from] Problem),
-    /// The beam saw another number of detections than was planted, so labels cannot be assigned.
-    #[error("the beam saw {seen} objects on a row of {planted}: it has to see each as one")]
-    Miscounted {
-        /// Objects that the controller classified.
-        seen: usize,
-        /// Plants and weeds in the row.
-        planted: usize,
-    },
-}
-
 /// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
 ///
 /// # Errors
-/// If rows cannot grow or be seen as they should.
-pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> {
+/// Where rows cannot grow or be seen as they should.
+pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut objects = Vec::new();
     for pass in 0..crop.passes {
@@ -174,13 +149,7 @@ pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>, SyntheticError> 
 }
 
 /// A row with missing plants, and weeds on its bare ground.
-fn grow(
-    crop: &Crop,
-    spacing_mm: f64,
-    headland_mm: f64,
-    ragged: bool,
-    rng: &mut impl Rng,
-) -> Result<Row, SyntheticError> {
+fn grow(crop: &Crop, spacing_mm: f64, headland_mm: f64, ragged: bool, rng: &mut impl Rng) -> Result<Row> {
     let planting = Planting {
         plants: PLANTS,
         spacing_mm,
@@ -270,59 +239,37 @@ impl Classifier for &Recorder<'_> {
     }
 }
 
-/// The controller's detections in a row.
-fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>, SyntheticError> {
+/// What the controller sees of a row.
+fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>> {
     let standard = Machine::default();
     // The firmware has the nominal wheel; a slipping wheel goes farther in a turn.
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
     let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
+    let trial = Trial { motion, ..Trial::at_speed(row.clone(), machine, Timing::default(), speed_mm_s) };
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
-    let beam_broken = !machine.beam_before(row, &motion).high;
-    let startup = Startup { readings: readings(0, Position::default()), beam_broken, cause: Cause::PowerOn };
+    let readings = |turn: u32, position: i64| {
+        Readings::new(Instant::default() + Interval::from_ms(turn), Position::new(position as i32))
+    };
+    let beam_broken = Levels::before(&trial).broken;
+    let startup = Startup { readings: readings(0, 0), beam_broken, cause: Cause::PowerOn };
     let mut controller = Controller::new(&recorder, Volatile::new(), startup);
-
-    let mut wheel = Encoder::default();
-    let mut next_loop = LOOP_CYCLES;
-    let mut edges = Vec::new();
-    for change in machine.pin_changes(row, &motion, 0) {
-        while next_loop <= change.cycle {
-            controller.turn(readings(next_loop, wheel.position), edges.drain(..));
-            next_loop += LOOP_CYCLES;
-        }
-        match change.pin {
-            wiring::BEAM => {
-                edges.push(Edge::Seen { position: wheel.position, broken: !change.high, second_broken: false })
-            }
-            _ => wheel.turn(change),
-        }
+    let sensors = Sensors::new(&trial, TURN_S);
+    for (turn, now) in (0..).zip(sensors.turns()).skip(1) {
+        let edges = now.edges.iter().map(|seen| Edge::Seen {
+            position: Position::new(seen.position as i32),
+            broken: seen.levels.broken,
+            second_broken: false,
+        });
+        controller.turn(readings(turn, now.position), edges);
     }
-    controller.turn(readings(next_loop, wheel.position), edges);
     drop(controller);
 
     let seen = recorder.seen.into_inner();
     let planted = row.things().len();
-    if seen.len() == planted { Ok(seen) } else { Err(SyntheticError::Miscounted { seen: seen.len(), planted }) }
-}
-
-fn readings(cycle: u64, position: Position) -> Readings {
-    let now = Instant::new((cycle / CYCLES_PER_STEP) as u32);
-    Readings::new(now, position)
-}
-
-/// The encoder's two channels, and the position from the firmware's decoder.
-#[derive(Default)]
-struct Encoder {
-    channels: u8,
-    decoder: Quadrature,
-    position: Position,
-}
-
-impl Encoder {
-    fn turn(&mut self, change: PinChange) {
-        let bit = if change.pin == wiring::ENCODER_A { 0b10 } else { 0b01 };
-        self.channels = if change.high { self.channels | bit } else { self.channels & !bit };
-        if let Step::Ticks(ticks) = self.decoder.step(self.channels) {
-            self.position = self.position + Ticks(i32::from(ticks));
-        }
-    }
+    ensure!(
+        seen.len() == planted,
+        "the beam saw {} objects on a row of {planted}: it has to see each as one",
+        seen.len()
+    );
+    Ok(seen)
 }

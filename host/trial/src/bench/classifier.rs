@@ -3,9 +3,10 @@
 //! The bench (`bench/` in the workspace) raises D13 around each call, so the cycles between the edges are exact. It
 //! also compares every answer of the search in flash with a plain search. If they differ, no figure is returned.
 
-use super::error::BenchError;
+use anyhow::{Context, Result, bail, ensure};
 use field::wiring;
 use knn_bench::{QUERIES, Task};
+use serde::Serialize;
 use std::path::Path;
 use uno::CYCLES_PER_SECOND;
 use uno::Uno;
@@ -16,11 +17,14 @@ const EDGE_CYCLES: u64 = 2;
 /// Longest time of the bench: ten times its usual time.
 const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
 
+/// What to do if the ELF is not the bench's.
+const RIGHT_ELF: &str = "run the ELF that `cargo bench-firmware` makes";
+
 /// Simulated time between two reports of progress.
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
 /// Cycles of the calls of one task.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Cycles {
     /// The fastest call.
     pub fewest: u64,
@@ -50,8 +54,8 @@ pub struct ClassifierCosts {
 /// Runs the bench at `elf`. `progress` is told the share of the calls done, from 0 to 1.
 ///
 /// # Errors
-/// If the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
-pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts, BenchError> {
+/// Where the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
+pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts> {
     let mut uno = Uno::boot(elf)?;
     variable(&uno, "DIFFERENT_ANSWERS")?;
     let expected = Task::ALL.len() * QUERIES;
@@ -68,14 +72,15 @@ pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Classifie
             match variable(&uno, "DIFFERENT_ANSWERS")? {
                 u16::MAX => {}
                 0 => break,
-                different => return Err(BenchError::Different(different)),
+                different => bail!(
+                    "{different} answers of the search in flash differ from the plain search's: its cycles mean nothing"
+                ),
             }
         }
     }
-    if calls.len() != expected {
-        return Err(BenchError::Unfinished { seen: calls.len(), expected });
-    }
-    // The stack grows down from the end of SRAM. Its pointer is at the first free byte.
+    let seen = calls.len();
+    ensure!(seen == expected, "the bench showed {seen} of {expected} calls on D13: {RIGHT_ELF}");
+    // The stack grows down from the end of SRAM, and its pointer stands on the first free byte.
     let own = 0x8FF - variable(&uno, "STACK_POINTER")?;
     let cycles = calls.chunks(QUERIES).filter_map(Cycles::of);
     Ok(ClassifierCosts { tasks: Task::ALL.into_iter().zip(cycles).collect(), stack: stack.unwrap_or(own) - own })
@@ -87,7 +92,7 @@ fn call_cycles(uno: &Uno) -> Vec<u64> {
     edges.chunks_exact(2).map(|edges| edges[1].cycle - edges[0].cycle - EDGE_CYCLES).collect()
 }
 
-fn variable(uno: &Uno, name: &'static str) -> Result<u16, BenchError> {
+fn variable(uno: &Uno, name: &'static str) -> Result<u16> {
     let bytes = uno.read(name).and_then(|bytes| bytes.try_into().ok());
-    bytes.map(u16::from_le_bytes).ok_or(BenchError::NoVariable(name))
+    bytes.map(u16::from_le_bytes).with_context(|| format!("the bench has no variable `{name}`: {RIGHT_ELF}"))
 }

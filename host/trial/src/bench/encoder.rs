@@ -16,13 +16,14 @@
 //! The firmware is in HOLD. Weeding adds less load than [`Load::Telemetry`], which requests more output than the serial
 //! line can carry, and makes the beam flicker as fast as its sensor can.
 
-use super::error::BenchError;
 use super::load::{EDGE_CYCLES, Telemetry, flicker};
 use crate::console::{ConsoleError, Status, ask};
 use crate::run;
+use anyhow::Result;
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use std::path::Path;
 use uno::{CYCLES_PER_SECOND, PinChange};
 use uno::{Place, SENT_BYTE_CYCLES, Uno};
@@ -39,8 +40,9 @@ const SILENT_SHARE: f64 = 0.1;
 /// Relative distance, at the end of the search, between a rate that passed and one that failed.
 pub const RESOLUTION: f64 = 0.01;
 
-/// The firmware's other load.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What else the firmware does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Load {
     /// No further load: clock, loop and servo.
     Idle,
@@ -49,7 +51,8 @@ pub enum Load {
 }
 
 /// Which way the encoder turns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Direction {
     /// AB = 00, 10, 11, 01.
     Forward,
@@ -57,8 +60,8 @@ pub enum Direction {
     Backward,
 }
 
-/// How the encoder turns, and the other load.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How the encoder turns, and beside what.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Turning {
     /// The other load.
     pub load: Load,
@@ -102,8 +105,8 @@ const SETTLE_MS: u64 = 100;
 /// Turns the encoder of the firmware at `elf` for half a second and by 40,000 counts at least.
 ///
 /// # Errors
-/// If the ELF cannot be run.
-pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
+/// Where the ELF cannot be run.
+pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
     let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
@@ -123,8 +126,8 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, 
     counted(&mut uno, turning, counts.into(), line_share)
 }
 
-/// Asks the firmware for its count after `counts` edges, once it is idle.
-fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted, BenchError> {
+/// Asks for what the firmware has counted of `counts` edges, once it has come to rest.
+fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted> {
     uno.run_for_ms(SETTLE_MS)?;
     let status = match Status::ask(uno) {
         Ok(status) => Some(status),
@@ -159,8 +162,8 @@ const SECTIONS_PASSED: u32 = 40;
 /// longest themselves, and are never closer together than `counts_per_s` and the jitter have them.
 ///
 /// # Errors
-/// If the ELF cannot be run.
-pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted, BenchError> {
+/// Where the ELF cannot be run.
+pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -220,10 +223,9 @@ impl World {
         Self { load, telemetry: Telemetry::default(), beam: true, beam_after: begin, byte_after: line }
     }
 
-    /// Runs until a handler begins. If no external input comes, it runs until the loop is about to turn interrupts off.
-    /// Returns the cycle of the handler's entry. An external input comes after `sections` critical sections of the
-    /// loop.
-    fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64, BenchError> {
+    /// Runs until a handler begins or, where nothing comes from outside, until the loop is about to turn interrupts off. Returns
+    /// the cycle of the handler's entry. Something comes from outside once the loop has passed so many critical sections.
+    fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64> {
         loop {
             let cycle = uno.cycle();
             if uno.place() == Place::BeforeCriticalSection {
@@ -280,8 +282,11 @@ fn nth_edge(direction: Direction, number: u32) -> PinChange {
 }
 
 /// The highest rate without a lost count.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
+    /// How the encoder turns.
+    #[serde(flatten)]
+    pub turning: Turning,
     /// Counts a second.
     pub counts_per_s: f64,
     /// Share of the serial line's capacity that the firmware used at that rate, from 0 to 1.
@@ -295,8 +300,8 @@ const HIGHEST_PER_S: f64 = 800_000.0;
 /// Shares of the found rate that must pass as well.
 const BELOW: [f64; 8] = [0.99, 0.98, 0.97, 0.95, 0.9, 0.8, 0.7, 0.5];
 
-/// Both trials of a rate. `None` if one of them failed.
-fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate>, BenchError> {
+/// Both trials of a rate; `None` where one of them was not passed.
+fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate>> {
     let mut line_share = 1.0_f64;
     for trial in [turn_at_worst, turn] {
         let counted = trial(elf, turning, counts_per_s)?;
@@ -305,15 +310,15 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
         }
         line_share = line_share.min(counted.line_share);
     }
-    Ok(Some(Rate { counts_per_s, line_share }))
+    Ok(Some(Rate { turning, counts_per_s, line_share }))
 }
 
 /// Searches the highest rate of the firmware at `elf`. `progress` is told the share of the search done, from 0 to 1.
 ///
 /// # Errors
-/// If the ELF cannot be run.
-pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate, BenchError> {
-    let mut passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
+/// Where the ELF cannot be run.
+pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate> {
+    let mut passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
     let mut failed = HIGHEST_PER_S;
     let bisections = ((HIGHEST_PER_S / LOWEST_PER_S).ln() / RESOLUTION.ln_1p()).log2().ceil();
     let trials = bisections + BELOW.len() as f64;
@@ -340,7 +345,7 @@ pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64))
         match chance {
             Some(rate) => {
                 failed = rate;
-                passed = Rate { counts_per_s: LOWEST_PER_S, line_share: 0.0 };
+                passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
             }
             None => return Ok(passed),
         }

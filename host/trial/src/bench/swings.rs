@@ -3,8 +3,8 @@
 //! Each row is a separate trial, from power-up. The real ELF weeds it. [`field::verdict`] compares each rising edge of
 //! a new width with the position where the swing was due. Rows run in parallel.
 
-use super::error::BenchError;
 use crate::run::run;
+use anyhow::Result;
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::{Planting, WEED_MARGIN_MM};
@@ -107,8 +107,8 @@ const ROOM_FOR_WEED_MM: f64 = 2.0 * WEED_MARGIN_MM + 30.0;
 /// Has the firmware at `elf` weed the rows. `progress` is told the share of the rows done, from 0 to 1.
 ///
 /// # Errors
-/// If the ELF cannot be run.
-pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Result<Lateness, BenchError> {
+/// Where the ELF cannot be run.
+pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Result<Lateness> {
     let count = rows.seeds.end.saturating_sub(rows.seeds.start) as f64;
     let done = AtomicUsize::new(0);
     let outcomes: Vec<_> = rows
@@ -122,7 +122,7 @@ pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Resul
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count);
             Ok(outcome)
         })
-        .collect::<Result<_, BenchError>>()?;
+        .collect::<Result<_>>()?;
 
     let judgements = || outcomes.iter().map(|outcome| &outcome.judgement);
     let plants: usize = judgements().map(|judgement| judgement.plants.len()).sum();

@@ -6,22 +6,23 @@
 
 use super::classifier::ClassifierCosts;
 use super::encoder::{Direction, JITTER, Load, Rate, Turning};
-use super::servo::{COUNTS_PER_S, Jitter};
+use super::servo::Jitter;
 use super::swings::Lateness;
-use super::weeding::FirmwareCosts;
-use comfy_table::{CellAlignment, Table, presets};
+use crate::report::number_table;
+use comfy_table::Table;
 use knn_bench::Task;
 use uno::CYCLES_PER_SECOND;
+use uno::elf::Size;
 
 /// All results of the benchmark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figures {
     /// The classifier alone.
     pub classifier: ClassifierCosts,
-    /// The firmware at work.
-    pub firmware: FirmwareCosts,
-    /// The highest rate for each kind of turning.
-    pub rates: Vec<(Turning, Rate)>,
+    /// The firmware's flash and static SRAM.
+    pub size: Size,
+    /// The highest rate of each way of turning the encoder.
+    pub rates: Vec<Rate>,
     /// The servo's pulses.
     pub jitter: Jitter,
     /// The swings of many rows at 2.5 km/h.
@@ -46,14 +47,14 @@ const fn turning(load: Load, direction: Direction, jitter: f64) -> Turning {
 
 impl Figures {
     /// All tables, the comparison with others first.
-    pub fn tables(&self) -> [Table; 6] {
-        [self.others(), self.rates(), self.times(), self.interrupts(), self.classifier(), self.memory()]
+    pub fn tables(&self) -> [Table; 3] {
+        [self.others(), self.rates(), self.classifier()]
     }
 
     /// This firmware's figures beside others. A ratio above 1 is in its favour.
     fn others(&self) -> Table {
         let header = ["", "this firmware", "Arduino sketch", "best library", "assembly"];
-        let mut table = number_table(&header);
+        let mut table = number_table(header, 1);
         let idle = self.lowest_rate(Load::Idle);
         let busy = self.lowest_rate(Load::Telemetry);
         for (name, ours, others) in [
@@ -73,10 +74,9 @@ impl Figures {
             });
             table.add_row([name.to_owned(), figure(ours)].into_iter().chain(others));
         };
-        if let Some(cycles) = self.encoder_cycles() {
-            // The assembly version stores the direction, as this firmware does. Without that it takes 24 cycles.
-            fewer_is_better("cycles of an encoder edge", cycles, 0, [Some(233.0), Some(144.0), Some(41.0)]);
-        }
+        // The one in assembly remembers the direction, as ours does; without that it takes 24.
+        let others = [Some(233.0), Some(144.0), Some(41.0)];
+        fewer_is_better("cycles of an encoder edge", self.jitter.edge_cycles, 0, others);
         let classification = self.classifier.tasks.iter().find(|(task, _)| *task == Task::Classify(32));
         if let Some((_, cycles)) = classification {
             let others = [Some(92_309.0), Some(3_910.0), Some(1_707.0)];
@@ -87,38 +87,30 @@ impl Figures {
         let lateness = self.lateness.worst_ticks();
         fewer_is_better("worst swing at 2.5 km/h, ticks", lateness, 1, [Some(31.6), None, None]);
         // A classifier and a serial line, without a schedule of several plants, settings, alarms, or field examples.
-        fewer_is_better("flash, bytes", self.firmware.size.flash as f64, 0, [Some(8_374.0), None, None]);
-        fewer_is_better("static SRAM and heap, bytes", self.firmware.size.sram as f64, 0, [Some(883.0), None, None]);
+        fewer_is_better("flash, bytes", self.size.flash as f64, 0, [Some(8_374.0), None, None]);
+        fewer_is_better("static SRAM and heap, bytes", self.size.sram as f64, 0, [Some(883.0), None, None]);
         table
     }
 
     /// The lowest of the rates beside a load, without jitter.
     fn lowest_rate(&self, load: Load) -> f64 {
-        let steady = self.rates.iter().filter(|(turning, _)| turning.load == load && turning.jitter == 0.0);
-        steady.map(|(_, rate)| rate.counts_per_s).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Mean cycles of an edge of the encoder.
-    fn encoder_cycles(&self) -> Option<f64> {
-        let handlers = &self.firmware.interrupts.handlers;
-        let encoder: Vec<_> = ENCODER_VECTORS.iter().filter_map(|vector| handlers.get(vector)).collect();
-        let (total, count) = encoder.iter().fold((0, 0), |sum, handler| (sum.0 + handler.total, sum.1 + handler.count));
-        (count > 0).then(|| total as f64 / count as f64)
+        let steady = self.rates.iter().filter(|rate| rate.turning.load == load && rate.turning.jitter == 0.0);
+        steady.map(|rate| rate.counts_per_s).fold(f64::INFINITY, f64::min)
     }
 
     /// One line a load, with the highest rate in each direction.
     fn rates(&self) -> Table {
-        let mut table = number_table(&[
+        let header = [
             "highest counts/s without a lost count,\nfor any phase of the edges",
             "forward",
             "backward",
             "30 % jitter,\nforward",
             "30 % jitter,\nbackward",
             "serial line\nin use",
-        ]);
+        ];
+        let mut table = number_table(header, 1);
         for (name, load) in [("idle", Load::Idle), ("status streaming, beam flickering", Load::Telemetry)] {
-            let rates: Vec<Rate> =
-                self.rates.iter().filter(|(turning, _)| turning.load == load).map(|&(_, rate)| rate).collect();
+            let rates: Vec<&Rate> = self.rates.iter().filter(|rate| rate.turning.load == load).collect();
             let least_share = rates.iter().map(|rate| rate.line_share).fold(1.0, f64::min);
             let rates = rates.iter().map(|rate| thousands(rate.counts_per_s));
             table.add_row([name.to_owned()].into_iter().chain(rates).chain([format!("{:.0} %", least_share * 100.0)]));
@@ -126,62 +118,9 @@ impl Figures {
         table
     }
 
-    /// The loop's turns, the servo's jitter, and the delays of the swings.
-    fn times(&self) -> Table {
-        let mut table = number_table(&["times", "cycles", "ms", "ticks at\n2.5 km/h"]);
-        let of_cycles = |cycles: f64| {
-            let ms = cycles * 1e3 / CYCLES_PER_SECOND as f64;
-            [thousands(cycles), format!("{ms:.2}"), String::new()]
-        };
-        let of_ticks = |ticks: f64| {
-            let ms = self.lateness.milliseconds(ticks);
-            [String::new(), format!("{ms:.2}"), format!("{ticks:.1}")]
-        };
-        let turns = self.firmware.turns;
-        let swings = self.lateness.errors_ticks.len();
-        let (earliest, latest) = self.lateness.span_ticks();
-        for (name, figures) in [
-            ("longest turn of the loop, weeding with its status streaming".to_owned(), of_cycles(turns.longest as f64)),
-            ("mean turn".to_owned(), of_cycles(turns.mean())),
-            (
-                format!("jitter of {} servo pulses at {COUNTS_PER_S} counts/s: width", self.jitter.pulses),
-                of_cycles(self.jitter.width_cycles as f64),
-            ),
-            ("frame of 20 ms".to_owned(), of_cycles(self.jitter.frame_cycles as f64)),
-            (format!("from a swing's due place to the servo's pin, earliest of {swings}"), of_ticks(earliest)),
-            ("latest".to_owned(), of_ticks(latest)),
-            ("mean distance".to_owned(), of_ticks(self.lateness.mean_ticks())),
-        ] {
-            table.add_row([name].into_iter().chain(figures));
-        }
-        table
-    }
-
-    /// A line per interrupt, and how long they are off.
-    fn interrupts(&self) -> Table {
-        let mut table = number_table(&["interrupt", "times", "fewest\ncycles", "mean", "most"]);
-        for (&vector, handler) in &self.firmware.interrupts.handlers {
-            table.add_row([
-                interrupt_name(vector),
-                handler.count.to_string(),
-                handler.fewest.to_string(),
-                format!("{:.0}", handler.mean()),
-                handler.most.to_string(),
-            ]);
-        }
-        let off = [
-            ("longest stretch with interrupts off", self.firmware.interrupts.longest_off),
-            ("longest critical section outside of them", self.firmware.interrupts.longest_critical_section),
-        ];
-        for (name, cycles) in off {
-            table.add_row([name, "", "", "", &cycles.to_string()]);
-        }
-        table
-    }
-
     /// A line per task of the classifier.
     fn classifier(&self) -> Table {
-        let mut table = number_table(&["classifier", "fewest\ncycles", "mean", "most"]);
+        let mut table = number_table(["classifier", "fewest\ncycles", "mean", "most"], 1);
         for (task, cycles) in &self.classifier.tasks {
             let name = match task {
                 Task::Quantise => "scale five features to bytes".to_owned(),
@@ -192,30 +131,6 @@ impl Figures {
         }
         table
     }
-
-    /// The memory that the firmware and its classifier take.
-    fn memory(&self) -> Table {
-        let mut table = number_table(&["memory", "bytes"]);
-        for (name, bytes) in [
-            ("flash", self.firmware.size.flash),
-            ("static SRAM", self.firmware.size.sram),
-            ("stack at its deepest", self.firmware.stack as u64),
-            ("stack of a classification", self.classifier.stack.into()),
-        ] {
-            table.add_row([name.to_owned(), bytes.to_string()]);
-        }
-        table
-    }
-}
-
-/// A table without inner lines. Its columns from the second on are numbers.
-fn number_table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_BORDERS_ONLY).set_header(header.iter().copied());
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }
 
 /// Another implementation's figure, and the ratio to it.
@@ -234,26 +149,6 @@ fn thousands(number: f64) -> String {
         grouped.push(digit);
     }
     grouped
-}
-
-/// The vectors that the encoder's pins can raise (data sheet, table 12-6): INT0, INT1 and PCINT2.
-const ENCODER_VECTORS: [u8; 3] = [1, 2, 5];
-
-/// The firmware's use of a vector (data sheet, table 12-6).
-fn interrupt_name(vector: u8) -> String {
-    match vector {
-        1 => "encoder A (INT0)".to_owned(),
-        2 => "encoder B (INT1)".to_owned(),
-        3 => "beam (PCINT0)".to_owned(),
-        5 => "encoder (PCINT2)".to_owned(),
-        6 => "watchdog (WDT)".to_owned(),
-        14 => "heartbeat (TIMER0_COMPA)".to_owned(),
-        15 => "heartbeat (TIMER0_COMPB)".to_owned(),
-        16 => "clock (TIMER0_OVF)".to_owned(),
-        18 => "serial, received (USART_RX)".to_owned(),
-        19 => "serial, sending (USART_UDRE)".to_owned(),
-        other => format!("vector {other}"),
-    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@
 //!
 //! The cable itself is not simulated: it loses and delays no edge.
 
-use super::{Live, LiveError, LiveUno, Pace, SLICE_MS, Setup};
+use super::{Live, LiveUno, Pace, SLICE_MS, Setup};
+use anyhow::{Error, Result};
 use rustix::time::{ClockId, clock_gettime};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -73,7 +74,7 @@ impl LiveRows {
     ///
     /// # Errors
     /// As [`LiveUno::start`].
-    pub fn start(setups: Vec<Setup>) -> Result<Self, LiveError> {
+    pub fn start(setups: Vec<Setup>) -> Result<Self> {
         let fast = setups.first().is_some_and(|setup| setup.fast);
         let unos = setups.into_iter().map(LiveUno::start).collect::<Result<_, _>>()?;
         Ok(Self { unos, mishaps: Arc::default(), fast })
@@ -87,8 +88,8 @@ impl LiveRows {
     /// Runs until `stop` is set, or for this time of the Unos' clock.
     ///
     /// # Errors
-    /// The error that has ended one row, and the row's number, once the others have ended as well.
-    pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, LiveError)> {
+    /// What has ended one of them, and which, once the others have ended as well.
+    pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, Error)> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let threads = cores.min(self.unos.len() / ROWS_OF_A_THREAD).max(1);
         let each = self.unos.len().div_ceil(threads).max(1);
@@ -163,7 +164,7 @@ fn worked() -> Duration {
 struct Part<'a> {
     first: usize,
     unos: Vec<(&'a mut LiveUno, bool)>,
-    failed: Option<(usize, LiveError)>,
+    failed: Option<(usize, Error)>,
 }
 
 impl<'a> Part<'a> {
@@ -184,8 +185,8 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Stops a row. To programs at its port, the cable seems to be unplugged.
-    fn stop(&mut self, place: usize, error: LiveError) {
+    /// One has stopped: to those at its port it is as if its cable were pulled.
+    fn stop(&mut self, place: usize, error: Error) {
         let (uno, runs) = &mut self.unos[place];
         uno.unplug();
         *runs = false;
@@ -224,8 +225,8 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Ends all rows. Returns the first failure.
-    fn end(mut self) -> Option<(usize, LiveError)> {
+    /// Ends them, and says what has stopped one before.
+    fn end(mut self) -> Option<(usize, Error)> {
         for place in 0..self.unos.len() {
             let (uno, runs) = &mut self.unos[place];
             if *runs && let Err(error) = uno.end() {
@@ -257,7 +258,7 @@ impl Reached {
 impl Live for LiveRows {
     type Outside = Reached;
     /// Which row has ended, and why.
-    type Failure = (usize, LiveError);
+    type Failure = (usize, Error);
 
     fn outside(&self) -> Reached {
         let paths = self.paths().into_iter().map(Path::to_owned).collect();

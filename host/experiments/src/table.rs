@@ -1,6 +1,11 @@
-//! The page's tables, and the format of numbers in them.
+//! The tables of reports, for the page and for a terminal, and how numbers read in them.
+
+use std::fmt::{self, Display, Formatter};
+use std::ops::Range;
+use trial::report::number_table;
 
 /// A table whose first column names its rows.
+#[derive(Clone, Debug)]
 pub struct Table {
     /// What is in it.
     pub caption: String,
@@ -18,6 +23,29 @@ impl Table {
         let columns = columns.into_iter().map(Into::into).collect();
         Self { caption: caption.into(), columns, rows: Vec::new(), is_prose: false }
     }
+
+    /// The same table without these columns.
+    pub fn without(mut self, columns: Range<usize>) -> Self {
+        for cells in self.rows.iter_mut().chain([&mut self.columns]) {
+            cells.drain(columns.clone());
+        }
+        self
+    }
+}
+
+impl Display for Table {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        let mut table = number_table(self.columns.iter().map(|heading| in_two_lines(heading)), 1);
+        table.add_rows(&self.rows);
+        write!(f, "{}\n{table}", self.caption)
+    }
+}
+
+/// A heading, broken at the blank nearest to its middle.
+pub fn in_two_lines(heading: &str) -> String {
+    let off_middle = |(at, _): &(usize, &str)| at.abs_diff(heading.len() / 2);
+    let at = heading.match_indices(' ').min_by_key(off_middle).map_or(heading.len(), |(at, _)| at);
+    format!("{}\n{}", &heading[..at], heading[at..].trim_start())
 }
 
 /// The text of a missing number.
