@@ -91,7 +91,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
     }
 
     /// An edge comes from a beam.
-    #[inline]
+    #[inline(always)]
     pub fn edge(&mut self, position: Position, beams: Beams) {
         self.beams = beams;
         let Beams { broken, second_broken } = beams;
@@ -105,9 +105,15 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
     }
 
     /// A turn of the loop.
-    #[inline]
     pub fn turn(&mut self) -> Orders {
         self.controller.step(self.readings)
+    }
+
+    /// The sensors show this, and the loop turns.
+    #[inline(always)]
+    pub fn turn_with(&mut self, readings: Readings) -> Orders {
+        self.readings = readings;
+        self.controller.step(readings)
     }
 
     /// A turn of the loop, so many microseconds later.
