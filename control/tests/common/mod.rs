@@ -1,19 +1,11 @@
-//! What the tests of the decisions share: readings, and a classifier that knows the truth.
+//! What the tests of the decisions share: a machine with a classifier that knows the truth.
 
-mod readings;
-
-pub use readings::{readings, woken_up};
-
-use control::{
-    ground::{
-        class::{Class, Classifier, ExamplesFull, Listed, Vote},
-        features::Features,
-    },
-    measure::reset::Cause,
-    memory::Volatile,
-    weeder::Controller,
+use control::ground::{
+    class::{Class, Classifier, ExamplesFull, Listed, Vote},
+    features::Features,
 };
 use knn::Example;
+use rig::Rig;
 
 /// Takes for a weed what is narrower than 60 mm, or nothing.
 #[derive(Clone, Debug)]
@@ -89,15 +81,8 @@ impl Classifier for ByWidth {
 
 /// A machine in HOLD that woke up without saved settings and was told that this is right.
 pub fn machine() -> Machine {
-    machine_that_judges(ByWidth::late_by(0))
-}
-
-/// The same, with a classifier that may take its time.
-pub fn machine_that_judges(classifier: ByWidth) -> Machine {
-    let mut machine = Controller::new(classifier, Volatile::new(), woken_up(Cause::PowerOn));
-    machine.clear();
-    machine
+    Rig::new(ByWidth::late_by(0))
 }
 
 /// A machine as the tests have it.
-pub type Machine = Controller<ByWidth, Volatile>;
+pub type Machine = Rig<ByWidth>;

@@ -67,11 +67,6 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         Self { controller, readings, beams, line: LineBuffer::new() }
     }
 
-    /// Resets the machine, whose sensors go on to show what they showed.
-    pub fn reset(&mut self, classifier: C, memory: M, cause: Cause) {
-        *self = Self::wake_at(classifier, memory, self.readings, self.beams, cause);
-    }
-
     /// The encoder counts to `count`.
     pub fn at(&mut self, count: i32) -> &mut Self {
         self.readings.position = Position::new(count);
