@@ -1,7 +1,7 @@
 //! Objects from simulated rows, as the firmware's own code sees them.
 //!
 //! The machine rolls past rows of a [`Crop`] at its speeds and two spacings, and the levels that its encoder and its
-//! beam give go through the firmware's decoder and its [`Controller`]; no feature is made up. What varies: speed within
+//! beam give go through the firmware's decoder and its decisions; no feature is made up. What varies: speed within
 //! a tenth of its class, spacing and canopy, plants that are missing, tall weeds wherever there is ground, closed and
 //! ragged canopies, and the slip of the wheel.
 //!
@@ -15,13 +15,10 @@ use super::labelled::Labelled;
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
 use control::measure::quadrature::{Quadrature, Step};
+use control::measure::readings::Readings;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::units::{Instant, Interval, Position, Ticks};
-use control::{
-    measure::readings::{Edge, Readings, Startup},
-    weeder::Controller,
-};
+use control::units::{Instant, Position, Ticks};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::planting::{Planting, PlantingError};
@@ -30,6 +27,7 @@ use field::wiring;
 use knn::Example;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rig::{Beams, Rig};
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
 use thiserror::Error;
@@ -127,10 +125,8 @@ const SLIP: RangeInclusive<f64> = -0.03..=0.03;
 const ACCELERATION_MM_S2: f64 = 1e6;
 
 /// How often the firmware's main loop takes its readings here; on the chip it is more often.
+const LOOP_US: u32 = 1000;
 const LOOP_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
-
-/// The Uno's cycles in a step of the firmware's clock.
-const CYCLES_PER_STEP: u64 = CYCLES_PER_SECOND / Interval::STEPS_PER_SECOND as u64;
 
 /// Why there is no field.
 #[derive(Debug, Error, PartialEq)]
@@ -276,36 +272,28 @@ fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
     let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
-    let beam_broken = !machine.beam_before(row, &motion).high;
-    let startup = Startup { readings: readings(0, Position::default()), beam_broken, cause: Cause::PowerOn };
-    let mut controller = Controller::new(&recorder, Volatile::new(), startup);
+    let beams = Beams::one(!machine.beam_before(row, &motion).high);
+    let readings = Readings::new(Instant::ZERO, Position::default());
+    let mut rig = Rig::wake_at(&recorder, Volatile::new(), readings, beams, Cause::PowerOn);
 
     let mut wheel = Encoder::default();
     let mut next_loop = LOOP_CYCLES;
-    let mut edges = Vec::new();
     for change in machine.pin_changes(row, &motion, 0) {
         while next_loop <= change.cycle {
-            controller.turn(readings(next_loop, wheel.position), edges.drain(..));
+            rig.turn_after(LOOP_US);
             next_loop += LOOP_CYCLES;
         }
         match change.pin {
-            wiring::BEAM => {
-                edges.push(Edge::Seen { position: wheel.position, broken: !change.high, second_broken: false })
-            }
-            _ => wheel.turn(change),
+            wiring::BEAM => rig.see(Beams::one(!change.high)),
+            _ => rig.readings.position = wheel.turn(change),
         }
     }
-    controller.turn(readings(next_loop, wheel.position), edges);
-    drop(controller);
+    rig.turn_after(LOOP_US);
+    drop(rig);
 
     let seen = recorder.seen.into_inner();
     let planted = row.things().len();
     if seen.len() == planted { Ok(seen) } else { Err(SyntheticError::Miscounted { seen: seen.len(), planted }) }
-}
-
-fn readings(cycle: u64, position: Position) -> Readings {
-    let now = Instant::new((cycle / CYCLES_PER_STEP) as u32);
-    Readings::new(now, position)
 }
 
 /// The encoder's two channels, and the position that the firmware's decoder makes of them.
@@ -317,11 +305,12 @@ struct Encoder {
 }
 
 impl Encoder {
-    fn turn(&mut self, change: PinChange) {
+    fn turn(&mut self, change: PinChange) -> Position {
         let bit = if change.pin == wiring::ENCODER_A { 0b10 } else { 0b01 };
         self.channels = if change.high { self.channels | bit } else { self.channels & !bit };
         if let Step::Ticks(ticks) = self.decoder.step(self.channels) {
             self.position = self.position + Ticks(i32::from(ticks));
         }
+        self.position
     }
 }
