@@ -298,7 +298,8 @@ impl Machine for Board {
 
     fn turn(&mut self, before: &World, now: &World) -> Result<i64, Failure> {
         // All of it by name, so that the compiler finds a sensor without a pin. Encoder and beams have come edge by edge.
-        let &World { time_us, count, switch_on, end_switch_on, stack_is_low, jumps: _, broken: _, second_broken: _ } = now;
+        let &World { time_us, count, switch_on, end_switch_on, stack_is_low, jumps: _, broken: _, second_broken: _ } =
+            now;
         let cycles = (time_us - before.time_us) * CYCLES_A_US;
         let until = self.uno.cycle() + cycles;
         self.uno.set(wiring::WORK_SWITCH, !switch_on);
