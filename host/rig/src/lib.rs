@@ -104,7 +104,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         self.controller.step(self.readings)
     }
 
-    /// The sensors show this, and the loop turns.
+    /// The sensors show this, and the loop turns: faster than [`turn`](Self::turn), as nothing is read back.
     #[inline(always)]
     pub fn turn_with(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
