@@ -2,17 +2,14 @@
 
 mod common;
 
-use common::{ByWidth, Machine, machine, readings, woken_up};
+use common::{ByWidth, machine};
 use control::{
     alarm::{Alarm, Warning},
     ground::{
         class::{Class, Vote},
         keep_out::Plan,
     },
-    measure::{
-        readings::{Edge, Readings},
-        reset::Cause,
-    },
+    measure::reset::Cause,
     memory::Volatile,
     operate::{
         calibration::{Outcome, SwingTimes},
@@ -27,28 +24,14 @@ use control::{
     },
     settings::Setting,
     units::{Position, Ticks},
-    weeder::Controller,
 };
+use rig::{Beams, Rig};
 
 /// A line's text; checks its length.
 fn said(line: Line) -> String {
     let said: String = line.map(char::from).collect();
     assert!(said.len() <= LINE, "{} characters: {said}", said.len());
     said
-}
-
-/// Enters a line and returns the answer's lines.
-fn ask(machine: &mut Machine, line: &str) -> Vec<String> {
-    let mut buffer = LineBuffer::new();
-    let command = line.bytes().chain(*b"\n").find_map(|byte| buffer.take(byte)).expect("a line that says something");
-    let mut answer = say::execute(command, machine);
-    let mut lines = Vec::new();
-    while !answer.is_done() {
-        let mut line = Line::new();
-        answer.write_line(machine, &mut line);
-        lines.push(said(line).strip_suffix("\r\n").expect("a line's end").to_owned());
-    }
-    lines
 }
 
 fn settings() -> impl Iterator<Item = Setting> {
@@ -82,7 +65,7 @@ fn every_answer_ends_in_exactly_one_ok_or_error() {
         ]);
     }
     for line in lines {
-        let answer = ask(&mut machine(), &line);
+        let answer = machine().ask(&line);
         let ends = answer.iter().filter(|line| *line == "ok" || line.starts_with("error: ")).count();
         assert_eq!(ends, 1, "{line}: {answer:?}");
         assert!(answer.last().is_some_and(|line| line == "ok" || line.starts_with("error: ")), "{line}: {answer:?}");
@@ -91,7 +74,7 @@ fn every_answer_ends_in_exactly_one_ok_or_error() {
 
 #[test]
 fn help_lists_every_command() {
-    let help = ask(&mut machine(), "help");
+    let help = machine().ask("help");
     for word in (0..).map_while(Word::from_index) {
         let word = String::from_utf8(word.text().bytes().collect()).unwrap();
         assert!(help.iter().any(|line| line.starts_with(&word)), "{word}");
@@ -106,29 +89,26 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
         let mut machine = machine();
         // These values contradict no value of another setting.
         for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 1000", "set wheel_mm 200"] {
-            assert_eq!(ask(&mut machine, line), ["ok"]);
+            assert_eq!(machine.ask(line), ["ok"]);
         }
         for value in [description.least, description.greatest] {
-            assert_eq!(ask(&mut machine, &format!("set {name} {value}")), ["ok"]);
+            assert_eq!(machine.ask(&format!("set {name} {value}")), ["ok"]);
             assert_eq!(machine.settings().get(setting), value);
             if !setting.is_switched() {
-                assert!(ask(&mut machine, &format!("get {name}"))[0].starts_with(&format!("{name}={value} ")));
+                assert!(machine.ask(&format!("get {name}"))[0].starts_with(&format!("{name}={value} ")));
             }
         }
         if setting.is_switched() {
             let refusal = [format!("error: {name} takes on or off")];
-            assert_eq!(ask(&mut machine, &format!("set {name} 2")), refusal);
-            assert_eq!(
-                ask(&mut machine, &format!("get {name}"))[0],
-                format!("{name}=on on or off, default off, not saved")
-            );
+            assert_eq!(machine.ask(&format!("set {name} 2")), refusal);
+            assert_eq!(machine.ask(&format!("get {name}"))[0], format!("{name}=on on or off, default off, not saved"));
             continue;
         }
         let outside = [description.least.checked_sub(1), description.greatest.checked_add(1)];
         for value in outside.into_iter().flatten() {
             let range = format!("from {} to {}", description.least, description.greatest);
             let expected = format!("error: {name} takes a whole number {range}");
-            assert_eq!(ask(&mut machine, &format!("set {name} {value}")), [expected]);
+            assert_eq!(machine.ask(&format!("set {name} {value}")), [expected]);
             assert_eq!(machine.settings().get(setting), description.greatest, "the old value stays");
         }
     }
@@ -137,54 +117,55 @@ fn a_setting_takes_every_value_of_its_range_and_no_other() {
 #[test]
 fn settings_that_move_the_tool_are_refused_at_work() {
     let mut machine = machine();
-    assert_eq!(ask(&mut machine, "start"), ["ok"]);
+    assert_eq!(machine.ask("start"), ["ok"]);
     let refusal = "error: wheel_mm changes where the tool is, hold first";
-    assert_eq!(ask(&mut machine, "set wheel_mm 500"), [refusal]);
-    assert!(ask(&mut machine, "set servo_out_us 1500")[0].starts_with("error: servo_out_us changes"));
-    assert_eq!(ask(&mut machine, "set lead_out_ms 150"), ["ok"]);
-    assert_eq!(ask(&mut machine, "hold"), ["ok"]);
-    assert_eq!(ask(&mut machine, "set wheel_mm 500"), ["ok"]);
+    assert_eq!(machine.ask("set wheel_mm 500"), [refusal]);
+    assert!(machine.ask("set servo_out_us 1500")[0].starts_with("error: servo_out_us changes"));
+    assert_eq!(machine.ask("set lead_out_ms 150"), ["ok"]);
+    assert_eq!(machine.ask("hold"), ["ok"]);
+    assert_eq!(machine.ask("set wheel_mm 500"), ["ok"]);
 }
 
 #[test]
 fn an_alarm_is_named_and_keeps_the_machine_from_starting_until_it_is_cleared() {
     let mut machine = machine();
-    ask(&mut machine, "start");
-    machine.turn(readings(1000, 0), [Edge::Lost { broken: false }]);
-    assert!(ask(&mut machine, "status")[0].starts_with("state=alarm code=1-3 name=beam_edges_lost tool=out "));
-    assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
-    ask(&mut machine, "hold");
+    machine.ask("start");
+    machine.lose_edges(Beams::default());
+    machine.turn_after(1000);
+    assert!(machine.ask("status")[0].starts_with("state=alarm code=1-3 name=beam_edges_lost tool=out "));
+    assert_eq!(machine.ask("start"), ["error: an alarm is latched, see status, then clear it"]);
+    machine.ask("hold");
     assert!(matches!(machine.state(), State::Alarm(_)), "hold does not clear an alarm");
-    assert_eq!(ask(&mut machine, "clear"), ["ok"]);
-    assert_eq!(ask(&mut machine, "start"), ["ok"]);
+    assert_eq!(machine.ask("clear"), ["ok"]);
+    assert_eq!(machine.ask("start"), ["ok"]);
 }
 
 #[test]
 fn status_shows_the_distance_to_seen_ground() {
     let mut machine = machine();
     assert_eq!(
-        ask(&mut machine, "status"),
+        machine.ask("status"),
         [
             "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400",
             "lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=65535 reset=power_on",
             "ok"
         ]
     );
-    assert_eq!(ask(&mut machine, "start"), ["ok"]);
-    machine.turn(readings(1000, 0), []);
-    assert!(ask(&mut machine, "status")[0].starts_with("state=work tool=out for=unseen_ground "));
-    assert_eq!(ask(&mut machine, "start now"), ["ok"]);
-    assert!(ask(&mut machine, "status")[0].ends_with("unseen_mm=0"));
+    assert_eq!(machine.ask("start"), ["ok"]);
+    machine.turn_after(1000);
+    assert!(machine.ask("status")[0].starts_with("state=work tool=out for=unseen_ground "));
+    assert_eq!(machine.ask("start now"), ["ok"]);
+    assert!(machine.ask("status")[0].ends_with("unseen_mm=0"));
 }
 
 #[test]
 fn the_longest_numbers_fit_on_the_status_line() {
     let mut machine = machine();
-    ask(&mut machine, "start");
-    let mut readings = readings(1000, i32::MIN);
-    (readings.lost, readings.jumps) = (u16::MAX, u16::MAX);
-    machine.turn(readings, [Edge::Lost { broken: false }]);
-    ask(&mut machine, "status");
+    machine.ask("start");
+    machine.lose_edges(Beams::default());
+    (machine.readings.lost, machine.readings.jumps) = (u16::MAX, u16::MAX);
+    machine.at(i32::MIN).turn_after(1000);
+    machine.ask("status");
 }
 
 #[test]
@@ -214,24 +195,25 @@ fn every_event_fits_on_a_line() {
 #[test]
 fn an_alarm_is_not_cleared_by_the_switch_going_on() {
     let mut machine = machine();
-    ask(&mut machine, "start");
-    machine.turn(readings(0, 0), [Edge::Lost { broken: false }]);
-    let mut throw = |milliseconds: u64, switch_on: bool| {
-        for moment in [milliseconds, milliseconds + 30] {
-            machine.turn(Readings { switch_on, ..readings(moment * 1000, 0) }, []);
-        }
+    machine.ask("start");
+    machine.lose_edges(Beams::default());
+    machine.turn();
+    let mut throw = |switch_on: bool| {
+        machine.readings.switch_on = switch_on;
+        machine.stand(30);
         machine.state()
     };
-    assert_eq!(throw(100, true), State::Alarm(Alarm::BeamEdgesLost));
-    assert_eq!(throw(200, false), State::Hold);
-    assert_eq!(throw(300, true), State::Work);
+    assert_eq!(throw(true), State::Alarm(Alarm::BeamEdgesLost));
+    assert_eq!(throw(false), State::Hold);
+    assert_eq!(throw(true), State::Work);
 }
 
 #[test]
 fn after_lost_edges_the_present_level_of_the_beam_counts() {
     for broken in [false, true] {
         let mut machine = machine();
-        machine.turn(readings(1000, 0), [Edge::Lost { broken }]);
+        machine.lose_edges(Beams::one(broken));
+        machine.turn_after(1000);
         assert_eq!(machine.zones(), u8::from(broken));
     }
 }
@@ -240,15 +222,15 @@ fn after_lost_edges_the_present_level_of_the_beam_counts() {
 fn contradicting_settings_are_refused_with_the_allowed_value() {
     let mut machine = machine();
     let refusal = "error: margin, leads and top speed would need beam_to_tool_mm 389 or more, change one of them first";
-    assert_eq!(ask(&mut machine, "set beam_to_tool_mm 388"), [refusal]);
-    assert_eq!(ask(&mut machine, "set beam_to_tool_mm 389"), ["ok"]);
+    assert_eq!(machine.ask("set beam_to_tool_mm 388"), [refusal]);
+    assert_eq!(machine.ask("set beam_to_tool_mm 389"), ["ok"]);
     for line in ["set margin_mm 51", "set lead_out_ms 240", "set top_speed_mm_s 1310", "set beam_response_ms 3"] {
-        assert!(ask(&mut machine, line)[0].starts_with("error: margin, leads and top speed would need"), "{line}");
+        assert!(machine.ask(line)[0].starts_with("error: margin, leads and top speed would need"), "{line}");
     }
-    assert_eq!(ask(&mut machine, "set top_speed_mm_s 1000"), ["ok"]);
-    assert_eq!(ask(&mut machine, "set margin_mm 60"), ["ok"]);
+    assert_eq!(machine.ask("set top_speed_mm_s 1000"), ["ok"]);
+    assert_eq!(machine.ask("set margin_mm 60"), ["ok"]);
     let refusal = "error: servo_in_us and servo_out_us would be equal, and the tool would not move";
-    assert_eq!(ask(&mut machine, "set servo_in_us 2000"), [refusal]);
+    assert_eq!(machine.ask("set servo_in_us 2000"), [refusal]);
 }
 
 #[test]
@@ -261,40 +243,40 @@ fn a_wheel_with_too_few_counts_is_refused_with_the_allowed_value() {
         ("set ticks_per_m 899", "set ticks_per_m 1500"),
         ("set ticks_per_rev 1130", "set ticks_per_rev 1132"),
     ] {
-        assert_eq!(ask(&mut machine, too_few), [refusal], "{too_few}");
-        assert_eq!(ask(&mut machine, enough), ["ok"], "{enough}");
+        assert_eq!(machine.ask(too_few), [refusal], "{too_few}");
+        assert_eq!(machine.ask(enough), ["ok"], "{enough}");
     }
-    assert_eq!(ask(&mut machine, "set wheel_mm 401"), [refusal]);
-    ask(&mut machine, "calibrate start");
-    machine.turn(readings(1000, 800), []);
-    assert_eq!(ask(&mut machine, "calibrate 1000 force"), [refusal]);
+    assert_eq!(machine.ask("set wheel_mm 401"), [refusal]);
+    machine.ask("calibrate start");
+    machine.at(800).turn_after(1000);
+    assert_eq!(machine.ask("calibrate 1000 force"), [refusal]);
     assert_eq!(machine.settings().get(Setting::TicksPerM), 0);
 }
 
 #[test]
 fn settings_are_saved_in_hold_only() {
     let mut machine = machine();
-    assert_eq!(ask(&mut machine, "save"), ["ok"]);
-    ask(&mut machine, "start");
-    assert_eq!(ask(&mut machine, "save"), ["error: the machine is at work, hold first"]);
+    assert_eq!(machine.ask("save"), ["ok"]);
+    machine.ask("start");
+    assert_eq!(machine.ask("save"), ["error: the machine is at work, hold first"]);
 }
 
 #[test]
-fn a_machine_without_saved_settings_raises_an_alarm_and_does_not_start_until_it_is_cleared() {
-    let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), woken_up(Cause::BrownOut));
+fn a_machine_without_saved_settings_says_so_and_does_not_start_until_that_is_cleared() {
+    let mut machine = Rig::wake(ByWidth::late_by(0), Volatile::new(), Cause::BrownOut);
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsLost));
-    assert_eq!(ask(&mut machine, "start"), ["error: an alarm is latched, see status, then clear it"]);
-    assert_eq!(ask(&mut machine, "clear"), ["ok"]);
-    assert_eq!(ask(&mut machine, "start"), ["ok"]);
+    assert_eq!(machine.ask("start"), ["error: an alarm is latched, see status, then clear it"]);
+    assert_eq!(machine.ask("clear"), ["ok"]);
+    assert_eq!(machine.ask("start"), ["ok"]);
 }
 
 #[test]
 fn lines_with_an_error_are_counted() {
     let mut machine = machine();
     for line in ["nonsense", "set", "\u{7}"] {
-        ask(&mut machine, line);
+        machine.ask(line);
     }
-    assert!(ask(&mut machine, "status")[1].contains(" mistakes=3 "));
+    assert!(machine.ask("status")[1].contains(" mistakes=3 "));
 }
 
 #[test]
@@ -317,7 +299,7 @@ fn the_table_of_faults_names_every_alarm_with_its_code_and_every_warning_and_cau
 fn get_and_help_show_the_unit_as_a_separate_word() {
     for command in ["get", "help"] {
         let tells = |setting: &str, shown: &str| {
-            let answer = ask(&mut machine(), &format!("{command} {setting}"));
+            let answer = machine().ask(&format!("{command} {setting}"));
             assert!(answer[answer.len() - 2].starts_with(shown), "{answer:?}");
         };
         tells("top_speed_mm_s", "top_speed_mm_s=1300 mm/s from 100 to 3000, default 1300");
@@ -330,38 +312,38 @@ fn get_and_help_show_the_unit_as_a_separate_word() {
 #[test]
 fn get_shows_the_saved_value_if_it_differs() {
     let mut machine = machine();
-    assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3, not saved");
-    assert_eq!(ask(&mut machine, "save"), ["ok"]);
+    assert_eq!(machine.ask("get k")[0], "k=3 from 1 to 15, default 3, not saved");
+    assert_eq!(machine.ask("save"), ["ok"]);
     while !machine.carry_on() {}
-    assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3");
-    ask(&mut machine, "set k 5");
-    assert_eq!(ask(&mut machine, "get k")[0], "k=5 from 1 to 15, default 3, saved 3");
-    assert_eq!(ask(&mut machine, "revert"), ["ok"]);
-    assert_eq!(ask(&mut machine, "get k")[0], "k=3 from 1 to 15, default 3");
+    assert_eq!(machine.ask("get k")[0], "k=3 from 1 to 15, default 3");
+    machine.ask("set k 5");
+    assert_eq!(machine.ask("get k")[0], "k=5 from 1 to 15, default 3, saved 3");
+    assert_eq!(machine.ask("revert"), ["ok"]);
+    assert_eq!(machine.ask("get k")[0], "k=3 from 1 to 15, default 3");
 }
 
 #[test]
 fn a_calibration_answers_its_result_or_what_is_allowed() {
     let mut machine = machine();
-    assert_eq!(ask(&mut machine, "calibrate 10000"), ["error: calibrate start first, then roll"]);
-    assert_eq!(ask(&mut machine, "calibrate start"), ["ok"]);
-    machine.turn(readings(1000, 18_900), []);
-    assert_eq!(ask(&mut machine, "calibrate 500"), ["error: roll 1000 mm at least, 10000 are better"]);
+    assert_eq!(machine.ask("calibrate 10000"), ["error: calibrate start first, then roll"]);
+    assert_eq!(machine.ask("calibrate start"), ["ok"]);
+    machine.at(18_900).turn_after(1000);
+    assert_eq!(machine.ask("calibrate 500"), ["error: roll 1000 mm at least, 10000 are better"]);
     let refusal = "error: that would be ticks_per_m 3780, the wheel has 1910, look again, or add force";
-    assert_eq!(ask(&mut machine, "calibrate 5000"), [refusal]);
+    assert_eq!(machine.ask("calibrate 5000"), [refusal]);
     let answer = ["ticks_per_m=1890 from 0 to 20000, default 0, not saved", "ok"];
-    assert_eq!(ask(&mut machine, "calibrate 10000"), answer);
-    assert_eq!(ask(&mut machine, "calibrate 5000 force")[0], "ticks_per_m=3780 from 0 to 20000, default 0, not saved");
+    assert_eq!(machine.ask("calibrate 10000"), answer);
+    assert_eq!(machine.ask("calibrate 5000 force")[0], "ticks_per_m=3780 from 0 to 20000, default 0, not saved");
 }
 
 #[test]
 fn manual_tests_are_refused_at_work_with_what_to_do() {
     let mut machine = machine();
     let speed = "error: test row takes a speed in mm/s from 100 to 1300";
-    assert_eq!(ask(&mut machine, "test row 1401"), [speed]);
-    assert_eq!(ask(&mut machine, "servo 499"), ["error: servo takes a whole number from 500 to 2500"]);
-    assert_eq!(ask(&mut machine, "revert"), ["error: no settings are saved, save does it"]);
-    ask(&mut machine, "start");
+    assert_eq!(machine.ask("test row 1401"), [speed]);
+    assert_eq!(machine.ask("servo 499"), ["error: servo takes a whole number from 500 to 2500"]);
+    assert_eq!(machine.ask("revert"), ["error: no settings are saved, save does it"]);
+    machine.ask("start");
     for line in [
         "servo in",
         "servo out",
@@ -373,7 +355,7 @@ fn manual_tests_are_refused_at_work_with_what_to_do() {
         "revert",
         "save",
     ] {
-        assert_eq!(ask(&mut machine, line), ["error: the machine is at work, hold first"], "{line}");
+        assert_eq!(machine.ask(line), ["error: the machine is at work, hold first"], "{line}");
     }
 }
 
@@ -394,14 +376,14 @@ fn plot_lines_contain_only_labels_and_values() {
 fn curves_show_speed_and_beam_and_status_shows_the_speed() {
     let mut machine = machine();
     for (direction, broken) in [(1, true), (-1, false)] {
-        let edge = Edge::Seen { position: Position::new(0), broken, second_broken: false };
-        machine.turn(readings(0, 0), [edge]);
-        for milliseconds in 1..1000 {
-            machine.turn(readings(milliseconds * 1000, i32::from(direction) * milliseconds as i32), []);
+        machine.see(Beams::one(broken));
+        for _ in 1..1000 {
+            let count = machine.readings.position.count() + i32::from(direction);
+            machine.at(count).turn_after(1000);
         }
         let speed = machine.speed_mm_s();
         assert!((speed * direction - 523).abs() <= 1, "1000 ticks a second of the default wheel: {speed}");
-        assert!(ask(&mut machine, "status")[0].contains(&format!(" speed_mm_s={speed} ")));
+        assert!(machine.ask("status")[0].contains(&format!(" speed_mm_s={speed} ")));
         let mut line = Line::new();
         say::write_plot(&machine, Plot::Arduino, &mut line);
         let curves = said(line);
@@ -418,8 +400,8 @@ fn status_counts_dropped_events() {
         machine.start(false).expect("no alarm is latched");
         machine.hold();
     }
-    assert!(ask(&mut machine, "status")[1].contains(" missed=4 "), "six of ten wait");
-    assert_eq!(std::iter::from_fn(|| machine.next_event()).count(), 6);
+    assert!(machine.ask("status")[1].contains(" missed=4 "), "six of ten wait");
+    assert_eq!(machine.events().len(), 6);
 }
 
 #[test]
@@ -430,8 +412,8 @@ fn events_and_curves_wait_until_an_answer_is_complete() {
     let (mut console, mut typed) = (Console::new(), LineBuffer::new());
     let mut to_type = b"help\nnonsense\nget\nversion\n".iter();
     let mut said = String::new();
-    for turn in 0..20_000 {
-        machine.turn(readings(turn * 300, 0), []);
+    for turn in 0..20_000_u32 {
+        machine.turn_after(300);
         match turn % 200 {
             0 => machine.start(false).expect("no alarm is latched"),
             100 => machine.hold(),
@@ -450,8 +432,8 @@ fn events_and_curves_wait_until_an_answer_is_complete() {
         }
     }
     for line in ["help", "nonsense", "get", "version"] {
-        let answer = ask(&mut machine, line).join("\r\n") + "\r\n";
-        assert_eq!(said.matches(&answer).count(), 1, "{line} is answered once and without interruption: {said}");
+        let answer = machine.ask(line).join("\r\n") + "\r\n";
+        assert_eq!(said.matches(&answer).count(), 1, "{line} is answered once and in one piece: {said}");
     }
     assert_eq!(said.lines().filter(|line| *line == "ok" || line.starts_with("error: ")).count(), 4);
     assert!(said.starts_with("weeder "), "it greets: {said}");

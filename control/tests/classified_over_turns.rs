@@ -7,7 +7,7 @@ mod common;
 #[path = "common/rolling.rs"]
 mod rolling;
 
-use common::{ByWidth, machine_with};
+use common::ByWidth;
 use control::{
     alarm::Alarm,
     ground::class::{Class, Vote},
@@ -16,6 +16,7 @@ use control::{
     units::{Position, Ticks},
 };
 use proptest::prelude::*;
+use rig::Rig;
 use rolling::{BEAM_TO_TOOL_MM, MARGIN_MM, Rolling, SECOND_BEAM_MM};
 
 /// Wider detections are plants.
@@ -36,7 +37,7 @@ fn rolling(turns: u16, seen_mm: &[(f64, f64)], unseen: usize, settings: &[(Setti
     let (first_mm, second_mm) = (first_mm.collect(), seen_mm.to_vec());
     match turns {
         0 => Rolling::along(first_mm, second_mm, settings),
-        _ => Rolling::with(machine_with(ByWidth::late_by(turns)), first_mm, second_mm, settings),
+        _ => Rolling::with(Rig::new(ByWidth::late_by(turns)), first_mm, second_mm, settings),
     }
 }
 

@@ -10,21 +10,17 @@
 use control::{
     alarm::Alarm,
     ground::{examples::EXAMPLES, nearest::Nearest},
-    measure::{
-        quadrature::{Quadrature, Step},
-        readings::{Edge, Readings, Startup},
-        reset::Cause,
-    },
+    measure::quadrature::{Quadrature, Step},
     memory::Volatile,
     operate::{servo, state::State},
     settings::{Setting, TICKS_PER_M_LEAST},
-    units::{Instant, Interval, Position},
-    weeder::Controller,
+    units::{Instant, Interval},
 };
 use expect_test::{ExpectFile, expect_file};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use rig::{Beams, Rig};
 use std::fmt::{self, Write};
 use std::ops::Range;
 
@@ -288,13 +284,7 @@ fn canopies_mm() -> impl Iterator<Item = Range<f64>> {
 fn roll(run: Run) -> Shown {
     let way = Way { speed_mm_s: run.speed_km_h / 0.0036 };
     let mut wires = Wires::new(way, run);
-    let readings = |time_s: f64, wires: &Wires| {
-        let now = Instant::default() + Interval::from_steps((time_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
-        Readings { jumps: wires.jumps, ..Readings::new(now, Position::new(wires.count as i32)) }
-    };
-    let startup = Startup { readings: readings(0.0, &wires), beam_broken: false, cause: Cause::PowerOn };
-    let mut weeder = Controller::new(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), startup);
-    weeder.clear();
+    let mut weeder = Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new()));
     if run.tick_mm != TICK_MM {
         weeder.set(Setting::TicksPerM, (1000.0 / run.tick_mm).round() as u16).expect("fine enough");
     }
@@ -315,7 +305,6 @@ fn roll(run: Run) -> Shown {
     let (mut out, mut told_s, mut was_clear) = (true, f64::NEG_INFINITY, true);
     let end_s = way.time_s(canopies[PLANTS - 1].end + BEAM_TO_TOOL_MM + MARGIN_MM);
     let (mut time_s, mut turn, mut alarm) = (0.0, 0_u32, None);
-    let mut edges = Vec::new();
     while time_s < alarm.map_or(end_s, |(_, at_s): (Alarm, f64)| f64::min(at_s + 2.0 * SWING_S, end_s)) {
         turn += 1;
         // The loop's turns while it weeds and the operator requests the status.
@@ -326,10 +315,12 @@ fn roll(run: Run) -> Shown {
         };
         while let Some((edge_s, broken)) = beam.next_if(|&(edge_s, _)| edge_s <= time_s) {
             wires.roll_to(edge_s);
-            edges.push(Edge::Seen { position: Position::new(wires.count as i32), broken, second_broken: false });
+            weeder.at(wires.count as i32).see(Beams::one(broken));
         }
         wires.roll_to(time_s);
-        let orders = weeder.turn(readings(time_s, &wires), edges.drain(..));
+        weeder.readings.now = Instant::new((time_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
+        weeder.readings.jumps = wires.jumps;
+        let orders = weeder.at(wires.count as i32).turn();
         if let (State::Alarm(raised), None) = (weeder.state(), alarm) {
             alarm = Some((raised, time_s));
         }

@@ -7,11 +7,8 @@ use bolero::{TypeGenerator, check};
 use control::{
     alarm::Alarm,
     ground::{class::Classifier, examples::EXAMPLES, field_examples, nearest::Nearest},
-    measure::{
-        readings::{Readings, Startup},
-        reset::Cause,
-    },
-    memory::{ERASED, Memory, SIZE, Volatile},
+    measure::reset::Cause,
+    memory::{ERASED, SIZE, Volatile},
     operate::{
         saved::{COPY, SavedSettings},
         state::State,
@@ -22,15 +19,12 @@ use control::{
         line::Line,
     },
     settings::{Setting, Settings},
-    units::{Instant, Position},
-    weeder::Controller,
 };
+use rig::{ByExamples, Rig};
 
-/// The firmware's machine, with these contents of the EEPROM's halves.
-fn machine(for_settings: Volatile, for_examples: Volatile) -> Controller<impl Classifier, impl Memory> {
-    let readings = Readings::new(Instant::new(0), Position::new(0));
-    let startup = Startup { readings, beam_broken: false, cause: Cause::PowerOn };
-    Controller::new(Nearest::new(&EXAMPLES[..], for_examples), for_settings, startup)
+/// The machine as the firmware has it, with these contents of its EEPROM's halves.
+fn machine(for_settings: Volatile, for_examples: Volatile) -> Rig<ByExamples> {
+    Rig::wake(Nearest::new(&EXAMPLES[..], for_examples), for_settings, Cause::PowerOn)
 }
 
 /// Input on the serial line. Random bytes alone seldom make a command.
@@ -73,8 +67,8 @@ fn every_line_is_answered_by_lines_that_fit_and_one_verdict() {
         bytes.push(b'\n');
         let mut machine = machine(Volatile::new(), Volatile::new());
         let mut line = LineBuffer::new();
-        for (turn, byte) in (0_u32..).zip(bytes) {
-            machine.turn(Readings::new(Instant::new(turn * 125), Position::new(turn.cast_signed() / 4)), []);
+        for (turn, byte) in (0..).zip(bytes) {
+            machine.at(turn / 4).turn_after(500);
             let Some(command) = line.take(byte) else { continue };
             let mut answer = say::execute(command, &mut machine);
             while !machine.carry_on() {}

@@ -1,44 +1,30 @@
 //! The operator's labels and entered examples, compared with the built-in examples.
 
-#[path = "common/readings.rs"]
-mod readings;
-
 use control::{
     ground::{
         class::{Class, Classifier},
         examples::EXAMPLES,
         nearest::Nearest,
     },
-    measure::{readings::Edge, reset::Cause},
     memory::Volatile,
-    say::{self, command::LineBuffer, line::Line},
     settings::Setting,
-    units::Position,
-    weeder::Controller,
 };
-use readings::{readings, woken_up};
+use rig::{Beams, ByExamples, Rig};
 
-type Machine = Controller<Nearest<&'static [knn::Example<5>], Volatile>, Volatile>;
-
-/// 2 km/h in ticks a second.
-const SPEED: u64 = 1061;
+/// A tick at 2 km/h.
+const TICK_US: u32 = 942;
 
 /// A machine that rolls at 2 km/h, in hold.
 struct Rolling {
-    machine: Machine,
-    count: i32,
+    machine: Rig<ByExamples>,
     /// Where the last detection began.
     leading: i32,
-    /// Beam edges since the last turn.
-    edges: Vec<Edge>,
 }
 
 impl Rolling {
     fn new() -> Self {
         let nearest = Nearest::new(&EXAMPLES[..], Volatile::new());
-        let mut machine = Controller::new(nearest, Volatile::new(), woken_up(Cause::PowerOn));
-        machine.clear();
-        Self { machine, count: 0, leading: 0, edges: Vec::new() }
+        Self { machine: Rig::new(nearest), leading: 0 }
     }
 
     /// Rolls past a detection, `spacing_mm` behind the last one's leading edge. Returns its class.
@@ -47,32 +33,23 @@ impl Rolling {
         let leading = self.leading + wheel.ticks(spacing_mm).0;
         let trailing = leading + wheel.ticks(width_mm).0;
         self.roll_to(leading);
-        self.edges.push(Edge::Seen { position: Position::new(leading), broken: true, second_broken: false });
+        self.machine.see(Beams::one(true));
         self.roll_to(trailing);
-        self.edges.push(Edge::Seen { position: Position::new(trailing), broken: false, second_broken: false });
+        self.machine.see(Beams::one(false));
         self.roll_to(trailing + wheel.ticks(40).0);
         self.leading = leading;
         self.machine.detections().last().expect("the object was seen").vote.class
     }
 
     fn roll_to(&mut self, count: i32) {
-        while self.count < count {
-            self.count += 1;
-            self.machine.turn(readings(self.count as u64 * 1_000_000 / SPEED, self.count), self.edges.drain(..));
+        for count in self.machine.readings.position.count() + 1..=count {
+            self.machine.at(count).turn_after(TICK_US);
         }
     }
 
     /// Enters a line. Returns the last line of its answer.
     fn ask(&mut self, line: &str) -> String {
-        let mut typed = LineBuffer::new();
-        let said = line.bytes().chain(*b"\n").find_map(|byte| typed.take(byte)).expect("a line that says something");
-        let mut answer = say::execute(said, &mut self.machine);
-        let mut written = Line::new();
-        while !answer.is_done() {
-            written = Line::new();
-            answer.write_line(&self.machine, &mut written);
-        }
-        written.map(char::from).collect::<String>().trim_end().to_owned()
+        self.machine.ask(line).pop().expect("an answer")
     }
 
     fn label(&self) -> Option<u8> {

@@ -5,20 +5,21 @@
 
 mod common;
 
-use common::{machine, readings};
+use common::machine;
 use control::{
-    measure::readings::Edge,
     operate::{event::Event, servo},
     settings::Setting,
-    units::{Position, Ticks},
+    units::Ticks,
 };
 use proptest::prelude::*;
+use rig::Beams;
 
 /// Ticks a metre of the default wheel.
 const TICKS_A_METRE: f64 = 1909.86;
 
 /// A turn of the main loop.
-const TURN_US: u64 = 500;
+const TURN_US: u32 = 500;
+const TURN_S: f64 = TURN_US as f64 / 1e6;
 
 /// Tolerance of the command in ticks, because the measured speed lags.
 const TOLERANCE: f64 = 12.0;
@@ -86,10 +87,9 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     let tool_in = servo::from_us(machine.settings().get(Setting::ServoInUs));
 
     let mut run = Run { plants_told: 0, plants_seen: 0 };
-    let (mut time_us, mut position, mut count, mut broken, mut farthest) = (0_u64, 0.0_f64, 0_i32, false, 0_i32);
+    let (mut time_us, mut position, mut count, mut farthest) = (0, 0.0_f64, 0_i32, 0_i32);
     let mut speed = 0.0_f64;
     let mut out_since_us = None;
-    let mut edges = Vec::new();
     for leg in legs {
         // Rolling back too fast is an alarm too.
         let most_mm_s = 0.95 * top_speed_mm_s;
@@ -97,10 +97,10 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
         let mut left = leg.length_mm * TICKS_A_METRE / 1000.0;
         while left > 0.0 {
             // A person pushes: 1 m/s2.
-            let most = 1000.0 * TICKS_A_METRE / 1000.0 * TURN_US as f64 / 1e6;
+            let most = 1000.0 * TICKS_A_METRE / 1000.0 * TURN_S;
             let step = (target - speed).clamp(-most, most);
             speed += step;
-            let rolled = speed * TURN_US as f64 / 1e6;
+            let rolled = speed * TURN_S;
             position += rolled;
             left -= rolled.abs().max(0.01);
             time_us += TURN_US;
@@ -108,24 +108,20 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
             let reached = position.floor() as i32;
             while count != reached {
                 count += (reached - count).signum();
-                if broken_at(count) != broken {
-                    broken = !broken;
-                    edges.push(Edge::Seen { position: Position::new(count), broken, second_broken: false });
-                }
+                machine.at(count).see(Beams::one(broken_at(count)));
             }
             farthest = farthest.max(count);
-            let orders = machine.turn(readings(time_us, count), edges.drain(..));
-            while let Some(event) = machine.next_event() {
-                run.plants_told += usize::from(matches!(event, Event::Detection { .. }));
-            }
+            let orders = machine.turn_after(TURN_US);
+            let events = machine.events();
+            run.plants_told += events.iter().filter(|event| matches!(event, Event::Detection { .. })).count();
             let tool = f64::from(count) - distance;
             if orders.pulse != tool_in {
                 // Over a canopy, the servo must have had its lead to swing out.
                 let over_a_canopy = canopies.iter().any(|&(from, to)| (from..to).contains(&tool));
-                let out_for_s = (time_us - *out_since_us.get_or_insert(time_us)) as f64 / 1e6;
+                let out_for_s = f64::from(time_us - *out_since_us.get_or_insert(time_us)) / 1e6;
                 prop_assert!(
-                    !over_a_canopy || out_for_s + TURN_US as f64 / 1e6 >= lead_out_s,
-                    "the tool was commanded out only {out_for_s} s ago, at {tool}, at {speed} ticks/s"
+                    !over_a_canopy || out_for_s + TURN_S >= lead_out_s,
+                    "the tool was told to leave only {out_for_s} s ago, at {tool}, at {speed} ticks/s"
                 );
                 continue;
             }
@@ -180,12 +176,11 @@ proptest! {
 fn the_tool_is_in_the_row_if_nothing_keeps_it_out() {
     let mut machine = machine();
     machine.start(false).unwrap();
-    let mut orders = machine.turn(readings(0, 0), []);
+    let mut orders = machine.turn();
     let out = servo::from_us(machine.settings().get(Setting::ServoOutUs));
     assert_eq!(orders.pulse, out, "the beam has not seen this ground");
-    for millisecond in 1..2000 {
-        let count = millisecond as i32;
-        orders = machine.turn(readings(millisecond * 1000, count), []);
+    for count in 1..2000 {
+        orders = machine.at(count).turn_after(1000);
         let seen = Ticks(count) - machine.settings().ticks(Setting::BeamToToolMm);
         // The lead of 40 ms is 40 ticks at this speed.
         if seen > Ticks(5) {

@@ -4,9 +4,10 @@ mod common;
 #[path = "common/rolling.rs"]
 mod rolling;
 
-use common::{ByWidth, machine_with};
+use common::ByWidth;
 use control::settings::Setting;
 use proptest::prelude::*;
+use rig::Rig;
 use rolling::{BEAM_TO_TOOL_MM, Rolling, SECOND_BEAM_MM};
 
 const ZONE_MM: f64 = 96.0;
@@ -88,7 +89,7 @@ fn a_cut_detection_is_kept_from_end_to_end() {
 #[test]
 fn a_detection_unclassified_before_the_next_is_kept_from_end_to_end() {
     let plants = vec![(500.0, 650.0), (680.0, 830.0)];
-    let machine = machine_with(ByWidth::late_by(1250));
+    let machine = Rig::new(ByWidth::late_by(1250));
     let mut rolling = Rolling::with(machine, plants, Vec::new(), &SETTINGS);
     rolling.roll_to(1600.0, 300.0);
     rolling.assert_kept(500.0, 650.0);

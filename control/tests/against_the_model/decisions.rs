@@ -11,15 +11,11 @@ use control::{
         features::Features,
         nearest::Nearest,
     },
-    measure::{
-        quadrature::Odometer,
-        readings::{Edge, Readings, Startup},
-        reset::Cause,
-    },
+    measure::{quadrature::Odometer, readings::Readings, reset::Cause},
     operate::{servo, state::State, tool::Reason},
     settings::{Setting, Settings},
     units::{Instant, Interval, Position},
-    weeder::{Controller, Orders},
+    weeder::Orders,
 };
 use knn::Example;
 use model_test::{
@@ -27,6 +23,7 @@ use model_test::{
     run::Beginning,
 };
 use proptest::prelude::*;
+use rig::{Beams, ByExamples, Rig};
 use std::{cell::Cell, rc::Rc};
 
 /// Narrower detections are weeds.
@@ -38,8 +35,8 @@ const MARGINS_MM: i16 = 100;
 /// Classifies by width, but keeps examples as the firmware does.
 #[derive(Debug)]
 pub struct ByWidth {
-    nearest: Nearest<&'static [Example<5>], Half>,
-    /// The width of the last weed, in millimetres.
+    nearest: ByExamples<Half>,
+    /// The width of what was last taken for a weed, in millimetres.
     weed: Rc<Cell<Option<i16>>>,
 }
 
@@ -86,8 +83,8 @@ impl Classifier for ByWidth {
     }
 }
 
-/// The controller of that machine.
-pub type Weeder = Controller<ByWidth, Half>;
+/// Such a machine.
+pub type Weeder = Rig<ByWidth, Half>;
 
 /// The machine under test.
 #[derive(Debug)]
@@ -105,21 +102,26 @@ pub struct Decisions {
     reads_first: bool,
 }
 
-fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, startup: Startup) -> Weeder {
+fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, steps: u32, world: &World, cause: Cause) -> Weeder {
     let [for_settings, for_examples] = eeprom.halves();
     let classifier = ByWidth { nearest: Nearest::asleep(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
-    Controller::new(classifier, for_settings, startup)
+    let (readings, beams) = shown(steps, world);
+    Rig::wake_at(classifier, for_settings, readings, beams, cause)
 }
 
-fn readings(steps: u32, world: &World) -> Readings {
-    let now = Instant::new(steps) + Interval::from_steps((world.time_us / 4) as u32);
-    Readings {
-        switch_on: world.switch_on,
-        jumps: world.jumps,
-        stack_free: if world.stack_is_low { 40 } else { 300 },
-        end_switch_on: world.end_switch_on,
-        ..Readings::new(now, Position::new(world.count as i32))
-    }
+/// What the sensors show in a world; all of both by name, so that the compiler finds what is missing.
+fn shown(steps: u32, world: &World) -> (Readings, Beams) {
+    let &World { time_us, count, jumps, broken, second_broken, switch_on, end_switch_on, stack_is_low } = world;
+    let readings = Readings {
+        now: Instant::new(steps) + Interval::from_steps((time_us / 4) as u32),
+        position: Position::new(count as i32),
+        switch_on,
+        lost: 0,
+        jumps,
+        end_switch_on,
+        stack_free: if stack_is_low { 40 } else { 300 },
+    };
+    (readings, Beams { broken, second_broken })
 }
 
 /// The unwrapped count nearest to `count` for a position.
@@ -134,10 +136,9 @@ impl Machine for Decisions {
 
     fn new(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError> {
         let (eeprom, weed) = (Eeprom::new(), Rc::default());
-        let readings = readings(beginning.steps, world);
-        let weeder = wake(&eeprom, &weed, Startup { readings, beam_broken: world.broken, cause: Cause::PowerOn });
+        let weeder = wake(&eeprom, &weed, beginning.steps, world, Cause::PowerOn);
         Ok(Self {
-            odometer: Odometer::new(readings.position, world.jumps),
+            odometer: Odometer::new(weeder.readings.position, world.jumps),
             orders: weeder.orders(),
             weeder,
             console: Console::new(),
@@ -157,15 +158,12 @@ impl Machine for Decisions {
     }
 
     fn beam_edge(&mut self, world: &World) {
-        self.weeder.take_edge(Edge::Seen {
-            position: Position::new(world.count as i32),
-            broken: world.broken,
-            second_broken: world.second_broken,
-        });
+        let (readings, beams) = shown(self.steps, world);
+        self.weeder.edge(readings.position, beams);
     }
 
     fn lose_edges(&mut self, world: &World) -> Checked {
-        self.weeder.take_edge(Edge::Lost { broken: world.broken });
+        self.weeder.lose_edges(shown(self.steps, world).1);
         Ok(())
     }
 
@@ -178,10 +176,10 @@ impl Machine for Decisions {
     }
 
     fn turn(&mut self, before: &World, now: &World) -> Result<i64, TestCaseError> {
-        let readings = readings(self.steps, if self.reads_first { before } else { now });
+        let (readings, _) = shown(self.steps, if self.reads_first { before } else { now });
         self.odometer.read(readings.position, readings.jumps, self.weeder.believes_jumps());
         let place = unwrapped(now.count, self.odometer.place(readings.position));
-        self.orders = self.weeder.step(readings);
+        self.orders = self.weeder.turn_with(readings);
         Ok(place)
     }
 
@@ -265,11 +263,10 @@ impl Machine for Decisions {
             None => self.eeprom.reset(),
         }
         self.console = Console::new();
-        let readings = readings(self.steps, world);
-        self.weeder = wake(&self.eeprom, &self.weed, Startup { readings, beam_broken: world.broken, cause });
+        self.weeder = wake(&self.eeprom, &self.weed, self.steps, world, cause);
         self.orders = self.weeder.orders();
         prop_assert!(self.weeder.tool_out() && self.is_sent_out());
-        self.odometer = Odometer::new(readings.position, world.jumps);
+        self.odometer = Odometer::new(self.weeder.readings.position, world.jumps);
         Ok(())
     }
 }

@@ -1,19 +1,11 @@
-//! Shared by the tests of the decisions: readings, and a classifier by width.
+//! What the tests of the decisions share: a machine with a classifier that knows the truth.
 
-mod readings;
-
-pub use readings::{readings, woken_up};
-
-use control::{
-    ground::{
-        class::{Class, Classifier, ExamplesFull, Listed, Vote},
-        features::Features,
-    },
-    measure::reset::Cause,
-    memory::Volatile,
-    weeder::Controller,
+use control::ground::{
+    class::{Class, Classifier, ExamplesFull, Listed, Vote},
+    features::Features,
 };
 use knn::Example;
+use rig::Rig;
 
 /// Classifies detections narrower than 60 mm as weeds, or none.
 #[derive(Clone, Debug)]
@@ -89,15 +81,8 @@ impl Classifier for ByWidth {
 
 /// A machine in HOLD that started without saved settings; the operator has cleared that alarm.
 pub fn machine() -> Machine {
-    machine_with(ByWidth::late_by(0))
+    Rig::new(ByWidth::late_by(0))
 }
 
-/// The same, with this classifier.
-pub fn machine_with(classifier: ByWidth) -> Machine {
-    let mut machine = Controller::new(classifier, Volatile::new(), woken_up(Cause::PowerOn));
-    machine.clear();
-    machine
-}
-
-/// The machine of the tests.
-pub type Machine = Controller<ByWidth, Volatile>;
+/// A machine as the tests have it.
+pub type Machine = Rig<ByWidth>;

@@ -4,12 +4,9 @@
 
 #![allow(dead_code, reason = "no test uses all of it")]
 
-use crate::common::{Machine, machine, readings};
-use control::{
-    measure::readings::{Edge, Readings},
-    operate::event::Event,
-    settings::Setting,
-};
+use crate::common::{Machine, machine};
+use control::{operate::event::Event, settings::Setting};
+use rig::Beams;
 
 /// Ticks a millimetre of the default wheel without slip.
 pub const TICKS_A_MM: f64 = 1.90986;
@@ -22,7 +19,7 @@ pub const SECOND_BEAM_MM: f64 = 200.0;
 pub const MARGIN_MM: f64 = 50.0;
 
 /// A turn of the main loop.
-const TURN_US: u64 = 500;
+const TURN_US: u32 = 500;
 
 /// A machine under way.
 pub struct Rolling {
@@ -35,13 +32,11 @@ pub struct Rolling {
     pub weeded_mm: Vec<f64>,
     /// Events, and the first beam's position at each.
     pub told: Vec<(Event, f64)>,
-    time_us: u64,
     wheel_mm: f64,
     /// What each beam sees, from and to.
     first_mm: Vec<(f64, f64)>,
     second_mm: Vec<(f64, f64)>,
-    levels: (bool, bool),
-    /// Distances of the second beam and the tool behind the first.
+    /// How far the second beam and the tool are behind the first.
     second_beam_mm: f64,
     beam_to_tool_mm: f64,
 }
@@ -74,17 +69,15 @@ impl Rolling {
             turns: 1.0,
             weeded_mm: Vec::new(),
             told: Vec::new(),
-            time_us: 0,
             wheel_mm: 0.0,
             first_mm,
             second_mm,
-            levels: (false, false),
         }
     }
 
     /// Rolls until the first beam is at a position.
     pub fn roll_to(&mut self, to_mm: f64, speed_mm_s: f64) {
-        let step_mm = (to_mm - self.place_mm).signum() * speed_mm_s * TURN_US as f64 / 1e6;
+        let step_mm = (to_mm - self.place_mm).signum() * speed_mm_s * f64::from(TURN_US) / 1e6;
         while (to_mm - self.place_mm) * step_mm > 0.0 {
             self.turn(step_mm);
         }
@@ -94,33 +87,27 @@ impl Rolling {
     pub fn turn(&mut self, step_mm: f64) {
         self.place_mm += step_mm;
         self.wheel_mm += step_mm * self.turns;
-        self.time_us += TURN_US;
         let sees = |seen: &[(f64, f64)], place| seen.iter().any(|&(from, to)| (from..to).contains(&place));
-        let levels = (sees(&self.first_mm, self.place_mm), sees(&self.second_mm, self.place_mm - self.second_beam_mm));
-        let (broken, second_broken) = levels;
-        let now = self.readings();
-        let edge = Edge::Seen { position: now.position, broken, second_broken };
-        let edges = (levels != std::mem::replace(&mut self.levels, levels)).then_some(edge);
-        self.machine.turn(now, edges);
+        self.machine.at((self.wheel_mm * TICKS_A_MM).floor() as i32).see(Beams {
+            broken: sees(&self.first_mm, self.place_mm),
+            second_broken: sees(&self.second_mm, self.place_mm - self.second_beam_mm),
+        });
+        self.machine.turn_after(TURN_US);
         if !self.machine.tool_out() {
             self.weeded_mm.push(self.place_mm - self.beam_to_tool_mm);
         }
-        while let Some(event) = self.machine.next_event() {
-            self.told.push((event, self.place_mm));
-        }
+        self.told.extend(self.machine.events().into_iter().map(|event| (event, self.place_mm)));
     }
 
     /// Loses edges of the first beam, which is an alarm.
     pub fn lose_edges(&mut self) {
-        self.machine.turn(self.readings(), [Edge::Lost { broken: self.levels.0 }]);
+        let beams = self.machine.beams();
+        self.machine.lose_edges(beams);
+        self.machine.turn();
     }
 
     /// The events of a kind.
     pub fn told_of<T>(&self, of: impl Fn(Event) -> Option<T>) -> Vec<T> {
         self.told.iter().filter_map(|&(event, _)| of(event)).collect()
-    }
-
-    fn readings(&self) -> Readings {
-        readings(self.time_us, (self.wheel_mm * TICKS_A_MM).floor() as i32)
     }
 }

@@ -3,10 +3,10 @@
 use crate::drive::Drive;
 use control::{
     alarm::{Alarm, Warning},
-    measure::readings::Edge,
     operate::{event::Event, state::State},
     settings::Setting,
 };
+use rig::Beams;
 
 #[test]
 fn a_row_of_stalks_classified_as_weeds_is_an_alarm_at_the_fifth() {
@@ -49,7 +49,7 @@ fn a_detection_below_the_least_width_is_dust_and_neither_a_plant_nor_a_misfit() 
     }
     assert_eq!((drive.pass_stalks(10), drive.alarm()), (10, None));
     assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 0));
-    assert_eq!(drive.events(), [Event::Warning(Warning::NoPlants)], "no plant was seen");
+    assert_eq!(drive.machine.events(), [Event::Warning(Warning::NoPlants)], "nobody has seen a plant");
     drive.pass(0.5, 0.03);
     drive.roll(0.5, 0.1);
     assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 1));
@@ -62,7 +62,7 @@ fn a_detection_below_the_least_width_is_dust_and_neither_a_plant_nor_a_misfit() 
 fn the_narrow_rest_of_a_detection_is_no_dust() {
     let mut drive = Drive::in_hold();
     drive.machine.set(Setting::MinWidthMm, 100).unwrap();
-    drive.edges.push(Edge::Lost { broken: true });
+    drive.machine.lose_edges(Beams::one(true));
     drive.roll(0.5, 0.02);
     drive.beam(false);
     drive.roll(0.5, 0.1);
@@ -96,7 +96,7 @@ fn a_long_distance_without_a_plant_is_one_warning() {
     let mut drive = Drive::at_work();
     drive.machine.set(Setting::NoPlantM, 3).unwrap();
     let warned = |drive: &mut Drive| {
-        let events = drive.events();
+        let events = drive.machine.events();
         events.iter().filter(|event| **event == Event::Warning(Warning::NoPlants)).count()
     };
     drive.roll(0.5, 1.9);

@@ -1,30 +1,20 @@
 //! A machine for tests that control its beam and its encoder.
 
-use crate::common::{Machine, machine, readings};
-use control::{
-    alarm::Alarm,
-    measure::readings::{Edge, Readings},
-    operate::{event::Event, state::State},
-    settings::Setting,
-    units::Position,
-    weeder::Orders,
-};
+use crate::common::{Machine, machine};
+use control::{alarm::Alarm, operate::state::State, settings::Setting, weeder::Orders};
+use rig::Beams;
 
 /// Ticks a metre of the default wheel.
 pub const TICKS_A_METRE: f64 = 1909.86;
 
 /// A turn of the main loop.
-pub const TURN_US: u64 = 500;
+pub const TURN_US: u32 = 500;
+const TURN_S: f64 = TURN_US as f64 / 1e6;
 
-/// A machine with clock and position.
+/// A machine with its place.
 pub struct Drive {
     pub machine: Machine,
-    pub time_us: u64,
     pub place: f64,
-    /// The readings apart from time and position.
-    pub readings: Readings,
-    /// Beam edges since the last turn.
-    pub edges: Vec<Edge>,
 }
 
 impl Drive {
@@ -35,7 +25,7 @@ impl Drive {
         drive.machine.tell_events(true);
         drive.roll(0.5, 1.0);
         assert!(drive.tool_is_in());
-        drive.events();
+        drive.machine.events();
         drive
     }
 
@@ -45,7 +35,7 @@ impl Drive {
         // A servo that is out after 180 ms allows speeds up to 5 km/h.
         machine.set(Setting::LeadOutMs, 180).unwrap();
         machine.set(Setting::TopSpeedMmS, 1400).unwrap();
-        Self { machine, time_us: 0, place: 0.0, readings: readings(0, 0), edges: Vec::new() }
+        Self { machine, place: 0.0 }
     }
 
     pub fn tool_is_in(&self) -> bool {
@@ -54,18 +44,19 @@ impl Drive {
 
     /// A turn of the loop, with the encoder at a count.
     pub fn turn_at(&mut self, count: i32) -> Orders {
-        self.time_us += TURN_US;
-        let now = readings(self.time_us, count);
-        let readings = Readings { now: now.now, position: now.position, ..self.readings };
-        self.machine.turn(readings, self.edges.drain(..))
+        self.machine.at(count).turn_after(TURN_US)
+    }
+
+    fn roll_by(&mut self, metres: f64) {
+        self.place += metres * TICKS_A_METRE;
+        self.turn_at(self.place.floor() as i32);
     }
 
     /// Rolls this many metres at a speed, or stands for this many seconds at speed 0.
     pub fn roll(&mut self, speed_m_s: f64, metres_or_seconds: f64) {
         let seconds = if speed_m_s == 0.0 { metres_or_seconds } else { metres_or_seconds / speed_m_s.abs() };
-        for _ in 0..(seconds * 1e6) as u64 / TURN_US {
-            self.place += speed_m_s * TICKS_A_METRE * TURN_US as f64 / 1e6;
-            self.turn_at(self.place.floor() as i32);
+        for _ in 0..(seconds * 1e6) as u32 / TURN_US {
+            self.roll_by(speed_m_s * TURN_S);
         }
     }
 
@@ -77,9 +68,8 @@ impl Drive {
     pub fn brake_by(&mut self, speed_m_s: f64, braking_m_s2: f64) {
         let mut speed = speed_m_s;
         while speed > 0.0 {
-            speed = (speed - braking_m_s2 * TURN_US as f64 / 1e6).max(0.0);
-            self.place += speed * TICKS_A_METRE * TURN_US as f64 / 1e6;
-            self.turn_at(self.place.floor() as i32);
+            speed = (speed - braking_m_s2 * TURN_S).max(0.0);
+            self.roll_by(speed * TURN_S);
         }
     }
 
@@ -87,18 +77,13 @@ impl Drive {
     pub fn speed_up(&mut self, speed_m_s: f64, acceleration_m_s2: f64) {
         let mut speed = 0.0;
         while speed < speed_m_s {
-            speed += acceleration_m_s2 * TURN_US as f64 / 1e6;
-            self.place += speed * TICKS_A_METRE * TURN_US as f64 / 1e6;
-            self.turn_at(self.place.floor() as i32);
+            speed += acceleration_m_s2 * TURN_S;
+            self.roll_by(speed * TURN_S);
         }
     }
 
     pub fn beam(&mut self, broken: bool) {
-        self.edges.push(Edge::Seen {
-            position: Position::new(self.place.floor() as i32),
-            broken,
-            second_broken: false,
-        });
+        self.machine.at(self.place.floor() as i32).see(Beams::one(broken));
     }
 
     /// A plant of 150 mm passes the beam.
@@ -132,9 +117,5 @@ impl Drive {
             }
             _ => None,
         }
-    }
-
-    pub fn events(&mut self) -> Vec<Event> {
-        std::iter::from_fn(|| self.machine.next_event()).collect()
     }
 }

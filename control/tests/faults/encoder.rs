@@ -1,7 +1,7 @@
 //! Encoder faults: silent, dead, a dead channel, jumps. And similar readings without a fault: stops, trembling, leaves.
 
 use crate::{
-    common::{ByWidth, machine, readings, woken_up},
+    common::{ByWidth, machine},
     drive::{Drive, TICKS_A_METRE, TURN_US},
 };
 use control::{
@@ -11,8 +11,8 @@ use control::{
     operate::{event::Event, state::State, tool::Reason},
     settings::Setting,
     units::Ticks,
-    weeder::Controller,
 };
+use rig::{Beams, Rig};
 
 /// Silence in seconds, at a speed, after which it counts as sudden: ten ticks and three turns.
 fn sudden_s(speed_m_s: f64) -> f64 {
@@ -50,9 +50,9 @@ fn a_detection_in_the_beam_at_a_silence_is_a_plant_with_any_width_of_its_rest() 
     drive.roll(0.0, 0.1);
     drive.roll(0.7, 0.01);
     drive.beam(false);
-    drive.events();
+    drive.machine.events();
     drive.roll(0.7, 0.05);
-    let told = drive.events().into_iter().find_map(|event| match event {
+    let told = drive.machine.events().into_iter().find_map(|event| match event {
         Event::Detection { vote, .. } => Some(vote.class),
         _ => None,
     });
@@ -96,11 +96,10 @@ fn a_hard_stop_is_no_silence_with_any_encoder() {
         machine.set(Setting::WheelMm, wheel_mm).unwrap();
         machine.set(Setting::TicksPerRev, ticks_per_rev).unwrap();
         let a_metre = f64::from(ticks_per_rev) * 1000.0 / (std::f64::consts::PI * f64::from(wheel_mm));
-        let (mut time_us, mut place_m) = (0, 0.0);
+        let mut place_m = 0.0;
         let mut turn = |speed_m_s: f64, place_m: &mut f64| {
-            time_us += 250;
             *place_m += speed_m_s * 0.000_25;
-            machine.turn(readings(time_us, (*place_m * a_metre).floor() as i32), []);
+            machine.at((*place_m * a_metre).floor() as i32).turn_after(250);
             machine.encoder_is_silent()
         };
         let mut silent = 0;
@@ -128,16 +127,14 @@ fn a_fine_encoder_that_falls_silent_is_found_as_soon() {
     machine.set(Setting::TicksPerM, 20_000).unwrap();
     for speed_m_s in [0.3, 0.7, 1.3] {
         let mut place = 0.0;
-        let base = machine.readings().position.count();
-        let base_us = u64::from(machine.readings().now.steps()) * 4;
+        let base = machine.readings.position.count();
         for turn in 1..4000 {
             place += speed_m_s * 20_000.0 * 0.000_25;
-            machine.turn(readings(base_us + turn * 250, base + place as i32), []);
+            machine.at(base + place as i32).turn_after(250);
             assert!(!machine.encoder_is_silent() || turn < 200);
         }
-        let now_us = u64::from(machine.readings().now.steps()) * 4;
-        for turn in 1..200 {
-            machine.turn(readings(now_us + turn * 250, base + place as i32), []);
+        for _ in 1..200 {
+            machine.turn_after(250);
         }
         assert!(machine.encoder_is_silent(), "{speed_m_s} m/s");
     }
@@ -216,8 +213,8 @@ fn plants_that_pass_a_rolling_machine_raise_no_doubt_in_the_encoder() {
     }
 }
 
-/// Moves the encoder to and fro between two counts, this many edges a second, for two seconds.
-fn tremble(drive: &mut Drive, edges_a_second: u64) {
+/// Has the encoder go to and fro between two counts, so many edges a second, for two seconds.
+fn tremble(drive: &mut Drive, edges_a_second: u32) {
     let count = drive.place.floor() as i32;
     for turn in 0..2_000_000 / TURN_US {
         let edges = turn * TURN_US * edges_a_second / 1_000_000;
@@ -255,7 +252,7 @@ fn a_machine_that_reverses_at_work_has_no_dead_channel_with_any_encoder() {
             let mut machine = machine();
             machine.set(Setting::TicksPerM, ticks_per_m).unwrap();
             machine.start(false).unwrap();
-            let (mut time_us, mut place_m, mut speed, mut alarms) = (0, 0.0, 0.0, Vec::new());
+            let (mut place_m, mut speed, mut alarms) = (0.0, 0.0, Vec::new());
             for turned in 0..20 {
                 // It reverses at each position within a tick and a progress; after its rest it goes the other way.
                 let to = if turned % 2 == 0 { speed_m_s } else { -speed_m_s } + f64::from(turned) * 0.001;
@@ -267,9 +264,8 @@ fn a_machine_that_reverses_at_work_has_no_dead_channel_with_any_encoder() {
                     speed = (speed + step).clamp(-to.abs(), to.abs());
                     let stops = if before * speed < 0.0 { rest } else { 0 };
                     for speed in std::iter::repeat_n(0.0, stops).chain([speed]) {
-                        time_us += 250;
                         place_m += speed * 0.000_25;
-                        machine.turn(readings(time_us, (place_m * f64::from(ticks_per_m)).floor() as i32), []);
+                        machine.at((place_m * f64::from(ticks_per_m)).floor() as i32).turn_after(250);
                     }
                 }
                 if let State::Alarm(alarm) = machine.state() {
@@ -289,14 +285,14 @@ fn a_dead_channel_is_an_alarm_with_every_encoder() {
         let mut machine = machine();
         machine.set(Setting::TicksPerM, ticks_per_m).unwrap();
         machine.start(false).unwrap();
-        // At 2.5 km/h each second tick comes, to and fro, not synchronous with the loop.
-        let (mut time_us, mut place_m, mut dies_at) = (0, 0.0, 0);
+        // At 2.5 km/h every other tick comes, to and fro. The loop's turns are not in step with them.
+        let (mut place_m, mut dies_at) = (0.0, 0);
         for turn in 0..8000 {
-            time_us += 250 + turn % 7 * 20;
-            place_m += 0.694 * (250 + turn % 7 * 20) as f64 / 1e6;
+            let turn_us = 250 + turn % 7 * 20;
+            place_m += 0.694 * f64::from(turn_us) / 1e6;
             let count = (place_m * f64::from(ticks_per_m)).floor() as i32;
             dies_at = if turn < 2000 { count } else { dies_at };
-            machine.turn(readings(time_us, if turn < 2000 { count } else { dies_at + count / 2 % 2 }), []);
+            machine.at(if turn < 2000 { count } else { dies_at + count / 2 % 2 }).turn_after(turn_us);
         }
         let State::Alarm(alarm) = machine.state() else { panic!("{ticks_per_m} a metre: no alarm") };
         assert!(matches!(alarm, Alarm::EncoderChannelDead | Alarm::EncoderJumps), "{ticks_per_m} a metre: {alarm:?}");
@@ -321,13 +317,14 @@ fn jumps_are_an_alarm_by_the_distance_between_them() {
     // Across the count's wrap. Each jump brings two ticks that are noise.
     for (metres_between, alarm) in [(0.02, Some(Alarm::EncoderJumps)), (0.05, None)] {
         for speed_m_s in [0.3, 1.2] {
-            let mut startup = woken_up(Cause::PowerOn);
-            startup.readings.jumps = u16::MAX - 10;
-            let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), startup);
+            let mut readings = machine().readings;
+            readings.jumps = u16::MAX - 10;
+            let (classifier, memory) = (ByWidth::late_by(0), Volatile::new());
+            let mut machine = Rig::wake_at(classifier, memory, readings, Beams::default(), Cause::PowerOn);
             machine.clear();
-            let mut drive = Drive { machine, time_us: 0, place: 0.0, readings: startup.readings, edges: Vec::new() };
+            let mut drive = Drive { machine, place: 0.0 };
             for _ in 0..200 {
-                drive.readings.jumps = drive.readings.jumps.wrapping_add(1);
+                drive.machine.readings.jumps = drive.machine.readings.jumps.wrapping_add(1);
                 drive.place += 2.0;
                 drive.roll(speed_m_s, metres_between);
             }
@@ -341,7 +338,7 @@ fn jumps_at_rest_move_nothing_and_many_are_an_alarm() {
     for (every_ms, alarm) in [(4, Some(Alarm::EncoderJumps)), (40, None)] {
         let mut drive = Drive::in_hold();
         for jump in 1..=200 {
-            drive.readings.jumps += 1;
+            drive.machine.readings.jumps += 1;
             drive.place += 2.0;
             drive.roll(0.0, f64::from(every_ms) / 1000.0);
             assert_eq!(drive.machine.readings().position.count(), 0, "jump {jump}");
@@ -358,7 +355,7 @@ fn jumps_count_for_a_wheel_so_fast_that_an_edge_can_be_missed() {
         let before = drive.machine.readings().position;
         let (place, jumps) = (drive.place, 5);
         for _ in 0..jumps {
-            drive.readings.jumps += 1;
+            drive.machine.readings.jumps += 1;
             drive.roll(speed_m_s, 0.1);
         }
         let counted = drive.place.floor() as i32 - place.floor() as i32;

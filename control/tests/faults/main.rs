@@ -9,20 +9,17 @@ mod drive;
 mod encoder;
 mod saved_settings;
 
-use common::{ByWidth, readings, woken_up};
+use common::ByWidth;
 use control::{
     alarm::{Alarm, Warning},
-    measure::{
-        readings::{Edge, Readings},
-        reset::Cause,
-    },
+    measure::{readings::Readings, reset::Cause},
     memory::Volatile,
     operate::{event::Event, state::State, tool::Reason},
     settings::Setting,
-    units::{Instant, Interval, Position, Ticks},
-    weeder::Controller,
+    units::{Instant, Position},
 };
 use drive::{Drive, TURN_US};
+use rig::{Beams, Rig};
 
 #[test]
 fn working_faster_than_the_limit_is_an_alarm_in_both_directions() {
@@ -46,11 +43,11 @@ fn a_jump_in_speed_just_before_a_zone_is_counted_as_late_and_the_tool_leaves_at_
         drive.pass_a_plant(0.3);
         drive.roll(0.3, 0.1);
         assert!(drive.tool_is_in());
-        drive.events();
+        drive.machine.events();
         drive.roll(if jumps { 1.3 } else { 0.3 }, 0.12);
         assert!(!drive.tool_is_in());
         assert_eq!(drive.machine.late(), late);
-        let told = drive.events().contains(&Event::Warning(Warning::LateCommand));
+        let told = drive.machine.events().contains(&Event::Warning(Warning::LateCommand));
         assert_eq!(told, jumps);
         assert_eq!(drive.machine.state(), State::Work);
     }
@@ -124,7 +121,7 @@ fn a_tool_that_does_not_follow_is_an_alarm_with_an_end_switch() {
 
     let mut drive = Drive::at_work();
     drive.machine.set(Setting::EndSwitch, 1).unwrap();
-    drive.readings.end_switch_on = true;
+    drive.machine.readings.end_switch_on = true;
     drive.roll(0.5, 0.05);
     assert_eq!(drive.alarm(), Some(Alarm::ToolStuck), "closed, and the tool is commanded in");
 }
@@ -135,15 +132,10 @@ fn a_tool_that_follows_within_its_time_is_no_alarm() {
     drive.machine.set(Setting::EndSwitch, 1).unwrap();
     let mut is_out = [drive.machine.tool_out(); 360];
     for turn in 0..40_000 {
-        if turn % 2_000 == 500 {
-            drive.beam(true);
-        }
-        if turn % 2_000 == 1_000 {
-            drive.beam(false);
-        }
-        // 180 ms after the command, with bouncing contacts.
+        drive.beam((500..1_000).contains(&(turn % 2_000)));
+        // 180 ms behind the command, and the contacts bounce.
         let place = turn % is_out.len();
-        drive.readings.end_switch_on = is_out[place] ^ (turn % 50 == 0);
+        drive.machine.readings.end_switch_on = is_out[place] ^ (turn % 50 == 0);
         drive.roll(0.5, 0.5 * TURN_US as f64 / 1e6);
         is_out[place] = drive.machine.tool_out();
     }
@@ -153,10 +145,10 @@ fn a_tool_that_follows_within_its_time_is_no_alarm() {
 #[test]
 fn a_stack_that_is_nearly_used_up_is_an_alarm() {
     let mut drive = Drive::at_work();
-    drive.readings.stack_free = 48;
+    drive.machine.readings.stack_free = 48;
     drive.roll(0.5, 0.1);
     assert_eq!(drive.alarm(), None);
-    drive.readings.stack_free = 47;
+    drive.machine.readings.stack_free = 47;
     drive.roll(0.5, 0.1);
     assert_eq!(drive.alarm(), Some(Alarm::StackLow));
 }
@@ -164,27 +156,17 @@ fn a_stack_that_is_nearly_used_up_is_an_alarm() {
 #[test]
 fn nothing_happens_when_time_and_position_wrap() {
     // Both counters pass their end in the middle of a row.
-    let ticks_before = 3000;
-    let steps_before = 1_000_000;
-    let moved = |now: Readings| Readings {
-        now: Instant::new(0_u32.wrapping_sub(steps_before)) + Interval::from_steps(now.now.steps()),
-        position: Position::new(i32::MAX - ticks_before) + Ticks(now.position.count()),
-        ..now
-    };
-    let swings = |wraps: bool| {
-        let place = |now: Readings| if wraps { moved(now) } else { now };
-        let mut startup = woken_up(Cause::PowerOn);
-        startup.readings = place(readings(0, 0));
-        let mut machine = Controller::new(ByWidth::late_by(0), Volatile::new(), startup);
+    let swings = |first_steps: u32, first_count: i32| {
+        let readings = Readings::new(Instant::new(first_steps), Position::new(first_count));
+        let (classifier, memory) = (ByWidth::late_by(0), Volatile::new());
+        let mut machine = Rig::wake_at(classifier, memory, readings, Beams::default(), Cause::PowerOn);
         machine.clear();
         machine.start(false).unwrap();
         let (mut swings, mut was_out) = (Vec::new(), true);
-        for turn in 0..24_000_u64 {
-            let count = (turn as f64 * 0.53) as i32;
-            let broken = count % 1000 >= 700 && count > 1000;
-            let now = place(readings(turn * TURN_US, count));
-            let is_edge = count > 1000 && broken != ((count - 1) % 1000 >= 700 && count - 1 > 1000);
-            machine.turn(now, is_edge.then_some(Edge::Seen { position: now.position, broken, second_broken: false }));
+        for turn in 0..24_000 {
+            let count = (f64::from(turn) * 0.53) as i32;
+            machine.at(first_count.wrapping_add(count)).see(Beams::one(count % 1000 >= 700 && count > 1000));
+            machine.turn_after(TURN_US);
             if machine.tool_out() != was_out {
                 was_out = !was_out;
                 swings.push((turn, was_out));
@@ -193,7 +175,7 @@ fn nothing_happens_when_time_and_position_wrap() {
         assert_eq!(machine.state(), State::Work);
         swings
     };
-    let plain = swings(false);
+    let plain = swings(0, 0);
     assert!(plain.len() > 15, "{plain:?}");
-    assert_eq!(swings(true), plain);
+    assert_eq!(swings(0_u32.wrapping_sub(1_000_000), i32::MAX - 3000), plain);
 }

@@ -1,24 +1,20 @@
 //! Saved settings at start-up, valid or contradicting each other.
 
-use crate::common::{ByWidth, readings, woken_up};
+use crate::common::ByWidth;
 use control::{
     alarm::Alarm,
-    measure::{
-        readings::{Edge, Readings},
-        reset::Cause,
-    },
+    measure::reset::Cause,
     memory::Volatile,
     operate::{command_error::CommandError, saved::SavedSettings, state::State},
     settings::{Setting, Settings},
-    units::Position,
-    weeder::Controller,
 };
+use rig::{Beams, Rig};
 
 #[test]
 fn saved_settings_are_in_use_after_a_restart() {
     let mut settings = Settings::new();
     settings.set(Setting::K, 7).unwrap();
-    let machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
+    let machine = Rig::wake(ByWidth::late_by(0), saved(&settings), Cause::PowerOn);
     assert_eq!((machine.state(), machine.settings()), (State::Hold, &settings));
 }
 
@@ -34,10 +30,11 @@ fn saved(settings: &Settings) -> Volatile {
 fn a_dry_run_refused_for_contradicting_settings_keeps_the_open_detection() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
-    let mut machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
+    let mut machine = Rig::wake(ByWidth::late_by(0), saved(&settings), Cause::PowerOn);
     machine.clear();
-    machine.turn(readings(0, 0), []);
-    machine.turn(readings(1000, 0), [Edge::Seen { position: Position::new(0), broken: true, second_broken: false }]);
+    machine.turn();
+    machine.see(Beams::one(true));
+    machine.turn_after(1000);
     assert_eq!(machine.zones(), 1);
     assert_eq!(machine.test_row(500), Err(CommandError::PulsesEqual));
     assert_eq!(machine.zones(), 1);
@@ -48,15 +45,14 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
     settings.set(Setting::BeamToToolMm, 200).unwrap();
-    let mut machine = Controller::new(ByWidth::late_by(0), saved(&settings), woken_up(Cause::PowerOn));
+    let mut machine = Rig::wake(ByWidth::late_by(0), saved(&settings), Cause::PowerOn);
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
     machine.clear();
     assert_eq!(machine.start(false), Err(CommandError::PulsesEqual));
     assert_eq!(machine.save(), Err(CommandError::PulsesEqual));
     // The switch does not start it either.
-    for millisecond in 0..100 {
-        machine.turn(Readings { switch_on: true, ..readings(millisecond * 1000, 0) }, []);
-    }
+    machine.readings.switch_on = true;
+    machine.stand(100);
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
     machine.clear();
     // They can be corrected one at a time.

@@ -17,7 +17,7 @@
 use crate::budget::{Part, Reason, Reasons, part_of};
 use crate::ground::union;
 use crate::machine::Machine;
-use crate::native::{Levels, Sensors, ServoLine, Turn, turns};
+use crate::native::{Sensors, ServoLine, Turn, beams_before, turns};
 use crate::servo::Servo;
 use crate::stand::Stem;
 use crate::trial::Trial;
@@ -63,14 +63,14 @@ pub fn as_in_the_paper(trial: &Trial) -> Weeded {
     let margin = hold / 2;
     let sensors = Sensors::new(trial, PAPER_TURN_S);
     let mut turns = sensors.turns();
-    let Levels { mut broken, .. } = Levels::before(trial);
+    let mut broken = beams_before(trial).broken;
     let mut canopy: Option<Range<i64>> = None;
     let mut slot: Option<(Range<i64>, Part)> = None;
     let mut reasons = Reasons::default();
     let pulses = swing(trial, servo, PAPER_TURN_S, 0, |time_s| {
         let Some(Turn { position, edges, .. }) = turns.next() else { return (false, time_s) };
         if let Some(last) = edges.last() {
-            broken = last.levels.broken;
+            broken = last.beams.broken;
         }
         match &mut canopy {
             None if broken => canopy = Some(position..position),

@@ -17,28 +17,21 @@ use crate::wiring;
 use control::ground::AtTool;
 use control::ground::class::label;
 use control::ground::examples::EXAMPLES;
-use control::ground::features;
 use control::ground::nearest::Nearest;
+use control::measure::readings::Readings;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
 use control::operate::event::Event;
 use control::operate::servo::{self, Action, FRAME, HalfMicros};
-use control::operate::tool;
-use control::say;
-use control::say::command::LineBuffer;
-use control::say::line::Line;
+use control::operate::{state::State, tool};
 use control::settings::Setting;
 use control::units::{Instant, Interval, Position};
-use control::{
-    measure::readings::{Edge, Readings, Startup},
-    operate::state::State,
-    weeder::Controller,
-};
+use rig::{Beams, ByExamples, Rig};
 use std::collections::VecDeque;
 use thiserror::Error;
-use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
+use uno::{CYCLES_PER_SECOND, Pulse};
 
-type Weeder = Controller<Nearest<&'static [knn::Example<{ features::COUNT }>], Volatile>, Volatile>;
+type Weeder = Rig<ByExamples>;
 
 /// A turn of the loop.
 pub const TURN_S: f64 = 0.001;
@@ -161,7 +154,7 @@ pub struct Seen {
     /// The encoder's count when it comes.
     pub position: i64,
     /// Which of the beams are broken from then on.
-    pub levels: Levels,
+    pub beams: Beams,
 }
 
 impl Sensors {
@@ -171,10 +164,11 @@ impl Sensors {
         let mut edges = machine.beam_changes(row, motion, 0);
         edges.extend(machine.second_beam_changes(row, motion, 0));
         edges.sort_by_key(|edge| edge.cycle);
-        let mut levels = Levels::before(trial);
+        let mut beams = beams_before(trial);
         let edges = edges.into_iter().map(|edge| {
-            levels = levels.behind(edge);
-            Seen { time_s: time_at_s(0, edge.cycle), position: 0, levels }
+            let broken = if edge.pin == wiring::BEAM { &mut beams.broken } else { &mut beams.second_broken };
+            *broken = !edge.high;
+            Seen { time_s: time_at_s(0, edge.cycle), position: 0, beams }
         });
         let mut edges: Vec<Seen> = edges.collect();
         let mut to_come = edges.iter_mut().peekable();
@@ -271,29 +265,12 @@ impl<'a> Encoder<'a> {
     }
 }
 
-/// Which of the beams are broken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Levels {
-    /// The first.
-    pub broken: bool,
-    /// The second; no, where there is none.
-    pub second_broken: bool,
-}
-
-impl Levels {
-    /// Those before the motion begins.
-    pub fn before(trial: &Trial) -> Self {
-        let Trial { machine, motion, row, .. } = trial;
-        Self {
-            broken: !machine.beam_before(row, motion).high,
-            second_broken: machine.second_beam_before(row, motion).is_some_and(|before| !before.high),
-        }
-    }
-
-    /// Those from an edge on.
-    fn behind(self, edge: PinChange) -> Self {
-        let broken = !edge.high;
-        if edge.pin == wiring::BEAM { Self { broken, ..self } } else { Self { second_broken: broken, ..self } }
+/// What the beams see before the motion begins.
+pub fn beams_before(trial: &Trial) -> Beams {
+    let Trial { machine, motion, row, .. } = trial;
+    Beams {
+        broken: !machine.beam_before(row, motion).high,
+        second_broken: machine.second_beam_before(row, motion).is_some_and(|before| !before.high),
     }
 }
 
@@ -329,11 +306,9 @@ pub fn slips_permille(trial: &Trial, sensors: &Sensors) -> Result<Vec<i16>, Refu
 /// Weeds the row; `listen` is given the decisions behind each turn.
 #[inline(always)]
 fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
-    let Levels { broken, .. } = Levels::before(trial);
     let readings = Readings::new(instant(0), Position::new(0));
-    let startup = Startup { readings, beam_broken: broken, cause: Cause::PowerOn };
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
-    let mut weeder: Weeder = Controller::new(classifier, Volatile::new(), startup);
+    let mut weeder: Weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(trial), Cause::PowerOn);
     type_line(&mut weeder, "clear")?;
     for (setting, value) in trial.firmware_settings() {
         type_line(&mut weeder, &format!("set {} {value}", setting.text()))?;
@@ -348,12 +323,10 @@ fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) ->
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     for (turn, Turn { time_s, position, edges }) in (0..=turns(trial, TURN_S)).zip(sensors.turns()) {
-        let edges = edges.iter().map(|&Seen { position, levels: Levels { broken, second_broken }, .. }| Edge::Seen {
-            position: Position::new(position as i32),
-            broken,
-            second_broken,
-        });
-        let orders = weeder.turn(Readings::new(instant(turn), Position::new(position as i32)), edges);
+        for &Seen { position, beams, .. } in edges {
+            weeder.edge(Position::new(position as i32), beams);
+        }
+        let orders = weeder.turn_with(Readings::new(instant(turn), Position::new(position as i32)));
         line.command(orders.pulse, time_s);
         listen(&mut weeder);
         if turn % LOOK_TURNS == 0 {
@@ -464,19 +437,10 @@ fn instant(turn: u32) -> Instant {
 
 /// Types a line into the decisions' console.
 fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
-    let mut line = LineBuffer::new();
-    let Some(typed) = command.bytes().chain(*b"\n").find_map(|byte| line.take(byte)) else { return Ok(()) };
-    let mut answer = say::execute(typed, weeder);
-    let mut said = String::new();
-    while !answer.is_done() {
-        let mut written = Line::new();
-        answer.write_line(weeder, &mut written);
-        said.extend(written.map(char::from));
+    match weeder.ask(command).pop() {
+        Some(answer) if answer != "ok" => Err(Refused { command: command.to_owned(), answer }),
+        _ => Ok(()),
     }
-    if said.trim_end().ends_with("ok") {
-        return Ok(());
-    }
-    Err(Refused { command: command.to_owned(), answer: said.trim_end().to_owned() })
 }
 
 #[cfg(test)]

@@ -7,19 +7,19 @@
 use control::alarm::Alarm;
 use control::ground::examples::EXAMPLES;
 use control::ground::nearest::Nearest;
-use control::measure::readings::{Edge, Readings, Startup};
+use control::measure::readings::Readings;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
 use control::operate::state::State;
-use control::units::{Instant, Interval, Position};
-use control::weeder::Controller;
+use control::units::{Instant, Position};
 use field::conditions::Conditions;
 use field::driving::drive;
-use field::native::{Levels, Sensors, TURN_S};
+use field::native::{Sensors, TURN_S, beams_before};
 use field::stand::Stand;
 use field::trial::{Start, Trial};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rig::Rig;
 
 /// Default number of rows of each field.
 const ROWS: u64 = 300;
@@ -47,26 +47,20 @@ fn weed(preset: &str, number: u64, spacing_mm: f64, speed_km_h: f64) -> (Option<
         settings: conditions.firmware_settings(),
         examples: Vec::new(),
     };
-    let readings = |turn: u64, position: i64| {
-        let now = Instant::default() + Interval::from_ms(100 + turn as u32);
-        Readings::new(now, Position::new(position as i32))
-    };
-    let beam_broken = Levels::before(&trial).broken;
-    let startup = Startup { readings: readings(0, 0), beam_broken, cause: Cause::PowerOn };
-    let mut weeder = Controller::new(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), startup);
+    let readings = Readings::new(Instant::ZERO, Position::new(0));
+    let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
+    let mut weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(&trial), Cause::PowerOn);
     weeder.clear();
     for (setting, value) in trial.firmware_settings() {
         weeder.set(setting, value).expect("the field's settings do not contradict each other");
     }
     weeder.start(false).expect("nothing is wrong yet");
     let sensors = Sensors::new(&trial, TURN_S);
-    let alarm = (0..).zip(sensors.turns()).find_map(|(turn, now)| {
-        let edges = now.edges.iter().map(|seen| Edge::Seen {
-            position: Position::new(seen.position as i32),
-            broken: seen.levels.broken,
-            second_broken: seen.levels.second_broken,
-        });
-        weeder.turn(readings(turn, now.position), edges);
+    let alarm = sensors.turns().find_map(|now| {
+        for seen in now.edges {
+            weeder.edge(Position::new(seen.position as i32), seen.beams);
+        }
+        weeder.at(now.position as i32).turn_after(1000);
         match weeder.state() {
             State::Alarm(alarm) => Some((alarm, now.time_s)),
             _ => None,

@@ -205,15 +205,8 @@ mod tests {
     use control::ground::{class::label, nearest::Nearest};
     use control::measure::reset::Cause;
     use control::memory::Volatile;
-    use control::say;
-    use control::say::command;
-    use control::say::line::Line;
-    use control::units::{Instant, Position};
-    use control::{
-        measure::readings::{Readings, Startup},
-        weeder::Controller,
-    };
     use knn::Example;
+    use rig::Rig;
 
     #[test]
     fn a_setting_is_read_with_its_range_and_what_is_saved() {
@@ -300,21 +293,10 @@ mod tests {
 
     /// All lines of the firmware's answer to a command.
     fn answer(command: &str) -> Vec<ConsoleLine> {
-        let startup = Startup {
-            readings: Readings::new(Instant::new(0), Position::new(0)),
-            beam_broken: false,
-            cause: Cause::Unknown,
-        };
         let examples = [Example::new([1, 2, 3, 4, 5], label::PLANT), Example::new([9, 8, 7, 6, 5], label::WEED)];
-        let mut controller = Controller::new(Nearest::new(&examples[..], Volatile::new()), Volatile::new(), startup);
-        let mut answer = say::execute(command::parse(command.as_bytes()), &mut controller);
-        let mut said = String::new();
-        while !answer.is_done() {
-            let mut line = Line::new();
-            answer.write_line(&controller, &mut line);
-            said.extend(line.map(char::from));
-        }
-        said.lines().map(ConsoleLine::parse).collect()
+        let examples = Nearest::new(&examples[..], Volatile::new());
+        let said = Rig::wake(examples, Volatile::new(), Cause::Unknown).ask(command);
+        said.iter().map(|line| ConsoleLine::parse(line)).collect()
     }
 
     #[test]

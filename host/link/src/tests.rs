@@ -6,12 +6,8 @@ use control::ground::class::label;
 use control::ground::examples::EXAMPLES;
 use control::ground::features::Features;
 use control::ground::nearest::Nearest;
-use control::measure::readings::{Readings, Startup};
-use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::say::{self, command, line::Line};
-use control::units::{Instant, Position};
-use control::weeder::Controller;
+use rig::Rig;
 use std::cell::RefCell;
 use std::io::{Read, Write};
 
@@ -159,25 +155,9 @@ fn a_port_that_goes_away_says_so() {
 
 /// A link to the firmware's decisions in HOLD, with its built-in examples, after these typed lines.
 fn link_to_machine(typed: &[&str]) -> Link {
-    let startup = Startup {
-        readings: Readings::new(Instant::new(0), Position::new(0)),
-        beam_broken: false,
-        cause: Cause::PowerOn,
-    };
-    let nearest = Nearest::new(&EXAMPLES[..], Volatile::new());
-    let machine = RefCell::new(Controller::new(nearest, Volatile::new(), startup));
-    let answer = move |line: &str| {
-        let mut machine = machine.borrow_mut();
-        let mut answer = say::execute(command::parse(line.as_bytes()), &mut machine);
-        let mut said = Vec::new();
-        while !answer.is_done() {
-            let mut written = Line::new();
-            answer.write_line(&machine, &mut written);
-            said.extend(written);
-        }
-        said
-    };
-    ["clear"].iter().chain(typed).for_each(|line| drop(answer(line)));
+    let rig = RefCell::new(Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new())));
+    let answer = move |line: &str| (rig.borrow_mut().ask(line).join("\r\n") + "\r\n").into_bytes();
+    typed.iter().for_each(|line| drop(answer(line)));
     link(answer)
 }
 

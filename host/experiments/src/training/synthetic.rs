@@ -1,9 +1,9 @@
 //! Detections from simulated rows, seen by the firmware's own code.
 //!
-//! The machine rolls past rows of a [`Crop`] at its speeds and two spacings. The levels of its encoder and beam pass
-//! through the firmware's decoder and its [`Controller`], so all features are the firmware's own. Several things vary:
-//! the speed within a tenth of its class, spacing and canopy, missing plants, tall weeds on bare ground, closed and
-//! ragged canopies, and the wheel's slip.
+//! The machine rolls past rows of a [`Crop`] at its speeds and two spacings, and the levels that its encoder and its
+//! beam give go through the firmware's decoder and its decisions; no feature is made up. What varies: speed within
+//! a tenth of its class, spacing and canopy, plants that are missing, tall weeds wherever there is ground, closed and
+//! ragged canopies, and the slip of the wheel.
 //!
 //! Each pass begins with the firmware's start on bare ground while the machine already rolls. So weeds are met at every
 //! distance from the start of counting.
@@ -15,13 +15,11 @@ use super::labelled::Labelled;
 use anyhow::{Result, ensure};
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
+use control::measure::quadrature::{Quadrature, Step};
+use control::measure::readings::Readings;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::units::{Instant, Interval, Position};
-use control::{
-    measure::readings::{Edge, Readings, Startup},
-    weeder::Controller,
-};
+use control::units::{Instant, Position, Ticks};
 use field::machine::Machine;
 use field::motion::Motion;
 use field::native::{Levels, Sensors, TURN_S};
@@ -32,6 +30,7 @@ use field::verdict::Timing;
 use knn::Example;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rig::{Beams, Rig};
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
 
@@ -126,6 +125,29 @@ const SLIP: RangeInclusive<f64> = -0.03..=0.03;
 
 /// The machine rolls from the start: it reaches its speed within a fraction of a millisecond.
 const ACCELERATION_MM_S2: f64 = 1e6;
+
+/// How often the firmware's main loop takes its readings here; on the chip it is more often.
+const LOOP_US: u32 = 1000;
+const LOOP_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
+
+/// Why there is no field.
+#[derive(Debug, Error, PartialEq)]
+pub enum SyntheticError {
+    /// The plants do not fit.
+    #[error(transparent)]
+    Planting(#[from] PlantingError),
+    /// The row is not one.
+    #[error(transparent)]
+    Row(#[from] Problem),
+    /// The beam did not see the row as it was planted, so that nothing can be labelled.
+    #[error("the beam saw {seen} objects on a row of {planted}: it has to see each as one")]
+    Miscounted {
+        /// Objects that the controller classified.
+        seen: usize,
+        /// Plants and weeds in the row.
+        planted: usize,
+    },
+}
 
 /// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
 ///
@@ -247,29 +269,45 @@ fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<
     let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
     let trial = Trial { motion, ..Trial::at_speed(row.clone(), machine, Timing::default(), speed_mm_s) };
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
-    let readings = |turn: u32, position: i64| {
-        Readings::new(Instant::default() + Interval::from_ms(turn), Position::new(position as i32))
-    };
-    let beam_broken = Levels::before(&trial).broken;
-    let startup = Startup { readings: readings(0, 0), beam_broken, cause: Cause::PowerOn };
-    let mut controller = Controller::new(&recorder, Volatile::new(), startup);
-    let sensors = Sensors::new(&trial, TURN_S);
-    for (turn, now) in (0..).zip(sensors.turns()).skip(1) {
-        let edges = now.edges.iter().map(|seen| Edge::Seen {
-            position: Position::new(seen.position as i32),
-            broken: seen.levels.broken,
-            second_broken: false,
-        });
-        controller.turn(readings(turn, now.position), edges);
+    let beams = Beams::one(!machine.beam_before(row, &motion).high);
+    let readings = Readings::new(Instant::ZERO, Position::default());
+    let mut rig = Rig::wake_at(&recorder, Volatile::new(), readings, beams, Cause::PowerOn);
+
+    let mut wheel = Encoder::default();
+    let mut next_loop = LOOP_CYCLES;
+    for change in machine.pin_changes(row, &motion, 0) {
+        while next_loop <= change.cycle {
+            rig.turn_after(LOOP_US);
+            next_loop += LOOP_CYCLES;
+        }
+        match change.pin {
+            wiring::BEAM => rig.see(Beams::one(!change.high)),
+            _ => rig.readings.position = wheel.turn(change),
+        }
     }
-    drop(controller);
+    rig.turn_after(LOOP_US);
+    drop(rig);
 
     let seen = recorder.seen.into_inner();
     let planted = row.things().len();
-    ensure!(
-        seen.len() == planted,
-        "the beam saw {} objects on a row of {planted}: it has to see each as one",
-        seen.len()
-    );
-    Ok(seen)
+    if seen.len() == planted { Ok(seen) } else { Err(SyntheticError::Miscounted { seen: seen.len(), planted }) }
+}
+
+/// The encoder's two channels, and the position that the firmware's decoder makes of them.
+#[derive(Default)]
+struct Encoder {
+    channels: u8,
+    decoder: Quadrature,
+    position: Position,
+}
+
+impl Encoder {
+    fn turn(&mut self, change: PinChange) -> Position {
+        let bit = if change.pin == wiring::ENCODER_A { 0b10 } else { 0b01 };
+        self.channels = if change.high { self.channels | bit } else { self.channels & !bit };
+        if let Step::Ticks(ticks) = self.decoder.step(self.channels) {
+            self.position = self.position + Ticks(i32::from(ticks));
+        }
+        self.position
+    }
 }

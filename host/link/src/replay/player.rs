@@ -13,11 +13,8 @@ use control::memory::Volatile;
 use control::operate::event::Event;
 use control::say::command::{self, Command};
 use control::units::{Instant, Interval, Position, Ticks, TicksPerSecond};
-use control::{
-    measure::readings::{Edge, Readings, Startup},
-    operate::state::State,
-    weeder::Controller,
-};
+use control::{measure::readings::Readings, operate::state::State};
+use rig::{Beams, Rig};
 use std::rc::Rc;
 
 /// Time between two steps of a machine at rest.
@@ -79,15 +76,12 @@ impl Pace {
 /// The decisions, driven along the log.
 pub(super) struct Player<'a> {
     pace: Pace,
-    controller: Controller<ReplayClassifier<'a>, Volatile>,
+    rig: Rig<ReplayClassifier<'a>>,
     witness: Rc<Witness>,
     /// The ground over which the beam was broken.
     canopies: Canopies,
-    broken: bool,
-    now: Instant,
     /// Steps until here, which are the same at every pace.
     steps: u64,
-    position: i32,
     /// The machine's speed over the ground.
     pub(super) speed_mm_s: i32,
     /// What the decisions told.
@@ -106,43 +100,49 @@ impl<'a> Player<'a> {
         let has_rolled = began != stretch.first.position;
         let position = if has_rolled { began.wrapping_sub(DETECTION_TICKS + 1) } else { began };
         let broken = canopies.over(position).is_some();
-        let readings = Readings::new(Instant::new(0), Position::new(position));
-        let startup = Startup { readings, beam_broken: broken, cause: Cause::Unknown };
+        // A log has no other sensor than these: add another here only where a log tells its level, else refuse the log in `replay_stretch`.
+        let readings = Readings {
+            now: Instant::ZERO,
+            position: Position::new(position),
+            switch_on: false,
+            lost: 0,
+            jumps: 0,
+            end_switch_on: false,
+            stack_free: u16::MAX,
+        };
+        let beams = Beams { broken, second_broken: false };
         let witness = Rc::new(Witness::default());
         let classifier = ReplayClassifier::new(&stretch.examples, stretch.built_in, Rc::clone(&witness));
-        let mut controller = Controller::new(classifier, Volatile::new(), startup);
-        controller.clear();
-        for (setting, value) in steps(controller.settings(), &stretch.settings) {
+        let mut rig = Rig::wake_at(classifier, Volatile::new(), readings, beams, Cause::Unknown);
+        rig.clear();
+        for (setting, value) in steps(rig.settings(), &stretch.settings) {
             // In an order that the firmware takes, and every value is in its range.
-            let _ = controller.set(setting, value);
+            let _ = rig.set(setting, value);
         }
         let mut player = Self {
             pace,
             steps: 0,
-            controller,
+            rig,
             witness,
             canopies,
-            broken,
-            now: Instant::new(0),
-            position,
             speed_mm_s: stretch.first.speed_mm_s,
             heard: Vec::new(),
             swallows_alarm: false,
         };
         player.roll_in(&stretch.first);
         if stretch.first.mode == Mode::Work {
-            let _ = player.controller.start(stretch.first.unseen_mm <= 0);
+            let _ = player.rig.start(stretch.first.unseen_mm <= 0);
         }
-        player.controller.tell_events(true);
+        player.rig.tell_events(true);
         player
     }
 
     /// Rolls from where watching began to where the log begins, at the speed that the machine has there; so slowly where it stands
     /// there that an encoder which falls silent then is no wonder.
     fn roll_in(&mut self, first: &Status) {
-        let way = first.position.wrapping_sub(self.position);
+        let way = first.position.wrapping_sub(self.position());
         let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { SLOWLY_MM_S };
-        let way_mm = i64::from(self.controller.settings().wheel().millimetres(Ticks(way)));
+        let way_mm = i64::from(self.rig.settings().wheel().millimetres(Ticks(way)));
         let time_ms = (way_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
         self.roll_by(way, speed_mm_s, speed_mm_s, time_ms);
         self.speed_mm_s = first.speed_mm_s;
@@ -150,19 +150,19 @@ impl<'a> Player<'a> {
 
     /// Where the machine is.
     pub(super) fn position(&self) -> i32 {
-        self.position
+        self.rig.readings.position.count()
     }
 
     /// The machine's speed in ticks.
     pub(super) fn speed(&self) -> TicksPerSecond {
-        let wheel = self.controller.settings().wheel();
+        let wheel = self.rig.settings().wheel();
         let ticks = wheel.ticks(self.speed_mm_s.unsigned_abs().min(FASTEST_MM_S.into()) as u16).0;
         TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
     }
 
     /// Rolls from one status to the next, `host_ms` later by the host's clock, gaining or losing speed evenly.
     pub(super) fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
-        let way = to.position.wrapping_sub(self.position);
+        let way = to.position.wrapping_sub(self.position());
         if way.saturating_abs() > LONGEST_WAY {
             return Err(());
         }
@@ -180,9 +180,9 @@ impl<'a> Player<'a> {
 
     /// Rolls to a place on the way to the next status, if it lies there.
     pub(super) fn roll_to(&mut self, place: i32, from: &Status, next: Option<&Status>) {
-        let way = place.wrapping_sub(self.position);
+        let way = place.wrapping_sub(self.position());
         let Some(next) = next else { return };
-        let whole = next.position.wrapping_sub(self.position);
+        let whole = next.position.wrapping_sub(self.position());
         if way == 0 || way.signum() != whole.signum() || way.unsigned_abs() > whole.unsigned_abs() {
             return;
         }
@@ -197,7 +197,7 @@ impl<'a> Player<'a> {
     /// Rolls a way, tick by tick. The speeds say how long it takes. Where they are next to nothing, the host's clock does: a host that
     /// was busy reads late, and two lines that came far apart at once.
     fn roll_by(&mut self, way: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
-        let tick_mm = 100.0 / f64::from(self.controller.settings().wheel().ticks(100).0.max(1));
+        let tick_mm = 100.0 / f64::from(self.rig.settings().wheel().ticks(100).0.max(1));
         let way_mm = f64::from(way) * tick_mm;
         let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
         let mean = (from + to) / 2.0;
@@ -206,15 +206,15 @@ impl<'a> Player<'a> {
         let host_s = (host_ms as f64 / 1000.0).max(way_mm.abs() / MOST_MM_S);
         let is_known = by_speed_s > 0.0 && (by_speed_s < 3.0 * host_s.max(0.1) || mean.abs() > SURE_MM_S);
         let steps = way.unsigned_abs();
-        let start = self.position;
+        let start = self.position();
         let mut speed = from.abs();
         for step in 1..=steps {
             let before = speed;
             speed = self.pace.speed(from, to, f64::from(step) / f64::from(steps));
             let interval_s = if is_known { 2.0 * tick_mm / (before + speed) } else { host_s / f64::from(steps) };
             self.speed_mm_s = (from_mm_s.signum() | to_mm_s.signum()) * speed.round() as i32;
-            self.now = self.now + Interval::from_steps((interval_s * f64::from(Interval::STEPS_PER_SECOND)) as u32);
-            self.position = start.wrapping_add(way.signum() * step as i32);
+            self.wait(Interval::from_steps((interval_s * f64::from(Interval::STEPS_PER_SECOND)) as u32));
+            self.rig.at(start.wrapping_add(way.signum() * step as i32));
             self.step();
         }
         self.speed_mm_s = to_mm_s;
@@ -222,47 +222,38 @@ impl<'a> Player<'a> {
 
     fn rest(&mut self, time_ms: u64) {
         for _ in 0..time_ms.div_ceil(u64::from(REST_MS)) {
-            self.now = self.now + Interval::from_ms(REST_MS);
+            self.wait(Interval::from_ms(REST_MS));
             self.step();
         }
     }
 
-    /// Has the decisions take the place where the machine now is.
-    fn step(&mut self) {
-        self.step_behind(None);
+    fn wait(&mut self, interval: Interval) {
+        self.rig.readings.now = self.rig.readings.now + interval;
     }
 
-    /// Has the decisions take what came from the beam before, and the place where the machine now is.
-    fn step_behind(&mut self, before: Option<Edge>) {
+    /// Has the decisions take the place where the machine now is.
+    fn step(&mut self) {
         self.steps += 1;
-        let response = self.speed().distance_in_ms(self.controller.settings().get(Setting::BeamResponseMs));
-        let ground = (Position::new(self.position) - response).count();
+        let response = self.speed().distance_in_ms(self.rig.settings().get(Setting::BeamResponseMs));
+        let ground = (self.rig.readings.position - response).count();
         let canopy = self.canopies.over(ground);
-        let broken = canopy.is_some();
-        let edge = (broken != self.broken).then_some(Edge::Seen {
-            position: Position::new(self.position),
-            broken,
-            second_broken: false,
-        });
-        self.broken = broken;
-        // The edge may end the detection before, which is classified by the time that another edge is asked for.
-        let canopy = edge.and(canopy);
-        let behind_it = std::iter::from_fn(|| {
-            if let Some(canopy) = canopy {
-                self.witness.seen.set(canopy.seen);
-            }
-            None
-        });
-        let mut readings = Readings::new(self.now, Position::new(self.position));
+        let before = self.rig.beams();
+        self.rig.see(Beams { broken: canopy.is_some(), second_broken: false });
+        // The edge may have ended the detection before, which is classified by now.
+        if let Some(canopy) = canopy
+            && !before.broken
+        {
+            self.witness.seen.set(canopy.seen);
+        }
         // An end switch that does as it is told.
-        readings.end_switch_on = self.controller.tool_out();
-        self.controller.turn(readings, before.into_iter().chain(edge).chain(behind_it));
+        self.rig.readings.end_switch_on = self.rig.tool_out();
+        self.rig.turn();
         self.listen();
     }
 
     fn listen(&mut self) {
         let speed = self.speed().0;
-        while let Some(event) = self.controller.next_event() {
+        while let Some(event) = self.rig.next_event() {
             match event {
                 Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => {}
                 Event::Detection { .. } | Event::Swing { .. } | Event::Alarm { .. } => {
@@ -277,13 +268,13 @@ impl<'a> Player<'a> {
 
     /// Goes to a state, unless it is there already; to work `now`, over ground that was not seen too.
     pub(super) fn enter(&mut self, mode: Mode, now: bool) {
-        match (mode, self.controller.state()) {
+        match (mode, self.rig.state()) {
             (Mode::Work, State::Hold) => {
-                let _ = self.controller.start(now);
+                let _ = self.rig.start(now);
             }
             (Mode::Hold, State::Work | State::Alarm(_)) => {
-                self.controller.hold();
-                self.controller.clear();
+                self.rig.hold();
+                self.rig.clear();
             }
             _ => return,
         }
@@ -292,14 +283,15 @@ impl<'a> Player<'a> {
 
     /// Raises an alarm that the log has; whether the replay did not have it by itself.
     pub(super) fn raise(&mut self) -> bool {
-        let is_given = !matches!(self.controller.state(), State::Alarm(_));
+        let is_given = !matches!(self.rig.state(), State::Alarm(_));
         if is_given {
             // All alarms do the same; this one can be given from outside.
             self.swallows_alarm = true;
-            // A new detection begins here, within the tolerance of a detection's position.
-            self.broken =
-                (0..=DETECTION_TICKS).any(|ahead| self.canopies.over(self.position.wrapping_add(ahead)).is_some());
-            self.step_behind(Some(Edge::Lost { broken: self.broken }));
+            // What was in the beam begins anew here, give or take what a detection's place may differ by.
+            let broken =
+                (0..=DETECTION_TICKS).any(|ahead| self.canopies.over(self.position().wrapping_add(ahead)).is_some());
+            self.rig.lose_edges(Beams { broken, second_broken: false });
+            self.step();
         }
         is_given
     }
@@ -308,22 +300,22 @@ impl<'a> Player<'a> {
     pub(super) fn command(&mut self, line: &str) -> bool {
         match command::parse(line.as_bytes()) {
             Ok(Command::Start { now }) => {
-                let _ = self.controller.start(now);
+                let _ = self.rig.start(now);
             }
-            Ok(Command::Hold) => self.controller.hold(),
-            Ok(Command::Clear) => self.controller.clear(),
+            Ok(Command::Hold) => self.rig.hold(),
+            Ok(Command::Clear) => self.rig.clear(),
             // What it sees is not in the log.
             Ok(Command::Set(Setting::SecondBeamMm, 1..)) => return false,
             Ok(Command::Set(setting, value)) => {
                 // Where the answer was lost, it is refused here as there.
-                let _ = self.controller.set(setting, value);
+                let _ = self.rig.set(setting, value);
             }
             Ok(Command::Label { label, force }) => {
-                let _ = self.controller.label(label, force);
+                let _ = self.rig.label(label, force);
             }
-            Ok(Command::Feature(feature)) => self.controller.tell_feature(feature),
+            Ok(Command::Feature(feature)) => self.rig.tell_feature(feature),
             Ok(Command::Teach(label)) => {
-                let _ = self.controller.teach(label);
+                let _ = self.rig.teach(label);
             }
             Ok(Command::Forget(_) | Command::ForgetAll) => return false,
             _ => {

@@ -8,20 +8,15 @@
 use super::tally::{Plan, SoakError, Tally, chance, count, total};
 use control::{
     ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
-    measure::{
-        readings::{Edge, Readings, Startup},
-        reset::Cause,
-    },
+    measure::{readings::Readings, reset::Cause},
     memory::{Memory, Volatile},
     operate::{
         event::Event,
         saved::{COPY, SavedSettings},
         state::State,
     },
-    say::{self, command::LineBuffer, line::Line},
     settings::{Setting, Settings},
-    units::{Instant, Position},
-    weeder::Controller,
+    units::{Instant, Position, Ticks},
 };
 use field::machine::Machine;
 use field::motion::mm_s;
@@ -30,10 +25,15 @@ use field::row::{Kind, Row};
 use field::wheel::{Wheel, most_slip};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use rig::{Beams, ByExamples, Rig};
 use std::{cell::RefCell, ops::Range, rc::Rc};
 
 /// A turn of the loop.
-const TURN_S: f64 = 0.001;
+const TURN_US: u32 = 1000;
+const TURN_S: f64 = TURN_US as f64 / 1e6;
+
+/// Bytes of the stack that were never used.
+const STACK_FREE: u16 = 300;
 
 /// Where clock and count begin: the clock a minute before its end, the count two hundred metres.
 const FIRST_STEPS: u32 = u32::MAX - 15_000_000;
@@ -82,7 +82,7 @@ const BLIND_TICKS: f64 = 24.0;
 /// What the ends of an object may be off by.
 const EDGE_TICKS: i64 = 4;
 
-type Weeder = Controller<Nearest<&'static [knn::Example<5>], Shared>, Shared>;
+type Weeder = Rig<ByExamples<Shared>, Shared>;
 
 /// A memory that stays when the machine is reset.
 #[derive(Clone, Debug, Default)]
@@ -159,25 +159,17 @@ struct Field {
     machine: Machine,
     weeder: Weeder,
     memories: [Shared; 2],
-    line: LineBuffer,
     turns: u64,
-    /// Where the machine is in its row, in ticks, and the encoder's count.
+    /// Where the machine is in its row, in ticks.
     place: f64,
     wheel: Wheel,
-    count: i64,
     speed: f64,
-    broken: bool,
-    second_broken: bool,
     /// What the firmware is told of the machine.
     told: [(Setting, u16); 3],
-    /// What came from the beam since the last turn.
-    edges: Vec<Edge>,
     /// Turns for which the encoder is yet to be dead, and whether one of its channels is alive then.
     silent_turns: u32,
     one_channel_lives: bool,
-    jumps: u16,
-    stack_free: u16,
-    /// Ticks that the count lacks since the firmware last forgot its ground.
+    /// Ticks that the count lacks since the firmware last began to see its ground anew.
     lost_ticks: i64,
     blind_until_turn: u64,
     /// What went wrong last, and at which turn.
@@ -226,27 +218,21 @@ pub fn hour(plan: Plan, number: u64, part: f64, mut progress: impl FnMut(f64)) -
 impl Field {
     fn new(rng: ChaCha8Rng, machine: Machine) -> Self {
         let memories = [Shared::default(), Shared::default()];
-        let readings = Readings::new(Instant::new(FIRST_STEPS), Position::new(FIRST_COUNT));
-        let weeder = init(&memories, readings, false, Cause::PowerOn);
+        let mut readings = Readings::new(Instant::new(FIRST_STEPS), Position::new(FIRST_COUNT));
+        readings.stack_free = STACK_FREE;
+        let weeder = init(&memories, readings, Beams::default(), Cause::PowerOn);
         Self {
             rng,
             machine,
             weeder,
             memories,
-            line: LineBuffer::new(),
             turns: 0,
             place: 0.0,
             wheel: Wheel::default(),
-            count: FIRST_COUNT.into(),
             speed: 0.0,
-            broken: false,
-            second_broken: false,
             told: told(&machine, 0),
-            edges: Vec::new(),
             silent_turns: 0,
             one_channel_lives: false,
-            jumps: 0,
-            stack_free: 300,
             lost_ticks: 0,
             blind_until_turn: 0,
             last_fault: ("nothing", 0),
@@ -323,8 +309,7 @@ impl Field {
         // The machine was turned round and stands in the headland: the operator knows, and tells it.
         self.weeder.hold();
         (self.place, self.speed, self.wheel) = (0.0, 0.0, Wheel::default());
-        (self.broken, self.second_broken) = (false, false);
-        self.reset(Cause::ResetPin);
+        self.reset(Beams::default(), Cause::ResetPin);
         let (mut target, mut leg_turns) = (0.0_f64, 0_u32);
         while (self.place as usize) < ground.broken[0].len()
             && self.turns < last_turn
@@ -384,13 +369,10 @@ impl Field {
         }
     }
 
-    fn readings(&self) -> Readings {
-        let now = Instant::new(FIRST_STEPS.wrapping_add((self.turns * 250) as u32));
-        Readings {
-            jumps: self.jumps,
-            stack_free: self.stack_free,
-            ..Readings::new(now, Position::new(self.count as i32))
-        }
+    /// What the beams see with the machine at a place.
+    fn beams_at(&self, ground: &Ground, place: i64) -> Beams {
+        let apart = (self.machine.second_beam_mm / self.machine.tick_mm()).round() as i64;
+        Beams { broken: ground.is_broken(0, place), second_broken: ground.is_broken(1, place - apart) }
     }
 
     /// A turn of the loop.
@@ -401,7 +383,6 @@ impl Field {
         let to = self.place.floor() as i64;
         self.tally.metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
         let direction = (to - from).signum();
-        let apart = (self.machine.second_beam_mm / self.machine.tick_mm()).round() as i64;
         for step in 1..=(to - from).abs() {
             let place = from + step * direction;
             let turned = self.wheel.roll(place - direction, direction > 0);
@@ -410,31 +391,23 @@ impl Field {
                 (_, true) => turned.abs() * (1 - 2 * (self.wheel.ticks() & 1)),
                 (_, false) => 0,
             };
-            self.count += counted;
+            self.weeder.readings.position = self.weeder.readings.position + Ticks(counted as i32);
             self.lost_ticks += turned - counted;
-            let levels = (ground.is_broken(0, place), ground.is_broken(1, place - apart));
-            if levels != (self.broken, self.second_broken) {
-                self.edge(levels);
-            }
+            let beams = self.beams_at(ground, place);
+            self.weeder.see(beams);
         }
         if self.silent_turns > 0 {
             self.silent_turns -= 1;
             // The measured speed was wrong, and with it the leads: a swing may be late by that.
             self.blind_until_turn = self.turns + self.swing_ms() as u64 + SPEED_SETTLES_TURNS;
         }
-        self.weeder.turn(self.readings(), self.edges.drain(..));
+        self.weeder.turn_after(TURN_US);
         if !self.weeder.tool_out() {
             self.tally.weeded_metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
         }
-        self.stack_free = 300;
+        self.weeder.readings.stack_free = STACK_FREE;
         self.listen(ground);
         self.judge(ground, to - self.distance());
-    }
-
-    /// What the beams see is this from here on.
-    fn edge(&mut self, (broken, second_broken): (bool, bool)) {
-        (self.broken, self.second_broken) = (broken, second_broken);
-        self.edges.push(Edge::Seen { position: Position::new(self.count as i32), broken, second_broken });
     }
 
     /// Takes what the machine tells.
@@ -447,7 +420,7 @@ impl Field {
                 }
                 Event::Warning(warning) => count(&mut self.tally.warnings, &name(warning.text().bytes())),
                 Event::Detection { vote, leading, plan, .. } if vote.class == Class::Weed => {
-                    let behind = i64::from((leading - Position::new(self.count as i32)).0);
+                    let behind = i64::from((leading - self.weeder.readings.position).0);
                     let place = self.place as i64 + behind;
                     let margin = self.weeder.settings().ticks(Setting::MarginMm);
                     // Over ground the wheel has slipped since.
@@ -538,15 +511,15 @@ impl Field {
     fn fail(&mut self, ground: &Ground) {
         let fault = match self.rng.random_range(0..9) {
             0 => {
-                let (first, second) = (self.broken, self.second_broken);
+                let beams @ Beams { broken, second_broken } = self.weeder.beams();
                 let dusty = if self.machine.has_second_beam() && self.rng.random() {
-                    (first, !second)
+                    Beams { second_broken: !second_broken, ..beams }
                 } else {
-                    (!first, second)
+                    Beams { broken: !broken, ..beams }
                 };
                 for _ in 0..self.rng.random_range(1..40) {
-                    self.edge(dusty);
-                    self.edge((first, second));
+                    self.weeder.see(dusty);
+                    self.weeder.see(beams);
                 }
                 "dust"
             }
@@ -556,24 +529,23 @@ impl Field {
                 if self.one_channel_lives { "dead_channel" } else { "silent_encoder" }
             }
             2 => {
-                self.jumps = self.jumps.wrapping_add(self.rng.random_range(1..60));
+                let jumps = &mut self.weeder.readings.jumps;
+                *jumps = jumps.wrapping_add(self.rng.random_range(1..60));
                 "encoder_jumps"
             }
             3 => {
-                let apart = self.machine.second_beam_mm / self.machine.tick_mm();
-                self.broken = ground.is_broken(0, self.place as i64);
-                self.second_broken = ground.is_broken(1, self.place as i64 - apart.round() as i64);
-                self.edges.push(Edge::Lost { broken: self.broken });
+                let beams = self.beams_at(ground, self.place as i64);
+                self.weeder.lose_edges(beams);
                 "lost_edges"
             }
             4 => {
-                self.stack_free = 20;
+                self.weeder.readings.stack_free = 20;
                 "low_stack"
             }
             5 => {
                 let cause =
                     [Cause::PowerOn, Cause::BrownOut, Cause::Watchdog, Cause::LoopStalled][self.rng.random_range(0..4)];
-                self.reset(cause);
+                self.reset(self.weeder.beams(), cause);
                 "reset"
             }
             6 => {
@@ -584,7 +556,7 @@ impl Field {
                 let address = self.rng.random_range(0..control::memory::SIZE);
                 let byte = self.rng.random();
                 self.memories[self.rng.random_range(0..2)].0.borrow_mut().bytes[address] = byte;
-                self.reset(Cause::PowerOn);
+                self.reset(self.weeder.beams(), Cause::PowerOn);
                 "spoiled_eeprom"
             }
             _ => {
@@ -596,15 +568,14 @@ impl Field {
         count(&mut self.tally.faults, fault);
     }
 
-    /// The chip restarts.
-    fn reset(&mut self, cause: Cause) {
+    /// The chip starts anew.
+    fn reset(&mut self, beams: Beams, cause: Cause) {
         self.memories.iter().for_each(Shared::recover);
-        self.weeder = init(&self.memories, self.readings(), self.broken, cause);
+        self.weeder = init(&self.memories, self.weeder.readings, beams, cause);
         self.see_anew();
         if let State::Alarm(alarm) = self.weeder.state() {
             count(&mut self.tally.alarms, &link::advice::name(alarm));
         }
-        self.line = LineBuffer::new();
         count(&mut self.tally.resets, &name(cause.text().bytes()));
         if !self.weeder.tool_out() || self.weeder.state() == State::Work {
             self.tally.violated(self.time_s(), "the machine woke up with the tool in the row");
@@ -628,7 +599,7 @@ impl Field {
         let bytes = self.rng.random_range(0..=COPY);
         self.memories[0].0.borrow_mut().lose_power_after(bytes);
         while !self.weeder.carry_on() {}
-        self.reset(Cause::BrownOut);
+        self.reset(self.weeder.beams(), Cause::BrownOut);
         let found = self.saved();
         if found.as_ref() != Some(&new) && (found != old || bytes == COPY) {
             let time_s = self.time_s();
@@ -643,25 +614,11 @@ impl Field {
 
     /// Bytes by chance come along the line, and questions among them.
     fn noise(&mut self) {
-        for _ in 0..self.rng.random_range(1..300) {
-            let byte = match self.rng.random_range(0..4) {
-                0 => b'\n',
-                _ => self.rng.random(),
-            };
-            self.type_byte(byte);
-        }
-        b"\nstatus\nget\ndump\nexamples\n".iter().for_each(|&byte| self.type_byte(byte));
-    }
-
-    fn type_byte(&mut self, byte: u8) {
-        if let Some(command) = self.line.take(byte) {
-            let mut answer = say::execute(command, &mut self.weeder);
-            while !answer.is_done() {
-                let mut line = Line::new();
-                answer.write_line(&self.weeder, &mut line);
-                line.for_each(drop);
-            }
-        }
+        let bytes = (0..self.rng.random_range(1..300)).map(|_| match self.rng.random_range(0..4) {
+            0 => b'\n',
+            _ => self.rng.random(),
+        });
+        self.weeder.type_in(bytes.chain(*b"\nstatus\nget\ndump\nexamples\n"));
     }
 }
 
@@ -674,9 +631,9 @@ fn told(machine: &Machine, stem_zone_mm: u16) -> [(Setting, u16); 3] {
     ]
 }
 
-fn init(memories: &[Shared; 2], readings: Readings, beam_broken: bool, cause: Cause) -> Weeder {
+fn init(memories: &[Shared; 2], readings: Readings, beams: Beams, cause: Cause) -> Weeder {
     let nearest = Nearest::new(&EXAMPLES[..], memories[1].clone());
-    let mut weeder = Controller::new(nearest, memories[0].clone(), Startup { readings, beam_broken, cause });
+    let mut weeder = Rig::wake_at(nearest, memories[0].clone(), readings, beams, cause);
     weeder.tell_events(true);
     weeder
 }

@@ -1,0 +1,170 @@
+//! The decisions compiled for the host, with the sensors that they read: the machine that simulations, replays and tests drive.
+//!
+//! A [`Rig`] stands where `src/main.rs` stands on the chip. It holds what the sensors show, passes it to the [`Controller`], and has the
+//! controller's methods. Its driver says how the machine rolls, what breaks the beams, and how long a turn of the loop takes. All other
+//! [`Readings`] stay as they are until the driver changes them, so a driver names only the sensors that it simulates.
+//!
+//! The decisions take an edge of a beam as it comes, and the other sensors once a turn.
+
+use control::ground::{class::Classifier, features, nearest::Nearest};
+use control::measure::readings::{Edge, Readings, Startup};
+use control::measure::reset::Cause;
+use control::memory::{Memory, Volatile};
+use control::operate::event::Event;
+use control::say::{self, LINE, command::LineBuffer, line::Line};
+use control::units::{Instant, Interval, Position};
+use control::weeder::{Controller, Orders};
+use std::ops::{Deref, DerefMut};
+
+/// The classifier of the firmware, with examples and a memory for those from the field.
+pub type ByExamples<M = Volatile> = Nearest<&'static [knn::Example<{ features::COUNT }>], M>;
+
+/// Which of the beams are broken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Beams {
+    /// The first.
+    pub broken: bool,
+    /// The second; false where there is none.
+    pub second_broken: bool,
+}
+
+impl Beams {
+    /// Those of a machine with one beam.
+    pub const fn one(broken: bool) -> Self {
+        Self { broken, second_broken: false }
+    }
+}
+
+/// A machine to drive, see the module's words.
+#[derive(Clone, Debug)]
+pub struct Rig<C, M = Volatile> {
+    controller: Controller<C, M>,
+    /// What the next turn reads.
+    pub readings: Readings,
+    beams: Beams,
+    line: LineBuffer,
+}
+
+impl<C: Classifier> Rig<C> {
+    /// A new board in HOLD, at time and count 0. The operator has cleared the alarm about its settings.
+    pub fn new(classifier: C) -> Self {
+        let mut rig = Self::wake(classifier, Volatile::new(), Cause::PowerOn);
+        rig.clear();
+        rig
+    }
+}
+
+impl<C: Classifier, M: Memory> Rig<C, M> {
+    /// Wakes up at time and count 0, with all sensors at rest.
+    pub fn wake(classifier: C, memory: M, cause: Cause) -> Self {
+        Self::wake_at(classifier, memory, Readings::new(Instant::ZERO, Position::new(0)), Beams::default(), cause)
+    }
+
+    /// Wakes up with sensors that show this.
+    pub fn wake_at(classifier: C, memory: M, readings: Readings, beams: Beams, cause: Cause) -> Self {
+        let startup = Startup { readings, beam_broken: beams.broken, cause };
+        let controller = Controller::new(classifier, memory, startup);
+        Self { controller, readings, beams, line: LineBuffer::new() }
+    }
+
+    /// The encoder counts to `count`.
+    pub fn at(&mut self, count: i32) -> &mut Self {
+        self.readings.position = Position::new(count);
+        self
+    }
+
+    /// What the beams show.
+    pub fn beams(&self) -> Beams {
+        self.beams
+    }
+
+    /// The beams show this from the present count on.
+    pub fn see(&mut self, beams: Beams) {
+        if beams != self.beams {
+            self.edge(self.readings.position, beams);
+        }
+    }
+
+    /// An edge comes from a beam.
+    #[inline(always)]
+    pub fn edge(&mut self, position: Position, beams: Beams) {
+        self.beams = beams;
+        let Beams { broken, second_broken } = beams;
+        self.controller.take_edge(Edge::Seen { position, broken, second_broken });
+    }
+
+    /// Edges found no room to wait in.
+    pub fn lose_edges(&mut self, beams: Beams) {
+        self.beams = beams;
+        self.controller.take_edge(Edge::Lost { broken: beams.broken });
+    }
+
+    /// A turn of the loop.
+    pub fn turn(&mut self) -> Orders {
+        self.controller.step(self.readings)
+    }
+
+    /// The sensors show this, and the loop turns: faster than [`turn`](Self::turn), as nothing is read back.
+    #[inline(always)]
+    pub fn turn_with(&mut self, readings: Readings) -> Orders {
+        self.readings = readings;
+        self.controller.step(readings)
+    }
+
+    /// A turn of the loop, so many microseconds later.
+    pub fn turn_after(&mut self, microseconds: u32) -> Orders {
+        self.readings.now = self.readings.now + Interval::from_steps(microseconds / 4);
+        self.turn()
+    }
+
+    /// Stands for so many milliseconds, with a turn in each.
+    pub fn stand(&mut self, milliseconds: u32) -> Orders {
+        (0..milliseconds).map(|_| self.turn_after(1000)).last().unwrap_or_else(|| self.orders())
+    }
+
+    /// Types a line; the lines of the answer, of which the last is `ok` or begins with `error: `.
+    pub fn ask(&mut self, line: &str) -> Vec<String> {
+        self.type_in(line.bytes().chain(*b"\n"))
+    }
+
+    /// Types bytes; the lines of the answers.
+    ///
+    /// # Panics
+    /// If a line of an answer does not end, or is too long for the chip's buffer.
+    pub fn type_in(&mut self, bytes: impl IntoIterator<Item = u8>) -> Vec<String> {
+        let mut said = Vec::new();
+        for byte in bytes {
+            let Some(typed) = self.line.take(byte) else { continue };
+            let mut answer = say::execute(typed, &mut self.controller);
+            while !answer.is_done() {
+                let mut line = Line::new();
+                answer.write_line(&self.controller, &mut line);
+                let line: String = line.map(char::from).collect();
+                let text = line.strip_suffix("\r\n").filter(|_| line.len() <= LINE);
+                said.push(text.unwrap_or_else(|| panic!("not a line: {line:?}")).to_owned());
+            }
+        }
+        said
+    }
+
+    /// Takes the events that wait to be told.
+    pub fn events(&mut self) -> Vec<Event> {
+        std::iter::from_fn(|| self.next_event()).collect()
+    }
+}
+
+impl<C, M> Deref for Rig<C, M> {
+    type Target = Controller<C, M>;
+
+    #[inline]
+    fn deref(&self) -> &Self::Target {
+        &self.controller
+    }
+}
+
+impl<C, M> DerefMut for Rig<C, M> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.controller
+    }
+}
