@@ -49,7 +49,7 @@ fn a_detection_below_the_least_width_is_dust_and_neither_a_plant_nor_a_misfit() 
     }
     assert_eq!((drive.pass_stalks(10), drive.alarm()), (10, None));
     assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 0));
-    assert_eq!(drive.machine.events(), [Event::Warning(Warning::NoPlants)], "nobody has seen a plant");
+    assert_eq!(drive.machine.events(), [Event::Warning(Warning::NoPlants)], "there was no plant");
     drive.pass(0.5, 0.03);
     drive.roll(0.5, 0.1);
     assert_eq!((drive.machine.dust(), drive.machine.detections().len()), (10, 1));

@@ -122,7 +122,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         (0..milliseconds).map(|_| self.turn_after(1000)).last().unwrap_or_else(|| self.orders())
     }
 
-    /// Types a line; the lines of the answer, of which the last is `ok` or begins with `error: `.
+    /// Types a line. Returns the lines of the answer: the last is `ok`, or begins with `error: `.
     pub fn ask(&mut self, line: &str) -> Vec<String> {
         self.type_in(line.bytes().chain(*b"\n"))
     }

@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_told_all_at_once_whenever_it_comes_and_what_others_change_after_that() {
+    fn a_page_gets_all_at_once_when_it_connects_and_then_what_others_change() {
         run(async {
             let (machine, hub, _) = machine();
             let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();

@@ -1,28 +1,27 @@
-//! Detections from simulated rows, seen by the firmware's own code.
+//! Objects from simulated rows, as the firmware's own code sees them.
 //!
 //! The machine rolls past rows of a [`Crop`] at its speeds and two spacings, and the levels that its encoder and its
-//! beam give go through the firmware's decoder and its decisions; no feature is made up. What varies: speed within
+//! beam give go through the firmware's decisions; no feature is made up. What varies: speed within
 //! a tenth of its class, spacing and canopy, plants that are missing, tall weeds wherever there is ground, closed and
 //! ragged canopies, and the slip of the wheel.
 //!
-//! Each pass begins with the firmware's start on bare ground while the machine already rolls. So weeds are met at every
-//! distance from the start of counting.
+//! Each pass begins with the firmware waking up on bare ground while the machine rolls already, so that weeds are met at
+//! every distance from where counting begins.
 //!
-//! The classifier here only records. It gets the true class of each detection, in their order, so that the next spacing
-//! is counted from a plant.
+//! The classifier here only takes notes. It is told the truth about each object, in the order in which they stand, so
+//! that the spacing of the next one is counted from a plant.
 
 use super::labelled::Labelled;
 use anyhow::{Result, ensure};
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
-use control::measure::quadrature::{Quadrature, Step};
 use control::measure::readings::Readings;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
-use control::units::{Instant, Position, Ticks};
+use control::units::{Instant, Interval, Position};
 use field::machine::Machine;
 use field::motion::Motion;
-use field::native::{Levels, Sensors, TURN_S};
+use field::native::{Sensors, TURN_S, beams_before};
 use field::planting::Planting;
 use field::row::{Kind, Row, Thing};
 use field::trial::Trial;
@@ -30,16 +29,16 @@ use field::verdict::Timing;
 use knn::Example;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rig::{Beams, Rig};
+use rig::Rig;
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
 
-/// A crop, and the weeds that outgrow the beam.
+/// How a crop stands, and which weeds outgrow the beam beside it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crop {
     /// What it is called.
     pub name: &'static str,
-    /// The speed classes for it, in mm/s.
+    /// The speed classes at which it is weeded, in mm/s.
     pub speeds_mm_s: &'static [i16],
     /// Its plant spacings.
     pub spacings_mm: [f64; 2],
@@ -51,8 +50,8 @@ pub struct Crop {
     pub canopy_scatter_mm: f64,
     /// Whether there are canopies through which the beam passes.
     pub is_ragged: bool,
-    /// Bare ground between the firmware's start and the first planting position, used in turn. Without an earlier
-    /// plant, spacing is counted from the start.
+    /// Bare ground between the places where the firmware wakes up and the first plant's place, in turn: where no plant was before, spacing
+    /// is counted from there.
     pub headlands_mm: &'static [f64],
     /// Passes over a row at each speed and spacing.
     pub passes: usize,
@@ -60,7 +59,7 @@ pub struct Crop {
     pub weed_widths_mm: RangeInclusive<f64>,
 }
 
-/// The crops, the paper's first. Everything except its spacings is assumed.
+/// The crops that there are, the paper's first. All but its spacings is assumed.
 pub const CROPS: [Crop; 3] = [
     Crop {
         name: "chilli",
@@ -87,8 +86,7 @@ pub const CROPS: [Crop; 3] = [
         passes: 12,
         weed_widths_mm: 12.0..=30.0,
     },
-    // Stalks below their leaves, and grasses, which are narrower. Above 1.25 km/h this narrow spacing leaves the tool
-    // no time.
+    // Stalks below their leaves, and grasses, which are the narrower ones. Above 1.25 km/h so narrow a spacing leaves the tool no time.
     Crop {
         name: "maize",
         speeds_mm_s: &[SPEED_CLASSES_MM_S[0]],
@@ -103,51 +101,28 @@ pub const CROPS: [Crop; 3] = [
     },
 ];
 
-/// Plants in a row before some are removed.
+/// Plants in a row before any go missing.
 const PLANTS: usize = 20;
 
 /// Share of the plants that did not come up; never two neighbours.
 const MISSING: f64 = 0.05;
 
-/// Tall weeds: their number on a metre of bare ground, and their distance from everything else. The distance makes each
-/// weed a detection of its own.
+/// Tall weeds: how many grow on a metre of bare ground, and how far they stand from everything else, so
+/// that the beam sees each as an object of its own.
 const WEEDS_PER_METRE: f64 = 3.0;
 const WEED_MARGIN_MM: f64 = 25.0;
 
-/// Ground behind the last plant or weed, over which the beam stays clear.
+/// Ground behind the last thing, over which the machine sees that it was the last.
 const RUN_OUT_MM: f64 = 100.0;
 
 /// The speed of a pass, as a share of its class.
 const PACE: RangeInclusive<f64> = 0.9..=1.1;
 
-/// Slip: the additional distance of the wheel in a turn, as a share of its circumference; negative if it drags.
+/// How much farther than its circumference the wheel goes in a turn; negative where it drags.
 const SLIP: RangeInclusive<f64> = -0.03..=0.03;
 
-/// The machine rolls from the start: it reaches its speed within a fraction of a millisecond.
+/// The machine rolls from the beginning: it has its speed within a fraction of a millisecond.
 const ACCELERATION_MM_S2: f64 = 1e6;
-
-/// How often the firmware's main loop takes its readings here; on the chip it is more often.
-const LOOP_US: u32 = 1000;
-const LOOP_CYCLES: u64 = CYCLES_PER_SECOND / 1000;
-
-/// Why there is no field.
-#[derive(Debug, Error, PartialEq)]
-pub enum SyntheticError {
-    /// The plants do not fit.
-    #[error(transparent)]
-    Planting(#[from] PlantingError),
-    /// The row is not one.
-    #[error(transparent)]
-    Row(#[from] Problem),
-    /// The beam did not see the row as it was planted, so that nothing can be labelled.
-    #[error("the beam saw {seen} objects on a row of {planted}: it has to see each as one")]
-    Miscounted {
-        /// Objects that the controller classified.
-        seen: usize,
-        /// Plants and weeds in the row.
-        planted: usize,
-    },
-}
 
 /// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
 ///
@@ -209,7 +184,7 @@ fn grow(crop: &Crop, spacing_mm: f64, headland_mm: f64, ragged: bool, rng: &mut 
     Ok(Row::new(things)?)
 }
 
-/// Records the controller's requests, and answers with the true class.
+/// Takes notes of what the controller asks, and answers with the truth.
 struct Recorder<'a> {
     row: &'a Row,
     seen: RefCell<Vec<Labelled>>,
@@ -220,7 +195,7 @@ impl Classifier for &Recorder<'_> {
 
     fn classify(&self, features: &Features, _k: u8) -> Vote {
         let mut seen = self.seen.borrow_mut();
-        // Too many detections are an error at the end.
+        // More objects than things are found out at the end.
         let kind = self.row.things().get(seen.len()).map_or(Kind::Plant, |thing| thing.kind);
         seen.push(Labelled { features: *features, kind });
         let class = match kind {
@@ -230,7 +205,7 @@ impl Classifier for &Recorder<'_> {
         Vote { class, votes: 0 }
     }
 
-    // It already knows the true classes: it cannot be taught, and cannot forget.
+    // It knows the truth already: there is nothing to teach it, and nothing to forget.
 
     fn built_in_class(&mut self, _: &Features) -> Class {
         Class::Unknown
@@ -264,50 +239,27 @@ impl Classifier for &Recorder<'_> {
 /// What the controller sees of a row.
 fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>> {
     let standard = Machine::default();
-    // The firmware has the nominal wheel; a slipping wheel goes farther in a turn.
+    // The firmware knows the wheel; the wheel that slips goes farther in a turn than it knows.
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
     let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
     let trial = Trial { motion, ..Trial::at_speed(row.clone(), machine, Timing::default(), speed_mm_s) };
     let recorder = Recorder { row, seen: RefCell::new(Vec::new()) };
-    let beams = Beams::one(!machine.beam_before(row, &motion).high);
-    let readings = Readings::new(Instant::ZERO, Position::default());
-    let mut rig = Rig::wake_at(&recorder, Volatile::new(), readings, beams, Cause::PowerOn);
-
-    let mut wheel = Encoder::default();
-    let mut next_loop = LOOP_CYCLES;
-    for change in machine.pin_changes(row, &motion, 0) {
-        while next_loop <= change.cycle {
-            rig.turn_after(LOOP_US);
-            next_loop += LOOP_CYCLES;
-        }
-        match change.pin {
-            wiring::BEAM => rig.see(Beams::one(!change.high)),
-            _ => rig.readings.position = wheel.turn(change),
-        }
+    let readings = |turn: u32, position: i64| {
+        Readings::new(Instant::default() + Interval::from_ms(turn), Position::new(position as i32))
+    };
+    let mut rig = Rig::wake_at(&recorder, Volatile::new(), readings(0, 0), beams_before(&trial), Cause::PowerOn);
+    for (turn, now) in (0..).zip(Sensors::new(&trial, TURN_S).turns()).skip(1) {
+        now.edges.iter().for_each(|seen| rig.edge(Position::new(seen.position as i32), seen.beams));
+        rig.turn_with(readings(turn, now.position));
     }
-    rig.turn_after(LOOP_US);
     drop(rig);
 
     let seen = recorder.seen.into_inner();
     let planted = row.things().len();
-    if seen.len() == planted { Ok(seen) } else { Err(SyntheticError::Miscounted { seen: seen.len(), planted }) }
-}
-
-/// The encoder's two channels, and the position that the firmware's decoder makes of them.
-#[derive(Default)]
-struct Encoder {
-    channels: u8,
-    decoder: Quadrature,
-    position: Position,
-}
-
-impl Encoder {
-    fn turn(&mut self, change: PinChange) -> Position {
-        let bit = if change.pin == wiring::ENCODER_A { 0b10 } else { 0b01 };
-        self.channels = if change.high { self.channels | bit } else { self.channels & !bit };
-        if let Step::Ticks(ticks) = self.decoder.step(self.channels) {
-            self.position = self.position + Ticks(i32::from(ticks));
-        }
-        self.position
-    }
+    ensure!(
+        seen.len() == planted,
+        "the beam saw {} objects on a row of {planted}: it has to see each as one",
+        seen.len()
+    );
+    Ok(seen)
 }

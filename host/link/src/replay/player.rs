@@ -287,7 +287,7 @@ impl<'a> Player<'a> {
         if is_given {
             // All alarms do the same; this one can be given from outside.
             self.swallows_alarm = true;
-            // What was in the beam begins anew here, give or take what a detection's place may differ by.
+            // A detection in the beam begins here, give or take the tolerance of its place.
             let broken =
                 (0..=DETECTION_TICKS).any(|ahead| self.canopies.over(self.position().wrapping_add(ahead)).is_some());
             self.rig.lose_edges(Beams { broken, second_broken: false });

@@ -169,7 +169,7 @@ struct Field {
     /// Turns for which the encoder is yet to be dead, and whether one of its channels is alive then.
     silent_turns: u32,
     one_channel_lives: bool,
-    /// Ticks that the count lacks since the firmware last began to see its ground anew.
+    /// Ticks that the count lacks since the firmware last forgot its ground.
     lost_ticks: i64,
     blind_until_turn: u64,
     /// What went wrong last, and at which turn.
@@ -568,7 +568,7 @@ impl Field {
         count(&mut self.tally.faults, fault);
     }
 
-    /// The chip starts anew.
+    /// The chip is reset.
     fn reset(&mut self, beams: Beams, cause: Cause) {
         self.memories.iter().for_each(Shared::recover);
         self.weeder = init(&self.memories, self.weeder.readings, beams, cause);
