@@ -102,8 +102,8 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
         servo.command(orders.pulse, orders.gap_ms);
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
-        // A turn has little time for the console: some bytes, or one longer step. After other long work there is none.
-        let bytes = if orders.turn_spent { 0 } else { CONSOLE_BYTES };
+        // A turn has time for one of these: a long calculation, some bytes of the console, or one step of its work.
+        let bytes = if controller.catch_up() { 0 } else { CONSOLE_BYTES };
         for _ in 0..bytes {
             loop_bound::at_most::<CONSOLE_BYTES>();
             if serial.room() > 0

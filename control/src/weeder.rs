@@ -54,9 +54,6 @@ pub struct Orders {
     pub pulse_out: HalfMicros,
     /// The shortest gap between servo pulses in milliseconds; 0 for fixed frames.
     pub gap_ms: u8,
-    /// Whether this turn did long work: a classification step, or new leads, slip or settings. The loop then skips the console in
-    /// this turn.
-    pub turn_spent: bool,
 }
 
 /// The machine's decisions and their state.
@@ -74,8 +71,6 @@ pub struct Controller<C, M> {
     tool: Tool,
     /// Whether the speed has changed since the leads were calculated.
     leads_are_old: bool,
-    /// Whether this turn has already done long work.
-    turn_spent: bool,
     /// Whether the machine waits for a watchdog reset: `test watchdog`.
     tests_watchdog: bool,
     /// Console lines with an error, or with lost bytes.
@@ -110,7 +105,6 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             state: State::Hold,
             tool: Tool::NONE,
             leads_are_old: false,
-            turn_spent: false,
             tests_watchdog: false,
             mistakes: 0,
             dust: 0,
@@ -244,21 +238,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             Some(Err(ScheduleFull)) => self.raise(Alarm::ScheduleFull),
             None => {}
         }
-        // Each of these uses a large part of a turn's cycle budget, so a turn does only one of them.
-        if !self.turn_spent {
-            if self.configuration.has_changed() {
-                self.follow_settings();
-            } else if self.ground.is_to_be_corrected() {
-                self.ground.correct(self.configuration.settings());
-                self.turn_spent = true;
-            } else if self.leads_are_old {
-                self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
-                (self.leads_are_old, self.turn_spent) = (false, true);
-            } else if self.ground.unclassified().is_some() {
-                // Last, because one detection can follow right after another.
-                self.go_on_classifying();
-            }
-        }
         if let Some(alarm) = self.fault(doubted) {
             self.raise(alarm);
         }
@@ -270,7 +249,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let orders = self.orders();
         self.tool.order(orders.pulse, readings.now);
         self.warn();
-        self.turn_spent = false;
         orders
     }
 
@@ -282,7 +260,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
             pulse_out: pulse_of(Setting::ServoOutUs),
             gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
-            turn_spent: self.turn_spent,
         }
     }
 
@@ -294,7 +271,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Starts to classify a complete detection. Classification takes several turns. Dust is only counted.
     fn classify(&mut self, detection: Detection, is_of_second: bool) {
-        self.turn_spent = true;
         let width_mm = self.ground.millimetres(self.ground.ticks(detection.width()));
         if !detection.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
             count(&mut self.dust);
@@ -318,12 +294,25 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.decide(vote);
     }
 
-    /// Runs one more step of the classification.
+    /// Runs one of the calculations that take a large part of a turn, if one is due: of settings, slip, leads or a class. Returns
+    /// whether it ran one. The loop calls this once a turn, and has no time for the console then.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    fn go_on_classifying(&mut self) {
-        self.turn_spent = true;
-        let vote = self.classifier.go_on();
-        self.decide(vote);
+    pub fn catch_up(&mut self) -> bool {
+        if self.configuration.has_changed() {
+            self.follow_settings();
+        } else if self.ground.is_to_be_corrected() {
+            self.ground.correct(self.configuration.settings());
+        } else if self.leads_are_old {
+            self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
+            self.leads_are_old = false;
+        } else if self.ground.unclassified().is_some() {
+            // Last, because one detection can follow right after another.
+            let vote = self.classifier.go_on();
+            self.decide(vote);
+        } else {
+            return false;
+        }
+        true
     }
 
     /// Once there is a vote: reports the detection, and keeps its ground unless it is a weed.

@@ -217,7 +217,7 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     let moving = usize::from(MAX_K);
     let search = by_depth("weeder_firmware::examples::BuiltIn::keep_nearest");
     assert_eq!(search, [examples::COUNT + 2, moving]);
-    assert_eq!(by_depth("control::weeder::Controller::go_on_classifying"), [nearest::AT_ONCE + 2, moving]);
+    assert_eq!(by_depth("control::weeder::Controller::catch_up"), [nearest::AT_ONCE + 2, moving]);
     // The ELF must have the loops' own records: of the edges that a turn takes, and of the console's bytes.
     let records = program(&elf()).records().len();
     assert_eq!(records, 2);

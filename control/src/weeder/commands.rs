@@ -89,7 +89,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let settings = self.configuration.settings();
         self.ground.follow(settings, self.sensors.readings.position, self.sensors.meter.speed());
         self.limits = Limits::of(settings, self.ground.wheel());
-        (self.leads_are_old, self.turn_spent) = (false, true);
+        self.leads_are_old = false;
     }
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.

@@ -101,14 +101,16 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
 
     /// A turn of the loop.
     pub fn turn(&mut self) -> Orders {
-        self.controller.step(self.readings)
+        self.turn_with(self.readings)
     }
 
     /// The sensors show this, and the loop turns: faster than [`turn`](Self::turn), as nothing is read back.
     #[inline(always)]
     pub fn turn_with(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
-        self.controller.step(readings)
+        let orders = self.controller.step(readings);
+        self.controller.catch_up();
+        orders
     }
 
     /// A turn of the loop, so many microseconds later.
