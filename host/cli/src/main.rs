@@ -12,24 +12,18 @@ mod bounds;
 mod check_board;
 mod classify;
 mod completions;
-mod course;
 mod design;
-mod destination;
 mod evaluate;
 mod examples;
 mod figures;
-mod finding;
 mod flash;
 mod hex;
 mod map;
 mod merge;
 mod monitor;
-mod numbers;
-mod output;
 mod part;
 mod plan;
 mod ports;
-mod progress;
 mod receiver;
 mod record;
 mod replay;
@@ -37,19 +31,18 @@ mod rows;
 mod serve;
 mod set_up;
 mod settings;
-mod sim;
 mod soak;
-mod source;
 mod sweep;
 mod train;
 mod trial;
 mod virtual_uno;
 
-use crate::finding::Finding;
 use anyhow::Result;
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use sim::finding::Finding;
+use sim::{course, destination, finding, numbers, output, progress, row, source};
 use std::env;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -75,7 +68,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Weed a simulated row with the real firmware on a virtual Uno.
-    Sim(Box<sim::Arguments>),
+    Sim(Box<row::Arguments>),
     /// Build the firmware and flash the Uno at a USB port.
     Flash(flash::Arguments),
     /// Write the firmware as an Intel HEX file, for the Arduino tools.
@@ -161,20 +154,13 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => error.exit(),
     };
-    match run(arguments.command) {
-        Ok(Finding::Good) => ExitCode::SUCCESS,
-        Ok(Finding::Bad) => ExitCode::from(1),
-        Err(error) => {
-            output::tell!("error: {error:#}");
-            ExitCode::from(2)
-        }
-    }
+    finding::exit(run(arguments.command))
 }
 
 /// Runs a command and returns its finding.
 fn run(command: Command) -> Result<Finding> {
     match command {
-        Command::Sim(arguments) => sim::run(&arguments),
+        Command::Sim(arguments) => row::run(&arguments),
         Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
         Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
         Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),

@@ -11,17 +11,19 @@ use std::env;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 
-/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`].
+/// Prints a line of a result. Takes the arguments of `println!`, and returns the result of [`print()`](crate::output::print()).
+#[macro_export]
 macro_rules! say {
     ($($words:tt)*) => { $crate::output::print(format_args!("{}\n", format_args!($($words)*))) };
 }
 
 /// Prints a message. Takes the arguments of `eprintln!`.
+#[macro_export]
 macro_rules! tell {
     ($($words:tt)*) => { $crate::output::tell_line(format_args!($($words)*)) };
 }
 
-pub(crate) use {say, tell};
+pub use {say, tell};
 
 /// Prints a part of the result, unchanged.
 ///
