@@ -14,7 +14,7 @@ use vcd::{Command, IdCode, Parser, Scope, ScopeItem, TimescaleUnit, Value, Var};
 use crate::error::FileError;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange};
 
-/// Longest recording, in hours. Nobody waits for the firmware to play a longer one.
+/// Longest recording, in hours. The firmware would take days to play a longer one.
 const MOST_HOURS: u64 = 24;
 
 /// Greatest nesting of scopes. An analyser writes one or two, and each uses the reader's stack.

@@ -403,7 +403,7 @@ fn a_paired_phone_watches_and_holds_and_nothing_else_unless_the_operator_allowed
             assert_eq!(served.command(&served.here, "", "start"), (200, "ok\n".to_owned()));
         }
         events.wait_for(|message| message["is"] == "event" && has(message, "said", "state is=work"));
-        // Whoever did not start it may hold it.
+        // A client that did not start it may hold it.
         assert_eq!(served.command(&served.lan, &other, "hold"), (200, "ok\n".to_owned()));
         events.wait_for(|message| message["is"] == "event" && has(message, "said", "state is=hold"));
         served.process.interrupt();
