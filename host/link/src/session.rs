@@ -269,6 +269,8 @@ impl Session {
                 // Noise has spoiled a line: once more.
                 _ => drop(self.own.insert(asked.line.clone())),
             },
+            // At once, not at the answer's end: a log and a map take the machine's position from it.
+            Some(_) if let ConsoleLine::Status(status) = said => self.happened.push_back(Happening::Status(status, line)),
             Some(lines) => lines.push(line),
             None => {
                 if said == ConsoleLine::Done {
