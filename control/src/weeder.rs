@@ -77,6 +77,8 @@ pub struct Controller<C, M> {
     mistakes: u16,
     /// Detections narrower than `min_width_mm`: dust.
     dust: u16,
+    /// Whether this turn has begun to classify a detection.
+    has_begun: bool,
     plant_timeout: PlantTimeout,
     unknown_run: UnknownRun,
     told: ExampleEntry,
@@ -108,6 +110,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             tests_watchdog: false,
             mistakes: 0,
             dust: 0,
+            has_begun: false,
             plant_timeout: PlantTimeout::since(Position::new(0)),
             unknown_run: UnknownRun::NONE,
             told: ExampleEntry::NONE,
@@ -285,6 +288,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let classified = Classified { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
         self.detections.remember(classified);
         self.ground.await_class(detection, is_of_second);
+        self.has_begun = true;
         // A detection without a seen beginning may be the rest of a plant, as narrow as a weed. It stays unknown.
         let vote = if detection.cut {
             Some(Vote::UNKNOWN)
@@ -298,7 +302,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// whether it ran one. The loop calls this once a turn, and has no time for the console then.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn catch_up(&mut self) -> bool {
-        if self.configuration.has_changed() {
+        if core::mem::take(&mut self.has_begun) {
+            // That was one.
+        } else if self.configuration.has_changed() {
             self.follow_settings();
         } else if self.ground.is_to_be_corrected() {
             self.ground.correct(self.configuration.settings());

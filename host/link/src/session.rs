@@ -270,7 +270,9 @@ impl Session {
                 _ => drop(self.own.insert(asked.line.clone())),
             },
             // At once, not at the answer's end: a log and a map take the machine's position from it.
-            Some(_) if let ConsoleLine::Status(status) = said => self.happened.push_back(Happening::Status(status, line)),
+            Some(_) if let ConsoleLine::Status(status) = said => {
+                self.happened.push_back(Happening::Status(status, line))
+            }
             Some(lines) => lines.push(line),
             None => {
                 if said == ConsoleLine::Done {
