@@ -336,7 +336,8 @@ fn lines(way_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Ve
     let steps = ((way_m.end - way_m.start) / LINE_STEP_M).ceil().max(1.0);
     for step in 0..=steps as u64 {
         let share = step as f64 / steps;
-        match (find(way_m.start + share * (way_m.end - way_m.start)), lines.last_mut()) {
+        // Exact at both ends: a rounding error beyond the last fix would lose the end.
+        match (find(way_m.start * (1.0 - share) + way_m.end * share), lines.last_mut()) {
             (Ok(found), Some(line)) => line.push(found.place),
             (Err(_), Some(line)) if !line.is_empty() => lines.push(Vec::new()),
             _ => {}

@@ -199,7 +199,9 @@ impl Track {
             let from_m = self.stations[first].way_m;
             let Some(to) = self.stations.get(first + 1) else { continue };
             let (low, high) = (from_m.min(to.way_m), from_m.max(to.way_m));
-            if (low..=high).contains(&way_m) && high > low {
+            // The fixes of a standstill are one station, which lies where the first of them does: the track ends a little beyond.
+            let beyond = if first + 2 == self.stations.len() { STANDING_M } else { 0.0 };
+            if (low - beyond..=high + beyond).contains(&way_m) && high > low {
                 return Ok(first);
             }
             if high < way_m - ROLLED_BACK_M.max(self.longest_outage_m) {
@@ -283,6 +285,18 @@ mod tests {
     #[track_caller]
     fn off_m(found: Result<Found, Missing>, metres: Metres) -> f64 {
         Plane::around(FIELD).metres(found.expect("it has a place").place).minus(metres).length()
+    }
+
+    #[test]
+    fn the_track_reaches_to_where_the_machine_stands_at_its_end() {
+        // The fixes of the standstill are one station, at the first of them.
+        let ways_m = every_half_metre(10).chain([4.998, 5.0, 5.0]);
+        let track = Track::through(&driven(ways_m, |way_m| Metres { east: way_m, north: 0.0 }), None, 20.0)
+            .expect("it has fixes");
+        for way_m in [4.998, 5.0, 5.002] {
+            assert!(off_m(track.find(way_m, 12_000.0, Offset::default()), Metres { east: way_m, north: 0.0 }) < 0.005);
+        }
+        assert_eq!(track.find(5.01, 12_000.0, Offset::default()), Err(Missing::NoFixBehind));
     }
 
     proptest! {
