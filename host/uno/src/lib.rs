@@ -22,6 +22,8 @@ pub mod elf;
 #[cfg(feature = "simavr")]
 mod error;
 #[cfg(feature = "simavr")]
+mod file_error;
+#[cfg(feature = "simavr")]
 pub mod hex;
 #[cfg(feature = "simavr")]
 mod interrupts;
@@ -49,7 +51,8 @@ pub use self::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 #[cfg(feature = "simavr")]
 pub use self::{
     board::Uno,
-    error::{FileError, UnoError},
+    error::UnoError,
+    file_error::FileError,
     interrupts::{HandlerCycles, InterruptStatistics, Place},
     recorder::{ReceivedByte, Reset, ResetCause},
     terminal::{BAUD, SENT_BYTE_CYCLES},
