@@ -330,14 +330,13 @@ impl Job {
 /// Distance between two positions of a line, in metres.
 const LINE_STEP_M: f64 = 0.5;
 
-/// The lines along this distance, wherever there are positions.
+/// The lines along this distance, where positions are known.
 fn lines(way_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Vec<Vec<Place>> {
     let mut lines: Vec<Vec<Place>> = vec![Vec::new()];
     let steps = ((way_m.end - way_m.start) / LINE_STEP_M).ceil().max(1.0);
     for step in 0..=steps as u64 {
         let share = step as f64 / steps;
-        // Exact at both ends: a rounding error beyond the last fix would lose the end.
-        match (find(way_m.start * (1.0 - share) + way_m.end * share), lines.last_mut()) {
+        match (find(way_m.start + share * (way_m.end - way_m.start)), lines.last_mut()) {
             (Ok(found), Some(line)) => line.push(found.place),
             (Err(_), Some(line)) if !line.is_empty() => lines.push(Vec::new()),
             _ => {}
