@@ -223,7 +223,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let doubted = self.sensors.odometer.read(readings.position, readings.jumps, self.believes_jumps());
         let position = self.sensors.odometer.place(readings.position);
         self.sensors.readings.position = position;
-        self.leads_are_old |= self.sensors.meter.read(readings.now, position).is_some();
+        self.leads_are_old |= self.sensors.meter.read(readings.now, position);
         match self.sensors.switch.read(readings.now, readings.switch_on) {
             // The operator clears an alarm first: with `clear`, or by turning the switch off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
@@ -309,7 +309,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         } else if self.ground.is_to_be_corrected() {
             self.ground.correct(self.configuration.settings());
         } else if self.leads_are_old {
-            self.ground.lead(self.configuration.settings(), self.sensors.meter.speed());
+            self.ground.lead(self.configuration.settings(), self.sensors.meter.expected());
             self.leads_are_old = false;
         } else if self.ground.unclassified().is_some() {
             // Last, because one detection can follow right after another.

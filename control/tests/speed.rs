@@ -36,6 +36,10 @@ impl Run {
     fn speed(&self) -> f64 {
         f64::from(self.meter.speed().0)
     }
+
+    fn expected(&self) -> f64 {
+        f64::from(self.meter.expected().0)
+    }
 }
 
 proptest! {
@@ -51,6 +55,36 @@ proptest! {
         let mut run = Run::new();
         run.roll(1200, turn_us, |time| speed * time);
         prop_assert!((run.speed() - speed).abs() <= 1.0 + speed.abs() / 100.0, "{} is not {speed}", run.speed());
+        // Some ticks of the averaging time.
+        let ahead = (run.expected() - run.speed()) * speed.signum();
+        prop_assert!((0.0..=50.0 + speed.abs() / 50.0).contains(&ahead), "{ahead} ticks a second ahead of {speed}");
+    }
+
+    #[test]
+    fn the_expected_speed_is_ahead_of_a_machine_that_accelerates(
+        // 0.26 to 1.3 m/s2 on the default wheel.
+        ticks_a_s2 in 500_f64..2500.0,
+        backwards in any::<bool>(),
+        turn_us in 200_u64..1000,
+    ) {
+        let direction = if backwards { -1.0 } else { 1.0 };
+        let mut run = Run::new();
+        let ticks = |time: f64| direction * ticks_a_s2 * time * time / 2.0;
+        run.roll(1000, turn_us, ticks);
+        let ahead_ms = |run: &Run| 1000.0 * (direction * run.expected() / ticks_a_s2 - run.time_us as f64 / 1e6);
+        let mean_ms = (0..50).map(|_| ahead_ms(run.roll(20, turn_us, ticks))).sum::<f64>() / 50.0;
+        // 100 ms ahead of a measurement that is 40 ms old, or older where ticks are rare.
+        prop_assert!((40.0..=90.0).contains(&mean_ms), "{mean_ms} ms ahead");
+    }
+
+    #[test]
+    fn the_expected_speed_of_a_machine_that_brakes_is_the_measured_one(speed in 300_f64..2000.0, backwards in any::<bool>()) {
+        let direction = if backwards { -1.0 } else { 1.0 };
+        let mut run = Run::new();
+        run.roll(1000, 700, |time| direction * speed * time);
+        // It stands after a second.
+        run.roll(200, 700, |time| direction * speed * (time - (time - 1.0).powi(2) / 2.0));
+        prop_assert_eq!(run.expected(), run.speed());
     }
 
     #[test]
@@ -112,18 +146,20 @@ fn one_tick_backwards_changes_the_speed_by_its_share() {
 }
 
 #[test]
-fn the_speed_is_returned_only_when_it_has_changed() {
+fn a_reading_that_changes_a_speed_is_reported() {
     let mut meter = SpeedMeter::new(Position::new(0), Instant::default());
-    let mut known = meter.speed();
+    let mut reported = 0;
     for milliseconds in 0..2000_u32 {
         // It accelerates, rolls at constant speed and stands.
         let count = (milliseconds * milliseconds / 500).min(milliseconds).min(1000);
         let now = Instant::default() + Interval::from_ms(milliseconds);
-        let told = meter.read(now, Position::new(count as i32));
-        assert_eq!(told, (meter.speed() != known).then_some(meter.speed()), "at {milliseconds} ms");
-        known = told.unwrap_or(known);
+        let before = (meter.speed(), meter.expected());
+        let is_reported = meter.read(now, Position::new(count as i32));
+        assert!(is_reported || (meter.speed(), meter.expected()) == before, "at {milliseconds} ms");
+        reported += u32::from(is_reported);
     }
-    assert_eq!(known, TicksPerSecond(0));
+    assert_eq!((meter.speed(), meter.expected()), (TicksPerSecond(0), TicksPerSecond(0)));
+    assert!(reported < 150, "{reported} of 2000 readings");
 }
 
 #[test]

@@ -201,9 +201,9 @@ impl KeepOut {
         self.canopies.iter().any(|canopy| (canopy.to() - near) >= -margin && (canopy.from() - near) <= length)
     }
 
-    /// The canopy whose margin covers a place, from its beginning to its end; the nearest one if there are several.
+    /// The canopy or stem zone whose margin covers a place, from its beginning to its end; the nearest one if there are several.
     pub fn zone_at(&self, place: WrappedPosition, margin: Length) -> Option<(WrappedPosition, WrappedPosition)> {
-        let zones = self.canopies.iter().map(|canopy| (canopy.leading, canopy.trailing));
+        let zones = self.canopies.iter().map(|canopy| (canopy.from(), canopy.to()));
         let off =
             |&(begin, end): &(WrappedPosition, WrappedPosition)| (begin - place).max(place - end).max(Length::ZERO);
         zones.min_by_key(off).filter(|zone| off(zone) <= margin)

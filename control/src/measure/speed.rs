@@ -4,6 +4,10 @@
 //! oldest one, divided by its time: about 80 ms at walking speed, and six ticks if the machine creeps. After a longer silence than
 //! the speed explains, the speed is limited to one tick in that silence; after `STANDSTILL` it is 0. A single tick backwards from
 //! vibration changes the speed only by its share.
+//!
+//! So the measured speed of a machine that accelerates is 40 ms old, and in the middle of a swing the machine is faster again.
+//! [`SpeedMeter::expected`] adds what the machine gains in 100 ms. The gain shows in the distance of the averaging time, compared with
+//! its mean over another 80 ms.
 
 use crate::units::{Coarse, Instant, Position, TicksPerSecond};
 
@@ -16,6 +20,9 @@ const SAMPLES: u8 = 8;
 
 /// Silence after which the machine stands.
 const STANDSTILL: u16 = Coarse::steps_in_ms(500);
+
+/// The patience of a meter that has shown a standing machine. It is beyond the patience of any speed.
+const STANDING: u16 = STANDSTILL + 1;
 
 /// The longest averaging time has to fit a coarse moment.
 const _: () = assert!(SAMPLES as u32 * (STANDSTILL as u32) < u16::MAX as u32);
@@ -39,6 +46,10 @@ pub struct SpeedMeter {
     /// The silence that the present speed explains.
     patience: u16,
     speed: TicksPerSecond,
+    /// Eight times the mean distance of the last averaging times, in ticks.
+    trend: i16,
+    /// The last distance above that mean, in ticks; 0 for a machine that does not become faster.
+    gain: i16,
 }
 
 impl SpeedMeter {
@@ -50,6 +61,8 @@ impl SpeedMeter {
         last: Sample { place: 0, time: Coarse::ZERO },
         patience: 0,
         speed: TicksPerSecond(0),
+        trend: 0,
+        gain: 0,
     };
 
     /// A meter of a machine that stands at `position`.
@@ -70,30 +83,37 @@ impl SpeedMeter {
         self.speed
     }
 
-    /// Takes a reading. Returns the speed if it has changed. The caller calls it at least every few milliseconds.
+    /// The speed in the middle of a swing that starts now, if the machine goes on accelerating. It is at least the measured speed,
+    /// because a machine that brakes may stop braking.
+    #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn read(&mut self, now: Instant, position: Position) -> Option<TicksPerSecond> {
-        let before = self.speed;
+    pub fn expected(&self) -> TicksPerSecond {
+        // A tick in 80 ms is 12.5 ticks a second. The machine gained them in 80 ms, and gains 16 in 100 ms.
+        TicksPerSecond(self.speed.0 + i32::from(self.gain << 4))
+    }
+
+    /// Takes a reading. Returns whether it may have changed the speeds. The caller calls it at least every few milliseconds.
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    pub fn read(&mut self, now: Instant, position: Position) -> bool {
         let reading = Sample { place: position.count() as u16, time: now.coarse() };
         if reading.place != self.last.place {
-            self.moved(reading);
+            self.moved(reading)
         } else {
-            self.silent(reading.time.since(self.last.time));
+            self.silent(reading.time.since(self.last.time))
         }
-        (self.speed != before).then_some(self.speed)
     }
 
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    fn moved(&mut self, reading: Sample) {
+    fn moved(&mut self, reading: Sample) -> bool {
         self.last = reading;
         if self.count == 0 {
             self.remember(reading);
-            return;
+            return false;
         }
         let newest = self.samples[usize::from((self.next + SAMPLES - 1) % SAMPLES)];
         if reading.time.since(newest.time) < SPACING {
-            return;
+            return false;
         }
         let oldest = self.samples[usize::from((self.next + SAMPLES - self.count) % SAMPLES)];
         self.remember(reading);
@@ -101,11 +121,16 @@ impl SpeedMeter {
         let time = reading.time.since(oldest.time);
         let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
         self.speed = TicksPerSecond(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
+        // It wraps only beyond 40,000 ticks a second, which are no machine's.
+        let gain = distance.wrapping_sub(self.trend >> 3);
+        self.trend = self.trend.wrapping_add(gain);
+        self.gain = if (gain ^ distance) < 0 { 0 } else { gain };
         // The time of two ticks, because encoders do not space their edges evenly.
         self.patience = match speed {
             0 => STANDSTILL,
             speed => ((2 * Coarse::STEPS_PER_SECOND / speed) as u16).clamp(SPACING, STANDSTILL),
         };
+        true
     }
 
     fn remember(&mut self, reading: Sample) {
@@ -115,20 +140,20 @@ impl SpeedMeter {
     }
 
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    fn silent(&mut self, silence: u16) {
+    fn silent(&mut self, silence: u16) -> bool {
         if silence < self.patience {
-            return;
+            return false;
         }
         // The samples no longer give the speed. Measurement restarts when the machine moves.
-        self.count = 0;
+        (self.count, self.trend, self.gain) = (0, 0, 0);
         if silence >= STANDSTILL {
             self.speed = TicksPerSecond(0);
-            self.patience = STANDSTILL;
-            return;
+            return core::mem::replace(&mut self.patience, STANDING) != STANDING;
         }
         let limit = i32::from(Coarse::STEPS_PER_SECOND as u16 / silence);
         self.speed = TicksPerSecond(self.speed.0.clamp(-limit, limit));
         // The next check comes after an eighth more, so that divisions stay rare.
         self.patience = (silence + silence / 8).min(STANDSTILL);
+        true
     }
 }

@@ -87,7 +87,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.ground.forget_slip();
         }
         let settings = self.configuration.settings();
-        self.ground.follow(settings, self.sensors.readings.position, self.sensors.meter.speed());
+        self.ground.follow(settings, self.sensors.readings.position, self.sensors.meter.expected());
         self.limits = Limits::of(settings, self.ground.wheel());
         self.leads_are_old = false;
     }
