@@ -76,7 +76,7 @@ console_lines! {
     }
     /// The end of an answer.
     End {
-        /// The error, and what would be right. `None` if the command succeeded.
+        /// The error, and what would be right; missing if the command succeeded.
         error: Option<String>,
     }
     /// A setting: a line of the answer to `get`, or the measured value in the answer to `calibrate MM`. A switch is 0 or 1.
