@@ -43,7 +43,8 @@ macro_rules! event_table {
             Swing "the tool was commanded in or out",
             Event::Swing { out, position } => "swing" {
                 "tool" = place(out) => out: bool, "where it is to be";
-                "pos" = number(position.count()) => position: i32, "the machine's position at the command, in encoder ticks";
+                "pos" = number(position.count()) => position: i32,
+                    "the machine's position at the command, in encoder ticks";
             }
             Slip "a plant passed both beams and told the wheel's slip",
             Event::Slip { permille } => "slip" {
@@ -80,42 +81,48 @@ macro_rules! event_table {
     };
 }
 
-/// Passes the table of the answer to `status` to a macro: first the name of its [`Controller`](crate::weeder::Controller), then the lines.
+/// Passes the table of the answer to `status` to a macro.
 ///
-/// A row has the line's name, its meaning, and its values in groups. A value is as in the [table of events](event_table). A group
-/// behind `if` is in the line if its pattern matches, and its fields are optional.
+/// It begins with the name that its expressions have for the [`Controller`](crate::weeder::Controller). A row has the line's name,
+/// its meaning, and its values in groups. A value is as in the [table of events](event_table). A group behind `if` is in the line
+/// if its pattern matches. Its fields are optional.
 #[macro_export]
 macro_rules! status_table {
     ($make:ident) => {
         $make! { machine:
-            Status "the first line of the answer to `status`: the machine" {
-                "state" = state(machine.state()) => mode: Mode, "what the machine is doing";
+            Status "the first line of the answer to `status`" {
+                "state" = state(machine.state()) => mode: Mode, "the machine's state";
             } if State::Alarm(alarm) = machine.state() => {
-                "code" = led(alarm), "the alarm as the lamp blinks it";
-                "name" = alarm(alarm) => alarm: Option<Alarm>, "the latched alarm";
+                "code" = led(alarm), "in an alarm: how the lamp shows it";
+                "name" = alarm(alarm) => alarm: Option<Alarm>, "in an alarm: which one";
             } {
                 "tool" = place(machine.tool_out()) => tool_out: bool, "where the tool is to be";
             } if Some(reason) = machine.reason() => {
                 "for" = reason(reason) => reason: Option<String>,
-                    "why the tool is out at work: `plant`, `unseen_ground`, `too_fast`, `encoder_doubtful`";
+                    "at work: why the tool is out (`plant`, `unseen_ground`, `too_fast`, `encoder_doubtful`)";
             } {
-                "pos" = number(machine.readings().position.count()) => position: i32, "the machine's position, in encoder ticks";
-                "speed_mm_s" = number(machine.speed_mm_s()) => speed_mm_s: i32, "its speed in mm/s, negative backwards";
+                "pos" = number(machine.readings().position.count()) => position: i32,
+                    "the machine's position, in encoder ticks";
+                "speed_mm_s" = number(machine.speed_mm_s()) => speed_mm_s: i32,
+                    "the machine's speed in mm/s, negative backwards";
                 "windows" = count(machine.zones()) => zones: u32, "keep-out zones at the tool or ahead of it";
                 "unseen_mm" = number(machine.unseen_mm()) => unseen_mm: i32,
-                    "distance in mm until ground that the beam has seen reaches the tool";
+                    "distance until ground that the beam has seen reaches the tool, in mm";
             } if true = machine.has_second_beam() => {
                 "slip_permille" = optional(machine.slip_permille()) => slip_permille: Option<i32>,
-                    "with a second beam: the wheel's slip in thousandths, above 0 if the wheel turns farther than the machine rolls, or `none`";
+                    "with a second beam: the wheel's slip in thousandths, as the event has it, or `none`";
             };
-            Counts "the second line of the answer to `status`: what was counted since the reset" {
+            Counts "the second line of the answer to `status`, with what was counted since the reset" {
                 "lost" = count(machine.readings().lost) => lost: u16, "encoder steps without a direction";
-                "jumps" = count(machine.readings().jumps) => jumps: u16, "changes of both channels at once, which are not counted";
+                "jumps" = count(machine.readings().jumps) => jumps: u16,
+                    "changes of both channels at once, which are not counted";
                 "late" = count(machine.late()) => late: u16, "commands to the tool that came too late";
-                "missed" = count(machine.events_missed()) => missed: u16, "events that were dropped, because the monitor reads too slowly";
+                "missed" = count(machine.events_missed()) => missed: u16,
+                    "events that were dropped, because the monitor reads too slowly";
                 "mistakes" = count(machine.command_errors()) => command_errors: u16, "console lines with an error";
                 "dust" = count(machine.dust()) => dust: u16, "detections narrower than `min_width_mm`";
-                "stack_free" = count(machine.readings().stack_free) => stack_free: u16, "bytes of stack that were never used";
+                "stack_free" = count(machine.readings().stack_free) => stack_free: u16,
+                    "bytes of stack that were never used";
                 "reset" = cause(machine.cause()) => cause: String, "cause of the last reset";
             } if true = machine.sees_no_plants() => {
                 "warning" = warning(Warning::NoPlants) => warning: Option<Warning>, "the present warning";

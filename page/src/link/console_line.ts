@@ -95,30 +95,30 @@ export interface Plot {
     readonly is: "plot";
 }
 
-/** The first line of the answer to `status`: the machine. */
+/** The first line of the answer to `status`. */
 export interface Status {
     readonly is: "status";
-    /** What the machine is doing. */
+    /** The machine's state. */
     readonly mode: Mode;
-    /** The latched alarm. */
+    /** In an alarm: which one. */
     readonly alarm?: string;
     /** Where the tool is to be. */
     readonly toolOut: boolean;
-    /** Why the tool is out at work: `plant`, `unseen_ground`, `too_fast`, `encoder_doubtful`. */
+    /** At work: why the tool is out (`plant`, `unseen_ground`, `too_fast`, `encoder_doubtful`). */
     readonly reason?: string;
     /** The machine's position, in encoder ticks. */
     readonly position: number;
-    /** Its speed in mm/s, negative backwards. */
+    /** The machine's speed in mm/s, negative backwards. */
     readonly speedMmS: number;
     /** Keep-out zones at the tool or ahead of it. */
     readonly zones: number;
-    /** Distance in mm until ground that the beam has seen reaches the tool. */
+    /** Distance until ground that the beam has seen reaches the tool, in mm. */
     readonly unseenMm: number;
-    /** With a second beam: the wheel's slip in thousandths, above 0 if the wheel turns farther than the machine rolls, or `none`. */
+    /** With a second beam: the wheel's slip in thousandths, as the event has it, or `none`. */
     readonly slipPermille?: number;
 }
 
-/** The second line of the answer to `status`: what was counted since the reset. */
+/** The second line of the answer to `status`, with what was counted since the reset. */
 export interface Counts {
     readonly is: "counts";
     /** Encoder steps without a direction. */
