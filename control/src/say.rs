@@ -12,10 +12,10 @@
 mod answer;
 pub mod command;
 mod errors;
-mod event_table;
 mod events;
 mod execute;
 pub mod line;
+mod line_tables;
 pub mod names;
 pub mod packed;
 mod status;

@@ -74,7 +74,7 @@ pub struct Controller<C, M> {
     /// Whether the machine waits for a watchdog reset: `test watchdog`.
     tests_watchdog: bool,
     /// Console lines with an error, or with lost bytes.
-    mistakes: u16,
+    command_errors: u16,
     /// Detections narrower than `min_width_mm`: dust.
     dust: u16,
     /// Whether this turn has begun to classify a detection.
@@ -108,7 +108,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             tool: Tool::NONE,
             leads_are_old: false,
             tests_watchdog: false,
-            mistakes: 0,
+            command_errors: 0,
             dust: 0,
             has_begun: false,
             plant_timeout: PlantTimeout::since(Position::new(0)),

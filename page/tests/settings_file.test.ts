@@ -2,10 +2,11 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Setting } from "../src/link/grammar.ts";
+import type { Setting } from "../src/link/console_line.ts";
 import { parse, SettingsFileError } from "../src/link/settings_file.ts";
 
 const setting = (name: string, value: number, greatest: number): Setting => ({
+    is: "setting",
     name,
     value,
     least: 0,

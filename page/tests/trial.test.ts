@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import hex from "weeder.hex";
-import { isTold, read } from "../src/link/grammar.ts";
+import { isEvent, read } from "../src/link/grammar.ts";
 import { LineReader } from "../src/link/lines.ts";
 import { inWords } from "../src/try/outcome.ts";
 import { Trial } from "../src/try/trial.ts";
@@ -23,8 +23,8 @@ class Tried {
             this.heard += text;
             for (const line of lines.take(text)) {
                 const said = read(line);
-                if (said.is === "status") this.trial.take({ is: "status", status: said.status, line });
-                else if (isTold(said)) this.trial.take({ is: "told", said, line });
+                if (said.is === "status") this.trial.take({ is: "status", status: said, line });
+                else if (isEvent(said)) this.trial.take({ is: "event", event: said, line });
             }
         };
         this.pass(0.5);

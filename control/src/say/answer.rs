@@ -2,14 +2,18 @@
 
 use super::{
     command::{Command, ParseError},
-    errors::{write_mistake, write_refusal},
+    errors::{write_command_error, write_parse_error},
     line::Line,
-    status::{write_counts, write_detection, write_example, write_setting, write_state, write_status},
+    names,
+    status::{Counts, Status, write_detection, write_example, write_setting},
     texts::{self, Text},
     words::Word,
 };
 use crate::{
-    ground::class::Classifier, memory::Memory, operate::command_error::CommandError, settings::Setting,
+    ground::class::Classifier,
+    memory::Memory,
+    operate::{command_error::CommandError, state::State},
+    settings::Setting,
     weeder::Controller,
 };
 
@@ -69,7 +73,10 @@ impl Answer {
                 line.say(texts::RESET_BY);
                 line.say(controller.cause().text());
                 line.say(texts::STATE);
-                write_state(controller.state(), texts::IN_WORDS, line);
+                line.say(names::state(controller.state()));
+                if let State::Alarm(alarm) = controller.state() {
+                    line.alarm(texts::IN_WORDS, alarm);
+                }
                 line.say(texts::TOOL_OUT);
                 Self::Done
             }
@@ -85,11 +92,11 @@ impl Answer {
                 Self::Get(setting)
             }
             Self::Status => {
-                write_status(controller, line);
+                Status::write(controller, line);
                 Self::Counts
             }
             Self::Counts => {
-                write_counts(controller, line);
+                Counts::write(controller, line);
                 Self::Ok
             }
             Self::Get(setting) => {
@@ -132,11 +139,11 @@ impl Answer {
                 Self::Done
             }
             Self::Wrong(error) => {
-                write_mistake(error, line);
+                write_parse_error(error, line);
                 Self::Done
             }
             Self::Refused(error, setting) => {
-                write_refusal(error, setting, controller, line);
+                write_command_error(error, setting, controller, line);
                 Self::Done
             }
         };

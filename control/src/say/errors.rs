@@ -15,7 +15,7 @@ use crate::{
     weeder::Controller,
 };
 
-pub(super) fn write_mistake(error: ParseError, line: &mut Line) {
+pub(super) fn write_parse_error(error: ParseError, line: &mut Line) {
     line.say(texts::ERROR);
     let what = match error {
         ParseError::TooLong => texts::TOO_LONG,
@@ -33,7 +33,7 @@ pub(super) fn write_mistake(error: ParseError, line: &mut Line) {
     line.say(what);
 }
 
-pub(super) fn write_refusal<C: Classifier, M: Memory>(
+pub(super) fn write_command_error<C: Classifier, M: Memory>(
     error: CommandError,
     setting: Option<Setting>,
     controller: &Controller<C, M>,

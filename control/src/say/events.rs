@@ -1,8 +1,8 @@
 //! Writes the lines of events from the [table of events](crate::event_table).
 
 use super::{
-    event_table::event_line,
     line::Line,
+    line_tables::line,
     names,
     texts::{self, Text},
 };
@@ -20,7 +20,7 @@ macro_rules! write_event {
         #[inline(never)]
         pub fn write_event(event: &Event, line: &mut Line) {
             match *event {
-                $($pattern => event_line!(write(line) $beginning $($values)* $($tail)?),)*
+                $($pattern => line!(write(line) $beginning " " $($values)* $($tail)?),)*
             }
             line.say(texts::END);
         }

@@ -19,7 +19,7 @@ where
     let command = match line {
         Ok(command) => command,
         Err(error) => {
-            controller.count_mistake();
+            controller.count_command_error();
             return Answer::Wrong(error);
         }
     };

@@ -5,7 +5,10 @@
 
 use crate::{
     alarm::Alarm,
-    say::{packed::Characters, texts::Text},
+    say::{
+        packed::Characters,
+        texts::{self, Text},
+    },
 };
 use ufmt::{Formatter, uDisplay, uWrite};
 
@@ -70,9 +73,17 @@ impl Line {
         self.numbers += 1;
     }
 
-    /// Adds an alarm's code, for two `#`.
+    /// Adds a number, or `none`.
+    pub(crate) fn optional(&mut self, number: Option<i16>) {
+        self.say(if number.is_some() { texts::NUMBER } else { texts::NONE });
+        self.number(number.unwrap_or(0).into());
+    }
+
+    /// Adds an alarm's code, in a text with two `#`, and its name.
     #[inline(never)]
-    pub(crate) fn led(&mut self, alarm: Alarm) {
+    pub(crate) fn alarm(&mut self, code: Text, alarm: Alarm) {
+        self.say(code);
+        self.say(alarm.text());
         let (first, second) = alarm.code();
         self.counted(first.into());
         self.counted(second.into());
@@ -125,7 +136,6 @@ impl Default for Line {
 mod tests {
     extern crate std;
     use super::*;
-    use crate::say::texts;
     use std::string::{String, ToString};
 
     fn written(mut line: Line) -> String {

@@ -47,6 +47,7 @@ impl Setting {
 }
 
 /// The state's name.
+#[inline(never)]
 pub fn state(state: State) -> Text {
     match state {
         State::Hold => Word::Hold.text(),
@@ -63,6 +64,16 @@ pub fn alarm(alarm: Alarm) -> Text {
 /// A warning's name.
 pub fn warning(warning: Warning) -> Text {
     warning.text()
+}
+
+/// The name of the reason for the tool being out.
+pub fn reason(reason: Reason) -> Text {
+    reason.text()
+}
+
+/// The name of a reset's cause.
+pub fn cause(cause: Cause) -> Text {
+    cause.text()
 }
 
 /// The tool's command: `in` or `out`.

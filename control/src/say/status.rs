@@ -1,8 +1,8 @@
 //! Lines about the machine: status, curves, settings, examples and detections.
 
-use super::names;
+use super::{line_tables::line, names};
 use crate::{
-    alarm::{Alarm, Warning},
+    alarm::Warning,
     ground::class::{Classifier, Listed},
     memory::Memory,
     operate::{detections::Classified, plot::Plot, state::State},
@@ -12,63 +12,30 @@ use crate::{
         words::Argument,
     },
     settings::Setting,
+    status_table,
     weeder::Controller,
 };
 
-/// The state, and for an alarm its code within the text `between`, and its name.
-pub(super) fn write_state(state: State, between: Text, line: &mut Line) {
-    line.say(names::state(state));
-    if let State::Alarm(alarm) = state {
-        write_alarm(alarm, between, line);
-    }
+macro_rules! write_status {
+    ($machine:ident: $(
+        $Line:ident $meaning:literal { $($first:tt)* } $($(if $pattern:pat = $from:expr =>)? { $($values:tt)* })*;
+    )*) => {$(
+        #[doc = $meaning]
+        pub(super) struct $Line;
+
+        impl $Line {
+            /// Builds the line.
+            pub(super) fn write<C: Classifier, M: Memory>($machine: &Controller<C, M>, line: &mut Line) {
+                line!(write(line) "" "" $($first)*);
+                $($(if let $pattern = $from)? {
+                    line!(write(line) "" " " $($values)*);
+                })*
+            }
+        }
+    )*};
 }
 
-/// An alarm's code, within a text for its two digits, and its name.
-#[inline(never)]
-pub(super) fn write_alarm(alarm: Alarm, code: Text, line: &mut Line) {
-    line.say(code);
-    line.led(alarm);
-    line.say(alarm.text());
-}
-
-pub(super) fn write_status<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
-    line.say(texts::STATE_IS);
-    write_state(controller.state(), texts::CODE, line);
-    line.say(texts::TOOL_IS);
-    line.say(names::place(controller.tool_out()));
-    if let Some(reason) = controller.reason() {
-        line.say(texts::FOR);
-        line.say(reason.text());
-    }
-    line.say(texts::PLACE);
-    line.number(controller.readings().position.count());
-    line.number(controller.speed_mm_s().into());
-    line.counted(controller.zones().into());
-    line.number(controller.unseen_mm().into());
-    if controller.has_second_beam() {
-        line.say(texts::SLIP_IS);
-        let slip = controller.slip_permille();
-        line.say(if slip.is_some() { texts::NUMBER } else { texts::NONE });
-        line.number(slip.unwrap_or(0).into());
-    }
-}
-
-pub(super) fn write_counts<C: Classifier, M: Memory>(controller: &Controller<C, M>, line: &mut Line) {
-    let readings = controller.readings();
-    line.say(texts::COUNTS);
-    line.counted(readings.lost);
-    line.counted(readings.jumps);
-    line.counted(controller.late());
-    line.counted(controller.events_missed());
-    line.counted(controller.mistakes());
-    line.counted(controller.dust());
-    line.counted(readings.stack_free);
-    line.say(controller.cause().text());
-    if controller.sees_no_plants() {
-        line.say(texts::WARNING_IS);
-        line.say(Warning::NoPlants.text());
-    }
-}
+status_table!(write_status);
 
 /// Builds the next points of a plotter's curves, each `label:value`.
 #[inline(never)]

@@ -9,18 +9,19 @@ use crate::{
     measure::reset::Cause,
     operate::{command_error::CommandError, tool::Reason},
     say::{
-        event_table::event_line,
+        line_tables::line,
         version,
         words::{Argument, Word},
     },
     settings::{self, Setting},
+    status_table,
 };
 
 /// All texts, in the order of the table in flash.
 pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
-    EVENTS,
-    REFUSALS,
+    KEYED,
+    COMMAND_ERRORS,
     TAKES_WORDS,
     HELPS,
     settings::UNITS,
@@ -63,11 +64,11 @@ impl Text {
         Self(first)
     }
 
-    /// A text in the line of an event.
-    pub(crate) const fn of_event(text: &str) -> Self {
-        let place = place_of(text, EVENTS);
-        assert!(place < EVENTS.len(), "the table of events has it");
-        Self::first_of(EVENTS).plus(place as u8)
+    /// A text in a line of the tables.
+    pub(crate) const fn of_line(text: &str) -> Self {
+        let place = place_of(text, KEYED);
+        assert!(place < KEYED.len(), "the tables have it");
+        Self::first_of(KEYED).plus(place as u8)
     }
 
     /// The text this many places after this one.
@@ -100,19 +101,35 @@ const fn is_same_text(one: &[u8], other: &[u8]) -> bool {
 macro_rules! texts_of_events {
     ($($Event:ident $meaning:literal, $pattern:pat => $beginning:literal { $($values:tt)* } $($tail:literal)?)*) => {
         /// The texts in the lines of events, line by line.
-        const OF_EVENTS: &[&[&str]] = &[$(event_line!(texts(line) $beginning $($values)* $($tail)?)),*];
+        const OF_EVENTS: &[&[&str]] = &[$(line!(texts(line) $beginning " " $($values)* $($tail)?)),*];
     };
 }
 
 event_table!(texts_of_events);
 
-/// The same without repetitions, and their number.
-const DISTINCT: ([&str; 32], usize) = {
-    let (mut texts, mut count, mut line) = ([""; 32], 0, 0);
-    while line < OF_EVENTS.len() {
+macro_rules! texts_of_status {
+    ($machine:ident: $(
+        $Line:ident $meaning:literal { $($first:tt)* } $($(if $pattern:pat = $from:expr =>)? { $($values:tt)* })*;
+    )*) => {
+        /// The texts in the answer to `status`, group by group.
+        const OF_STATUS: &[&[&str]] = &[$(line!(texts(line) "" "" $($first)*), $(line!(texts(line) "" " " $($values)*)),*),*];
+    };
+}
+
+status_table!(texts_of_status);
+
+/// Both without repetitions, and their number.
+const DISTINCT: ([&str; 48], usize) = distinct(OF_STATUS, distinct(OF_EVENTS, ([""; 48], 0)));
+
+const fn distinct(
+    lines: &[&[&'static str]],
+    (mut texts, mut count): ([&'static str; 48], usize),
+) -> ([&'static str; 48], usize) {
+    let mut line = 0;
+    while line < lines.len() {
         let mut place = 0;
-        while place < OF_EVENTS[line].len() {
-            let text = OF_EVENTS[line][place];
+        while place < lines[line].len() {
+            let text = lines[line][place];
             if place_of(text, &texts) == texts.len() {
                 (texts[count], count) = (text, count + 1);
             }
@@ -121,9 +138,10 @@ const DISTINCT: ([&str; 32], usize) = {
         line += 1;
     }
     (texts, count)
-};
+}
 
-const EVENTS: &[&str] = DISTINCT.0.split_at(DISTINCT.1).0;
+/// The texts of the tables.
+const KEYED: &[&str] = DISTINCT.0.split_at(DISTINCT.1).0;
 
 /// A text's index; the length if it is not there.
 const fn place_of(text: &str, texts: &[&str]) -> usize {
@@ -168,17 +186,9 @@ said! {
     ON_OR_OFF = " on or off";
     TAKES = " takes";
     TAKES_A_NUMBER = " takes a whole number";
-    STATE_IS = "state=";
-    TOOL_IS = " tool=";
-    FOR = " for=";
-    PLACE = " pos=# speed_mm_s=# windows=# unseen_mm=#";
-    COUNTS = "lost=# jumps=# late=# missed=# mistakes=# dust=# stack_free=# reset=";
-    WARNING_IS = " warning=";
-    SLIP_IS = " slip_permille=";
     NONE = "none";
     YES = "yes";
     NO = "no";
-    CODE = " code=#-# name=";
     SERIAL_PLOTTER = "speed_mm_s:#,tool_deg:#,beam_broken:#,windows:#";
     TELEPLOT = ">speed_mm_s:#\r\n>tool_deg:#\r\n>beam_broken:#\r\n>windows:#";
     FIELD = "field";
@@ -205,14 +215,14 @@ said! {
 }
 
 /// The texts of command errors: one each, up to `WheelDiffers`. From there on several texts make the line.
-macro_rules! refusals {
+macro_rules! command_errors {
     ($($CommandError:ident $text:literal;)*) => {
-        const REFUSALS: &[&str] = &[$($text),*];
+        const COMMAND_ERRORS: &[&str] = &[$($text),*];
 
         const _: () = {
             let mut place = 0;
             $(
-                assert!(CommandError::$CommandError as u8 == place, "the refusals stand here in the order of declaration");
+                assert!(CommandError::$CommandError as u8 == place, "the errors stand here in the order of declaration");
                 place += 1;
             )*
             assert!(place == CommandError::WheelDiffers as u8);
@@ -223,11 +233,11 @@ macro_rules! refusals {
 impl CommandError {
     /// Its text, if it has only one.
     pub(crate) fn text(self) -> Text {
-        const { Text::first_of(REFUSALS) }.plus(self as u8)
+        const { Text::first_of(COMMAND_ERRORS) }.plus(self as u8)
     }
 }
 
-refusals! {
+command_errors! {
     AlarmLatched "an alarm is latched, see status, then clear it";
     NotInHold "the machine is at work, hold first";
     PulsesEqual "servo_in_us and servo_out_us would be equal, and the tool would not move";

@@ -183,7 +183,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Counts a console line with an error.
-    pub fn count_mistake(&mut self) {
-        count(&mut self.mistakes);
+    pub fn count_command_error(&mut self) {
+        count(&mut self.command_errors);
     }
 }

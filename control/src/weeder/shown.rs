@@ -134,8 +134,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Console lines with an error.
-    pub fn mistakes(&self) -> u16 {
-        self.mistakes
+    pub fn command_errors(&self) -> u16 {
+        self.command_errors
     }
 
     /// Detections narrower than `min_width_mm`.

@@ -103,7 +103,7 @@ pub fn lost(turning: Turning, weeder: &mut Weeder, tester: &mut Tester) -> Resul
     if turning.busy {
         for _ in 0..ANSWER_READS {
             match weeder.next_line()?.map(|line| ConsoleLine::parse(&line)) {
-                Some(ConsoleLine::Done) => break,
+                Some(ConsoleLine::End { error: None }) => break,
                 Some(ConsoleLine::Greeting { .. }) => return Ok(None),
                 _ => {}
             }

@@ -137,7 +137,7 @@ impl Kept {
     pub fn read(weeder: &mut Weeder, tester: &mut Tester) -> Result<Self, CheckError> {
         reset(weeder, tester)?;
         let setting = |line: &String| match ConsoleLine::parse(line) {
-            ConsoleLine::Setting(setting) => Some((setting.name, setting.value)),
+            ConsoleLine::Setting { name, value, .. } => Some((name, value)),
             _ => None,
         };
         Ok(Self {
@@ -225,7 +225,7 @@ fn saves(moments: u32, kept: u32, weeder: &mut Weeder, tester: &mut Tester) -> R
 fn value(weeder: &mut Weeder) -> Result<u32, CheckError> {
     let lines = weeder.ask(&format!("get {SETTING}"))?;
     let value = lines.iter().find_map(|line| match ConsoleLine::parse(line) {
-        ConsoleLine::Setting(setting) => Some(setting.value.into()),
+        ConsoleLine::Setting { value, .. } => Some(value.into()),
         _ => None,
     });
     value.ok_or(CheckError::Answer("get"))

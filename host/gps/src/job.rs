@@ -475,7 +475,7 @@ impl Reading {
     fn answer(&mut self, line: &str) -> Option<Settings> {
         let before = self.tick_mm();
         match ConsoleLine::parse(line) {
-            ConsoleLine::Done => {
+            ConsoleLine::End { error: None } => {
                 let (number, time_ms, command) = self.unanswered.pop_front()?;
                 let words: Vec<&str> = command.split_whitespace().collect();
                 match words.as_slice() {
@@ -484,11 +484,11 @@ impl Reading {
                     _ => {}
                 }
             }
-            ConsoleLine::Refused(_) => {
+            ConsoleLine::End { error: Some(_) } => {
                 self.unanswered.pop_front();
             }
             // The output of `get` and `calibrate`.
-            ConsoleLine::Setting(_) => self.set(line),
+            ConsoleLine::Setting { .. } => self.set(line),
             _ => {}
         }
         (before != self.tick_mm()).then(|| self.settings.clone()).flatten()

@@ -4,37 +4,107 @@
 //! part is [`ConsoleLine::Other`]. This module does not know which command a line answers. A setting's name, range and
 //! unit are read from the line, not from this version's table.
 
-use super::{EventLine, Status};
+use super::event_line::{Counts, EventLine, Fields, LineDescription, Status, ValueDescription};
 use control::ground::class::Class;
 use control::ground::features::COUNT;
 
-/// What a line says.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum ConsoleLine {
+/// Defines the lines of answers that have no `key=value` words, and with them all lines.
+macro_rules! console_lines {
+    ($(
+        $(#[doc = $meaning:literal])+
+        $Line:ident { $($(#[doc = $about:literal])+ $field:ident: $Type:ty,)* }
+    )*) => {
+        /// What a line says.
+        #[derive(Clone, Debug, PartialEq, Eq)]
+        pub enum ConsoleLine {
+            $(
+                $(#[doc = $meaning])+
+                $Line { $($(#[doc = $about])+ $field: $Type,)* },
+            )*
+            /// The first line of the answer to `status`.
+            Status(Status),
+            /// The second line of the answer to `status`.
+            Counts(Counts),
+            /// An event.
+            Event(EventLine),
+            /// Something else.
+            Other,
+        }
+
+        /// The lines of answers, except those in [`STATUS`](crate::STATUS).
+        pub const ANSWERS: &[LineDescription] = &[$(LineDescription {
+            name: stringify!($Line),
+            meaning: concat!($($meaning),+),
+            beginning: "",
+            values: &[$(ValueDescription {
+                key: "",
+                kind: "",
+                field: Some((stringify!($field), stringify!($Type))),
+                meaning: concat!($($about),+),
+            }),*],
+        }),*];
+
+        impl ConsoleLine {
+            /// Its name, and its fields by name.
+            pub fn fields(&self) -> Fields {
+                match self {
+                    $(Self::$Line { $($field,)* } => {
+                        (stringify!($Line), vec![$((stringify!($field), $field.clone().into())),*])
+                    })*
+                    Self::Status(status) => status.fields(),
+                    Self::Counts(counts) => counts.fields(),
+                    Self::Event(event) => event.fields(),
+                    Self::Other => ("Other", Vec::new()),
+                }
+            }
+        }
+    };
+}
+
+console_lines! {
     /// The first line after a reset.
     Greeting {
         /// The firmware's version.
         version: String,
         /// The reset cause, in the firmware's word.
         cause: String,
-    },
+    }
     /// The answer to `version`.
-    Version(String),
-    /// The end of an answer: the command succeeded.
-    Done,
-    /// The end of an answer: the error, and what would be right.
-    Refused(String),
-    /// The first line of the answer to `status`.
-    Status(Status),
-    /// A line of the answer to `get`, or the measured value in the answer to `calibrate MM`.
-    Setting(SettingValue),
+    Version {
+        /// The firmware's version.
+        version: String,
+    }
+    /// The end of an answer.
+    End {
+        /// The error, and what would be right; missing if the command succeeded.
+        error: Option<String>,
+    }
+    /// A setting: a line of the answer to `get`, or the measured value in the answer to `calibrate MM`. A switch is 0 or 1.
+    Setting {
+        /// Its name.
+        name: String,
+        /// Its value in use.
+        value: u16,
+        /// Its unit; empty for a count.
+        unit: String,
+        /// The least value.
+        least: u16,
+        /// The greatest value.
+        greatest: u16,
+        /// Whether it is a switch.
+        is_switched: bool,
+        /// Its value on a new machine.
+        default: u16,
+        /// The saved value, if there is one.
+        saved: Option<u16>,
+    }
     /// A line of the answer to `help`.
     Help {
         /// A setting's or a command's name.
         name: String,
         /// What it is.
         help: String,
-    },
+    }
     /// A line of the answer to `examples`.
     Example {
         /// True for a taught example, false for a built-in one.
@@ -45,28 +115,7 @@ pub enum ConsoleLine {
         label: Class,
         /// Its features, on the scale of the firmware's own examples.
         features: [u8; COUNT],
-    },
-    /// An event.
-    Event(EventLine),
-    /// Something else.
-    Other,
-}
-
-/// A setting as `get` shows it. A switch is 0 or 1.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SettingValue {
-    /// Its name.
-    pub name: String,
-    /// Its value in use.
-    pub value: u16,
-    /// Its unit; empty for a count.
-    pub unit: String,
-    /// The least and the greatest value. `None` for a switch.
-    pub range: Option<(u16, u16)>,
-    /// Its value on a new machine.
-    pub default: u16,
-    /// The saved value, if there is one.
-    pub saved: Option<u16>,
+    }
 }
 
 /// The prefix of the firmware's greeting and version.
@@ -80,19 +129,18 @@ impl ConsoleLine {
             return greeting;
         }
         if line == "ok" {
-            return Self::Done;
+            return Self::End { error: None };
         }
         if let Some(error) = line.strip_prefix("error:") {
-            return Self::Refused(error.trim().to_owned());
+            return Self::End { error: Some(error.trim().to_owned()) };
         }
-        let by_itself = || EventLine::parse(line).map(Self::Event);
-        let answer = || Status::parse(line).map(Self::Status);
-        let shown = || SettingValue::parse(line).map(Self::Setting);
-        by_itself()
-            .or_else(answer)
+        let event = EventLine::parse(line).map(Self::Event);
+        event
+            .or_else(|| Status::parse(line).map(Self::Status))
+            .or_else(|| Counts::parse(line).map(Self::Counts))
             .or_else(|| version(line))
             .or_else(|| example(line))
-            .or_else(shown)
+            .or_else(|| setting(line))
             .or_else(|| help(line))
             .unwrap_or(Self::Other)
     }
@@ -110,7 +158,7 @@ fn greeting(line: &str) -> Option<ConsoleLine> {
 fn version(line: &str) -> Option<ConsoleLine> {
     line.strip_prefix(NAME)
         .filter(|version| is_version(version))
-        .map(|version| ConsoleLine::Version(version.to_owned()))
+        .map(|version| ConsoleLine::Version { version: version.to_owned() })
 }
 
 /// `field|built_in NUMBER LABEL FEATURES`.
@@ -141,34 +189,30 @@ fn help(line: &str) -> Option<ConsoleLine> {
     (!usage.contains('=')).then(|| ConsoleLine::Help { name: name.to_owned(), help: help.to_owned() })
 }
 
-impl SettingValue {
-    /// Parses `NAME=VALUE UNIT from LEAST to GREATEST, default VALUE, saved VALUE`. A count has no unit. A switch has
-    /// `on or off` in place of the range. The saved value is missing if it equals the current one.
-    fn parse(line: &str) -> Option<Self> {
-        let mut parts = line.split(", ");
-        let (name, rest) = parts.next()?.split_once('=')?;
-        let mut words = rest.split(' ');
-        let value = value(words.next()?)?;
-        let words: Vec<&str> = words.collect();
-        let (unit, range) = match words.as_slice() {
-            ["on", "or", "off"] => ("", None),
-            ["from", least, "to", greatest] => ("", Some((least, greatest))),
-            [unit, "from", least, "to", greatest] => (*unit, Some((least, greatest))),
-            _ => return None,
-        };
-        let range = match range {
-            Some((least, greatest)) => Some((least.parse().ok()?, greatest.parse().ok()?)),
-            None => None,
-        };
-        let default = self::value(parts.next()?.strip_prefix("default ")?)?;
-        let saved = match parts.next() {
-            None => Some(value),
-            Some("not saved") => None,
-            Some(saved) => Some(self::value(saved.strip_prefix("saved ")?)?),
-        };
-        let is_shown = is_name(name) && parts.next().is_none();
-        is_shown.then(|| Self { name: name.to_owned(), value, unit: unit.to_owned(), range, default, saved })
-    }
+/// Parses `NAME=VALUE UNIT from LEAST to GREATEST, default VALUE, saved VALUE`. A count has no unit. A switch has `on or
+/// off` in place of the range. The saved value is missing if it equals the current one.
+fn setting(line: &str) -> Option<ConsoleLine> {
+    let mut parts = line.split(", ");
+    let (name, rest) = parts.next()?.split_once('=')?;
+    let mut words = rest.split(' ');
+    let value = self::value(words.next()?)?;
+    let words: Vec<&str> = words.collect();
+    let (unit, least, greatest) = match words.as_slice() {
+        ["on", "or", "off"] => ("", "0", "1"),
+        ["from", least, "to", greatest] => ("", *least, *greatest),
+        [unit, "from", least, "to", greatest] => (*unit, *least, *greatest),
+        _ => return None,
+    };
+    let (least, greatest) = (least.parse().ok()?, greatest.parse().ok()?);
+    let default = self::value(parts.next()?.strip_prefix("default ")?)?;
+    let saved = match parts.next() {
+        None => Some(value),
+        Some("not saved") => None,
+        Some(saved) => Some(self::value(saved.strip_prefix("saved ")?)?),
+    };
+    let (name, unit, is_switched) = (name.to_owned(), unit.to_owned(), words == ["on", "or", "off"]);
+    let is_shown = is_name(&name) && parts.next().is_none();
+    is_shown.then_some(ConsoleLine::Setting { name, value, unit, least, greatest, is_switched, default, saved })
 }
 
 fn value(word: &str) -> Option<u16> {
@@ -208,36 +252,41 @@ mod tests {
     use knn::Example;
     use rig::Rig;
 
+    const DONE: ConsoleLine = ConsoleLine::End { error: None };
+
     #[test]
     fn a_setting_is_read_with_its_range_and_what_is_saved() {
-        let wheel = |saved| SettingValue {
+        let wheel = |saved| ConsoleLine::Setting {
             name: "wheel_mm".to_owned(),
             value: 405,
             unit: "mm".to_owned(),
-            range: Some((200, 800)),
+            least: 200,
+            greatest: 800,
+            is_switched: false,
             default: 400,
             saved,
         };
         let line = "wheel_mm=405 mm from 200 to 800, default 400";
         for (rest, saved) in [("", Some(405)), (", not saved", None), (", saved 410", Some(410))] {
-            assert_eq!(ConsoleLine::parse(&format!("{line}{rest}")), ConsoleLine::Setting(wheel(saved)));
+            assert_eq!(ConsoleLine::parse(&format!("{line}{rest}")), wheel(saved));
         }
-        let switched = SettingValue {
+        let switched = ConsoleLine::Setting {
             name: "end_switch".to_owned(),
             value: 0,
             unit: String::new(),
-            range: None,
+            least: 0,
+            greatest: 1,
+            is_switched: true,
             default: 0,
             saved: Some(1),
         };
-        assert_eq!(
-            ConsoleLine::parse("end_switch=off on or off, default off, saved on"),
-            ConsoleLine::Setting(switched)
-        );
-        let ConsoleLine::Setting(count) = ConsoleLine::parse("k=3 from 1 to 9, default 3") else {
+        assert_eq!(ConsoleLine::parse("end_switch=off on or off, default off, saved on"), switched);
+        let ConsoleLine::Setting { unit, least: 1, greatest: 9, is_switched: false, .. } =
+            ConsoleLine::parse("k=3 from 1 to 9, default 3")
+        else {
             panic!("no setting")
         };
-        assert_eq!((count.unit.as_str(), count.range), ("", Some((1, 9))));
+        assert_eq!(unit, "");
     }
 
     #[test]
@@ -247,8 +296,11 @@ mod tests {
             ConsoleLine::parse("weeder 0.2.0, reset by brown_out, state alarm 5-1 settings_lost, tool out"),
             greeting
         );
-        assert_eq!(ConsoleLine::parse("weeder 0.2.0"), ConsoleLine::Version("0.2.0".to_owned()));
-        assert_eq!(ConsoleLine::parse("weeder 0.2.0 (abc1234)"), ConsoleLine::Version("0.2.0 (abc1234)".to_owned()));
+        assert_eq!(ConsoleLine::parse("weeder 0.2.0"), ConsoleLine::Version { version: "0.2.0".to_owned() });
+        assert_eq!(
+            ConsoleLine::parse("weeder 0.2.0 (abc1234)"),
+            ConsoleLine::Version { version: "0.2.0 (abc1234)".to_owned() }
+        );
         for foreign in ["weeder 0.2.0 abc1234", "weeder 0.2.0 ()", "weeder  (abc1234)", "weeder 0.2.0 (abc 1234)"] {
             assert_eq!(ConsoleLine::parse(foreign), ConsoleLine::Other, "{foreign}");
         }
@@ -262,8 +314,11 @@ mod tests {
 
     #[test]
     fn lines_of_answers_are_told_apart() {
-        assert_eq!(ConsoleLine::parse("ok"), ConsoleLine::Done);
-        assert_eq!(ConsoleLine::parse("error: no such command"), ConsoleLine::Refused("no such command".to_owned()));
+        assert_eq!(ConsoleLine::parse("ok"), DONE);
+        assert_eq!(
+            ConsoleLine::parse("error: no such command"),
+            ConsoleLine::End { error: Some("no such command".to_owned()) }
+        );
         let taught =
             ConsoleLine::Example { from_field: true, number: 7, label: Class::Weed, features: [1, 2, 3, 4, 5] };
         assert_eq!(ConsoleLine::parse("field 7 weed 1 2 3 4 5"), taught);
@@ -303,19 +358,21 @@ mod tests {
     fn every_line_of_the_firmwares_answers_is_read() {
         let table = Setting::all().map(|setting| {
             let description = setting.description();
-            ConsoleLine::Setting(SettingValue {
+            ConsoleLine::Setting {
                 name: settings::name(setting),
                 value: description.default,
                 unit: settings::unit(setting),
-                range: (!setting.is_switched()).then_some((description.least, description.greatest)),
+                least: description.least,
+                greatest: description.greatest,
+                is_switched: setting.is_switched(),
                 default: description.default,
                 saved: None,
-            })
+            }
         });
-        assert_eq!(answer("get"), table.chain([ConsoleLine::Done]).collect::<Vec<_>>());
-        assert!(matches!(answer("version").as_slice(), [ConsoleLine::Version(_), ConsoleLine::Done]));
-        assert!(matches!(answer("status").as_slice(), [ConsoleLine::Status(_), ConsoleLine::Other, ConsoleLine::Done]));
-        assert!(matches!(answer("nothing").as_slice(), [ConsoleLine::Refused(_)]));
+        assert_eq!(answer("get"), table.chain([DONE]).collect::<Vec<_>>());
+        assert!(matches!(answer("version").as_slice(), [ConsoleLine::Version { .. }, DONE]));
+        assert!(matches!(answer("status").as_slice(), [ConsoleLine::Status(_), ConsoleLine::Counts(_), DONE]));
+        assert!(matches!(answer("nothing").as_slice(), [ConsoleLine::End { error: Some(_) }]));
         let examples = answer("examples");
         let [
             ConsoleLine::Example { from_field: false, .. },
@@ -325,7 +382,7 @@ mod tests {
         else {
             panic!("{examples:?}")
         };
-        assert_eq!(rest.last(), Some(&ConsoleLine::Done));
+        assert_eq!(rest.last(), Some(&DONE));
         let help = answer("help");
         assert!(
             help.len() > 15 && help[..help.len() - 1].iter().all(|said| matches!(said, ConsoleLine::Help { .. })),

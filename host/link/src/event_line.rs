@@ -1,36 +1,36 @@
-//! Parses lines of the firmware as an event or the status.
+//! Parses the firmware's lines with `key=value` words: events, and the answer to `status`.
 //!
 //! Lines are `name key=value key=value`. Unknown keys are ignored, so that a newer firmware may add more. A line that
 //! lacks a key, or has an invalid value, does not match.
 
 use control::alarm::{Alarm, Warning};
-use control::ground::class::Class;
+use control::ground::{class::Class, features};
 use control::operate::calibration::{Outcome, SwingTimes};
 use control::operate::event::Event;
 use control::operate::state::State;
 use control::say::names;
 
-/// An event, as the [table of events](control::event_table) describes it.
+/// A line, as the tables of [events](control::event_table) and [status](control::status_table) describe it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EventDescription {
+pub struct LineDescription {
     /// Its name.
     pub name: &'static str,
-    /// What happened.
+    /// What it says.
     pub meaning: &'static str,
-    /// The beginning of its line. Empty if a value comes first.
+    /// Its beginning. Empty if a value comes first.
     pub beginning: &'static str,
-    /// The values in its line, in their order.
+    /// Its values, in their order.
     pub values: &'static [ValueDescription],
 }
 
-/// A value in the line of an event.
+/// A value in a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ValueDescription {
-    /// The text before `=`. Empty for the line's first word.
+    /// The text before `=`. Empty for a value without a key.
     pub key: &'static str,
-    /// The kind of its value, by its name in the table of events.
+    /// The kind of its value, by its name in the table. Empty for a value without a key.
     pub kind: &'static str,
-    /// The field of [`EventLine`] for this value, and its type. `None` if another value has the same content.
+    /// The field of [`EventLine`], [`Status`], [`Counts`] or [`ConsoleLine`](crate::ConsoleLine) for this value, and its type. `None` if another value has the same content.
     pub field: Option<(&'static str, &'static str)>,
     /// What it tells.
     pub meaning: &'static str,
@@ -57,7 +57,7 @@ macro_rules! event_lines {
         }
 
         /// All events, in the order of the table.
-        pub const EVENTS: &[EventDescription] = &[$(EventDescription {
+        pub const EVENTS: &[LineDescription] = &[$(LineDescription {
             name: stringify!($Event),
             meaning: $meaning,
             beginning: $beginning,
@@ -84,13 +84,13 @@ macro_rules! event_lines {
                 None
             }
 
-            /// The event's name in [`EVENTS`], and its fields by name for JSON. `None` for plotter data.
-            pub fn fields(&self) -> Option<(&'static str, Vec<(&'static str, Field)>)> {
+            /// The event's name in [`EVENTS`], or `Plot`, and its fields by name.
+            pub fn fields(&self) -> Fields {
                 match *self {
                     $(Self::$Event { $($($field,)?)* } => {
-                        Some((stringify!($Event), vec![$($((stringify!($field), $field.into()),)?)*]))
+                        (stringify!($Event), vec![$($((stringify!($field), $field.into()),)?)*])
                     })*
-                    Self::Plot => None,
+                    Self::Plot => ("Plot", Vec::new()),
                 }
             }
         }
@@ -107,15 +107,86 @@ macro_rules! event_lines {
 
 control::event_table!(event_lines);
 
-/// A field of an event.
+macro_rules! status_lines {
+    ($machine:ident: $($Line:ident $meaning:literal $($(if $pattern:pat = $from:expr =>)? {
+        $($key:literal = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
+    })*;)*) => {
+        $(
+            #[doc = $meaning]
+            #[derive(Clone, Debug, Default, PartialEq, Eq)]
+            pub struct $Line {
+                $($($(
+                    #[doc = $about]
+                    pub $field: $Type,
+                )?)*)*
+            }
+
+            impl $Line {
+                /// Parses the line. `None` if it is another.
+                pub fn parse(line: &str) -> Option<Self> {
+                    // Version 0.1 had another key for the alarm's name.
+                    let line = line.replace(" alarm=", " name=");
+                    let (values, mut read) = (Values(&line), Self::default());
+                    $(read_group!([$($pattern)?] values read $($($field $key $kind)?)*);)*
+                    Some(read)
+                }
+
+                /// Its name in [`STATUS`], and its fields by name.
+                pub fn fields(&self) -> Fields {
+                    (stringify!($Line), vec![$($($((stringify!($field), self.$field.clone().into()),)?)*)*])
+                }
+            }
+        )*
+
+        /// The lines of the answer to `status`.
+        pub const STATUS: &[LineDescription] = &[$(LineDescription {
+            name: stringify!($Line),
+            meaning: $meaning,
+            beginning: "",
+            values: &[$($(ValueDescription {
+                key: $key,
+                kind: stringify!($kind),
+                field: [$(Some((stringify!($field), stringify!($Type))),)? None][0],
+                meaning: $about,
+            }),*),*],
+        }),*];
+    };
+}
+
+/// Reads the fields of a group. Those of a group behind `if` may be missing, or have a value that only a newer firmware knows.
+macro_rules! read_group {
+    ([] $values:ident $read:ident $($field:ident $key:literal $kind:ident)*) => {
+        $($read.$field = kind::$kind($values.text($key)?)?;)*
+    };
+    ([$pattern:pat] $values:ident $read:ident $($field:ident $key:literal $kind:ident)*) => {
+        $($read.$field = $values.text($key).and_then(kind::$kind);)*
+    };
+}
+
+control::status_table!(status_lines);
+
+/// A line's name, and its fields by their names.
+pub type Fields = (&'static str, Vec<(&'static str, Field)>);
+
+/// A field of a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Field {
+    /// The line does not have it.
+    Missing,
     /// A number.
-    Number(i32),
+    Number(i64),
+    /// Several numbers.
+    Numbers(Vec<u8>),
     /// Yes or no.
     Flag(bool),
-    /// A word.
+    /// A word, or a text.
     Word(String),
+}
+
+impl<T: Into<Field>> From<Option<T>> for Field {
+    fn from(field: Option<T>) -> Self {
+        field.map_or(Self::Missing, T::into)
+    }
 }
 
 /// Which kind of field a type is.
@@ -130,10 +201,13 @@ macro_rules! fields {
 }
 
 fields! {
-    i32: number => Self::Number(number);
+    i32: number => Self::Number(number.into());
+    u32: number => Self::Number(number.into());
     u16: number => Self::Number(number.into());
     u8: number => Self::Number(number.into());
+    [u8; features::COUNT]: numbers => Self::Numbers(numbers.to_vec());
     bool: flag => Self::Flag(flag);
+    String: word => Self::Word(word);
     Class: class => Self::Word(names::class(class).to_string());
     Mode: mode => Self::Word(mode.name().to_owned());
     Alarm: alarm => Self::Word(alarm.text().to_string());
@@ -177,30 +251,6 @@ impl Mode {
     }
 }
 
-/// The first line that the machine answers to `status`.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Status {
-    /// What it is doing.
-    pub mode: Mode,
-    /// The latched alarm.
-    pub alarm: Option<Alarm>,
-    /// Whether the tool is commanded out of the row.
-    pub tool_out: bool,
-    /// The reason for the tool's command, if the machine works.
-    pub reason: Option<String>,
-    /// The encoder's count.
-    pub position: i32,
-    /// Speed over the ground, negative backwards.
-    pub speed_mm_s: i32,
-    /// Keep-out zones at the tool or ahead of it.
-    pub windows: u32,
-    /// Distance until ground that the beam has seen reaches the tool.
-    pub unseen_mm: i32,
-    /// The wheel's slip in thousandths, positive if the wheel turns farther than the machine rolls. `None` if it was
-    /// not measured.
-    pub slip_permille: Option<i32>,
-}
-
 /// The words `key=value` of a line, by their keys.
 pub struct Values<'a>(pub &'a str);
 
@@ -216,11 +266,6 @@ impl<'a> Values<'a> {
     /// As [`text`](Self::text), parsed as a number. `None` if it is no number.
     pub fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
         self.text(key)?.parse().ok()
-    }
-
-    /// The name of the alarm in a status line. Logs of version 0.1 have it under another key.
-    pub fn alarm(&self) -> Option<&'a str> {
-        self.text("name").or_else(|| self.text("alarm"))
     }
 }
 
@@ -238,18 +283,21 @@ fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
     is_whole.then_some(Values(rest))
 }
 
-/// How each kind of value of the table of events is read.
+/// How each kind of value of the tables is read.
 mod kind {
     use super::{Alarm, Class, Mode, Warning, names};
     use control::say::Text;
     use std::str::FromStr;
 
+    pub(super) use self::{number as count, number as optional, word as cause, word as reason};
+
     pub(super) fn number<T: FromStr>(word: &str) -> Option<T> {
         word.parse().ok()
     }
 
-    pub(super) fn count<T: FromStr>(word: &str) -> Option<T> {
-        word.parse().ok()
+    /// A newer firmware may have more of these words.
+    pub(super) fn word(word: &str) -> Option<String> {
+        Some(word.to_owned())
     }
 
     pub(super) fn class(word: &str) -> Option<Class> {
@@ -290,35 +338,25 @@ fn is_plot(line: &str) -> bool {
     line.strip_prefix('>').unwrap_or(line).split(',').all(point)
 }
 
-impl Status {
-    /// Parses a status line. `None` if it is no status.
-    pub fn parse(line: &str) -> Option<Self> {
-        let values = Values(line);
-        Some(Self {
-            mode: Mode::find(values.text("state")?)?,
-            alarm: values.alarm().and_then(|name| Alarm::find(name.as_bytes())),
-            tool_out: kind::place(values.text("tool")?)?,
-            reason: values.text("for").map(str::to_owned),
-            position: values.number("pos")?,
-            speed_mm_s: values.number("speed_mm_s")?,
-            windows: values.number("windows")?,
-            unseen_mm: values.number("unseen_mm")?,
-            slip_permille: values.number("slip_permille"),
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ConsoleLine;
+    use crate::settings::Setting;
     use control::ground::class::Vote;
+    use control::ground::examples::EXAMPLES;
     use control::ground::keep_out::Plan;
+    use control::ground::nearest::Nearest;
+    use control::measure::reset::Cause;
+    use control::memory::Volatile;
+    use control::operate::tool::Reason;
     use control::say::line::Line;
     use control::say::write_event;
     use control::units::{Position, Ticks};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-    use std::collections::BTreeMap;
+    use rig::{Beams, ByExamples, Rig};
+    use std::collections::{BTreeMap, BTreeSet};
 
     /// The event as the firmware writes it.
     fn line(event: Event) -> String {
@@ -365,7 +403,7 @@ mod tests {
             let line = line(event);
             let read = EventLine::parse(&line);
             assert_eq!(read, Some(EventLine::from(&event)), "{line}");
-            let (name, fields) = read.and_then(|read| read.fields()).expect("it has a name");
+            let (name, fields) = read.expect("it is an event").fields();
             // The description must match the line.
             let described = EVENTS.iter().find(|described| described.name == name).expect("it is described");
             let keys: Vec<&str> =
@@ -378,6 +416,88 @@ mod tests {
             met.entry(name).or_insert(line);
         }
         assert_eq!(met.len(), EVENTS.len(), "{met:#?}");
+    }
+
+    impl From<State> for Field {
+        fn from(state: State) -> Self {
+            Mode::from(state).into()
+        }
+    }
+
+    fields! {
+        i16: number => Self::Number(number.into());
+        Reason: reason => Self::Word(reason.text().to_string());
+        Cause: cause => Self::Word(cause.text().to_string());
+    }
+
+    macro_rules! fields_of_status {
+        ($machine:ident: $($Line:ident $meaning:literal $($(if $pattern:pat = $from:expr =>)? {
+            $($key:literal = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
+        })*;)*) => {
+            /// Each line's name, keys and fields, from the machine itself.
+            fn fields_of_status($machine: &Rig<ByExamples>) -> Vec<(Vec<&'static str>, Fields)> {
+                vec![$({
+                    let (mut keys, mut fields) = (Vec::new(), Vec::new());
+                    $($(if let $pattern = $from)? {
+                        $(keys.push($key); $(fields.push((stringify!($field), Field::from($value)));)?)*
+                    })*
+                    (keys, (stringify!($Line), fields))
+                }),*]
+            }
+        };
+    }
+
+    control::status_table!(fields_of_status);
+
+    /// Rolls over plants, with noise, and with commands between.
+    fn roll(rig: &mut Rig<ByExamples>, chance: &mut ChaCha8Rng) {
+        let second_beam = rig.settings().ticks(Setting::SecondBeamMm).0;
+        let sees = |count: i32| count.rem_euclid(900) < 200;
+        let step = chance.random_range(-1..4);
+        for _ in 0..chance.random_range(0..2000) {
+            let count = rig.readings.position.count();
+            let beams = Beams { broken: sees(count), second_broken: second_beam > 0 && sees(count - second_beam) };
+            rig.see(beams);
+            rig.at(count.wrapping_add(step)).turn_after(2000);
+        }
+        let commands =
+            ["start now", "start", "hold", "clear", "nonsense", "set second_beam_mm 100", "set no_plant_m 1"];
+        rig.ask(commands[chance.random_range(0..commands.len())]);
+        match chance.random_range(0..8) {
+            0 => rig.readings.position = Position::new(chance.random()),
+            1 => (rig.readings.lost, rig.readings.jumps) = (chance.random(), chance.random()),
+            2 => rig.readings.stack_free = chance.random(),
+            3 => rig.readings.switch_on = chance.random(),
+            _ => {}
+        }
+        rig.turn_after(2000);
+    }
+
+    #[test]
+    fn every_status_is_read_as_the_firmware_writes_it() {
+        let mut chance = ChaCha8Rng::seed_from_u64(28);
+        let mut met = BTreeSet::new();
+        let causes: Vec<Cause> = (0..).map_while(Cause::from_index).collect();
+        for _ in 0..100 {
+            let cause = causes[chance.random_range(0..causes.len())];
+            let mut rig = Rig::wake(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), cause);
+            for _ in 0..50 {
+                roll(&mut rig, &mut chance);
+                let lines = rig.ask("status");
+                for (line, (keys, (name, fields))) in lines.iter().zip(fields_of_status(&rig)) {
+                    let written: Vec<&str> = line.split(' ').filter_map(|word| Some(word.split_once('=')?.0)).collect();
+                    assert_eq!(written, keys, "{line}");
+                    let (read_name, mut read) = ConsoleLine::parse(line).fields();
+                    read.retain(|(_, field)| *field != Field::Missing);
+                    met.extend(read.iter().map(|&(field, _)| (name, field)));
+                    let fields = fields.into_iter().filter(|(_, field)| *field != Field::Missing).collect();
+                    assert_eq!((read_name, read), (name, fields), "{line}");
+                }
+            }
+        }
+        let described =
+            STATUS.iter().flat_map(|line| line.values.iter().filter_map(|value| Some((line.name, value.field?.0))));
+        assert_eq!(met, described.collect());
     }
 
     #[test]
@@ -451,7 +571,7 @@ mod tests {
             reason: None,
             position: -5,
             speed_mm_s: -3,
-            windows: 2,
+            zones: 2,
             unseen_mm: 400,
             slip_permille: None,
         };

@@ -33,9 +33,11 @@ pub mod set_up;
 pub mod settings;
 pub mod settings_file;
 
-pub use self::console_line::{ConsoleLine, SettingValue};
+pub use self::console_line::{ANSWERS, ConsoleLine};
 pub use self::error::LinkError;
-pub use self::event_line::{EVENTS, EventDescription, EventLine, Field, Mode, Status, ValueDescription, Values};
+pub use self::event_line::{
+    Counts, EVENTS, EventLine, Field, LineDescription, Mode, STATUS, Status, ValueDescription, Values,
+};
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::port::{find_uno, find_unos, listen, open_other, try_port};
@@ -124,7 +126,7 @@ impl Link {
         }
         let answer = answer?;
         match answer.last().map(|line| ConsoleLine::parse(line)) {
-            Some(ConsoleLine::Version(version)) => link.version = version,
+            Some(ConsoleLine::Version { version }) => link.version = version,
             _ => return Err(LinkError::NotTheWeeder(answer.join(" "))),
         }
         Ok(link)
@@ -157,8 +159,8 @@ impl Link {
                 Received::Line(line) => line,
             };
             match ConsoleLine::parse(&line) {
-                ConsoleLine::Done => return Ok(answer),
-                ConsoleLine::Refused(_) => {
+                ConsoleLine::End { error: None } => return Ok(answer),
+                ConsoleLine::End { error: Some(_) } => {
                     return Err(LinkError::Refused { command: command.to_owned(), answer: line });
                 }
                 ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),

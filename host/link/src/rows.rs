@@ -203,15 +203,14 @@ impl Talk {
                 }
             }
             Happening::Answer(line) => {
-                let said = ConsoleLine::parse(line);
-                if matches!(said, ConsoleLine::Done | ConsoleLine::Refused(_))
+                if let ConsoleLine::End { error } = ConsoleLine::parse(line)
                     && let Some(command) = self.typed.pop_front()
                 {
                     let is_hold = command == super::session::HOLD;
                     if is_hold && self.hold == Owed::Answer {
                         self.hold = Owed::Nothing;
                     }
-                    let refusal = (said != ConsoleLine::Done).then(|| line.clone());
+                    let refusal = error.map(|_| line.clone());
                     answered = Some(What::Answered { command, refusal });
                 }
             }

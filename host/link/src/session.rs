@@ -260,12 +260,13 @@ impl Session {
             self.happened.push_back(Happening::Event(event, line));
             return;
         }
-        let is_end = matches!(said, ConsoleLine::Done | ConsoleLine::Refused(_));
+        let is_end = matches!(said, ConsoleLine::End { .. });
+        let is_done = said == ConsoleLine::End { error: None };
         // The end of an abandoned answer is ignored.
         let Some(asked) = self.asked.front_mut() else { return };
         match &mut asked.own {
             Some(lines) if is_end => match told(&asked.line, std::mem::take(lines)) {
-                Ok(happening) if said == ConsoleLine::Done => self.happened.extend(happening),
+                Ok(happening) if is_done => self.happened.extend(happening),
                 // Noise has spoiled a line: once more.
                 _ => drop(self.own.insert(asked.line.clone())),
             },
@@ -275,7 +276,7 @@ impl Session {
             }
             Some(lines) => lines.push(line),
             None => {
-                if said == ConsoleLine::Done {
+                if is_done {
                     self.own.extend(changed_by(&asked.line));
                 }
                 self.happened.push_back(Happening::Answer(line));

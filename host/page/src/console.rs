@@ -1,42 +1,32 @@
 //! The console for the page: the meaning of lines, and the order of changed settings.
 
-use control::say::names;
 use link::settings::{Setting, Settings, explain, name, steps};
-use link::{ConsoleLine, EventLine, Field, SettingValue, Status, Values};
+use link::{ConsoleLine, Field, Values};
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// The meaning of a line, in the form of `page/src/link/grammar.ts`.
+/// The meaning of a line, in the form of `page/src/link/console_line.ts`: its name, and its fields.
 pub fn read(line: &str) -> Value {
-    match ConsoleLine::parse(line) {
-        ConsoleLine::Greeting { version, cause } => json!({ "is": "greeting", "version": version, "cause": cause }),
-        ConsoleLine::Version(version) => json!({ "is": "version", "version": version }),
-        ConsoleLine::Done => json!({ "is": "end" }),
-        ConsoleLine::Refused(error) => json!({ "is": "end", "error": error }),
-        ConsoleLine::Status(status) => json!({ "is": "status", "status": shown_status(&status, line) }),
-        ConsoleLine::Setting(setting) => json!({ "is": "setting", "setting": shown_setting(&setting) }),
-        ConsoleLine::Help { name, help } => json!({ "is": "help", "name": name, "help": help }),
-        ConsoleLine::Example { from_field, number, label, .. } => {
-            json!({ "is": "example", "fromField": from_field, "number": number, "label": names::class(label).to_string() })
-        }
-        ConsoleLine::Event(event) => read_event(&event),
-        ConsoleLine::Other => json!({ "is": "other" }),
-    }
-}
-
-/// An event: its name and its fields.
-fn read_event(event: &EventLine) -> Value {
-    let Some((name, fields)) = event.fields() else { return json!({ "is": "plot" }) };
-    let fields = fields.into_iter().map(|(field, value)| {
+    let said = ConsoleLine::parse(line);
+    let (name, fields) = said.fields();
+    let fields = fields.into_iter().filter_map(|(field, value)| {
         let value = match value {
+            Field::Missing => return None,
             Field::Number(number) => number.into(),
+            Field::Numbers(numbers) => numbers.into(),
             Field::Flag(flag) => flag.into(),
             Field::Word(word) => word.into(),
         };
-        (camel_case(field), value)
+        Some((camel_case(field), value))
     });
-    Value::Object([("is".to_owned(), camel_case(name).into())].into_iter().chain(fields).collect())
+    let mut meaning: Map<String, Value> =
+        [("is".to_owned(), camel_case(name).into())].into_iter().chain(fields).collect();
+    // A newer firmware's alarm has its name too.
+    if let (ConsoleLine::Status(_), Some(alarm)) = (said, Values(line).text("name")) {
+        meaning.insert("alarm".to_owned(), alarm.into());
+    }
+    meaning.into()
 }
 
 /// Converts a Rust name of a field or variant to TypeScript's form.
@@ -52,41 +42,6 @@ fn camel_case(name: &str) -> String {
         }
     }
     camel
-}
-
-/// The status. The alarm's name comes from the line, so that a newer alarm has its name too.
-fn shown_status(status: &Status, line: &str) -> Value {
-    let mut shown = json!({
-        "mode": status.mode.name(),
-        "toolOut": status.tool_out,
-        "position": status.position,
-        "speedMmS": status.speed_mm_s,
-        "windows": status.windows,
-        "unseenMm": status.unseen_mm,
-    });
-    for (key, text) in [("alarm", Values(line).alarm()), ("reason", status.reason.as_deref())] {
-        if let Some(text) = text {
-            shown[key] = text.into();
-        }
-    }
-    shown
-}
-
-fn shown_setting(setting: &SettingValue) -> Value {
-    let (least, greatest) = setting.range.unwrap_or((0, 1));
-    let mut shown = json!({
-        "name": setting.name,
-        "value": setting.value,
-        "unit": setting.unit,
-        "least": least,
-        "greatest": greatest,
-        "isSwitched": setting.range.is_none(),
-        "default": setting.default,
-    });
-    if let Some(saved) = setting.saved {
-        shown["saved"] = saved.into();
-    }
-    shown
 }
 
 /// The firmware of these sources: its version, and its settings' names. A release's version includes the commit
@@ -143,11 +98,11 @@ pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Sett
 mod tests {
     use super::*;
     use expect_test::expect_file;
-    use link::{EVENTS, Mode, ValueDescription};
+    use link::{ANSWERS, EVENTS, LineDescription, Mode, STATUS, ValueDescription};
 
-    /// A comment, unless the text is empty.
+    /// A comment.
     fn comment(indent: &str, meaning: &str) -> String {
-        let mut letters = meaning.chars();
+        let mut letters = meaning.trim().trim_end_matches('.').chars();
         let first = letters.next().map_or(String::new(), |first| first.to_uppercase().to_string());
         format!("{indent}/** {first}{}. */\n", letters.as_str())
     }
@@ -155,43 +110,54 @@ mod tests {
     /// The TypeScript type of a field in the result of [`read`].
     fn type_of(rust: &str) -> &str {
         match rust {
-            "i32" | "u16" | "u8" => "number",
+            "i32" | "u32" | "u16" | "u8" => "number",
+            "[u8;COUNT]" => "readonly number[]",
             "bool" => "boolean",
             "Mode" => "Mode",
             "Class" => "\"plant\" | \"weed\" | \"unknown\"",
-            "Alarm" | "Warning" => "string",
+            "Alarm" | "Warning" | "String" => "string",
             _ => panic!("say what {rust} is in TypeScript"),
         }
     }
 
+    fn field(value: &ValueDescription) -> Option<String> {
+        let (name, rust) = value.field?;
+        let (about, name, rust) = (comment("    ", value.meaning), camel_case(name), rust.replace(' ', ""));
+        let optional = rust.strip_prefix("Option<").and_then(|rust| rust.strip_suffix('>'));
+        let (name, rust) = optional.map_or((name.clone(), &*rust), |rust| (name + "?", rust));
+        Some(format!("{about}    readonly {name}: {};\n", type_of(rust)))
+    }
+
     #[test]
-    fn the_page_s_types_of_events_are_the_table_of_events() {
-        let field = |value: &ValueDescription| {
-            let (name, rust) = value.field?;
-            let about = comment("    ", value.meaning);
-            Some(format!("{about}    readonly {}: {};\n", camel_case(name), type_of(rust)))
+    fn the_page_s_types_of_lines_are_the_tables_of_lines() {
+        let shape = |line: &LineDescription| {
+            let fields: String = line.values.iter().filter_map(field).collect();
+            let (about, is) = (comment("", line.meaning), camel_case(line.name));
+            format!("{about}export interface {} {{\n    readonly is: \"{is}\";\n{fields}}}\n\n", line.name)
         };
-        let shapes = EVENTS.iter().map(|event| {
-            let fields: String = event.values.iter().filter_map(field).collect();
-            let (about, is) = (comment("", event.meaning), camel_case(event.name));
-            format!("{about}export interface {} {{\n    readonly is: \"{is}\";\n{fields}}}\n\n", event.name)
-        });
-        let shapes: String = shapes.collect();
+        let plot =
+            LineDescription { name: "Plot", meaning: "points of a plotter's curves", beginning: "", values: &[] };
+        let other = LineDescription { name: "Other", meaning: "something else", ..plot };
+        let events = [EVENTS, &[plot]].concat();
+        let answers = [STATUS, ANSWERS, &[other]].concat();
+        let shapes: String = events.iter().chain(&answers).map(shape).collect();
+        let list =
+            |lines: &[LineDescription], between| lines.iter().map(|line| line.name).collect::<Vec<_>>().join(between);
+        let names: String = events.iter().map(|event| format!("    \"{}\",\n", camel_case(event.name))).collect();
         let modes = [Mode::Hold, Mode::Work, Mode::Alarm].map(|mode| format!("\"{}\"", mode.name())).join(" | ");
-        let list = |line: fn(&str) -> String| EVENTS.iter().map(|event| line(event.name)).collect::<String>();
-        let [types, names] =
-            [list(|name| format!("\n    | {name}")), list(|name| format!("    \"{}\",\n", camel_case(name)))];
-        expect_file!["../../../page/src/link/events.ts"].assert_eq(&format!(
-            "// What the machine tells by itself: the table of events in control/src/say/event_table.rs, as types.\n\
-             // `UPDATE_EXPECT=1 cargo test -p page events` writes this file.\n\n\
+        expect_file!["../../../page/src/link/console_line.ts"].assert_eq(&format!(
+            "// What a line of the machine says: the tables of control/src/say/line_tables.rs and host/link/src/console_line.rs, as types.\n\
+             // `UPDATE_EXPECT=1 cargo test -p page lines` writes this file.\n\n\
              /** What the machine is doing. */\n\
              export type Mode = {modes};\n\n\
-             {shapes}/** Points of a plotter's curves. */\n\
-             export interface Plot {{\n    readonly is: \"plot\";\n}}\n\n\
-             /** What the machine tells by itself. */\n\
-             export type Told ={types}\n    | Plot;\n\n\
-             /** What each of them is. */\n\
-             export const TOLD: readonly Told[\"is\"][] = [\n{names}    \"plot\",\n];\n"
+             {shapes}/** What the machine tells by itself. */\n\
+             export type EventLine =\n    | {};\n\n\
+             /** The events' names. */\n\
+             export const EVENT_NAMES: readonly EventLine[\"is\"][] = [\n{names}];\n\n\
+             /** What a line says. */\n\
+             export type ConsoleLine = EventLine | {};\n",
+            list(&events, "\n    | "),
+            list(&answers, " | "),
         ));
     }
 
@@ -203,10 +169,10 @@ mod tests {
             ("alarm code=3-1 name=too_fast pos=7", json!({ "is": "alarm", "alarm": "too_fast", "position": 7 })),
             (
                 "state=alarm code=9-9 name=boredom tool=out pos=1 speed_mm_s=-2 windows=3 unseen_mm=4",
-                json!({ "is": "status", "status": {
-                    "mode": "alarm", "alarm": "boredom", "toolOut": true, "position": 1, "speedMmS": -2, "windows": 3,
-                    "unseenMm": 4,
-                } }),
+                json!({
+                    "is": "status", "mode": "alarm", "alarm": "boredom", "toolOut": true, "position": 1, "speedMmS": -2,
+                    "zones": 3, "unseenMm": 4,
+                }),
             ),
             (
                 "plant pos=-7 votes=3 spacing=1 delay=2 hold=3 actuation=5",
@@ -217,9 +183,10 @@ mod tests {
             ),
             (
                 "end_switch=off on or off, default off, not saved",
-                json!({ "is": "setting", "setting": {
-                    "name": "end_switch", "value": 0, "unit": "", "least": 0, "greatest": 1, "isSwitched": true, "default": 0,
-                } }),
+                json!({
+                    "is": "setting", "name": "end_switch", "value": 0, "unit": "", "least": 0, "greatest": 1,
+                    "isSwitched": true, "default": 0,
+                }),
             ),
             ("calibrated by=eye, set them", json!({ "is": "calibratedByEye" })),
             (

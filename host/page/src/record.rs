@@ -177,7 +177,7 @@ impl Picture {
                 self.changes.push(Change { mm: ground.tool_mm(position), out });
             }
             EventLine::Alarm { position, .. } => {
-                let (name, mm) = (Values(line).alarm().unwrap_or_default(), ground.tool_mm(position));
+                let (name, mm) = (Values(line).text("name").unwrap_or_default(), ground.tool_mm(position));
                 self.alarms.push(trouble(name, mm, false));
                 self.changes.push(Change { mm, out: true });
             }

@@ -160,7 +160,7 @@ impl Talk {
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
             Happening::Event(_, line) => self.hub.event(self.number, &line),
             Happening::Answer(line) => {
-                let is_end = matches!(ConsoleLine::parse(&line), ConsoleLine::Done | ConsoleLine::Refused(_));
+                let is_end = matches!(ConsoleLine::parse(&line), ConsoleLine::End { .. });
                 let Some(asked) = self.asked.front_mut() else { return };
                 if is_end || asked.answer.len() < LINES {
                     asked.answer.push(line);

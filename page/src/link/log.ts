@@ -30,7 +30,7 @@ export class Log {
             case "lost":
                 write("lost", happening.why);
                 break;
-            case "told":
+            case "event":
                 write("event", happening.line);
                 break;
             case "status":

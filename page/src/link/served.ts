@@ -5,7 +5,7 @@
 // until it answers.
 
 import { english } from "../words/words.ts";
-import { isTold, read, settingsOf } from "./grammar.ts";
+import { isEvent, read, settingsOf } from "./grammar.ts";
 import { type Happening, type Link, NoMachine, Refused } from "./session.ts";
 
 /** Time without a word from the computer after which it is taken for gone: it says something twice a second, however still the machines are. */
@@ -194,8 +194,8 @@ export class ServedMachine implements Link {
     /** A status, or an event. */
     #read(line: string): void {
         const said = read(line);
-        if (said.is === "status") this.onHappening({ is: "status", status: said.status, line });
-        else if (isTold(said)) this.onHappening({ is: "told", said, line });
+        if (said.is === "status") this.onHappening({ is: "status", status: said, line });
+        else if (isEvent(said)) this.onHappening({ is: "event", event: said, line });
     }
 
     async #type(line: string): Promise<string[]> {

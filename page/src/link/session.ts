@@ -5,8 +5,8 @@
 // chip's. After every start of the Uno it asks who is there, for settings and examples, and turns the events on. `hold` does
 // not wait. A wire that ended ends its session.
 
-import type { Told } from "./events.ts";
-import { isTold, read, type Setting, type Status, settingsOf } from "./grammar.ts";
+import type { EventLine, Setting, Status } from "./console_line.ts";
+import { isEvent, read, settingsOf } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
 /** Types a command, and gives back its answer without the `ok`. Throws what the machine refuses by. */
@@ -43,7 +43,7 @@ export type Happening =
     | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
     | { is: "status"; status: Status; line: string }
     /** The machine told something by itself. */
-    | { is: "told"; said: Told; line: string }
+    | { is: "event"; event: EventLine; line: string }
     | { is: "command"; line: string }
     | { is: "answer"; line: string }
     | { is: "settings"; settings: readonly Setting[] }
@@ -252,8 +252,8 @@ export class Session implements Link {
             this.#restart(line);
             return;
         }
-        if (isTold(said)) {
-            this.onHappening({ is: "told", said, line });
+        if (isEvent(said)) {
+            this.onHappening({ is: "event", event: said, line });
             if (said.is === "calibratedBySwitch" && said.isSet) this.#follow("calibrate").catch(() => {});
             return;
         }
@@ -263,7 +263,7 @@ export class Session implements Link {
         if (question.isTyped) this.onHappening({ is: "answer", line });
         if (said.is !== "end") {
             question.answer.push(line);
-            if (said.is === "status") this.onHappening({ is: "status", status: said.status, line });
+            if (said.is === "status") this.onHappening({ is: "status", status: said, line });
             return;
         }
         this.#asked.shift();

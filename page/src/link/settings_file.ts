@@ -2,7 +2,7 @@
 // not name are not changed. The parser accepts keys with values, and comments.
 
 import { english } from "../words/words.ts";
-import type { Setting } from "./grammar.ts";
+import type { Setting } from "./console_line.ts";
 
 /** An error in a settings file, and what would be right. */
 export class SettingsFileError extends Error {}

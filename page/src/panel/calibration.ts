@@ -1,7 +1,7 @@
 // Calibration, step by step: the wheel over a measured stretch, then the servo's pulses and times.
 
 import type { Parts } from "../dom.ts";
-import type { Told } from "../link/events.ts";
+import type { EventLine } from "../link/console_line.ts";
 import { read } from "../link/grammar.ts";
 import { type Ask, Refused } from "../link/session.ts";
 import { type Plain, quantity, say, told } from "../words/words.ts";
@@ -67,11 +67,11 @@ export class Calibration {
     }
 
     /** Shows the result of timing the servo, if this event is one. */
-    take(said: Told): void {
+    take(event: EventLine): void {
         let text: Plain;
-        if (said.is === "calibratedBySwitch") text = said.isSet ? "timedSet" : "timedNotSet";
-        else if (said.is === "calibratedByEye") text = "timedByEye";
-        else if (said.is === "notCalibrated") text = "notTimed";
+        if (event.is === "calibratedBySwitch") text = event.isSet ? "timedSet" : "timedNotSet";
+        else if (event.is === "calibratedByEye") text = "timedByEye";
+        else if (event.is === "notCalibrated") text = "notTimed";
         else return;
         this.#parts.say("servo-said", () => say(text));
     }
@@ -88,7 +88,7 @@ export class Calibration {
         try {
             const said = (await this.#ask(`calibrate ${distance}${force}`)).map(read);
             const measured = said.find((said) => said.is === "setting");
-            const counts = () => (measured ? `${say("countsPerMetre", { count: measured.setting.value })} ` : "");
+            const counts = () => (measured ? `${say("countsPerMetre", { count: measured.value })} ` : "");
             this.#parts.say("wheel-said", () => `${counts()}${say("notSavedYet")}`);
         } catch (error) {
             this.#parts.say("wheel-said", () => told(error instanceof Error ? error.message : String(error)));

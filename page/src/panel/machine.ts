@@ -1,8 +1,7 @@
 // The state of the machine at the other end of the wire, updated by events, with its texts for the operator.
 
 import faults from "faults.json";
-import type { Detection, Mode, Told } from "../link/events.ts";
-import type { Setting, Status } from "../link/grammar.ts";
+import type { Detection, EventLine, Mode, Setting, Status } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
@@ -57,7 +56,7 @@ export class Machine {
     examples: readonly string[] = [];
     /** The last detections, the newest first, and those with a zone that the machine still stores. */
     objects: Detection[] = [];
-    windows: Detection[] = [];
+    zones: Detection[] = [];
 
     /** Takes an event at a time. */
     take(happening: Happening, nowMs: number): void {
@@ -66,7 +65,7 @@ export class Machine {
                 this.version = happening.version;
                 this.settings = happening.settings;
                 this.examples = happening.examples;
-                [this.objects, this.windows] = [[], []];
+                [this.objects, this.zones] = [[], []];
                 [this.warning, this.status] = [undefined, undefined];
                 break;
             case "lost":
@@ -91,38 +90,38 @@ export class Machine {
                 this.statusMs = nowMs;
                 [this.mode, this.toolOut, this.alarm] = [status.mode, status.toolOut, status.alarm];
                 const behind = this.ticks(this.setting("beam_to_tool_mm"));
-                this.windows = this.windows.filter(
+                this.zones = this.zones.filter(
                     ({ position, delay, hold }) => position + delay + hold > status.position - behind,
                 );
                 break;
             }
-            case "told":
-                this.#take(happening.said);
+            case "event":
+                this.#take(happening.event);
                 break;
             default:
         }
     }
 
-    #take(said: Told): void {
-        switch (said.is) {
+    #take(event: EventLine): void {
+        switch (event.is) {
             case "detection":
-                this.objects = [said, ...this.objects].slice(0, OBJECTS);
-                this.windows = [said, ...this.windows].slice(0, OBJECTS);
-                if (said.class === "plant" && this.warning === "no_plants") this.warning = undefined;
+                this.objects = [event, ...this.objects].slice(0, OBJECTS);
+                this.zones = [event, ...this.zones].slice(0, OBJECTS);
+                if (event.class === "plant" && this.warning === "no_plants") this.warning = undefined;
                 break;
             case "state":
-                this.mode = said.mode;
-                if (said.mode !== "alarm") this.alarm = undefined;
-                if (said.mode === "hold") this.warning = undefined;
+                this.mode = event.mode;
+                if (event.mode !== "alarm") this.alarm = undefined;
+                if (event.mode === "hold") this.warning = undefined;
                 break;
             case "swing":
-                this.toolOut = said.out;
+                this.toolOut = event.out;
                 break;
             case "alarm":
-                [this.mode, this.toolOut, this.alarm, this.windows] = ["alarm", true, said.alarm, []];
+                [this.mode, this.toolOut, this.alarm, this.zones] = ["alarm", true, event.alarm, []];
                 break;
             case "warning":
-                this.warning = said.warning;
+                this.warning = event.warning;
                 break;
             default:
         }

@@ -153,7 +153,7 @@ export class Panel {
             "place",
             machine.status ? quantity((machine.status.position * machine.tickMm) / 1000, "meter", 2) : "-",
         );
-        parts.write("windows", machine.status ? String(machine.status.windows) : "-");
+        parts.write("zones", machine.status ? String(machine.status.zones) : "-");
         const trouble = machine.alarm ?? machine.warning;
         parts.html("alarm").hidden = trouble === undefined;
         parts.html("alarm").classList.toggle("warning", machine.alarm === undefined);
@@ -201,11 +201,11 @@ export class Panel {
                 this.#settings.show();
                 this.#calibration.showSettings();
                 break;
-            case "told":
-                if (happening.said.is === "plot") break;
-                this.#calibration.take(happening.said);
-                if (happening.said.is === "state") this.#parts.write("drive-said", "");
-                this.#console.add(happening.line, happening.said.is === "alarm" ? "error" : "");
+            case "event":
+                if (happening.event.is === "plot") break;
+                this.#calibration.take(happening.event);
+                if (happening.event.is === "state") this.#parts.write("drive-said", "");
+                this.#console.add(happening.line, happening.event.is === "alarm" ? "error" : "");
                 break;
             case "command":
                 this.#console.add(`> ${happening.line}`, "typed");
@@ -222,11 +222,11 @@ export class Panel {
     #signal(happening: Happening, isOtherAlarm: boolean): void {
         if (isOtherAlarm && this.machine.alarm !== undefined) signal("alarm");
         if (happening.is === "lost" && !happening.isWanted) signal("lost");
-        const said = happening.is === "told" ? happening.said : undefined;
-        if (said?.is !== "state" && said?.is !== "alarm" && happening.is !== "lost") return;
+        const event = happening.is === "event" ? happening.event : undefined;
+        if (event?.is !== "state" && event?.is !== "alarm" && happening.is !== "lost") return;
         // By its switch, or by another page's HOLD. This page's own HOLD is signalled by its answer, which comes before
         // or after this.
-        if (said?.is === "state" && said.mode === "hold" && !this.#isHolding) signal("held");
+        if (event?.is === "state" && event.mode === "hold" && !this.#isHolding) signal("held");
         this.#isHolding = false;
     }
 

@@ -50,7 +50,7 @@ export class SetUp {
         else if (is === "command" && /^(calibrate|set margin_mm) /.test(happening.line))
             this.#keep(`> ${happening.line}`);
         else if (is === "answer" && read(happening.line).is === "setting") this.#keep(happening.line);
-        else if (is === "told" && ["calibratedBySwitch", "calibratedByEye", "slip"].includes(happening.said.is))
+        else if (is === "event" && ["calibratedBySwitch", "calibratedByEye", "slip"].includes(happening.event.is))
             this.#keep(happening.line);
         else return;
         this.show();

@@ -2,7 +2,8 @@
 // saves them. They can be saved to a file and loaded from one.
 
 import { download, make, type Parts } from "../dom.ts";
-import { steps as order, type Setting } from "../link/grammar.ts";
+import type { Setting } from "../link/console_line.ts";
+import { steps as order } from "../link/grammar.ts";
 import type { Ask } from "../link/session.ts";
 import { parse, range, SettingsFileError, write } from "../link/settings_file.ts";
 import { type Plain, say, settingHelp, told } from "../words/words.ts";

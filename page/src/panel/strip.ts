@@ -40,7 +40,7 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
               ];
     };
     const marginMm = machine.setting("margin_mm");
-    const windows = machine.windows.flatMap((seen) => {
+    const zones = machine.zones.flatMap((seen) => {
         const fromMm = (seen.position + seen.delay - position) * machine.tickMm;
         const toMm = fromMm + seen.hold * machine.tickMm;
         if (seen.class === "weed")
@@ -72,7 +72,7 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
     svg.replaceChildren(
         make("rect", { class: "strip-ground", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
         ...(machine.version === undefined || unseenMm <= 0 ? [] : bar("strip-unseen", left, unseenMm, 0.12)),
-        ...(machine.version === undefined ? [] : windows),
+        ...(machine.version === undefined ? [] : zones),
         make("line", {
             class: "strip-beam",
             x1: beamMm,

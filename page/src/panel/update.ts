@@ -43,7 +43,7 @@ export class Update {
     take({ is }: Happening): void {
         if (is === "connected" && this.#isOwn && !this.#isLost()) keep(KEPT, "");
         if (is === "connected") this.#parts.write("restore-said", "");
-        if (["connected", "lost", "settings", "told"].includes(is)) this.#show();
+        if (["connected", "lost", "settings", "event"].includes(is)) this.#show();
     }
 
     /** Settings that only the machine has, and settings that only this page's firmware has. */

@@ -3,7 +3,7 @@
 // `advance` lets time pass. The operator may change the machine or the row between two calls. `outcome` has the result
 // for each plant behind the tool.
 
-import type { Detection } from "../link/events.ts";
+import type { Detection } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { Machine, type MachineKind, PIN } from "../row/machine.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
@@ -103,12 +103,12 @@ export class Trial {
             this.losses.isAtWork = happening.status.mode === "work";
             this.losses.reason = happening.status.reason;
         }
-        if (happening.is !== "told") return;
-        const { said } = happening;
-        if (said.is === "state" || said.is === "alarm")
-            this.losses.isAtWork = said.is === "state" && said.mode === "work";
-        if (said.is === "alarm") this.zones = [];
-        if (said.is === "detection" && said.class !== "weed") this.zones.push(this.#zone(said));
+        if (happening.is !== "event") return;
+        const { event } = happening;
+        if (event.is === "state" || event.is === "alarm")
+            this.losses.isAtWork = event.is === "state" && event.mode === "work";
+        if (event.is === "alarm") this.zones = [];
+        if (event.is === "detection" && event.class !== "weed") this.zones.push(this.#zone(event));
     }
 
     /**

@@ -126,7 +126,7 @@ export const es: Language = {
         toGo: "Faltan {distance}.",
         weedsOn:
             "Una máquina con alimentación propia sigue desherbando: su interruptor de trabajo saca la herramienta.",
-        windowsDrawn: "Zonas de exclusión entre el haz y la herramienta",
+        zonesDrawn: "Zonas de exclusión entre el haz y la herramienta",
         toolDrawnOut: "útil fuera",
         toolDrawnIn: "útil dentro",
         kmh: "km/h",
@@ -134,7 +134,7 @@ export const es: Language = {
         toolOut: "fuera",
         toolIn: "dentro",
         place: "Lugar",
-        windows: "Zonas",
+        zones: "Zonas",
         nothingSeen: "Aún no se ha visto nada",
         lastObject: "Último: {class}, {width} de ancho, {count} voto|Último: {class}, {width} de ancho, {count} votos",
         plant: "planta",

@@ -67,7 +67,7 @@ pub struct RowModel {
     /// The last objects, the newest first.
     pub objects: VecDeque<Seen>,
     /// The canopies in keep-out zones: those of `objects` since the zones were last emptied.
-    pub windows: VecDeque<Seen>,
+    pub zones: VecDeque<Seen>,
     /// Advice for the operator.
     pub advice: Option<String>,
     /// The state of the last command.
@@ -258,7 +258,7 @@ impl RowModel {
             status: Status { tool_out: true, ..Status::default() },
             settings: Settings::new(),
             objects: VecDeque::new(),
-            windows: VecDeque::new(),
+            zones: VecDeque::new(),
             advice: None,
             answer: Answer::None,
             set_up: SetUp::default(),
@@ -295,12 +295,12 @@ impl RowModel {
             Happening::Connected { version, settings, .. } => {
                 self.settings = settings;
                 self.connection = Connection::Up(version);
-                self.windows.clear();
+                self.zones.clear();
             }
             Happening::Lost(why) => {
                 self.connection = Connection::Down(why);
                 // It rolls on unseen.
-                self.windows.clear();
+                self.zones.clear();
                 // A command that is unanswered now stays unanswered.
                 if self.answer == Answer::Waiting {
                     self.answer = Answer::Refused;
@@ -326,7 +326,7 @@ impl RowModel {
         }
         let tool = status.position.wrapping_sub(self.settings.ticks(Setting::BeamToToolMm).0);
         let behind = self.settings.ticks(Setting::BeamToToolMm).0;
-        self.windows.retain(|seen| seen.leading.wrapping_add(seen.width).wrapping_sub(tool) > -behind);
+        self.zones.retain(|seen| seen.leading.wrapping_add(seen.width).wrapping_sub(tool) > -behind);
         self.status = status;
     }
 
@@ -339,10 +339,10 @@ impl RowModel {
                 let seen = Seen { class, votes, leading: position, width, spacing };
                 self.objects.push_front(seen);
                 self.objects.truncate(OBJECTS);
-                self.windows.push_front(seen);
-                self.windows.truncate(OBJECTS);
+                self.zones.push_front(seen);
+                self.zones.truncate(OBJECTS);
             }
-            EventLine::Alarm { .. } => self.windows.clear(),
+            EventLine::Alarm { .. } => self.zones.clear(),
             EventLine::Warning { warning } => {
                 self.advice =
                     Some(format!("warning {}: {}", name_of(warning.text().bytes()), advice::warning(warning)));

@@ -9,7 +9,7 @@ use expect_test::{ExpectFile, expect_file};
 use field::conditions::{Conditions, Parameter};
 use field::wiring::{self, Contact, PullUp};
 use link::settings::{help, name, unit};
-use link::{EVENTS, EventDescription, advice};
+use link::{EVENTS, LineDescription, STATUS, ValueDescription, advice};
 use std::fmt::Write;
 use svg::node::element::tag::Type;
 use svg::parser::Event;
@@ -27,21 +27,37 @@ fn with_part(page: &ExpectFile, name: &str, part: &str) -> String {
 /// All events, and their values.
 fn events() -> String {
     let mut table = "| event | value | meaning |\n| --- | --- | --- |\n".to_owned();
-    for EventDescription { meaning, beginning, values, .. } in EVENTS {
+    for LineDescription { meaning, beginning, values, .. } in EVENTS {
         let names =
             if beginning.is_empty() { "`plant`, `weed`, `unknown`".to_owned() } else { format!("`{beginning}`") };
         writeln!(table, "| {names} | | {meaning} |").expect("a string takes all");
         for value in values.iter().filter(|value| !value.key.is_empty()) {
-            let words = match value.kind {
-                "place" => "out\\|in",
-                "answer" => "yes\\|no",
-                "state" => "hold\\|work\\|alarm",
-                _ => "",
-            };
-            writeln!(table, "| | `{}={words}` | {} |", value.key, value.meaning).expect("a string takes all");
+            writeln!(table, "| | {} | {} |", key(value), value.meaning).expect("a string takes all");
         }
     }
     table
+}
+
+/// A value's key, and its words if they are few.
+fn key(value: &ValueDescription) -> String {
+    let words = match value.kind {
+        "place" => "out\\|in",
+        "answer" => "yes\\|no",
+        "state" => "hold\\|work\\|alarm",
+        _ => "",
+    };
+    format!("`{}={words}`", value.key)
+}
+
+/// The answer to `status`.
+fn status() -> String {
+    let table = |line: &LineDescription| {
+        let rows = line.values.iter().map(|value| format!("| {} | {} |\n", key(value), value.meaning));
+        let (first, rest) = line.meaning.split_at(1);
+        let heading = first.to_uppercase() + rest;
+        format!("{heading}:\n\n| key | meaning |\n| --- | --- |\n{}", rows.collect::<String>())
+    };
+    STATUS.iter().map(table).collect::<Vec<_>>().join("\n")
 }
 
 /// The texts of a drawing, each with its x and y.
@@ -95,6 +111,12 @@ fn the_settings_page_is_the_settings_table() {
 fn the_events_page_is_the_table_of_events() {
     let page = expect_file!["../../../../docs/events.md"];
     page.assert_eq(&with_part(&page, "events", &events()));
+}
+
+#[test]
+fn the_status_in_the_console_s_page_is_its_table() {
+    let page = expect_file!["../../../../docs/console.md"];
+    page.assert_eq(&with_part(&page, "status", &status()));
 }
 
 #[test]

@@ -113,7 +113,7 @@ impl<'a> Stretch<'a> {
     /// The first position from which the log has all inputs of the tool's swings. A machine that has just started has
     /// no zones, and the ground that it has seen was bare.
     pub(super) fn judged_from(&self) -> i32 {
-        if self.first.unseen_mm > 0 && self.first.windows == 0 {
+        if self.first.unseen_mm > 0 && self.first.zones == 0 {
             return i32::MIN;
         }
         let first = self.first.position;
@@ -208,8 +208,7 @@ fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)
 /// Whether a line that ends an answer is an error. `None` if it ends no answer.
 fn end_of_answer(line: &str) -> Option<bool> {
     match ConsoleLine::parse(line) {
-        ConsoleLine::Done => Some(false),
-        ConsoleLine::Refused(_) => Some(true),
+        ConsoleLine::End { error } => Some(error.is_some()),
         _ => None,
     }
 }

@@ -113,7 +113,7 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
     let status = &row.status;
     let slip = status.slip_permille.map_or_else(String::new, |slip| format!("   slip {:.1} %", f64::from(slip) / 10.0));
     let second = match row.is_there() {
-        true => format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.windows, status.unseen_mm),
+        true => format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.zones, status.unseen_mm),
         false => speed_and_place(row),
     };
     let key = Line::styled(format!(" {HOLD_KEY} "), hold_style()).right_aligned();

@@ -62,7 +62,7 @@ pub(super) fn ground(row: &RowModel, columns: usize) -> String {
     let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
     let mut ground = vec![Ground::Bare; columns];
     let margin = f64::from(row.settings.get(Setting::MarginMm));
-    for seen in &row.windows {
+    for seen in &row.zones {
         let from = row.millimetres(seen.leading.wrapping_sub(row.status.position)) + beam_to_tool;
         let to = from + row.millimetres(seen.width);
         let mut paint = |from: f64, to: f64, what: Ground| {

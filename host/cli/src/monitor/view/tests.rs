@@ -60,7 +60,7 @@ const ROW: [&str; 5] = [
 ];
 
 #[test]
-fn windows_move_toward_the_tool() {
+fn zones_move_toward_the_tool() {
     let mut lines = ROW.to_vec();
     lines.push("state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0");
     insta::assert_snapshot!(screen(&machine(&lines)));
