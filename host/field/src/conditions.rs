@@ -180,11 +180,9 @@ impl Conditions {
     /// The firmware's other settings, without those from machine and timing.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let timing = [Setting::MarginMm, Setting::LeadOutMs, Setting::LeadInMs];
-        self.settings
-            .iter()
-            .filter_map(|(key, &value)| Some((Setting::find(key.as_bytes())?, value)))
-            .filter(|(setting, _)| !timing.contains(setting))
-            .collect()
+        // In the table's order, the wheel comes before its calibration. The other way round, the wheel would reset it.
+        let others = Setting::all().filter(|setting| !timing.contains(setting));
+        others.filter_map(|setting| Some((setting, *self.settings.get(&setting.text().to_string())?))).collect()
     }
 }
 
@@ -212,6 +210,12 @@ mod tests {
         expected.set("k", 5.0).unwrap();
         assert_eq!(conditions, expected);
         assert_eq!(conditions.firmware_settings(), [(Setting::K, 5)]);
+    }
+
+    #[test]
+    fn a_calibrated_wheel_is_set_after_its_diameter_which_would_reset_it() {
+        let conditions = parse("[settings]\nticks_per_m = 2010\nwheel_mm = 400\n").unwrap();
+        assert_eq!(conditions.firmware_settings(), [(Setting::WheelMm, 400), (Setting::TicksPerM, 2010)]);
     }
 
     #[test]
