@@ -23,13 +23,9 @@
 //! WEEDER_SEED=7 WEEDER_CASES=1000000 cargo test -p control --release --test against_the_model
 //! ```
 
-mod console;
-mod decisions;
-mod eeprom;
 mod what_fell;
 
-use decisions::Decisions;
-use model_test::{Extent, drive::Drive, go_all, run};
+use model_test::{Extent, decisions::Decisions, drive::Drive, go_all, run};
 
 #[test]
 fn after_any_event_the_tool_keeps_off_every_seen_canopy_and_the_machine_works_again() {

@@ -207,19 +207,7 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     tally.seconds += motion.duration_s();
     tally.metres += (motion.end_mm() - motion.start_mm()).abs() / 1000.0;
     tally.rows += 1;
-    for line in heard.lines() {
-        let named = |event: &str| line.strip_prefix(event)?.split_whitespace().next();
-        if let Some((code, rest)) = line.strip_prefix("alarm code=").and_then(|rest| rest.split_once(" name=")) {
-            let name = rest.split_whitespace().next().unwrap_or_default();
-            count(&mut tally.alarms, &format!("{code} {name}"));
-        }
-        if let Some(warning) = named("warning name=") {
-            count(&mut tally.warnings, warning);
-        }
-        if let Some((_, cause)) = line.split_once("reset by ") {
-            count(&mut tally.resets, cause.split(',').next().unwrap_or(cause));
-        }
-    }
+    heard.lines().for_each(|line| tally.hear(line));
     let was_reset = matches!(fault, Some(Fault::Reset | Fault::BrownOut | Fault::PowerCut));
     if was_reset != !uno.resets().iter().all(|reset| reset.cycle < start_cycle) {
         tally.violated(fails_at_s, format_args!("{fault:?} and resets {:?}", uno.resets()));

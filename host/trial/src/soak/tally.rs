@@ -62,9 +62,23 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Notes what must not be.
+    /// Adds a violation.
     pub(super) fn violated(&mut self, time_s: f64, what: impl fmt::Display) {
         self.violations.push(format!("at {time_s:.3} s: {what}"));
+    }
+
+    /// Counts an alarm, a warning or a reset in a line that the machine wrote.
+    pub(super) fn hear(&mut self, line: &str) {
+        let word = |rest: &str| rest.split_whitespace().next().unwrap_or_default().to_owned();
+        if let Some((code, rest)) = line.strip_prefix("alarm code=").and_then(|rest| rest.split_once(" name=")) {
+            count(&mut self.alarms, &format!("{code} {}", word(rest)));
+        }
+        if let Some(rest) = line.strip_prefix("warning name=") {
+            count(&mut self.warnings, &word(rest));
+        }
+        if let Some((_, cause)) = line.split_once("reset by ") {
+            count(&mut self.resets, cause.split(',').next().unwrap_or(cause));
+        }
     }
 }
 
