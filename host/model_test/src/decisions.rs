@@ -21,6 +21,7 @@ use control::{
     units::{Instant, Interval, Position},
     weeder::Orders,
 };
+pub use eeprom::CHIP_SIZE;
 use eeprom::{Eeprom, Half};
 use knn::Example;
 use proptest::prelude::*;

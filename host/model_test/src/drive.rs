@@ -491,6 +491,9 @@ impl<M: Machine> Drive<M> {
         let turned = if self.encoder == Encoder::Works { self.speed * self.wheel.turns_a_tick } else { 0.0 };
         self.speeds.take(self.world.time_us, turned);
         self.roll_by(self.speed * seconds)?;
+        let rolled = (self.speed * seconds).abs();
+        self.rolled += rolled;
+        self.weeded += if self.machine.tool_out() { 0.0 } else { rolled };
         let tool_is_out = self.out_since_us.is_some_and(|since_us| since_us + SWITCH_DELAY_US <= self.world.time_us);
         self.world.end_switch_on = tool_is_out && !self.tool_is_stuck;
         self.step(&before)?;
@@ -503,7 +506,6 @@ impl<M: Machine> Drive<M> {
         self.ground += ticks;
         let to = self.ground.floor() as i64;
         let (moves, direction) = ((to - from).abs(), (to - from).signum());
-        self.rolled += moves as f64;
         for place in 1..=moves {
             let turned = self.wheel.roll(from + (place - 1) * direction, direction > 0);
             let counted = match self.encoder {

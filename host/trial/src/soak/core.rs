@@ -58,8 +58,8 @@ pub(super) const MISSED_ONCE_IN: usize = 16;
 /// Ground before and behind each row.
 const HEADLAND_MM: f64 = 1000.0;
 
-/// Turns of the longest save. The power fails at any moment of it.
-const SAVE_TURNS: u32 = 400;
+/// Turns of a save. The power fails at any moment of it.
+const SAVE_TURNS: u32 = 160;
 
 /// A machine and its operator in the field.
 struct Field {
@@ -67,9 +67,11 @@ struct Field {
     drive: Drive<Decisions>,
     /// The settings that the operator types for the present machine.
     typed: Vec<(Setting, u16)>,
-    /// Turns until the next fault, and the chance of a fault in a turn.
+    /// The position at which the present row ends.
+    row_end: i64,
+    /// Faults in a millisecond, on average, and the time until the next.
+    faults_a_ms: f64,
     fault_in_ms: u64,
-    fault_chance: f64,
     last_fault: (&'static str, f64),
     tally: Tally,
 }
@@ -131,25 +133,27 @@ fn standing() -> Run {
 
 impl Field {
     fn new(rng: ChaCha8Rng, faults_an_hour: f64) -> Self {
-        let drive = Drive::new(&standing()).expect("a new machine starts");
-        let fault_chance = faults_an_hour / 3_600_000.0;
         let mut field = Self {
             rng,
-            drive,
+            drive: Drive::new(&standing()).expect("a new machine starts"),
             typed: Vec::new(),
+            row_end: 0,
+            faults_a_ms: faults_an_hour / 3_600_000.0,
             fault_in_ms: 0,
-            fault_chance,
             last_fault: ("nothing", 0.0),
             tally: Tally::default(),
         };
         field.draw_fault_time();
+        // A new machine has an alarm about its settings until they are saved, which is no result of the soak.
+        field.type_in(&["save"]).expect("a machine in HOLD saves");
+        field.tally = Tally::default();
         field
     }
 
     /// Draws the time until the next fault.
     fn draw_fault_time(&mut self) {
         let share: f64 = self.rng.random();
-        self.fault_in_ms = 1 + ((1.0 - share).ln() / (1.0 - self.fault_chance).ln()).min(1e12) as u64;
+        self.fault_in_ms = ((-(1.0 - share).ln() / self.faults_a_ms) as u64).max(1);
     }
 
     /// Works row after row for this many seconds, or until a check fails.
@@ -203,9 +207,9 @@ impl Field {
         if let Err(failure) = outcome {
             let (fault, fault_s) = self.last_fault;
             let (time_s, state) = (self.drive.time_s(), self.drive.state());
-            let what = failure.to_string();
-            let what = format!("{what}, in {state:?}, {:.3} s after {fault}", time_s - fault_s);
-            self.tally.violated(time_s, format_args!("row {}, {what}", self.tally.rows));
+            let (row, ago_s) = (self.tally.rows, time_s - fault_s);
+            let what = format_args!("row {row}, in {state:?}, {ago_s:.3} s after {fault}: {failure}");
+            self.tally.violated(time_s, what);
         }
     }
 
@@ -220,8 +224,8 @@ impl Field {
         };
         self.drive.enter_row(run, geometry, ticks(stem_zone_mm.into()))?;
         self.set_up()?;
-        let end = run.levels()[0].len() as i64;
-        while self.drive.position() < end && self.drive.time_s() < last_s {
+        self.row_end = run.levels()[0].len() as i64;
+        while self.drive.position() < self.row_end && self.drive.time_s() < last_s {
             let most = most_slip(self.drive.settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
             let permille = (1000.0 * self.rng.random_range(-most..=most)) as i32;
             self.execute(&Step::Slip { permille })?;
@@ -244,13 +248,14 @@ impl Field {
         }
     }
 
-    /// Rolls at a speed for a time, with the faults that are due in it.
+    /// Rolls at a speed for a time, or to the row's end, with the faults that are due in it.
     fn roll(&mut self, mm_s: i32, mut ms: u64) -> Checked {
-        while ms > 0 {
+        while ms > 0 && self.drive.position() < self.row_end {
             let part_ms = ms.min(self.fault_in_ms);
+            let rest_mm = ((self.row_end - self.drive.position()) as f64 / TICKS_A_MM) as i32;
             self.execute(&match mm_s {
                 0 => Step::Stand { ms: part_ms as u32 },
-                _ => Step::Roll { mm: mm_s * part_ms as i32 / 1000 + mm_s.signum(), mm_s },
+                _ => Step::Roll { mm: (mm_s * part_ms as i32 / 1000).min(rest_mm) + mm_s.signum(), mm_s },
             })?;
             ms -= part_ms;
             self.fault_in_ms -= part_ms;

@@ -79,6 +79,9 @@ impl Tally {
         if let Some((_, cause)) = line.split_once("reset by ") {
             count(&mut self.resets, cause.split(',').next().unwrap_or(cause));
         }
+        if let Some((_, alarm)) = line.split_once(", state alarm ") {
+            count(&mut self.alarms, alarm.split(',').next().unwrap_or(alarm));
+        }
     }
 }
 
