@@ -252,9 +252,7 @@ impl<M: Machine> Drive<M> {
                 self.world.switch_on = on;
                 self.turn()
             }
-            Step::Dust { times, on_second: false } => {
-                (0..2 * times).try_for_each(|_| self.edge(!self.world.broken))
-            }
+            Step::Dust { times, on_second: false } => (0..2 * times).try_for_each(|_| self.edge(!self.world.broken)),
             Step::Dust { times, on_second: true } => {
                 for _ in 0..2 * times {
                     self.second_edge(!self.world.second_broken);

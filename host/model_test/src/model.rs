@@ -154,7 +154,10 @@ impl Model {
     /// If the beam has not seen all of that ground, or saw no plant at the spacing behind it.
     pub fn guard(&mut self, due: i64, spacing: i64, scatter: i64) -> Result<(), String> {
         if due + scatter > self.frontier + self.slack {
-            return Err(format!("the machine guards ground around {due}, but the beam has only reached {}", self.frontier));
+            return Err(format!(
+                "the machine guards ground around {due}, but the beam has only reached {}",
+                self.frontier
+            ));
         }
         // From the centre of a plant, which may have gaps, to that of the first, second, or third missed plant behind it.
         let is_from = |first: usize| {
@@ -165,7 +168,10 @@ impl Model {
             })
         };
         if !(0..self.stretches.len()).any(is_from) {
-            return Err(format!("the machine guards ground around {due}, {spacing} behind none of {:?}", self.stretches));
+            return Err(format!(
+                "the machine guards ground around {due}, {spacing} behind none of {:?}",
+                self.stretches
+            ));
         }
         let (leading, trailing) = (due - scatter, due + scatter);
         self.guarded.push(Stretch { leading, trailing, blur: 0, margin_to: i64::MAX, is_free: false });

@@ -158,7 +158,10 @@ impl fmt::Display for Step {
             Self::Reset(cause) => write!(f, "reset: {cause:?}"),
             Self::Spoil { address, byte } => write!(f, "change byte {address} of the EEPROM to {byte:#04x}, and reset"),
             Self::CutPower { line, turns, byte } => {
-                write!(f, "type `{line}`, and cut the power {turns} turns later; a byte being written becomes {byte:#04x}")
+                write!(
+                    f,
+                    "type `{line}`, and cut the power {turns} turns later; a byte being written becomes {byte:#04x}"
+                )
             }
             Self::LowerStack { turns } => write!(f, "leave 40 bytes of stack for {turns} turns"),
             Self::Slip { permille } => write!(f, "turn the wheel {permille} thousandths farther than the ground"),
@@ -210,20 +213,23 @@ impl Run {
 
     /// For each beam and each tick of the row: whether the beam is broken there.
     pub fn levels(&self) -> [Vec<bool>; 2] {
-        let ticks = |mm: u32| (f64::from(mm) * TICKS_A_MM) as usize;
         let sights = || self.sights.iter().copied().chain(std::iter::repeat(Sight::Both));
         [Sight::Second, Sight::First].map(|unseen| {
             let levels = |(&(gap, canopy), sight): (&(u32, u32), Sight)| {
-                let gap = std::iter::repeat_n(false, ticks(gap));
-                gap.chain(std::iter::repeat_n(sight != unseen, ticks(canopy)))
+                let gap = std::iter::repeat_n(false, ticks(gap) as usize);
+                gap.chain(std::iter::repeat_n(sight != unseen, ticks(canopy) as usize))
             };
             self.row.iter().zip(sights()).flat_map(levels).collect()
         })
     }
 
+    /// The ticks after which the row repeats.
+    pub fn period(&self) -> i64 {
+        self.row.iter().flat_map(|&(gap, canopy)| [gap, canopy]).map(ticks).sum()
+    }
+
     /// The ticks of each canopy that is too wide for a weed.
     pub fn plants(&self) -> Vec<Range<i64>> {
-        let ticks = |mm: u32| (f64::from(mm) * TICKS_A_MM) as i64;
         let mut end = 0;
         let spans = self.row.iter().map(|&(gap, canopy)| {
             let start = end + ticks(gap);
@@ -232,6 +238,11 @@ impl Run {
         });
         spans.filter(|&(canopy, _)| canopy >= PLANT_MM).map(|(_, span)| span).collect()
     }
+}
+
+/// Whole ticks in this many millimetres.
+fn ticks(mm: u32) -> i64 {
+    (f64::from(mm) * TICKS_A_MM) as i64
 }
 
 /// Parses a step: `roll 450 mm at 556 mm/s`, `roll back ...`, `stand for 100 ms`, or a line to type.

@@ -85,7 +85,7 @@ impl Stand {
             canopy.start + cut..canopy.end - cut
         };
         let zones = canopies.iter().map(zone).collect();
-        Self { zones, canopies, period: run.levels()[0].len() as i64, ..Self::default() }
+        Self { zones, canopies, period: run.period(), ..Self::default() }
     }
 
     /// Returns the plant whose zone holds a position: its number in the period, and the start of its zone.

@@ -224,7 +224,7 @@ impl Field {
         };
         self.drive.enter_row(run, geometry, ticks(stem_zone_mm.into()))?;
         self.set_up()?;
-        self.row_end = run.levels()[0].len() as i64;
+        self.row_end = run.period();
         while self.drive.position() < self.row_end && self.drive.time_s() < last_s {
             let most = most_slip(self.drive.settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
             let permille = (1000.0 * self.rng.random_range(-most..=most)) as i32;
