@@ -113,7 +113,7 @@ pub struct Drive<M> {
     out_since_us: Option<u64>,
     turns: u64,
     steady_swings: u32,
-    /// Ticks rolled in all, and with the tool in the row.
+    /// Ticks rolled in this row, and with the tool in the row.
     rolled: f64,
     weeded: f64,
     /// The least scatter and every spacing that were set: the machine may guard by values of a moment ago.
@@ -202,19 +202,19 @@ impl<M: Machine> Drive<M> {
         Ok(drive.turns)
     }
 
-    /// Carries the machine to the headland of another row, and resets it there. Returns the score of the old row.
+    /// Carries the machine to the headland of another row, and resets it there.
     ///
     /// # Errors
     /// If a check fails.
-    pub fn enter_row(&mut self, run: &Run, geometry: Geometry, stem_zone: i64) -> Result<Score, TestCaseError> {
+    pub fn enter_row(&mut self, run: &Run, geometry: Geometry, stem_zone: i64) -> Checked {
         self.stop();
         self.row = run.levels();
         (self.ground, self.farthest, self.wheel) = (0.0, 0, Wheel::default());
         (self.world.broken, self.world.second_broken) = (self.row[0][0], false);
         self.geometry = Some(geometry);
-        let score = self.stand.get_or_insert_default().replace(run, stem_zone);
-        self.init(Cause::ResetPin, None)?;
-        Ok(score)
+        (self.rolled, self.weeded) = (0.0, 0.0);
+        self.stand.get_or_insert_default().replace(run, stem_zone);
+        self.init(Cause::ResetPin, None)
     }
 
     /// Executes a step, and checks the machine.
@@ -414,14 +414,12 @@ impl<M: Machine> Drive<M> {
         self.world.time_us as f64 / 1e6
     }
 
-    /// Metres rolled in all, and with the tool in the row.
-    pub fn metres(&self) -> (f64, f64) {
-        (self.rolled / TICKS_A_MM / 1000.0, self.weeded / TICKS_A_MM / 1000.0)
-    }
-
-    /// The score of the present row.
+    /// The result of the present row.
     pub fn score(&self) -> Score {
-        self.stand.as_ref().map(Stand::score).unwrap_or_default()
+        let [metres, weeded_metres] = [self.rolled, self.weeded].map(|ticks| ticks / TICKS_A_MM / 1000.0);
+        let mut score = Score { metres, weeded_metres, ..Score::default() };
+        self.stand.iter().for_each(|stand| stand.add_to(&mut score));
+        score
     }
 
     /// Takes the alarms, warnings and greetings that the machine wrote.

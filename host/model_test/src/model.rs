@@ -96,7 +96,7 @@ impl Model {
         }
         // By now the machine has forgotten the ground: at eight metres, within a turn.
         if self.frontier - place > 8 * metre + metre / 64 {
-            self.begin_anew(self.frontier - 8 * metre);
+            self.see_again(self.frontier - 8 * metre);
         }
         let resolution = 1 + metre / 2400;
         let slack = 2 + 2 * resolution;
@@ -136,7 +136,7 @@ impl Model {
     }
 
     /// The ground ahead of a position is seen again as new.
-    pub fn begin_anew(&mut self, place: i64) {
+    pub fn see_again(&mut self, place: i64) {
         self.known_from = self.known_from.min(place);
         self.begin = self.begin.min(place);
         (self.frontier, self.is_growing, self.may_have_forgotten) = (place, false, false);

@@ -42,9 +42,13 @@ struct Fate {
     blind: bool,
 }
 
-/// The counts of plants since the last [`Stand::take_score`].
+/// The result of a row.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Score {
+    /// Metres rolled.
+    pub metres: f64,
+    /// Metres rolled with the tool ordered into the row.
+    pub weeded_metres: f64,
     /// Plants that the tool came to.
     pub plants: u64,
     /// Plants harmed without an excuse.
@@ -187,16 +191,14 @@ impl Stand {
         }
     }
 
-    /// Replaces the row by that of another run. Returns the score of the old one.
-    pub fn replace(&mut self, run: &Run, stem_zone: i64) -> Score {
-        let old = std::mem::replace(self, Self::new(run, stem_zone));
-        (self.in_row, self.ordered_us, self.was_in_row) = (old.in_row, old.ordered_us, old.was_in_row);
-        old.score()
+    /// Replaces the row by that of another run. The tool stays as it is.
+    pub fn replace(&mut self, run: &Run, stem_zone: i64) {
+        let Self { in_row, ordered_us, was_in_row, .. } = *self;
+        *self = Self { in_row, ordered_us, was_in_row, ..Self::new(run, stem_zone) };
     }
 
-    /// Counts the plants that the tool came to.
-    pub fn score(&self) -> Score {
-        let mut score = Score::default();
+    /// Adds the plants that the tool came to.
+    pub fn add_to(&self, score: &mut Score) {
         for fate in self.fates.values().filter(|fate| fate.passed) {
             score.plants += 1;
             match fate {
@@ -206,6 +208,5 @@ impl Stand {
                 _ => score.harmed += 1,
             }
         }
-        score
     }
 }

@@ -128,10 +128,10 @@ impl<M: Machine> Drive<M> {
         let wheel = self.machine.settings().wheel();
         // A millimetre, rounded up.
         let millimetre = i64::from(wheel.ticks(1).0) + 1;
-        let told = self.model.weed(self.here(), wheel.ticks(width_mm as u16).0.into(), millimetre);
+        let weed = self.model.weed(self.here(), wheel.ticks(width_mm as u16).0.into(), millimetre);
         // A weed that only the second beam saw opens no ground.
-        let is_right = told.is_ok() || self.model.is_in_doubt() || self.had_second_beam;
-        prop_assert!(is_right, "{}", told.unwrap_err());
+        let is_right = weed.is_ok() || self.model.is_in_doubt() || self.had_second_beam;
+        prop_assert!(is_right, "{}", weed.unwrap_err());
         Ok(())
     }
 

@@ -59,7 +59,7 @@ impl<M: Machine> Drive<M> {
         }
         if self.scale != scale(self.machine.settings()) {
             self.scale = scale(self.machine.settings());
-            self.model.begin_anew(self.here());
+            self.model.see_again(self.here());
         }
         for end in written.iter().filter(|line| is_end(line)) {
             self.end(end, unseen_mm);

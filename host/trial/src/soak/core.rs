@@ -29,7 +29,7 @@ const FIRST_STEPS: u32 = u32::MAX - 15_000_000;
 const FIRST_COUNT: i32 = i32::MAX - 382_000;
 
 /// The rows: plants half a metre apart, as for the built-in examples.
-const PLANTING: Planting = Planting {
+pub(super) const PLANTING: Planting = Planting {
     plants: 40,
     spacing_mm: 500.0,
     spacing_scatter_mm: 40.0,
@@ -187,28 +187,15 @@ impl Field {
 
     /// Works a row from its headland to its end, or to the soak's end.
     fn work(&mut self, row: &Row, machine: &Machine, stem_zone_mm: u16, last_s: f64) {
-        let begun_metres = self.drive.metres();
-        let begun_s = self.drive.time_s();
         let run = run_over(row, machine, &mut self.rng);
         let outcome = self.work_run(&run, machine, stem_zone_mm, last_s);
-        let Score { plants, harmed, mistaken, blind } = self.drive.score();
-        let (metres, weeded_metres) = self.drive.metres();
-        self.tally += Tally {
-            seconds: self.drive.time_s() - begun_s,
-            metres: metres - begun_metres.0,
-            rows: 1,
-            plants,
-            weeded_metres: weeded_metres - begun_metres.1,
-            harmed,
-            mistaken,
-            blind,
-            ..Tally::default()
-        };
+        let Score { metres, weeded_metres, plants, harmed, mistaken, blind } = self.drive.score();
+        self.tally += Tally { rows: 1, metres, weeded_metres, plants, harmed, mistaken, blind, ..Tally::default() };
+        self.tally.seconds = self.drive.time_s();
         if let Err(failure) = outcome {
             let (fault, fault_s) = self.last_fault;
-            let (time_s, state) = (self.drive.time_s(), self.drive.state());
-            let (row, ago_s) = (self.tally.rows, time_s - fault_s);
-            let what = format_args!("row {row}, in {state:?}, {ago_s:.3} s after {fault}: {failure}");
+            let (row, state, time_s) = (self.tally.rows, self.drive.state(), self.drive.time_s());
+            let what = format_args!("row {row}, in {state:?}, {:.3} s after {fault}: {failure}", time_s - fault_s);
             self.tally.violated(time_s, what);
         }
     }
@@ -231,7 +218,8 @@ impl Field {
             self.execute(&Step::Slip { permille })?;
             let (mm_s, ms) = self.draw_leg();
             self.start_again()?;
-            self.roll(mm_s, ms)?;
+            let rest_ms = ((last_s - self.drive.time_s()) * 1000.0) as u64;
+            self.roll(mm_s, ms.min(rest_ms))?;
         }
         Ok(())
     }
@@ -299,8 +287,7 @@ impl Field {
             self.type_in(&[&format!("set {} {value}", settings::name(setting))])?;
         }
         self.type_in(&["save"])?;
-        let is_set_up = self.is_set_up();
-        if is_set_up { Ok(()) } else { Err(Failure::fail("the machine refuses its settings")) }
+        if self.is_set_up() { Ok(()) } else { Err(Failure::fail("the machine refuses its settings")) }
     }
 
     /// The operator clears a latched alarm, and starts.
@@ -309,8 +296,11 @@ impl Field {
             return Ok(());
         }
         self.type_in(&["clear", "start"])?;
-        let is_hold = self.drive.state() == State::Hold;
-        if is_hold { Err(Failure::fail("the machine does not start on command")) } else { Ok(()) }
+        if self.drive.state() == State::Hold {
+            Err(Failure::fail("the machine does not start on command"))
+        } else {
+            Ok(())
+        }
     }
 
     /// Injects a fault.
