@@ -69,9 +69,9 @@ struct Field {
     typed: Vec<(Setting, u16)>,
     /// The position at which the present row ends.
     row_end: i64,
-    /// Faults in a millisecond, on average, and the time until the next.
-    faults_a_ms: f64,
-    fault_in_ms: u64,
+    /// Faults in a second, on average, and the time of the next.
+    faults_a_second: f64,
+    next_fault_s: f64,
     last_fault: (&'static str, f64),
     tally: Tally,
 }
@@ -138,8 +138,8 @@ impl Field {
             drive: Drive::new(&standing()).expect("a new machine starts"),
             typed: Vec::new(),
             row_end: 0,
-            faults_a_ms: faults_an_hour / 3_600_000.0,
-            fault_in_ms: 0,
+            faults_a_second: faults_an_hour / 3600.0,
+            next_fault_s: 0.0,
             last_fault: ("nothing", 0.0),
             tally: Tally::default(),
         };
@@ -150,10 +150,10 @@ impl Field {
         field
     }
 
-    /// Draws the time until the next fault.
+    /// Draws the time of the next fault.
     fn draw_fault_time(&mut self) {
         let share: f64 = self.rng.random();
-        self.fault_in_ms = ((-(1.0 - share).ln() / self.faults_a_ms) as u64).max(1);
+        self.next_fault_s = self.drive.time_s() - (1.0 - share).ln() / self.faults_a_second;
     }
 
     /// Works row after row for this many seconds, or until a check fails.
@@ -192,7 +192,7 @@ impl Field {
         let Score { metres, weeded_metres, plants, harmed, mistaken, blind } = self.drive.score();
         self.tally += Tally { rows: 1, metres, weeded_metres, plants, harmed, mistaken, blind, ..Tally::default() };
         self.tally.seconds = self.drive.time_s();
-        if let Err(failure) = outcome {
+        if let Err(Failure::Fail(failure) | Failure::Reject(failure)) = outcome {
             let (fault, fault_s) = self.last_fault;
             let (row, state, time_s) = (self.tally.rows, self.drive.state(), self.drive.time_s());
             let what = format_args!("row {row}, in {state:?}, {:.3} s after {fault}: {failure}", time_s - fault_s);
@@ -216,38 +216,31 @@ impl Field {
             let most = most_slip(self.drive.settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
             let permille = (1000.0 * self.rng.random_range(-most..=most)) as i32;
             self.execute(&Step::Slip { permille })?;
-            let (mm_s, ms) = self.draw_leg();
+            let (mm_s, leg_s) = self.draw_leg();
             self.start_again()?;
-            let rest_ms = ((last_s - self.drive.time_s()) * 1000.0) as u64;
-            self.roll(mm_s, ms.min(rest_ms))?;
+            self.roll(mm_s, last_s.min(self.drive.time_s() + leg_s))?;
         }
         Ok(())
     }
 
-    /// Draws a leg's speed in mm/s and its time: mostly a walk, now and then a stop or some distance back.
-    fn draw_leg(&mut self) -> (i32, u64) {
-        let forward_ms = self.rng.random_range(500..6000);
-        match self.rng.random_range(0..10) {
-            0 => (0, forward_ms),
-            1 if self.drive.position() > 5000 => {
-                (-mm_s(self.rng.random_range(0.5..1.5)) as i32, self.rng.random_range(300..1500))
-            }
-            _ => (mm_s(self.rng.random_range(0.8..3.0)) as i32, forward_ms),
+    /// Draws a leg's speed in mm/s and its time in seconds: mostly a walk, now and then a stop or some distance back.
+    fn draw_leg(&mut self) -> (i32, f64) {
+        let rng = &mut self.rng;
+        match rng.random_range(0..10) {
+            0 => (0, rng.random_range(0.5..6.0)),
+            1 if self.drive.position() > 5000 => (-mm_s(rng.random_range(0.5..1.5)) as i32, rng.random_range(0.3..1.5)),
+            _ => (mm_s(rng.random_range(0.8..3.0)) as i32, rng.random_range(0.5..6.0)),
         }
     }
 
-    /// Rolls at a speed for a time, or to the row's end, with the faults that are due in it.
-    fn roll(&mut self, mm_s: i32, mut ms: u64) -> Checked {
-        while ms > 0 && self.drive.position() < self.row_end {
-            let part_ms = ms.min(self.fault_in_ms);
-            let rest_mm = ((self.row_end - self.drive.position()) as f64 / TICKS_A_MM) as i32;
-            self.execute(&match mm_s {
-                0 => Step::Stand { ms: part_ms as u32 },
-                _ => Step::Roll { mm: (mm_s * part_ms as i32 / 1000).min(rest_mm) + mm_s.signum(), mm_s },
-            })?;
-            ms -= part_ms;
-            self.fault_in_ms -= part_ms;
-            if self.fault_in_ms == 0 {
+    /// Rolls at a speed until a time, or to the row's end, with the faults that are due meanwhile.
+    fn roll(&mut self, mm_s: i32, until_s: f64) -> Checked {
+        while self.drive.time_s() < until_s && self.drive.position() < self.row_end {
+            let ms = ((until_s.min(self.next_fault_s) - self.drive.time_s()) * 1000.0).ceil();
+            let rest_mm = (self.row_end - self.drive.position()) as f64 / TICKS_A_MM;
+            let mm = (f64::from(mm_s) * ms / 1000.0).min(rest_mm) as i32 + mm_s.signum();
+            self.execute(&if mm_s == 0 { Step::Stand { ms: ms as u32 } } else { Step::Roll { mm, mm_s } })?;
+            if self.drive.time_s() >= self.next_fault_s {
                 self.fail()?;
                 self.draw_fault_time();
             }
@@ -308,14 +301,13 @@ impl Field {
         let rng = &mut self.rng;
         let mut lines = Vec::new();
         let (fault, step) = match rng.random_range(0..9) {
-            0 => ("dust", Step::Dust { times: rng.random_range(1..40), on_second: rng.random() }),
+            0 => {
+                ("dust", Step::Dust { times: rng.random_range(1..40), on_second: self.typed[1].1 > 0 && rng.random() })
+            }
             1 => {
-                let ms = rng.random_range(5..600);
-                if rng.random() {
-                    ("dead_channel", Step::Silence { ms, encoder: Encoder::OneChannel })
-                } else {
-                    ("silent_encoder", Step::Silence { ms, encoder: Encoder::Silent })
-                }
+                let encoders = [("dead_channel", Encoder::OneChannel), ("silent_encoder", Encoder::Silent)];
+                let (fault, encoder) = encoders[rng.random_range(0..2)];
+                (fault, Step::Silence { ms: rng.random_range(5..600), encoder })
             }
             2 => ("encoder_jumps", Step::Spike { ticks: 0, times: rng.random_range(1..60) }),
             3 => ("lost_edges", Step::LoseEdges { turns: rng.random_range(0..3) }),
