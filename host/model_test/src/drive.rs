@@ -276,11 +276,9 @@ impl<M: Machine> Drive<M> {
             }
             Step::Spike { ticks, times } => (0..times).try_for_each(|_| {
                 self.model.is_shifted = true;
+                let ticks = if self.speed < 0.0 { -ticks } else { ticks };
                 let off = self.machine.spike(&mut self.world, ticks);
                 self.model.loosen(off);
-                if let Some(stand) = &mut self.stand {
-                    stand.lose_ticks(-i64::from(ticks));
-                }
                 // The speed is measured over 10 ms, so a spike looks like a speed of its own.
                 self.speeds.take(self.world.time_us, self.speed + f64::from(ticks) / 0.01);
                 self.turn()

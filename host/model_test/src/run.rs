@@ -99,7 +99,7 @@ pub enum Step {
     },
     /// Both channels of the encoder change at once.
     Spike {
-        /// Ticks that each spike adds to the count.
+        /// Ticks that each spike adds in the direction of rolling: 2, or -2 if it was about to change.
         ticks: i32,
         /// Number of spikes, a turn apart.
         times: u32,

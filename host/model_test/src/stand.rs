@@ -143,10 +143,10 @@ impl Stand {
             return Ok(());
         }
         let (canopy, age_us) = (&self.canopies[number], now_us - self.ordered_us);
-        let order = if self.in_row { "in" } else { "out" };
+        let (order, lost) = (if self.in_row { "in" } else { "out" }, self.lost_ticks);
         Err(format!(
             "a plant was harmed: the tool is at {tool} ticks of ground, {age_us} us after it was ordered {order}, in the \
-             plant at {canopy:?} of the row"
+             plant at {canopy:?} of the row; the encoder lacks {lost} ticks"
         ))
     }
 

@@ -309,7 +309,7 @@ impl Field {
                 let (fault, encoder) = encoders[rng.random_range(0..2)];
                 (fault, Step::Silence { ms: rng.random_range(5..600), encoder })
             }
-            2 => ("encoder_jumps", Step::Spike { ticks: 0, times: rng.random_range(1..60) }),
+            2 => ("encoder_jumps", Step::Spike { ticks: 2, times: rng.random_range(1..60) }),
             3 => ("lost_edges", Step::LoseEdges { turns: rng.random_range(0..3) }),
             4 => ("low_stack", Step::LowerStack { turns: 1 }),
             5 => {
