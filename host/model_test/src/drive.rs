@@ -584,8 +584,9 @@ impl<M: Machine> Drive<M> {
         self.out_since_us = self.machine.is_sent_out().then(|| self.out_since_us.unwrap_or(self.world.time_us));
         if state != state_before {
             self.disturb();
-            if is_alarm(state) {
-                self.forget();
+            let geometry = self.geometry();
+            if let Some(stand) = self.stand.as_mut().filter(|_| is_alarm(state)) {
+                stand.forget(self.world.time_us, &geometry);
             }
         }
         if M::IS_OPEN && state != state_before {
@@ -626,14 +627,6 @@ impl<M: Machine> Drive<M> {
             }
         }
         Some(kept)
-    }
-
-    /// The firmware forgets the ground of the row.
-    fn forget(&mut self) {
-        let geometry = self.geometry();
-        if let Some(stand) = &mut self.stand {
-            stand.forget(self.world.time_us, &geometry);
-        }
     }
 
     /// The real machine. By default its settings are right.
@@ -678,7 +671,10 @@ impl<M: Machine> Drive<M> {
         self.taught = examples;
         self.scale = scale(self.machine.settings());
         self.model = Model::new(self.here(), self.world.broken);
-        self.forget();
+        let geometry = self.geometry();
+        if let Some(stand) = &mut self.stand {
+            stand.reset(self.ground as i64, self.world.time_us, &geometry);
+        }
         // The measured speed is 0 until the first measurement.
         self.speeds = Speeds::default();
         self.speeds.take(self.world.time_us, 0.0);
