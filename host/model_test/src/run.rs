@@ -240,6 +240,9 @@ impl Run {
     }
 }
 
+/// Delay of the measured speed.
+const MEASURED_WITHIN_S: f64 = 0.05;
+
 /// Whole ticks in this many millimetres.
 fn ticks(mm: u32) -> i64 {
     (f64::from(mm) * TICKS_A_MM) as i64
@@ -515,7 +518,8 @@ fn stand() -> BoxedStrategy<Vec<((u32, u32), Sight)>> {
 }
 
 /// Runs of a machine with two beams, which works and rolls forward and back at most `rolls` times while its slip changes.
-/// The margin has room for three times the greatest error from slip: for a value measured before a change and used after it.
+/// Up to half of the margin is for the change of speed during a swing. The rest has room for three times the greatest error
+/// from slip: for a value measured before a change and used after it.
 pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
     let machine = (250_u32..=1000, 35_u32..95, 20_u32..70, prop_oneof![Just(0_u32), 40_u32..120]);
     let rolled = || prop_oneof![6 => roll(100..500, 500..6000), 2 => roll(-400..-50, 100..2500)];
@@ -528,7 +532,13 @@ pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
     let steps = prop::collection::vec(step, 6..rolls);
     let going = roll(200..500, 3000..12_000);
     (beginning(), stand(), machine, going, steps)
-        .prop_map(|(beginning, stand, (beam_to_tool_mm, share, margin_mm, lead_out_ms), going, steps)| {
+        .prop_map(|(mut beginning, stand, (beam_to_tool_mm, share, margin_mm, lead_out_ms), going, steps)| {
+            let mut spare_mm = f64::from(margin_mm);
+            if lead_out_ms > 0 {
+                let late_s = f64::from(lead_out_ms) / 1000.0 + MEASURED_WITHIN_S;
+                beginning.mm_s2 = beginning.mm_s2.min((spare_mm / late_s.powi(2)) as i32);
+                spare_mm -= f64::from(beginning.mm_s2) * late_s.powi(2) / 2.0;
+            }
             let (row, sights) = stand.into_iter().unzip();
             let least_mm = u32::from(SECOND_BEAM_LEAST_MM);
             let settings = [
@@ -545,7 +555,7 @@ pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
                 ),
             ];
             let settings = settings.map(|(name, value)| Step::Type(format!("set {name} {value}")));
-            let most_permille = (1000.0 * most_slip(margin_mm.into(), beam_to_tool_mm.into())) as i32;
+            let most_permille = (1000.0 * most_slip(spare_mm, beam_to_tool_mm.into())) as i32;
             let steps = steps.into_iter().flat_map(|(share, step)| match step {
                 Step::Stand { ms: 1 } => vec![Step::Slip { permille: most_permille * share / 100 }],
                 Step::Roll { .. } => vec![typed("clear"), typed("start"), step],
