@@ -129,7 +129,7 @@ pub enum Step {
     },
     /// The wheel's slip changes on new ground.
     Slip {
-        /// Thousandths by which the wheel turns farther than the machine rolls.
+        /// Excess of the turned distance over the rolled one, in thousandths.
         permille: i32,
     },
     /// The end switch sticks, or follows the tool again.

@@ -33,7 +33,7 @@ impl<M: Machine> Drive<M> {
         }
     }
 
-    /// Checks the swinging tool against the real plants, whatever the state.
+    /// Checks the swinging tool against the real plants, in every state.
     pub(super) fn check_stand(&mut self, ground: i64, out: bool) -> Checked {
         let geometry = self.geometry();
         let Some(stand) = &mut self.stand else { return Ok(()) };
