@@ -12,8 +12,9 @@
 //! - the tool is out in each state except WORK, and only the operator starts work or clears an alarm;
 //! - in the end, after the faults are repaired, the machine works again.
 //!
-//! With a second beam, each plant's real position counts. The tool keeps off each plant that at least one beam has seen. Meanwhile
-//! the wheel slips, the slip changes, and stands are too dense for the beams. Either beam misses plants, and sees its own dust.
+//! With a second beam, the real plants and the swinging tool count: the tool is clear of each plant that at least one beam has seen.
+//! Meanwhile the wheel slips, the slip changes, and stands are too dense for the beams. Either beam misses plants, and sees its own
+//! dust.
 //!
 //! A failure is reduced to a few steps, printed as console lines and motion. Runs are the same each time, so that only a change of
 //! the code can change the result. Runs and model come from the crate `model_test`, which also tests the firmware with them. For
@@ -23,13 +24,9 @@
 //! WEEDER_SEED=7 WEEDER_CASES=1000000 cargo test -p control --release --test against_the_model
 //! ```
 
-mod console;
-mod decisions;
-mod eeprom;
 mod what_fell;
 
-use decisions::Decisions;
-use model_test::{Extent, drive::Drive, go_all, run};
+use model_test::{Extent, decisions::Decisions, drive::Drive, go_all, run};
 
 #[test]
 fn after_any_event_the_tool_keeps_off_every_seen_canopy_and_the_machine_works_again() {

@@ -1,9 +1,10 @@
 //! Former failures, by name: the console lines and motion that showed each, and similar cases, checked by the model.
 
-use crate::decisions::Decisions;
 use control::{alarm::Alarm, operate::state::State};
 use model_test::{
-    Failure, cases, drive,
+    Failure, cases,
+    decisions::Decisions,
+    drive,
     run::{Run, Step},
 };
 use rayon::prelude::*;
@@ -24,14 +25,14 @@ fn run(row: &[(u32, u32)], lines: &str) -> Run {
     Run::written(row, lines)
 }
 
-/// Runs the steps, checked after each. Returns the machine.
+/// Executes the steps, checked after each. Returns the machine.
 #[track_caller]
 fn go(run: &Run) -> Drive {
-    let gone = Drive::new(run).and_then(|mut drive| {
-        run.steps.iter().try_for_each(|step| drive.happen(step))?;
+    let driven = Drive::new(run).and_then(|mut drive| {
+        run.steps.iter().try_for_each(|step| drive.execute(step))?;
         Ok(drive)
     });
-    gone.unwrap_or_else(|failure: Failure| panic!("{failure}\n{run:?}"))
+    driven.unwrap_or_else(|failure: Failure| panic!("{failure}\n{run:?}"))
 }
 
 #[test]

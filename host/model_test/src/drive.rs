@@ -1,9 +1,12 @@
-//! A machine on an endless row, compared with the model after every turn.
+//! Rolls a machine along a row, executes the steps of a run, and checks the machine after every turn of its loop.
 //!
 //! The ground is counted in ticks of the encoder. The trait [`Machine`] hides whether the machine is the decisions
 //! alone or the firmware in an Uno. Facts that are visible only in the decisions are checked only there. This file
 //! executes steps and rolls the machine. `checks` compares the tool with the model, and `console` types lines and
 //! follows their effects.
+//!
+//! [`Drive::go`] executes a run on a new machine. A soak keeps one drive for hours: it draws its steps one by one
+//! ([`Drive::execute`]), and takes the machine from row to row ([`Drive::enter_row`]).
 
 mod checks;
 mod console;
@@ -13,8 +16,9 @@ pub use console::is_end;
 use crate::{
     machine::{Checked, Machine, World},
     model::{Model, Stretch},
-    run::{Beginning, Run, Step, TEST_WATCHDOG, TICKS_A_MM},
+    run::{Beginning, Encoder, Run, Step, TEST_WATCHDOG, TICKS_A_MM},
     speeds::Speeds,
+    stand::{Geometry, Score, Stand},
 };
 use control::{
     alarm::Alarm,
@@ -27,22 +31,22 @@ use control::{
 use field::wheel::Wheel;
 use proptest::prelude::*;
 
-/// The grain of the measured speed: that of a tick in 10 ms, twice.
-const GRAIN_OF_SPEED: f64 = 200.0;
+/// Resolution of the measured speed, in ticks a second: twice a tick in 10 ms.
+const SPEED_RESOLUTION: f64 = 200.0;
 
-/// The end switch follows the tool by this.
+/// The end switch reports the tool's arrival after this time.
 const SWITCH_DELAY_US: u64 = 60_000;
 
-/// So many ticks behind the row, no monitor counts what stood there.
+/// Ticks behind the row after which the firmware's monitors no longer count its plants.
 const BEHIND_THE_ROW: i64 = 500;
 
-/// As a machine that is not open is asked for its state on the way back to work.
+/// Interval of `status` on the way back to work, for a machine that is not open.
 const ASKED_EVERY_US: u64 = 300_000;
 
-/// Edges of dust that are more than the machine can take at once.
+/// Edges of dust in one turn that overflow the machine's queue.
 const TOO_MANY: u32 = 40;
 
-/// Where the tool is while the machine rolls between two speeds, in ticks a second.
+/// The tool's position, while the machine rolls between two speeds in ticks a second.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     tool: i64,
@@ -52,73 +56,81 @@ struct Place {
     fastest: f64,
 }
 
-/// The machine on its way, see the module's words.
+/// A machine on a row, see the module's documentation.
 #[derive(Debug)]
 pub struct Drive<M> {
     machine: M,
-    /// The line that it is answering.
+    /// The line that the machine is answering.
     current: String,
-    /// The last lines that it wrote.
+    /// The lines that it wrote in the last turn.
     written: Vec<String>,
-    /// What is kept for sure, and what is being written.
+    /// The alarms, warnings and greetings since [`take_events`](Self::take_events).
+    events: Vec<String>,
+    /// The settings of the last acknowledged save, and those of a save in progress.
     saved: Option<Settings>,
     saving: Option<Settings>,
-    /// Whether the leads in it may be others, which the machine has measured meanwhile.
+    /// Whether the machine may have measured other leads before it saved.
     leads_in_doubt: bool,
+    /// Whether a byte of the EEPROM was changed, so that the next start may find anything.
+    is_spoiled: bool,
     taught: Vec<Listed>,
     model: Model,
     beginning: Beginning,
-    /// What each beam sees of the row, and the plants in it, if the ground is judged by these.
+    /// The level of each beam at each tick of the row, and the real plants, if they are checked.
     row: [Vec<bool>; 2],
-    plants: Option<Vec<(i64, i64)>>,
-    /// From which tick of it on it is bare; the farthest that the beam has come to.
+    stand: Option<Stand>,
+    /// The real machine, where its settings may be wrong.
+    geometry: Option<Geometry>,
+    /// The tick from which on the row is bare, and the farthest tick that the beam has reached.
     bare_from: i64,
     farthest: i64,
-    /// What the sensors show.
+    /// The sensors' levels.
     world: World,
-    /// Where the machine really is, in ticks, and its wheel.
+    /// The real position in ticks, and the wheel.
     ground: f64,
     wheel: Wheel,
-    /// In ticks a second: what it is, and what it is becoming.
+    /// The present and the intended speed, in ticks a second.
     speed: f64,
     target: f64,
     /// The speeds of the encoder's count.
     speeds: Speeds,
-    /// Since when the machine has rolled steadily, and nothing has come in between.
+    /// The time since which the machine has rolled steadily and undisturbed.
     calm_since_us: u64,
     /// The canopy for which the tool last left the row in that time.
     left_for: Option<Stretch>,
     was_out: bool,
-    /// Where the tool was first seen in the row over a canopy, and when: it may be on its way out.
+    /// The time and position at which the tool was first seen in the row over a canopy: it may be on its way out.
     suspect: Option<(u64, Place)>,
-    /// Whether something is tried on the bench, so that the tool may be in the row.
+    /// Whether a test on the bench is running, so that the tool may be in the row.
     is_tried: bool,
-    /// In what steps the machine remembers the ground.
+    /// The resolution at which the machine remembers the ground.
     scale: LengthScale,
-    encoder_is_silent: bool,
+    encoder: Encoder,
     edges_get_lost: bool,
     tool_is_stuck: bool,
-    /// Whether it was stuck since the machine woke up.
+    /// Whether the tool was stuck since the machine started.
     tool_was_stuck: bool,
     out_since_us: Option<u64>,
     turns: u64,
     steady_swings: u32,
-    /// The least that a plant was said to stand off its place, and every distance of plants that was set: the machine may guard by
-    /// what was set a moment ago.
+    /// Ticks rolled in this row, and with the tool in the row.
+    rolled: f64,
+    weeded: f64,
+    /// The least scatter and every spacing that were set: the machine may guard by values of a moment ago.
     guard_scatter: i64,
     guard_spacings: Vec<i64>,
-    /// Whether there has been a second beam. What it widens, and what it alone has seen, is no part of the model: that is closed besides.
+    /// Whether there was a second beam since the machine started. It can only close more ground, which the model does
+    /// not follow.
     had_second_beam: bool,
 }
 
 impl<M: Machine> Drive<M> {
-    /// A new board, told that its settings are right.
+    /// Starts a new machine. The operator clears the alarm about its settings.
     ///
     /// # Errors
-    /// What does not hold.
+    /// If a check fails.
     pub fn new(run: &Run) -> Result<Self, TestCaseError> {
         let (beginning, row) = (run.beginning.clone(), run.levels());
-        let plants = (!run.sights.is_empty()).then(|| run.plants());
         let world = World {
             time_us: 0,
             count: beginning.count.into(),
@@ -135,14 +147,17 @@ impl<M: Machine> Drive<M> {
             machine,
             current: String::new(),
             written: Vec::new(),
+            events: Vec::new(),
             saved: None,
             saving: None,
             leads_in_doubt: false,
+            is_spoiled: false,
             taught: Vec::new(),
             model: Model::new(world.count, world.broken),
             beginning,
             row,
-            plants,
+            stand: (!run.sights.is_empty()).then(|| Stand::new(run, 0)),
+            geometry: None,
             bare_from: i64::MAX,
             farthest: 0,
             world,
@@ -156,13 +171,15 @@ impl<M: Machine> Drive<M> {
             was_out: true,
             suspect: None,
             is_tried: false,
-            encoder_is_silent: false,
+            encoder: Encoder::Works,
             edges_get_lost: false,
             tool_is_stuck: false,
             tool_was_stuck: false,
             out_since_us: Some(0),
             turns: 0,
             steady_swings: 0,
+            rolled: 0.0,
+            weeded: 0.0,
             guard_scatter: i64::MAX,
             guard_spacings: Vec::new(),
             had_second_beam: false,
@@ -171,32 +188,47 @@ impl<M: Machine> Drive<M> {
         Ok(drive)
     }
 
-    /// Goes a run, and back to work; how many turns were checked.
+    /// Executes a run, and brings the machine back to work. Returns the number of checked turns.
     ///
     /// # Errors
-    /// What does not hold.
+    /// If a check fails.
     pub fn go(run: &Run) -> Result<u64, TestCaseError> {
         let mut drive = Self::new(run)?;
-        run.steps.iter().try_for_each(|step| drive.happen(step))?;
-        // Where the ground is judged by its plants, the row goes on.
-        if drive.plants.is_none() {
+        run.steps.iter().try_for_each(|step| drive.execute(step))?;
+        // Where the real plants are checked, the row goes on.
+        if drive.stand.is_none() {
             drive.come_back_to_work()?;
         }
         Ok(drive.turns)
     }
 
-    /// Has it happen.
+    /// Carries the machine to the headland of another row, and resets it there.
     ///
     /// # Errors
-    /// What does not hold.
-    pub fn happen(&mut self, step: &Step) -> Checked {
-        self.have(step)?;
+    /// If a check fails.
+    pub fn enter_row(&mut self, run: &Run, geometry: Geometry, stem_zone: i64) -> Checked {
+        self.stop();
+        self.row = run.levels();
+        (self.ground, self.farthest, self.wheel) = (0.0, 0, Wheel::default());
+        (self.world.broken, self.world.second_broken) = (self.row[0][0], false);
+        self.geometry = Some(geometry);
+        (self.rolled, self.weeded) = (0.0, 0.0);
+        self.stand.get_or_insert_default().replace(run, stem_zone);
+        self.init(Cause::ResetPin, None)
+    }
+
+    /// Executes a step, and checks the machine.
+    ///
+    /// # Errors
+    /// If a check fails.
+    pub fn execute(&mut self, step: &Step) -> Checked {
+        self.start_step(step)?;
         self.look()
     }
 
-    fn have(&mut self, step: &Step) -> Checked {
+    fn start_step(&mut self, step: &Step) -> Checked {
         match *step {
-            // The Uno would be reset while it answers, so that only the decisions are asked here.
+            // The Uno would be reset while it answers, so only the decisions get this line.
             Step::Type(ref line) if line == TEST_WATCHDOG => {
                 if M::IS_OPEN {
                     self.say(line)?;
@@ -220,7 +252,13 @@ impl<M: Machine> Drive<M> {
                 self.world.switch_on = on;
                 self.turn()
             }
-            Step::Dust { times } => (0..2 * times).try_for_each(|_| self.edge(!self.world.broken)),
+            Step::Dust { times, on_second: false } => (0..2 * times).try_for_each(|_| self.edge(!self.world.broken)),
+            Step::Dust { times, on_second: true } => {
+                for _ in 0..2 * times {
+                    self.second_edge(!self.world.second_broken);
+                }
+                Ok(())
+            }
             Step::LoseEdges { turns } if M::IS_OPEN => {
                 self.edges_get_lost = true;
                 self.turns(turns)?;
@@ -230,21 +268,27 @@ impl<M: Machine> Drive<M> {
                 (0..TOO_MANY).try_for_each(|_| self.edge(!self.world.broken))?;
                 self.turns(turns)
             }
-            Step::Silence { ms } => {
-                (self.encoder_is_silent, self.model.is_shifted) = (true, true);
+            Step::Silence { ms, encoder } => {
+                (self.encoder, self.model.is_shifted) = (encoder, true);
                 self.turns((u64::from(ms) * 1000 / self.beginning.turn_us) as u32)?;
-                self.encoder_is_silent = false;
+                self.encoder = Encoder::Works;
                 Ok(())
             }
             Step::Spike { ticks, times } => (0..times).try_for_each(|_| {
                 self.model.is_shifted = true;
+                let ticks = if self.speed < 0.0 { -ticks } else { ticks };
                 let off = self.machine.spike(&mut self.world, ticks);
                 self.model.loosen(off);
-                // A spike looks like a speed of its own, because the speed is measured over 10 ms.
+                // The speed is measured over 10 ms, so a spike looks like a speed of its own.
                 self.speeds.take(self.world.time_us, self.speed + f64::from(ticks) / 0.01);
                 self.turn()
             }),
             Step::Reset(cause) => self.init(cause, None),
+            Step::Spoil { address, byte } => {
+                self.machine.spoil(address, byte);
+                self.is_spoiled = true;
+                self.init(Cause::PowerOn, None)
+            }
             Step::CutPower { line, turns, byte } => {
                 self.type_in(line);
                 self.turns(turns)?;
@@ -254,7 +298,7 @@ impl<M: Machine> Drive<M> {
                 self.world.stack_is_low = true;
                 self.turns(turns)?;
                 self.world.stack_is_low = false;
-                // What the firmware has once seen used stays used.
+                // The firmware remembers the deepest stack until a reset.
                 if M::IS_OPEN { Ok(()) } else { self.init(Cause::ResetPin, None) }
             }
             Step::Slip { permille } => {
@@ -269,7 +313,7 @@ impl<M: Machine> Drive<M> {
         }
     }
 
-    /// Has the machine tell what cannot be seen of it.
+    /// Asks the machine for the facts that are not visible from outside.
     fn look(&mut self) -> Checked {
         if M::IS_OPEN {
             return Ok(());
@@ -279,18 +323,18 @@ impl<M: Machine> Drive<M> {
         }
         self.say("status")?;
         let state = self.machine.state();
-        // Only in HOLD is anything tried.
+        // Tests on the bench run only in HOLD.
         self.is_tried &= state == State::Hold;
         let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
         prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
         Ok(())
     }
 
-    /// Every fault is mended, and the row is at its end; the operator clears the alarm, starts, and drives on until the tool is
-    /// in. On the way back through the row there may be more alarms.
+    /// Repairs every fault and ends the row. The operator clears the alarm, starts, and drives on until the tool is in. On the
+    /// way back through the row there may be more alarms.
     ///
     /// # Errors
-    /// What does not hold.
+    /// If a check fails.
     pub fn come_back_to_work(&mut self) -> Checked {
         (self.tool_is_stuck, self.world.switch_on, self.bare_from) = (false, false, self.farthest);
         self.stop();
@@ -301,7 +345,7 @@ impl<M: Machine> Drive<M> {
         }
         self.look()?;
         let metre = f64::from(self.machine.settings().wheel().ticks(1000).0);
-        // Over what was seen, and forgotten, and on until ground that is known comes to the tool.
+        // The machine rolls over seen and forgotten ground, and on until known ground reaches the tool.
         let end = self.farthest.max(self.ground as i64)
             + self.unseen_row()
             + 2 * self.ticks(Setting::BeamToToolMm)
@@ -321,7 +365,7 @@ impl<M: Machine> Drive<M> {
             }
             self.turn()?;
             let there = self.ground as i64;
-            // What the last turn has rolled past is still counted.
+            // The plants of the last turn are still counted.
             let is_bare = there > self.bare_from + BEHIND_THE_ROW + self.unseen_row();
             prop_assert!(!is_bare || !is_alarm(self.machine.state()), "{:?} on bare ground", self.machine.state());
             let (state, reason) = (self.machine.state(), self.machine.reason());
@@ -330,7 +374,7 @@ impl<M: Machine> Drive<M> {
         Ok(())
     }
 
-    /// So far behind the row the machine may guard plants that it has not seen.
+    /// Ticks behind the row over which the machine may guard missed plants.
     fn unseen_row(&self) -> i64 {
         match self.ticks(Setting::GuardSpacingMm) {
             0 => 0,
@@ -348,23 +392,51 @@ impl<M: Machine> Drive<M> {
         self.machine.tool_out()
     }
 
-    /// Swings out at a steady speed, each for a window of its own.
+    /// Swings out at a steady speed, each for another keep-out zone.
     pub fn steady_swings(&self) -> u32 {
         self.steady_swings
+    }
+
+    /// The settings in use.
+    pub fn settings(&self) -> &Settings {
+        self.machine.settings()
+    }
+
+    /// The real position in ticks: 0 in the headland of the row.
+    pub fn position(&self) -> i64 {
+        self.ground as i64
+    }
+
+    /// Seconds since the run began.
+    pub fn time_s(&self) -> f64 {
+        self.world.time_us as f64 / 1e6
+    }
+
+    /// The result of the present row.
+    pub fn score(&self) -> Score {
+        let [metres, weeded_metres] = [self.rolled, self.weeded].map(|ticks| ticks / TICKS_A_MM / 1000.0);
+        let mut score = Score { metres, weeded_metres, ..Score::default() };
+        self.stand.iter().for_each(|stand| stand.add_to(&mut score));
+        score
+    }
+
+    /// Takes the alarms, warnings and greetings that the machine wrote.
+    pub fn take_events(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.events)
     }
 
     fn ticks(&self, setting: Setting) -> i64 {
         self.machine.settings().ticks(setting).0.into()
     }
 
-    /// Something came in between.
+    /// Ends a steady stretch.
     fn disturb(&mut self) {
         (self.calm_since_us, self.left_for) = (self.world.time_us, None);
     }
 
     fn roll(&mut self, ticks: f64, speed: f64) -> Checked {
         let (from, begun_us) = (self.ground, self.world.time_us);
-        // What it may take to turn round is not rolled.
+        // The time of a turn in the other direction.
         let most_us = ((ticks / speed).abs() * 1e6) as u64 + 5_000_000;
         if self.target != speed {
             self.disturb();
@@ -410,16 +482,19 @@ impl<M: Machine> Drive<M> {
         let seconds = self.beginning.turn_us as f64 / 1e6;
         let most = f64::from(self.beginning.mm_s2) * TICKS_A_MM * seconds;
         self.speed += (self.target - self.speed).clamp(-most, most);
-        let turned = if self.encoder_is_silent { 0.0 } else { self.speed * self.wheel.turns_a_tick };
+        let turned = if self.encoder == Encoder::Works { self.speed * self.wheel.turns_a_tick } else { 0.0 };
         self.speeds.take(self.world.time_us, turned);
         self.roll_by(self.speed * seconds)?;
+        let rolled = (self.speed * seconds).abs();
+        self.rolled += rolled;
+        self.weeded += if self.machine.tool_out() { 0.0 } else { rolled };
         let tool_is_out = self.out_since_us.is_some_and(|since_us| since_us + SWITCH_DELAY_US <= self.world.time_us);
         self.world.end_switch_on = tool_is_out && !self.tool_is_stuck;
         self.step(&before)?;
         self.attend_to_the_console()
     }
 
-    /// Rolls by so many ticks, past what stands there.
+    /// Rolls by this many ticks, past the plants and weeds there.
     fn roll_by(&mut self, ticks: f64) -> Checked {
         let from = self.ground.floor() as i64;
         self.ground += ticks;
@@ -427,10 +502,17 @@ impl<M: Machine> Drive<M> {
         let (moves, direction) = ((to - from).abs(), (to - from).signum());
         for place in 1..=moves {
             let turned = self.wheel.roll(from + (place - 1) * direction, direction > 0);
-            let turned = if self.encoder_is_silent { 0 } else { turned };
-            for _ in 0..turned.abs() {
-                self.world.count += turned.signum();
-                self.machine.count(turned > 0);
+            let counted = match self.encoder {
+                Encoder::Works => turned,
+                Encoder::Silent => 0,
+                Encoder::OneChannel => turned.abs() * (1 - 2 * (self.wheel.ticks() & 1)),
+            };
+            for _ in 0..counted.abs() {
+                self.world.count += counted.signum();
+                self.machine.count(counted > 0);
+            }
+            if let Some(stand) = &mut self.stand {
+                stand.lose_ticks(turned - counted);
             }
             self.beam_at(from + place * direction)?;
         }
@@ -441,19 +523,24 @@ impl<M: Machine> Drive<M> {
         self.farthest = self.farthest.max(ground);
         let stands_at =
             |row: &[bool], place: i64| place <= self.bare_from && row[place.rem_euclid(row.len() as i64) as usize];
-        let apart = self.ticks(Setting::SecondBeamMm);
+        let apart = self.geometry.map_or_else(|| self.ticks(Setting::SecondBeamMm), |real| real.second_beam);
         let [first, second] = &self.row;
         let (broken, second_broken) = (stands_at(first, ground), apart > 0 && stands_at(second, ground - apart));
         if second_broken != self.world.second_broken {
-            self.world.second_broken = second_broken;
-            if !self.edges_get_lost {
-                self.machine.beam_edge(&self.world);
-            }
+            self.second_edge(second_broken);
         }
         if broken == self.world.broken { Ok(()) } else { self.edge(broken) }
     }
 
-    /// The beam changes its level.
+    /// The second beam changes its level.
+    fn second_edge(&mut self, broken: bool) {
+        self.world.second_broken = broken;
+        if !self.edges_get_lost {
+            self.machine.beam_edge(&self.world);
+        }
+    }
+
+    /// The first beam changes its level.
     fn edge(&mut self, broken: bool) -> Checked {
         self.world.broken = broken;
         if !self.edges_get_lost {
@@ -472,14 +559,14 @@ impl<M: Machine> Drive<M> {
         Ok(())
     }
 
-    /// How far off the machine may have a place for its sensor's sake: the sensor of this machine answers at once.
+    /// Error of the machine's positions, in ticks, from the sensor response that it expects: this sensor answers at once.
     fn blur(&self) -> i64 {
         let (slowest, fastest) = self.speeds.extremes();
         let response_ms = self.machine.settings().get(Setting::BeamResponseMs);
         (fastest.max(-slowest) * f64::from(response_ms) / 1000.0) as i64 + 1
     }
 
-    /// The place that the machine takes itself to be at.
+    /// The position by the machine's count.
     fn here(&self) -> i64 {
         self.machine.place(self.world.count)
     }
@@ -497,20 +584,26 @@ impl<M: Machine> Drive<M> {
         self.out_since_us = self.machine.is_sent_out().then(|| self.out_since_us.unwrap_or(self.world.time_us));
         if state != state_before {
             self.disturb();
+            let geometry = self.geometry();
+            if let Some(stand) = self.stand.as_mut().filter(|_| is_alarm(state)) {
+                stand.forget(self.world.time_us, &geometry);
+            }
         }
         if M::IS_OPEN && state != state_before {
-            prop_assert!(state != State::Work || self.world.switch_on, "the machine went to work by itself");
-            prop_assert!(!is_alarm(state_before) || !self.world.switch_on, "{state_before:?} went away by itself");
+            prop_assert!(state != State::Work || self.world.switch_on, "the machine started work by itself");
+            prop_assert!(!is_alarm(state_before) || !self.world.switch_on, "{state_before:?} was cleared by itself");
             let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
             prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
         }
         prop_assert!(!M::IS_OPEN || !self.world.stack_is_low || is_alarm(state), "a low stack is no alarm");
         let works = if M::IS_OPEN { state == State::Work } else { !self.is_tried };
         let (slowest, fastest) = self.speeds.extremes();
-        let (slowest, fastest) = (slowest - GRAIN_OF_SPEED, fastest + GRAIN_OF_SPEED);
-        let beam_to_tool = self.ticks(Setting::BeamToToolMm);
-        let ground = self.ground.floor() as i64 - beam_to_tool;
-        let place = Place { tool: place - beam_to_tool, ground, slowest, fastest };
+        let (slowest, fastest) = (slowest - SPEED_RESOLUTION, fastest + SPEED_RESOLUTION);
+        let ground = self.ground.floor() as i64 - self.geometry().beam_to_tool;
+        let place = Place { tool: place - self.ticks(Setting::BeamToToolMm), ground, slowest, fastest };
+        if M::IS_OPEN {
+            self.check_stand(ground, out)?;
+        }
         if out || !works || self.machine.settings_are_in_doubt() {
             self.suspect = None;
         } else {
@@ -523,7 +616,7 @@ impl<M: Machine> Drive<M> {
         Ok(())
     }
 
-    /// What was kept, with the leads that were found, if they are in doubt.
+    /// The saved settings, with the leads that were found, if those are in doubt.
     fn with_leads_of(&self, kept: &Option<Settings>, found: &Option<Settings>) -> Option<Settings> {
         let (Some(kept), Some(found)) = (kept, found) else { return kept.clone() };
         let mut kept = kept.clone();
@@ -536,24 +629,40 @@ impl<M: Machine> Drive<M> {
         Some(kept)
     }
 
-    /// The machine has been reset: in HOLD or with an alarm, the tool out, and with all that it said that it keeps.
+    /// The real machine. By default its settings are right.
+    fn geometry(&self) -> Geometry {
+        self.geometry.unwrap_or_else(|| {
+            let us = |setting| u64::from(self.machine.settings().get(setting)) * 1000;
+            Geometry {
+                beam_to_tool: self.ticks(Setting::BeamToToolMm),
+                second_beam: self.ticks(Setting::SecondBeamMm),
+                dead_us: us(Setting::LeadInMs),
+                swing_us: us(Setting::LeadOutMs),
+            }
+        })
+    }
+
+    /// Resets the machine. It must start in HOLD or with an alarm, with the tool out, and with everything that it
+    /// acknowledged as saved.
     fn init(&mut self, cause: Cause, torn: Option<u8>) -> Checked {
+        let is_spoiled = std::mem::take(&mut self.is_spoiled);
         let is_answered = self.machine.is_done();
         let maybe = self.machine.examples();
         self.machine.reset(cause, torn, &self.world)?;
         let is_lost = self.machine.state() == State::Alarm(Alarm::SettingsLost);
-        prop_assert!(is_lost || self.machine.state() == State::Hold, "woken up in {:?}", self.machine.state());
+        prop_assert!(is_lost || self.machine.state() == State::Hold, "it started in {:?}", self.machine.state());
         let found = (!is_lost).then(|| self.machine.settings().clone());
-        // What was not acknowledged is there, or is not.
+        // A save that was not acknowledged may be complete, or have no effect.
         let expected = [&self.saving, &self.saved].map(|kept| self.with_leads_of(kept, &found));
-        if self.saving.is_some() && expected[0] == found {
+        if is_spoiled || self.saving.is_some() && expected[0] == found {
             self.saved = found;
         } else {
             prop_assert_eq!(&found, &expected[1], "other settings than were saved");
             self.saved = found;
         }
         let examples = self.machine.examples();
-        if is_answered {
+        if is_spoiled {
+        } else if is_answered {
             prop_assert_eq!(&examples, &self.taught, "other examples than were taught");
         } else {
             let is_known = |example| maybe.contains(example) || self.taught.contains(example);
@@ -562,17 +671,21 @@ impl<M: Machine> Drive<M> {
         self.taught = examples;
         self.scale = scale(self.machine.settings());
         self.model = Model::new(self.here(), self.world.broken);
-        // It takes itself for standing until it has measured.
+        let geometry = self.geometry();
+        if let Some(stand) = &mut self.stand {
+            stand.reset(self.ground as i64, self.world.time_us, &geometry);
+        }
+        // The measured speed is 0 until the first measurement.
         self.speeds = Speeds::default();
         self.speeds.take(self.world.time_us, 0.0);
-        (self.saving, self.suspect, self.is_tried) = (None, None, false);
+        (self.saving, self.suspect, self.is_tried, self.had_second_beam) = (None, None, false, false);
         (self.tool_was_stuck, self.out_since_us) = (self.tool_is_stuck, Some(self.world.time_us));
         self.disturb();
         Ok(())
     }
 }
 
-/// The unit of the machine's positions on the ground. Another unit makes it forget the ground.
+/// The unit of the machine's positions on the ground. A change of the unit makes the machine forget the ground.
 fn scale(settings: &Settings) -> LengthScale {
     LengthScale::of(settings.wheel().ticks(1000))
 }

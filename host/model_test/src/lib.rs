@@ -1,19 +1,24 @@
 //! Model-based tests: random runs of a weeder on a row, checked by a slow and simple model of the ground.
 //!
 //! [`run`] defines the steps of a run. [`drive`] executes them on a [`Machine`](machine::Machine) and checks it after
-//! each turn. [`model`] stores what the beam has seen. [`go_all`] executes many runs. It shrinks a failing run to a few
-//! steps, and prints them as lines to type and distances to roll. The machine is the decisions alone
-//! (`control/tests/against_the_model/`) or the firmware in the virtual Uno (`tests/end_to_end/random_walks.rs`). Both
-//! have the same checks, as far as they are visible from outside.
+//! each turn. [`model`] stores what the beam has seen, and judges orders. [`stand`] has the real plants, and judges the
+//! swinging tool. [`go_all`] executes many runs. It shrinks a failing run to a few steps, and prints them as lines to
+//! type and distances to roll.
+//!
+//! The machine is the [`decisions`] alone (`control/tests/against_the_model/`, and `weeder soak` for hours) or the
+//! firmware in the virtual Uno (`tests/end_to_end/random_walks.rs`). Both have the same checks, as far as they are
+//! visible from outside.
 //!
 //! The runs are the same each time, so that a result depends on the change and not on luck. `WEEDER_SEED` gives other
 //! runs, and `WEEDER_CASES` sets their number. [`is_thorough`] and [`cases`] are for every slow test.
 
+pub mod decisions;
 pub mod drive;
 pub mod machine;
-pub mod model;
+mod model;
 pub mod run;
 mod speeds;
+pub mod stand;
 
 use machine::Checked;
 use proptest::{
@@ -25,21 +30,21 @@ use run::Run;
 use std::env;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How many runs are gone, and how they are shrunk.
+/// The number of runs, and of attempts to shrink one.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
-    /// How many runs, by [`cases`], unless the environment says another number.
+    /// Number of runs, before [`cases`]. `WEEDER_CASES` replaces it.
     pub runs: u32,
-    /// At least so many turns are to be checked in all of them, so that they have not become idle.
+    /// Least number of checked turns in all runs: fewer would mean that the runs have become idle.
     pub least_turns: u64,
-    /// At most so many shorter runs are tried where one fails.
+    /// Most attempts to shrink a failing run.
     pub shrinkings: u32,
 }
 
-/// Goes runs in parallel, each by `go`, which returns how many turns were checked.
+/// Executes runs in parallel, each by `go`, which returns the number of checked turns.
 ///
 /// # Panics
-/// With the first run that fails, shrunk; where too few turns were checked; and where the environment's numbers are none.
+/// If a run fails, with the run shrunk; if too few turns were checked; or if an environment variable is not a number.
 pub fn go_all(extent: Extent, runs: &BoxedStrategy<Run>, go: impl Fn(&Run) -> Result<u64, Failure> + Sync) {
     let asked = number("WEEDER_CASES");
     let number_of_runs = asked.unwrap_or(cases(extent.runs.into()));
@@ -54,7 +59,7 @@ pub fn go_all(extent: Extent, runs: &BoxedStrategy<Run>, go: impl Fn(&Run) -> Re
     };
     let mut left = number_of_runs;
     while left > 0 {
-        // A run is shrunk by what it was drawn from, which stays in this thread.
+        // The value tree that shrinks a run cannot leave this thread.
         let trees: Vec<_> = (0..left.min(BATCH))
             .map(|_| runs.new_tree(&mut runner).unwrap_or_else(|reason| panic!("no run can be drawn: {reason}")))
             .collect();
@@ -63,11 +68,11 @@ pub fn go_all(extent: Extent, runs: &BoxedStrategy<Run>, go: impl Fn(&Run) -> Re
         let failed = drawn.par_iter().enumerate().find_map_first(|(place, run)| Some((place, check(run).err()?)));
         let Some((place, reason)) = failed else { continue };
         let Some(tree) = trees.into_iter().nth(place) else { continue };
-        println!("{reason}\n{:?}It is being shrunk.", drawn[place]);
+        println!("{reason}\n{:?}Shrinking the run.", drawn[place]);
         match runner.run_one(tree, |run| check(&run)) {
             Err(TestError::Fail(reason, run)) => panic!("{reason}\n{run:?}"),
             Err(TestError::Abort(reason)) => panic!("{reason}"),
-            Ok(_) => panic!("a run fails, and when it is gone again it does not:\n{:?}", drawn[place]),
+            Ok(_) => panic!("a run failed, but not when it was repeated:\n{:?}", drawn[place]),
         }
     }
     let turns = turns.into_inner();
@@ -85,12 +90,12 @@ pub fn cases(all: u64) -> u64 {
     if is_thorough() { all } else { all.div_ceil(5) }
 }
 
-/// Runs that are drawn before they are gone.
+/// Runs that are drawn before they are executed.
 const BATCH: u64 = 64;
 
 pub use proptest::test_runner::TestCaseError as Failure;
 
-/// What an environment variable says, if it is there.
+/// The number in an environment variable, if it is set.
 fn number(name: &str) -> Option<u64> {
     let text = env::var(name).ok()?;
     Some(text.parse().unwrap_or_else(|_| panic!("{name}={text} is not a whole number")))

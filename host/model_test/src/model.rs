@@ -14,56 +14,56 @@
 //! After an error of the encoder's count, the row is shifted by the lost or added ticks. The model still stores what
 //! the beam has seen at each count: the machine cannot know more.
 
-/// Ground over which the beam was broken without a break.
+/// Ground over which the beam was broken continuously.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stretch {
-    /// The first place at which the beam was broken.
+    /// The first position at which the beam was broken.
     pub leading: i64,
-    /// The last.
+    /// The last such position.
     pub trailing: i64,
-    /// How far off the machine may have it: by what its sensor's answer takes, as it is set.
+    /// Error of the machine's positions, from the sensor response that it expects.
     blur: i64,
-    /// How far its margin goes at the most: the operator's word ends it.
+    /// Limit of the margin behind it: `start now` may end it earlier.
     margin_to: i64,
-    /// Whether the tool may work here: it was taken for a weed, or the operator has said so.
+    /// Whether the tool may work here, because of a weed or of `start now`.
     is_free: bool,
 }
 
-/// The ground as the beam has shown it.
+/// The ground as the beam has seen it.
 #[derive(Debug)]
 pub struct Model {
-    /// All behind this place is unknown.
+    /// Ground behind this position is unknown.
     known_from: i64,
-    /// The first place that was looked at.
+    /// The first position of the beam.
     begin: i64,
-    /// The farthest place that the beam has come to.
+    /// The farthest position of the beam.
     frontier: i64,
-    /// Whether the beam is broken where it is, and whether the last stretch goes on at the frontier.
+    /// Whether the beam is broken now, and whether the last stretch goes on at the frontier.
     broken: bool,
     is_growing: bool,
-    /// In the order in which they lie.
+    /// In the order of their positions.
     stretches: Vec<Stretch>,
-    /// Ground where a plant was due and none was seen, in the order in which it was told.
+    /// Ground of expected but missed plants, in the order of the machine's reports.
     guarded: Vec<Stretch>,
-    /// Gaps that belong to a canopy, each with the frontier from which on it was set.
+    /// Gaps that belong to a canopy, each with the frontier at which it was set.
     merge_gaps: Vec<(i64, i64)>,
-    /// Zones round a stem, each with the frontier from which on it was set; and how far a second beam moves the end of one.
+    /// Stem zones, each with the frontier at which it was set; and the shift of an end by a second beam.
     stem_zones: Vec<(i64, i64)>,
     moved: i64,
     /// A detection up to this width may have been classified as a weed without an event.
     narrow: i64,
-    /// What every place may be off by: the steps in which the machine remembers the ground, and the turn of the loop.
+    /// Error of every position: from the machine's resolution of the ground, and a turn of the loop.
     slack: i64,
-    /// As much of it as the grain of that memory, and the turn, make.
-    grain_slack: i64,
+    /// The part of it that follows from the present resolution.
+    resolution_slack: i64,
     /// Whether the encoder's count has gone wrong.
     pub is_shifted: bool,
     /// Whether the machine came so near to the end of its memory that it may have forgotten the ground.
-    may_have_begun_anew: bool,
+    may_have_forgotten: bool,
 }
 
 impl Model {
-    /// Nothing is known but the beam's level.
+    /// A model that knows only the beam's level.
     pub fn new(place: i64, broken: bool) -> Self {
         let mut model = Self {
             known_from: place,
@@ -78,9 +78,9 @@ impl Model {
             moved: 0,
             narrow: 0,
             slack: 0,
-            grain_slack: 0,
+            resolution_slack: 0,
             is_shifted: false,
-            may_have_begun_anew: false,
+            may_have_forgotten: false,
         };
         model.touch(0);
         model
@@ -92,22 +92,22 @@ impl Model {
     pub fn follow(&mut self, place: i64, merge_gap: i64, metre: i64) {
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
-            self.may_have_begun_anew = true;
+            self.may_have_forgotten = true;
         }
-        // The machine has done so by now, at eight metres as near as its turns let it.
+        // By now the machine has forgotten the ground: at eight metres, within a turn.
         if self.frontier - place > 8 * metre + metre / 64 {
-            self.begin_anew(self.frontier - 8 * metre);
+            self.see_again(self.frontier - 8 * metre);
         }
-        let grain = 1 + metre / 2400;
-        let slack = 2 + 2 * grain;
-        self.slack += (slack - self.grain_slack).max(0);
-        self.grain_slack = self.grain_slack.max(slack);
+        let resolution = 1 + metre / 2400;
+        let slack = 2 + 2 * resolution;
+        self.slack += (slack - self.resolution_slack).max(0);
+        self.resolution_slack = self.resolution_slack.max(slack);
         if self.merge_gaps.last().is_none_or(|&(_, gap)| gap != merge_gap) {
             self.merge_gaps.push((self.frontier, merge_gap));
         }
     }
 
-    /// The settings as of now: the zone round a stem, and how far a second beam stands behind the first.
+    /// Applies the present stem zone, and the distance of the second beam.
     pub fn keep_stems(&mut self, zone: i64, second_beam: i64) {
         if self.stem_zones.last().map_or(0, |&(_, last)| last) != zone {
             self.stem_zones.push((self.frontier, zone));
@@ -115,31 +115,31 @@ impl Model {
         self.moved = self.moved.max(second_beam / 16);
     }
 
-    /// Whether any zone has been set.
+    /// Whether a stem zone was set.
     pub fn keeps_stems(&self) -> bool {
         !self.stem_zones.is_empty()
     }
 
-    /// Whether what the machine says of the ground may be of other ground than the model holds: nothing is to be held against it.
+    /// Whether the machine's reports may be about other ground than the model's. Then they are not checked.
     pub fn is_in_doubt(&self) -> bool {
-        self.is_shifted || self.may_have_begun_anew
+        self.is_shifted || self.may_have_forgotten
     }
 
-    /// The machine's places may be off by so many ticks more.
+    /// Adds an error, in ticks, to every position of the machine.
     pub fn loosen(&mut self, ticks: i64) {
         self.slack += ticks;
     }
 
-    /// Of a detection no longer than this the machine may make a weed without anybody being told.
+    /// The machine may classify a detection up to this width as a weed without an event.
     pub fn leave_narrow(&mut self, ticks: i64) {
         self.narrow = self.narrow.max(ticks);
     }
 
     /// The ground ahead of a position is seen again as new.
-    pub fn begin_anew(&mut self, place: i64) {
+    pub fn see_again(&mut self, place: i64) {
         self.known_from = self.known_from.min(place);
         self.begin = self.begin.min(place);
-        (self.frontier, self.is_growing, self.may_have_begun_anew) = (place, false, false);
+        (self.frontier, self.is_growing, self.may_have_forgotten) = (place, false, false);
         self.stretches.retain(|stretch| stretch.leading < place);
         self.stretches.iter_mut().for_each(|stretch| stretch.trailing = stretch.trailing.min(place - 1));
         self.guarded.retain(|guarded| guarded.trailing < place);
@@ -148,15 +148,18 @@ impl Model {
         self.stem_zones = zone.map(|(_, zone)| (place, zone)).into_iter().collect();
     }
 
-    /// The machine says that it guards the ground around a place, where a plant was due.
+    /// The machine reports that it guards the ground around a position, where a plant was expected.
     ///
     /// # Errors
-    /// What the beam has shown, where it has not seen all of that ground, or nothing stands so far behind that the plant was due.
+    /// If the beam has not seen all of that ground, or saw no plant at the spacing behind it.
     pub fn guard(&mut self, due: i64, spacing: i64, scatter: i64) -> Result<(), String> {
         if due + scatter > self.frontier + self.slack {
-            return Err(format!("ground is guarded around {due}, and the beam has only come to {}", self.frontier));
+            return Err(format!(
+                "the machine guards ground around {due}, but the beam has only reached {}",
+                self.frontier
+            ));
         }
-        // From the middle of a plant, which may have gaps, to that of the first, the second, or the third unseen behind it.
+        // From the centre of a plant, which may have gaps, to that of the first, second, or third missed plant behind it.
         let is_from = |first: usize| {
             self.stretches[first..].iter().any(|last| {
                 let middle = (self.stretches[first].leading + last.trailing) / 2;
@@ -165,14 +168,17 @@ impl Model {
             })
         };
         if !(0..self.stretches.len()).any(is_from) {
-            return Err(format!("ground is guarded around {due}, {spacing} behind none of {:?}", self.stretches));
+            return Err(format!(
+                "the machine guards ground around {due}, {spacing} behind none of {:?}",
+                self.stretches
+            ));
         }
         let (leading, trailing) = (due - scatter, due + scatter);
         self.guarded.push(Stretch { leading, trailing, blur: 0, margin_to: i64::MAX, is_free: false });
         Ok(())
     }
 
-    /// The beam has come to a place, which the machine may have by `blur` elsewhere.
+    /// The beam reaches a position. The machine's position may be off by `blur`.
     pub fn roll_to(&mut self, place: i64, blur: i64) {
         if place > self.frontier {
             self.touch(blur);
@@ -181,7 +187,7 @@ impl Model {
         }
     }
 
-    /// The beam breaks or clears at a place.
+    /// The beam breaks or clears at a position.
     pub fn edge(&mut self, place: i64, broken: bool, blur: i64) {
         self.roll_to(place, blur);
         self.broken = broken;
@@ -190,7 +196,7 @@ impl Model {
         }
     }
 
-    /// Something is in the beam at the frontier, or nothing is.
+    /// Stores the beam's level at the frontier.
     fn touch(&mut self, blur: i64) {
         if !self.broken {
             self.is_growing = false;
@@ -228,20 +234,20 @@ impl Model {
         for stretch in self.stretches.iter_mut().chain(&mut self.guarded).filter(|stretch| stretch.trailing < from) {
             stretch.margin_to = stretch.margin_to.min(from - 1);
         }
-        // What the beam is still to come to there counts as little.
+        // The beam may not have reached all of this ground.
         if to > self.frontier {
             (self.frontier, self.is_growing) = (to, false);
         }
     }
 
-    /// With the beam at a place, the machine has taken a detection for a weed of so many ticks, give or take `tolerance`.
+    /// With the beam at a position, the machine has classified a detection of this width as a weed. Opens its ground.
     ///
     /// # Errors
-    /// What the beam has shown, where no whole detection of this width has come to its end here.
+    /// If no whole detection of this width ended here, within `tolerance`.
     pub fn weed(&mut self, place: i64, width: i64, tolerance: i64) -> Result<(), String> {
         let last = self.stretches.partition_point(|stretch| stretch.trailing <= place);
         let nearest = |last: usize| &self.stretches[last.saturating_sub(4)..last];
-        // What still goes on at the frontier is not over.
+        // The stretch at the frontier has not ended yet.
         let last = if self.is_growing && last == self.stretches.len() { last.saturating_sub(1) } else { last };
         let shown = nearest(last).to_vec();
         for first in (0..last).rev() {
@@ -251,7 +257,7 @@ impl Model {
                 + 2 * self.stretches[first..last].iter().map(|stretch| stretch.blur).max().unwrap_or(0);
             let shortest_since = |place| self.merge_gaps_since(place).min().unwrap_or(0);
             let before = first.checked_sub(1).map(|before| self.stretches[before].trailing);
-            // What lies before it may have come to its end under another setting.
+            // The stretch before it may have ended under another setting.
             let begins = before.is_none_or(|end| leading - end >= shortest_since(end) - tolerance);
             let is_whole = begins && place - trailing >= shortest_since(leading) - tolerance;
             if is_whole && (trailing - leading).abs_diff(width) <= tolerance as u64 {
@@ -266,7 +272,7 @@ impl Model {
         if self.stretches[..last].is_empty() && place - width < self.begin {
             return Ok(());
         }
-        Err(format!("a weed of {width} ticks was told at {place}, where the beam has shown {shown:?}"))
+        Err(format!("the machine reports a weed of {width} ticks at {place}, but the beam saw {shown:?}"))
     }
 
     /// The gaps that were set while the beam came from a place on.
@@ -275,12 +281,12 @@ impl Model {
         self.merge_gaps[first..].iter().map(|&(_, gap)| gap)
     }
 
-    /// Whether the tool is behind all that the beam has seen, with `near` the first place that it asks for.
+    /// Whether the beam has not seen the ground at `near`.
     pub fn is_unseen(&self, near: i64) -> bool {
         near + self.slack < self.known_from
     }
 
-    /// A canopy that the tool has to keep off, with its margin, somewhere from `near` to `far`.
+    /// A canopy that the tool must avoid, with its margin, between `near` and `far`.
     pub fn canopy_between(&self, near: i64, far: i64, margin: i64) -> Option<Stretch> {
         let first = self.stretches.partition_point(|stretch| stretch.trailing + margin < near);
         let mut near_by = self.stretches[first..].iter().take_while(|stretch| stretch.leading - margin <= far);
@@ -290,12 +296,12 @@ impl Model {
         near_by.find(is_closed).or_else(guarded).copied()
     }
 
-    /// Whether the ground around a stretch is closed for sure somewhere from `near` to `far`.
+    /// Whether the ground around a stretch is certainly closed somewhere between `near` and `far`.
     fn is_met(&self, stretch: &Stretch, near: i64, far: i64, margin: i64) -> bool {
         self.bounds(stretch, margin).is_some_and(|(from, to)| from <= far && to >= near)
     }
 
-    /// As [`canopy_between`](Self::canopy_between), where all of the ground is closed by canopies and their margins.
+    /// The last canopy between `near` and `far`, if canopies and their margins close all of that ground.
     pub fn canopies_all_over(&self, mut near: i64, far: i64, margin: i64) -> Option<Stretch> {
         loop {
             let stretch = self.canopy_between(near, near, margin)?;
@@ -307,7 +313,7 @@ impl Model {
         }
     }
 
-    /// Whether a stretch belongs to a detection that is too wide for a weed: with the stretches so near to it that they are of the same one.
+    /// Whether a stretch belongs to a detection that is too wide for a weed, together with the stretches that merge with it.
     fn is_wide(&self, stretch: &Stretch) -> bool {
         let place = self.stretches.partition_point(|other| other.leading < stretch.leading);
         let gap = |first: usize, next: usize| {
@@ -324,7 +330,7 @@ impl Model {
         self.stretches[last].trailing - self.stretches[first].leading > self.narrow + self.slack + 2 * blur
     }
 
-    /// The ground around a stretch that is closed for sure; none where the tool may work, or the machine may have seen nothing.
+    /// The certainly closed ground around a stretch. None if the tool may work there, or the machine may have missed it.
     fn bounds(&self, stretch: &Stretch, margin: i64) -> Option<(i64, i64)> {
         let slack = self.slack + 2 * stretch.blur;
         let is_canopy = !stretch.is_free && stretch.trailing - stretch.leading > slack;
@@ -332,7 +338,7 @@ impl Model {
         is_canopy.then_some((stretch.leading + less, (stretch.trailing - less).min(stretch.margin_to)))
     }
 
-    /// How much at the end of a stretch may be taken for leaves alone, at the most.
+    /// The greatest part of a stretch's end that the machine may open as leaves beside the stem zone.
     fn given_up(&self, stretch: &Stretch) -> i64 {
         let first = self.stem_zones.partition_point(|&(from, _)| from <= stretch.trailing).saturating_sub(1);
         let zones = self.stem_zones[first..].iter().filter(|&&(_, zone)| zone > 0);
@@ -341,13 +347,13 @@ impl Model {
         most.map_or(0, |most| if most > 0 { most + self.moved + 1 } else { 0 })
     }
 
-    /// How wide the detection may be to which a stretch belongs, at the most.
+    /// The greatest width of the detection to which a stretch belongs.
     fn widest(&self, stretch: &Stretch) -> i64 {
         let is_one = |before: &Stretch, behind: &Stretch| {
             let longest = self.merge_gaps_since(before.leading).max().unwrap_or(0);
             behind.leading - before.trailing <= longest + self.slack + 2 * before.blur.max(behind.blur)
         };
-        // Guarded ground is none of them, and is looked up as what stands near to it.
+        // Guarded ground is not in the list, so a neighbour stands for it.
         let Some(end) = self.stretches.len().checked_sub(1) else { return 0 };
         let place = self.stretches.partition_point(|other| other.leading < stretch.leading).min(end);
         let (mut first, mut last) = (place, place);
@@ -361,8 +367,8 @@ impl Model {
         last.trailing - first.leading + 1 + self.slack + 2 * first.blur.max(last.blur)
     }
 
-    /// The window that a tool rolling on from a place comes to next: its canopy's first and last place.
-    pub fn next_window(&self, place: i64, forward: bool, margin: i64) -> Option<Stretch> {
+    /// The canopy of the next keep-out zone for a tool that rolls on from a position.
+    pub fn next_canopy(&self, place: i64, forward: bool, margin: i64) -> Option<Stretch> {
         if forward {
             self.stretches
                 .iter()

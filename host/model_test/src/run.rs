@@ -1,107 +1,140 @@
-//! Runs: a machine, a row, and the steps on it, one after the other, in an operator's terms.
+//! Runs: a machine, a row, and the steps on it, in the operator's terms.
 
 use control::{measure::reset::Cause, settings::SECOND_BEAM_LEAST_MM};
 use field::wheel::most_slip;
 use proptest::prelude::*;
-use std::fmt;
+use std::{fmt, ops::Range};
 
-/// A detection of this width is no weed, at any slip of the wheel.
+/// A canopy of this width is a plant, at any slip of the wheel.
 const PLANT_MM: u32 = 80;
 
 /// Ticks of the ground wheel in a millimetre, independent of the settings.
 pub const TICKS_A_MM: f64 = 1.909_86;
 
-/// What has the watchdog reset a machine that stands in hold.
+/// The command that makes the watchdog reset a machine in hold.
 pub const TEST_WATCHDOG: &str = "test watchdog";
 
-/// Where and when a run begins, and how the machine is.
+/// How the decisions classify detections. The firmware in an Uno always uses its examples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Classification {
+    /// By width alone.
+    Width,
+    /// By the firmware's examples.
+    Examples,
+}
+
+/// The machine at the beginning of a run.
 #[derive(Clone, Debug)]
 pub struct Beginning {
-    /// What the counters of way and time show.
+    /// The encoder's count.
     pub count: i32,
-    /// As `count`, in the clock's steps.
+    /// The clock, in its steps.
     pub steps: u32,
-    /// A turn of the loop, after which the machine is looked at.
+    /// Length of a turn of the loop. The machine is checked after each turn.
     pub turn_us: u64,
     /// Whether each reading is from before the edges that come with it.
     pub reads_first: bool,
-    /// How fast the machine gains and loses speed.
+    /// Acceleration of the machine, and its deceleration.
     pub mm_s2: i32,
+    /// The classifier of the decisions.
+    pub classification: Classification,
 }
 
-/// Something that happens.
+/// The encoder's health.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoder {
+    /// It counts.
+    Works,
+    /// It counts nothing.
+    Silent,
+    /// One channel is dead, so that it counts up and down in turn.
+    OneChannel,
+}
+
+/// A step of a run.
 #[derive(Clone, Debug)]
 pub enum Step {
-    /// A line is typed, and answered while the machine rolls on.
+    /// The operator types a line. The machine answers while it rolls on.
     Type(String),
-    /// The machine rolls so far, back where that is negative, and goes on at this speed.
+    /// The machine rolls, and goes on at this speed. Both values are negative to roll back.
     Roll {
-        /// How far.
+        /// The distance.
         mm: i32,
-        /// How fast.
+        /// The speed.
         mm_s: i32,
     },
-    /// The machine stands.
+    /// The machine brakes and stands.
     Stand {
-        /// How long.
+        /// The duration, with braking.
         ms: u32,
     },
-    /// The wheel trembles on an edge.
+    /// The machine stops, and its wheel trembles on an edge.
     Tremble {
         /// Ticks to and fro.
         times: u32,
     },
-    /// The work switch is thrown.
+    /// The operator turns the work switch.
     Switch {
-        /// To where.
+        /// Whether to work.
         on: bool,
     },
-    /// Leaves, or light between them, come and go in the beam at one place.
+    /// A beam changes its level, and back, at one position.
     Dust {
-        /// How often.
+        /// Number of such pairs.
         times: u32,
+        /// Whether this is the second beam.
+        on_second: bool,
     },
-    /// The next edges of the beam get lost.
+    /// The next edges of the beams are lost.
     LoseEdges {
-        /// For how long.
+        /// The duration.
         turns: u32,
     },
-    /// The encoder says nothing, while the machine rolls on.
+    /// The encoder fails, while the machine rolls on.
     Silence {
-        /// How long.
+        /// The duration.
         ms: u32,
+        /// How it fails.
+        encoder: Encoder,
     },
     /// Both channels of the encoder change at once.
     Spike {
-        /// What that adds to the count.
+        /// Ticks that each spike adds in the direction of rolling: 2, or -2 if it was about to change.
         ticks: i32,
-        /// How often, a turn apart.
+        /// Number of spikes, a turn apart.
         times: u32,
     },
     /// The machine is reset.
     Reset(Cause),
-    /// A line is typed, and after so many turns of the loop the power goes away; a byte that is being written becomes anything.
-    CutPower {
-        /// What is typed.
-        line: &'static str,
-        /// How long the machine has for it.
-        turns: u32,
-        /// What becomes of the byte.
+    /// A byte of the EEPROM changes, and the machine is switched off and on. Only the decisions show it.
+    Spoil {
+        /// The byte's address.
+        address: usize,
+        /// Its new value.
         byte: u8,
     },
-    /// The stack reaches nearly down to the variables.
+    /// The operator types a line, and then the power fails.
+    CutPower {
+        /// The line.
+        line: &'static str,
+        /// Turns from the line until the power fails.
+        turns: u32,
+        /// The new value of a byte that is being written.
+        byte: u8,
+    },
+    /// The stack nearly reaches the variables.
     LowerStack {
-        /// For how long.
+        /// The duration.
         turns: u32,
     },
-    /// From here on the wheel turns farther than the machine rolls, or less far where that is negative.
+    /// The wheel's slip changes on new ground.
     Slip {
-        /// By how much, in thousandths of the ground.
+        /// Excess of the turned distance over the rolled one, in thousandths.
         permille: i32,
     },
-    /// The end switch no longer follows the tool, or does again.
+    /// The end switch sticks, or follows the tool again.
     StickTool {
-        /// Which of them.
+        /// Whether it sticks.
         stuck: bool,
     },
 }
@@ -114,24 +147,31 @@ impl fmt::Display for Step {
             Self::Roll { mm, mm_s } => write!(f, "roll {mm} mm at {mm_s} mm/s"),
             Self::Stand { ms } => write!(f, "stand for {ms} ms"),
             Self::Tremble { times } => write!(f, "stop, and tremble by a tick {times} times"),
-            Self::Switch { on } => write!(f, "throw the work switch {}", if *on { "on" } else { "off" }),
-            Self::Dust { times } => write!(f, "have the beam change twice, {times} times, at one place"),
-            Self::LoseEdges { turns } => write!(f, "lose the beam's edges for {turns} turns of the loop"),
-            Self::Silence { ms } => write!(f, "silence the encoder for {ms} ms"),
-            Self::Spike { ticks, times } => write!(f, "spoil the count by {ticks} ticks, {times} times a turn apart"),
-            Self::Reset(cause) => write!(f, "reset, by {cause:?}"),
+            Self::Switch { on } => write!(f, "turn the work switch {}", if *on { "on" } else { "off" }),
+            Self::Dust { times, on_second } => {
+                let beam = if *on_second { "second" } else { "first" };
+                write!(f, "change the {beam} beam's level and back, {times} times at one position")
+            }
+            Self::LoseEdges { turns } => write!(f, "lose the beams' edges for {turns} turns of the loop"),
+            Self::Silence { ms, encoder } => write!(f, "fail the encoder for {ms} ms: {encoder:?}"),
+            Self::Spike { ticks, times } => write!(f, "add {ticks} ticks to the count, {times} times a turn apart"),
+            Self::Reset(cause) => write!(f, "reset: {cause:?}"),
+            Self::Spoil { address, byte } => write!(f, "change byte {address} of the EEPROM to {byte:#04x}, and reset"),
             Self::CutPower { line, turns, byte } => {
-                write!(f, "type `{line}`, and cut the power {turns} turns later; a byte under way becomes {byte:#04x}")
+                write!(
+                    f,
+                    "type `{line}`, and cut the power {turns} turns later; a byte being written becomes {byte:#04x}"
+                )
             }
             Self::LowerStack { turns } => write!(f, "leave 40 bytes of stack for {turns} turns"),
-            Self::Slip { permille } => write!(f, "have the wheel turn {permille} thousandths farther than the ground"),
-            Self::StickTool { stuck: true } => write!(f, "have the end switch stick"),
-            Self::StickTool { stuck: false } => write!(f, "have the end switch follow the tool again"),
+            Self::Slip { permille } => write!(f, "turn the wheel {permille} thousandths farther than the ground"),
+            Self::StickTool { stuck: true } => write!(f, "let the end switch stick"),
+            Self::StickTool { stuck: false } => write!(f, "let the end switch follow the tool again"),
         }
     }
 }
 
-/// Which of two beams see a thing.
+/// The beams that see a canopy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
     /// Both.
@@ -145,52 +185,70 @@ pub enum Sight {
 /// A run.
 #[derive(Clone)]
 pub struct Run {
-    /// Where it begins.
+    /// The machine at the beginning.
     pub beginning: Beginning,
-    /// Clear ground and ground with something on it, in turn, in millimetres; behind the last it begins again.
+    /// Gaps and canopies in turn, in millimetres. The row repeats.
     pub row: Vec<(u32, u32)>,
-    /// Which beams see each of the things in the row, both where nothing is said. The ground is judged by where these stand if anything is.
+    /// The beams that see each canopy; both beams see a canopy without an entry. With entries, the real plants are
+    /// checked too.
     pub sights: Vec<Sight>,
-    /// What happens, in this order.
+    /// The steps, in order.
     pub steps: Vec<Step>,
 }
 
 impl Run {
-    /// A run over a row, as written down: a line for each thing that is typed or rolled, by a machine that gains and loses speed as a
-    /// person pushes it.
+    /// A written run: each line is a step. A person pushes the machine.
     pub fn written(row: &[(u32, u32)], lines: &str) -> Self {
-        let beginning = Beginning { count: 0, steps: 0, turn_us: 1000, reads_first: true, mm_s2: 3000 };
+        let beginning = Beginning {
+            count: 0,
+            steps: 0,
+            turn_us: 1000,
+            reads_first: true,
+            mm_s2: 3000,
+            classification: Classification::Width,
+        };
         let steps = lines.lines().map(str::trim).filter(|line| !line.is_empty()).map(step).collect();
         Self { beginning, row: row.to_vec(), sights: Vec::new(), steps }
     }
 
-    /// For each tick of the row whether something stands there that the first beam sees, and the second.
+    /// For each beam and each tick of the row: whether the beam is broken there.
     pub fn levels(&self) -> [Vec<bool>; 2] {
-        let ticks = |mm: u32| (f64::from(mm) * TICKS_A_MM) as usize;
         let sights = || self.sights.iter().copied().chain(std::iter::repeat(Sight::Both));
         [Sight::Second, Sight::First].map(|unseen| {
-            let levels = |(&(gap, thing), sight): (&(u32, u32), Sight)| {
-                let gap = std::iter::repeat_n(false, ticks(gap));
-                gap.chain(std::iter::repeat_n(sight != unseen, ticks(thing)))
+            let levels = |(&(gap, canopy), sight): (&(u32, u32), Sight)| {
+                let gap = std::iter::repeat_n(false, ticks(gap) as usize);
+                gap.chain(std::iter::repeat_n(sight != unseen, ticks(canopy) as usize))
             };
             self.row.iter().zip(sights()).flat_map(levels).collect()
         })
     }
 
-    /// From which tick of the row to which each plant stands that is too wide for a weed.
-    pub fn plants(&self) -> Vec<(i64, i64)> {
-        let ticks = |mm: u32| (f64::from(mm) * TICKS_A_MM) as i64;
-        let mut place = 0;
-        let spans = self.row.iter().map(|&(gap, thing)| {
-            let from = place + ticks(gap);
-            place = from + ticks(thing);
-            (thing, (from, place))
+    /// The ticks after which the row repeats.
+    pub fn period(&self) -> i64 {
+        self.row.iter().flat_map(|&(gap, canopy)| [gap, canopy]).map(ticks).sum()
+    }
+
+    /// The ticks of each canopy that is too wide for a weed.
+    pub fn plants(&self) -> Vec<Range<i64>> {
+        let mut end = 0;
+        let spans = self.row.iter().map(|&(gap, canopy)| {
+            let start = end + ticks(gap);
+            end = start + ticks(canopy);
+            (canopy, start..end)
         });
-        spans.filter(|&(thing, _)| thing >= PLANT_MM).map(|(_, span)| span).collect()
+        spans.filter(|&(canopy, _)| canopy >= PLANT_MM).map(|(_, span)| span).collect()
     }
 }
 
-/// What a line says: `roll 450 mm at 556 mm/s`, `roll back ...`, `stand for 100 ms`, or what is typed.
+/// Delay of the measured speed.
+const MEASURED_WITHIN_S: f64 = 0.05;
+
+/// Whole ticks in this many millimetres.
+fn ticks(mm: u32) -> i64 {
+    (f64::from(mm) * TICKS_A_MM) as i64
+}
+
+/// Parses a step: `roll 450 mm at 556 mm/s`, `roll back ...`, `stand for 100 ms`, or a line to type.
 fn step(line: &str) -> Step {
     let numbers: Vec<i32> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
     match (line.split(' ').next(), &numbers[..]) {
@@ -201,26 +259,26 @@ fn step(line: &str) -> Step {
     }
 }
 
-/// What a person types and rolls.
+/// Lines to type and distances to roll.
 impl fmt::Debug for Run {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { beginning, row, sights, steps } = self;
         writeln!(f, "{beginning:?}")?;
-        write!(f, "the beam is at 0 mm; in the row stand things from")?;
-        let mut place = 0;
-        for (gap, thing) in row {
-            write!(f, " {} to {},", place + gap, place + gap + thing)?;
-            place += gap + thing;
+        write!(f, "the beam is at 0 mm; the row has canopies from")?;
+        let mut end = 0;
+        for (gap, canopy) in row {
+            write!(f, " {} to {},", end + gap, end + gap + canopy)?;
+            end += gap + canopy;
         }
-        writeln!(f, " and again every {place} mm")?;
+        writeln!(f, " and again every {end} mm")?;
         for (number, sight) in sights.iter().enumerate().filter(|(_, sight)| **sight != Sight::Both) {
-            writeln!(f, "number {} of them is seen by this beam alone: {sight:?}", number + 1)?;
+            writeln!(f, "only this beam sees canopy {}: {sight:?}", number + 1)?;
         }
         steps.iter().try_for_each(|step| writeln!(f, "    {step}"))
     }
 }
 
-/// Every command with every argument, and lines that are none.
+/// Every command with every argument, and lines that are not commands.
 fn line() -> BoxedStrategy<String> {
     let fixed = [
         "status",
@@ -281,7 +339,7 @@ fn line() -> BoxedStrategy<String> {
     .boxed()
 }
 
-/// Settings of machines that may be built, and now and then of others.
+/// Settings of practical machines, and now and then of others.
 fn setting() -> BoxedStrategy<String> {
     let usual = prop_oneof![
         4 => (Just("lead_out_ms"), 0_u32..=500),
@@ -333,7 +391,7 @@ fn setting() -> BoxedStrategy<String> {
         "end_switch",
     ];
     let any = (prop::sample::select(names.to_vec()), prop_oneof![0_u32..=600, 0_u32..=70_000]);
-    // A wheel that counts so rarely cannot tell where it is, and is nowhere sure enough to weed.
+    // With fewer ticks a metre the machine never knows its position well enough to weed.
     let any =
         any.prop_filter("a wheel that counts", |&(name, value)| name != "ticks_per_m" || !(1..400).contains(&value));
     prop_oneof![9 => usual, 1 => any].prop_map(|(name, value)| format!("set {name} {value}")).boxed()
@@ -348,7 +406,7 @@ fn typed(line: &str) -> Step {
     Step::Type(line.to_owned())
 }
 
-/// Some things that happen one after the other.
+/// A short sequence of steps.
 fn steps() -> BoxedStrategy<Vec<Step>> {
     use Step::*;
     let forward = || roll(prop_oneof![8 => 100..800, 1 => 5..100, 2 => 800..1500], 20..700);
@@ -358,10 +416,10 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
         prop::sample::select(vec!["save", "label weed", "label plant", "forget all", "forget 0", "hold", "status"]);
     let fault = || {
         prop_oneof![
-            2 => (1_u32..30).prop_map(|times| Dust { times }),
+            2 => (1_u32..30).prop_map(|times| Dust { times, on_second: false }),
             2 => (1_u32..4).prop_map(|turns| LoseEdges { turns }),
             1 => roll(1500..2500, 50..300),
-            1 => (5_u32..300).prop_map(|ms| Silence { ms }),
+            1 => (5_u32..300).prop_map(|ms| Silence { ms, encoder: Encoder::Silent }),
             1 => (prop_oneof![Just(-2), Just(2)], 1_u32..30).prop_map(|(ticks, times)| Spike { ticks, times }),
             1 => (1_u32..20).prop_map(|turns| LowerStack { turns }),
             1 => any::<bool>().prop_map(|stuck| StickTool { stuck }),
@@ -380,7 +438,7 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
         1 => cause.prop_map(Reset),
         1 => (kept, 0_u32..600, any::<u8>()).prop_map(|(line, turns, byte)| CutPower { line, turns, byte }),
     ];
-    // A row or the servo's swings come to their end, and something is typed in that very turn or near it.
+    // A dry run or the servo's test ends, and a line is typed in that turn or near it.
     let bench = prop_oneof![
         (900_u32..1300).prop_map(|mm_s| (format!("test row {mm_s}"), 3500 * 1000 / mm_s)),
         Just(("calibrate servo".to_owned(), 9000)),
@@ -390,7 +448,7 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
     });
     prop_oneof![
         24 => one.prop_map(|step| vec![step]),
-        // A crop at even distances, and the machine says what it guards of it.
+        // A crop at even distances. The machine reports where it guards missed plants.
         2 => (150_u32..900, to_work(), forward(), forward()).prop_map(|(mm, start, roll, on)| {
             let set = Type(format!("set guard_spacing_mm {mm}"));
             vec![typed("events on"), set, typed("clear"), typed(start), roll, on]
@@ -408,7 +466,7 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
         6 => (fault(), back(), to_work(), forward()).prop_map(|(fault, back, start, forward)| {
             vec![fault, back, typed("clear"), typed(start), forward]
         }),
-        // Far and fast, beyond what the machine remembers.
+        // Farther than the machine remembers, and fast.
         1 => (prop_oneof![-11_000..-2000, 2000..12_000], to_work()).prop_map(|(mm, start)| {
             vec![typed("hold"), Roll { mm, mm_s: 6000 * mm.signum() }, Stand { ms: 1 }, typed("clear"), typed(start)]
         }),
@@ -417,19 +475,22 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
     .boxed()
 }
 
-/// Clear ground and things in turn: plants, weeds, leaves with light between them.
+/// Gaps and canopies in turn: plants, weeds, leaves with light between them.
 fn row() -> BoxedStrategy<Vec<(u32, u32)>> {
     let gap = prop_oneof![2 => 1_u32..40, 5 => 40_u32..900];
-    let thing = prop_oneof![2 => 2_u32..40, 5 => 60_u32..300, 1 => 300_u32..500];
-    prop::collection::vec((gap, thing), 1..12).boxed()
+    let canopy = prop_oneof![2 => 2_u32..40, 5 => 60_u32..300, 1 => 300_u32..500];
+    prop::collection::vec((gap, canopy), 1..12).boxed()
 }
 
-/// Anywhere, or where a counter is about to run over its end.
+/// Any counts, often shortly before an overflow.
 fn beginning() -> BoxedStrategy<Beginning> {
     let count = prop_oneof![Just(0), i32::MAX - 20_000..=i32::MAX, i32::MIN..i32::MIN + 5_000, any::<i32>()];
     let steps = prop_oneof![Just(0), u32::MAX - 2_000_000..=u32::MAX, any::<u32>()];
     (count, steps, 300_u64..2000, any::<bool>(), 300..6000)
-        .prop_map(|(count, steps, turn_us, reads_first, mm_s2)| Beginning { count, steps, turn_us, reads_first, mm_s2 })
+        .prop_map(|(count, steps, turn_us, reads_first, mm_s2)| {
+            let classification = Classification::Width;
+            Beginning { count, steps, turn_us, reads_first, mm_s2, classification }
+        })
         .boxed()
 }
 
@@ -439,25 +500,26 @@ fn runs(steps: BoxedStrategy<Vec<Step>>) -> BoxedStrategy<Run> {
         .boxed()
 }
 
-/// Runs on which anything happens, so many times at the most.
-pub fn wild(happen: usize) -> BoxedStrategy<Run> {
-    runs(prop::collection::vec(steps(), 1..happen).prop_map(|some| some.into_iter().flatten().collect()).boxed())
+/// Runs with any steps: at most `sequences` short sequences of them.
+pub fn wild(sequences: usize) -> BoxedStrategy<Run> {
+    runs(prop::collection::vec(steps(), 1..sequences).prop_map(|some| some.into_iter().flatten().collect()).boxed())
 }
 
-/// A stand at even distances or not, with weeds and dust in it, and which beams see each of them: now and then one misses something.
+/// A row at even distances or not, with weeds and dust. Now and then a beam misses a canopy.
 fn stand() -> BoxedStrategy<Vec<((u32, u32), Sight)>> {
     let sight = || prop_oneof![14 => Just(Sight::Both), 1 => Just(Sight::First), 1 => Just(Sight::Second)];
     let even =
         (prop_oneof![2 => 40_u32..150, 3 => 150_u32..600], PLANT_MM..160, prop::collection::vec(sight(), 14..30))
             .prop_map(|(gap, width, sights)| sights.into_iter().map(|sight| ((gap, width), sight)).collect::<Vec<_>>());
     let narrow = (30_u32..200, prop_oneof![1 => 2_u32..12, 2 => 12_u32..50]);
-    let thing = prop_oneof![4 => (30_u32..600, PLANT_MM..220), 1 => narrow];
-    let uneven = prop::collection::vec((thing, sight()), 14..30);
+    let canopy = prop_oneof![4 => (30_u32..600, PLANT_MM..220), 1 => narrow];
+    let uneven = prop::collection::vec((canopy, sight()), 14..30);
     prop_oneof![2 => even, 1 => uneven].boxed()
 }
 
-/// Runs of a machine with two beams, at work and rolled forward and back so many times at the most, with slip that changes. Its margin
-/// has room for three times as much as that alone makes: what was measured before a change and what is right behind it.
+/// Runs of a machine with two beams, which works and rolls forward and back at most `rolls` times while its slip changes.
+/// Up to half of the margin is for the change of speed during a swing. The rest has room for three times the greatest error
+/// from slip: for a value measured before a change and used after it.
 pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
     let machine = (250_u32..=1000, 35_u32..95, 20_u32..70, prop_oneof![Just(0_u32), 40_u32..120]);
     let rolled = || prop_oneof![6 => roll(100..500, 500..6000), 2 => roll(-400..-50, 100..2500)];
@@ -470,7 +532,13 @@ pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
     let steps = prop::collection::vec(step, 6..rolls);
     let going = roll(200..500, 3000..12_000);
     (beginning(), stand(), machine, going, steps)
-        .prop_map(|(beginning, stand, (beam_to_tool_mm, share, margin_mm, lead_out_ms), going, steps)| {
+        .prop_map(|(mut beginning, stand, (beam_to_tool_mm, share, margin_mm, lead_out_ms), going, steps)| {
+            let mut spare_mm = f64::from(margin_mm);
+            if lead_out_ms > 0 {
+                let late_s = f64::from(lead_out_ms) / 1000.0 + MEASURED_WITHIN_S;
+                beginning.mm_s2 = beginning.mm_s2.min((spare_mm / late_s.powi(2)) as i32);
+                spare_mm -= f64::from(beginning.mm_s2) * late_s.powi(2) / 2.0;
+            }
             let (row, sights) = stand.into_iter().unzip();
             let least_mm = u32::from(SECOND_BEAM_LEAST_MM);
             let settings = [
@@ -487,7 +555,7 @@ pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
                 ),
             ];
             let settings = settings.map(|(name, value)| Step::Type(format!("set {name} {value}")));
-            let most_permille = (1000.0 * most_slip(margin_mm.into(), beam_to_tool_mm.into())) as i32;
+            let most_permille = (1000.0 * most_slip(spare_mm, beam_to_tool_mm.into())) as i32;
             let steps = steps.into_iter().flat_map(|(share, step)| match step {
                 Step::Stand { ms: 1 } => vec![Step::Slip { permille: most_permille * share / 100 }],
                 Step::Roll { .. } => vec![typed("clear"), typed("start"), step],
@@ -500,7 +568,7 @@ pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
         .boxed()
 }
 
-/// Runs of a machine that is set up and at work. It rolls steadily forward and back, `rolls` times at most.
+/// Runs of a machine that is set up and works. It rolls steadily forward and back, at most `rolls` times.
 pub fn calm(rolls: usize) -> BoxedStrategy<Run> {
     let rolled = prop_oneof![5 => roll(60..1400, 500..5000), 1 => roll(-800..-60, 100..3000)];
     let steps = (prop::collection::vec(setting(), 0..5), prop::collection::vec(rolled, 1..rolls));

@@ -1,24 +1,24 @@
-//! The speeds of the last second. A measured speed must lie between them.
+//! The range of speeds in the last second. The machine's measured speed must lie in it.
 
 use std::collections::VecDeque;
 
-/// The measured speed is that of some moment in this time.
+/// Longest delay of the measured speed.
 const MEMORY_US: u64 = 1_000_000;
 
-/// A share of it that is kept as one.
+/// Interval of one entry.
 const SHARE_US: u64 = MEMORY_US / 20;
 
-/// The speeds of the last second.
+/// The range of speeds in the last second.
 #[derive(Debug, Default)]
 pub struct Speeds {
-    /// Each share of it: its number, and the lowest and the highest in ticks a second.
+    /// For each interval its number, and the lowest and highest speed in ticks a second.
     shares: VecDeque<(u64, f64, f64)>,
-    /// The lowest and the highest of all shares, which are asked for far more often than a share begins.
+    /// The lowest and highest speed of all intervals. They are read far more often than an interval begins.
     extremes: (f64, f64),
 }
 
 impl Speeds {
-    /// Takes a speed at a time.
+    /// Adds a speed.
     pub fn take(&mut self, now_us: u64, speed: f64) {
         let number = now_us / SHARE_US;
         if let Some((_, least, greatest)) = self.shares.back_mut().filter(|(last, ..)| *last == number) {
@@ -35,7 +35,7 @@ impl Speeds {
             others.fold((speed, speed), |(least, greatest), (one, other)| (least.min(one), greatest.max(other)));
     }
 
-    /// The lowest and the highest.
+    /// The lowest and the highest speed.
     pub fn extremes(&self) -> (f64, f64) {
         self.extremes
     }

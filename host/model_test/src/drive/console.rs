@@ -1,23 +1,23 @@
-//! The lines that are typed into the machine: each must be answered once, and its effect is stored for the checks.
+//! Types lines into the machine, checks that each is answered once, and stores its effect for the checks.
 //!
 //! The content of an answer is not checked here, only its end.
 
 use super::{Drive, is_alarm, scale};
 use crate::machine::{Attended, Checked, Machine};
-use control::{operate::state::State, settings::Setting};
+use control::{operate::state::State, say::command::LineBuffer, settings::Setting};
 use proptest::prelude::*;
 
 /// Turns in which every line must be answered, also during a write to the EEPROM.
 const PATIENCE: u32 = 20_000;
 
-/// A short line is carried out and answered within this.
+/// A short line is executed and answered within this time.
 const ANSWERED_S: f64 = 0.05;
 
 impl<M: Machine> Drive<M> {
-    /// Types a line, or several, and waits until each of them has been answered: once.
+    /// Types one or several lines, and waits until each has been answered once.
     pub(super) fn say(&mut self, text: &str) -> Checked {
         if !M::IS_OPEN && text.contains("start now") {
-            // How much the operator is to vouch for.
+            // The reported unseen ground, which the operator vouches for.
             self.say("status")?;
         }
         let lines = self.type_in(text);
@@ -34,11 +34,11 @@ impl<M: Machine> Drive<M> {
         Ok(())
     }
 
-    /// Types a line, or several; those that are to be answered.
+    /// Types one or several lines. Returns those that must be answered.
     pub(super) fn type_in(&mut self, text: &str) -> Vec<String> {
         self.disturb();
-        let lines = text.split(['\r', '\n']).map(str::trim).filter(|line| !line.is_empty());
-        let lines: Vec<String> = lines.map(str::to_owned).collect();
+        let lines = text.split(['\r', '\n']).map(|line| line.trim_matches([' ', '\t']));
+        let lines: Vec<String> = lines.filter(|line| is_answered(line)).map(str::to_owned).collect();
         self.machine.put(text, &lines);
         lines
     }
@@ -59,17 +59,17 @@ impl<M: Machine> Drive<M> {
         }
         if self.scale != scale(self.machine.settings()) {
             self.scale = scale(self.machine.settings());
-            self.model.begin_anew(self.here());
+            self.model.see_again(self.here());
         }
         for end in written.iter().filter(|line| is_end(line)) {
             self.end(end, unseen_mm);
         }
-        written.iter().try_for_each(|line| self.check_guarded(line))?;
+        written.iter().try_for_each(|line| self.hear(line))?;
         self.written = written;
         Ok(())
     }
 
-    /// A line is carried out, now or soon.
+    /// A line is executed, now or soon.
     fn begin(&mut self, line: &str, before: State) {
         let words = words(line);
         self.is_tried |= matches!(words[0], "servo" | "calibrate" | "test");
@@ -87,7 +87,7 @@ impl<M: Machine> Drive<M> {
 
     fn check_begun(&self, line: &str, before: State) -> Checked {
         let (words, after) = (words(line), self.machine.state());
-        prop_assert!(after == before || after != State::Work || words[0] == "start", "{line:?} had it work");
+        prop_assert!(after == before || after != State::Work || words[0] == "start", "{line:?} started work");
         prop_assert!(after == before || !is_alarm(before) || words == ["clear"], "{line:?} cleared an alarm");
         Ok(())
     }
@@ -110,12 +110,12 @@ impl<M: Machine> Drive<M> {
         }
     }
 
-    /// The operator's word, if the line is it, for the ground that the machine has not seen by so much.
+    /// Opens the ground that the machine has not seen, if the line is the operator's `start now`.
     fn trust(&mut self, line: &str, unseen_mm: i16) {
         if words(line) == ["start", "now"] && unseen_mm > 0 {
             let tool = self.here() - self.ticks(Setting::BeamToToolMm);
             let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
-            // What the machine has rolled on since it was told.
+            // The distance rolled since the line was executed.
             let late = if M::IS_OPEN { 0 } else { (self.speed.abs() * ANSWERED_S) as i64 };
             self.model.trust(tool - self.ticks(Setting::MarginMm) - late, tool + unseen as i64);
         }
@@ -124,6 +124,12 @@ impl<M: Machine> Drive<M> {
 
 fn words(line: &str) -> Vec<&str> {
     line.split([' ', '\t']).filter(|word| !word.is_empty()).collect()
+}
+
+/// Whether the machine answers a line: backspaces may have emptied it.
+fn is_answered(line: &str) -> bool {
+    let mut buffer = LineBuffer::new();
+    line.bytes().chain(*b"\n").any(|byte| buffer.take(byte).is_some())
 }
 
 /// Whether a line is the last one of an answer.

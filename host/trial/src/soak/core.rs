@@ -1,49 +1,35 @@
-//! Hours of the decision core on the host: a turn of the loop is a millisecond, and an edge of the beam comes at its tick.
+//! Hours of the decisions on the host: a model-based run of chance steps, from row to row.
 //!
-//! Each row has a machine of its own, with a second beam or without, and a wheel whose slip changes. Where there are two beams, now and
-//! then one of them misses a plant. The tool must be out of the row at a plant that at least one beam has seen.
+//! [`Drive`] executes each step and checks it. This file draws the machines, the rows, the steps and the faults, and
+//! counts. Each row has another machine, with a second beam or without, and a wheel whose slip changes. Now and then one
+//! of two beams misses a plant. The tool must be clear of every plant that a beam has seen.
 //!
-//! Clock and count go on over resets, unlike on the chip, and begin shortly before their ends, so that in each hour both run over them.
+//! Unlike on the chip, clock and count continue over resets. They begin shortly before they overflow, so that each hour
+//! passes both overflows.
 
 use super::tally::{Plan, SoakError, Tally, chance, count, total};
-use control::{
-    ground::{class::Class, examples::EXAMPLES, nearest::Nearest},
-    measure::{readings::Readings, reset::Cause},
-    memory::{Memory, Volatile},
-    operate::{
-        event::Event,
-        saved::{COPY, SavedSettings},
-        state::State,
-    },
-    settings::{Setting, Settings},
-    units::{Instant, Position, Ticks},
-};
+use control::{measure::reset::Cause, operate::state::State, settings::Setting};
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
-use field::row::{Kind, Row};
-use field::wheel::{Wheel, most_slip};
+use field::row::Row;
+use field::wheel::most_slip;
+use link::settings;
+use model_test::Failure;
+use model_test::decisions::{CHIP_SIZE, Decisions};
+use model_test::drive::Drive;
+use model_test::machine::Checked;
+use model_test::run::{Beginning, Classification, Encoder, Run, Sight, Step, TICKS_A_MM};
+use model_test::stand::{Geometry, Score};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use rig::{Beams, ByExamples, Rig};
-use std::{cell::RefCell, ops::Range, rc::Rc};
 
-/// A turn of the loop.
-const TURN_US: u32 = 1000;
-const TURN_S: f64 = TURN_US as f64 / 1e6;
-
-/// Bytes of the stack that were never used.
-const STACK_FREE: u16 = 300;
-
-/// Where clock and count begin: the clock a minute before its end, the count two hundred metres.
+/// The clock begins a minute before its overflow, and the count 200 m before its own.
 const FIRST_STEPS: u32 = u32::MAX - 15_000_000;
 const FIRST_COUNT: i32 = i32::MAX - 382_000;
 
-/// Simulated time between two reports of progress.
-const PROGRESS_TURNS: u64 = 1_000_000;
-
-/// The rows: plants half a metre apart, as the examples were trained.
-const PLANTING: Planting = Planting {
+/// The rows: plants half a metre apart, as for the built-in examples.
+pub(super) const PLANTING: Planting = Planting {
     plants: 40,
     spacing_mm: 500.0,
     spacing_scatter_mm: 40.0,
@@ -53,7 +39,7 @@ const PLANTING: Planting = Planting {
     ragged: false,
 };
 
-/// A stand in which plants are too near for two beams.
+/// A row in which plants are too near for two beams.
 const DENSE: Planting = Planting {
     spacing_mm: 260.0,
     spacing_scatter_mm: 20.0,
@@ -66,133 +52,31 @@ const DENSE: Planting = Planting {
 /// Ground between the second beam and the tool: the tool swings out over it, at 3 km/h and with the margin.
 const SECOND_BEAM_TO_TOOL_MM: u16 = 300;
 
-/// Either of two beams misses a thing as rarely as this.
+/// Either of two beams misses one canopy in this many.
 pub(super) const MISSED_ONCE_IN: usize = 16;
 
 /// Ground before and behind each row.
 const HEADLAND_MM: f64 = 1000.0;
 
-/// The measured speed is right again so long after the encoder was silent.
-const SPEED_SETTLES_TURNS: u64 = 100;
+/// Turns of a save. The power fails at any moment of it.
+const SAVE_TURNS: u32 = 160;
 
-/// An offset between the ground and the count from which on the firmware cannot know: a quarter of the margin. The rest is
-/// what a push, a jerk or slip may use up.
-const BLIND_TICKS: f64 = 24.0;
-
-/// What the ends of an object may be off by.
-const EDGE_TICKS: i64 = 4;
-
-type Weeder = Rig<ByExamples<Shared>, Shared>;
-
-/// A memory that stays when the machine is reset.
-#[derive(Clone, Debug, Default)]
-struct Shared(Rc<RefCell<Volatile>>);
-
-impl Memory for Shared {
-    fn read(&self, address: u16) -> u8 {
-        self.0.borrow().read(address)
-    }
-
-    fn is_ready(&self) -> bool {
-        true
-    }
-
-    fn write(&mut self, address: u16, byte: u8) {
-        self.0.borrow_mut().write(address, byte);
-    }
-}
-
-impl Shared {
-    /// What is found when the power is back.
-    fn recover(&self) {
-        let found = self.0.borrow().clone().with_power();
-        *self.0.borrow_mut() = found;
-    }
-}
-
-/// A row in ticks of a wheel that does not slip.
-struct Ground {
-    /// Whether each beam is broken over each tick.
-    broken: [Vec<bool>; 2],
-    plants: Vec<Range<i64>>,
-    /// What the tool must not reach of each plant.
-    kept: Vec<Range<i64>>,
-}
-
-impl Ground {
-    /// A row as the beams of a machine see it: of two, now and then one misses a thing. Of a plant the stem's zone is kept, where there
-    /// is one.
-    fn of(row: &Row, machine: &Machine, stem_zone_mm: u16, rng: &mut ChaCha8Rng) -> Self {
-        let start_mm = row.span_mm().start - HEADLAND_MM;
-        let tick = |mm: f64| ((mm - start_mm) / machine.tick_mm()).round() as i64;
-        let length = tick(row.span_mm().end + HEADLAND_MM + machine.beam_to_tool_mm);
-        let mut broken = [vec![false; length as usize], vec![false; length as usize]];
-        for thing in row.things() {
-            let span = thing.span_mm();
-            let missed = if machine.has_second_beam() { rng.random_range(0..MISSED_ONCE_IN) } else { MISSED_ONCE_IN };
-            for (beam, broken) in broken.iter_mut().enumerate().filter(|&(beam, _)| beam != missed) {
-                // The second beam has nothing to see where there is none.
-                let is_there = beam == 0 || machine.has_second_beam();
-                broken[tick(span.start) as usize..tick(span.end) as usize].fill(is_there);
-            }
-        }
-        let spans = |most_mm: f64| {
-            let plants = row.things().iter().filter(|thing| thing.kind == Kind::Plant).map(|plant| plant.span_mm());
-            let plants = plants.map(|Range { start, end }| {
-                let cut_mm = ((end - start - most_mm) / 2.0).max(0.0);
-                tick(start + cut_mm)..tick(end - cut_mm)
-            });
-            plants.collect::<Vec<_>>()
-        };
-        let zone_mm = if stem_zone_mm > 0 { stem_zone_mm.into() } else { f64::INFINITY };
-        Self { broken, plants: spans(f64::INFINITY), kept: spans(zone_mm) }
-    }
-
-    fn is_broken(&self, beam: usize, place: i64) -> bool {
-        usize::try_from(place).is_ok_and(|place| self.broken[beam].get(place).copied().unwrap_or(false))
-    }
-}
-
-/// The machine in the field, with its operator.
+/// A machine and its operator in the field.
 struct Field {
     rng: ChaCha8Rng,
-    machine: Machine,
-    weeder: Weeder,
-    memories: [Shared; 2],
-    turns: u64,
-    /// Where the machine is in its row, in ticks.
-    place: f64,
-    wheel: Wheel,
-    speed: f64,
-    /// What the firmware is told of the machine.
-    told: [(Setting, u16); 3],
-    /// Turns for which the encoder is yet to be dead, and whether one of its channels is alive then.
-    silent_turns: u32,
-    one_channel_lives: bool,
-    /// Ticks that the count lacks since the firmware last forgot its ground.
-    lost_ticks: i64,
-    blind_until_turn: u64,
-    /// What went wrong last, and at which turn.
-    last_fault: (&'static str, u64),
-    /// Turns since the tool's last order, and whether it was fully out before that.
-    order_turns: u64,
-    was_clear: bool,
-    tool_out: bool,
-    /// Plants of the row that were mistaken or reached blindly.
-    excused: Vec<Excuse>,
+    drive: Drive<Decisions>,
+    /// The settings that the operator types for the present machine.
+    typed: Vec<(Setting, u16)>,
+    /// The position at which the present row ends.
+    row_end: i64,
+    /// Faults in a second, on average, and the time of the next.
+    faults_a_second: f64,
+    next_fault_s: f64,
+    last_fault: (&'static str, f64),
     tally: Tally,
 }
 
-/// What may have become of a plant.
-#[derive(Clone, Copy, Default)]
-struct Excuse {
-    mistaken: bool,
-    blind: bool,
-    passed: bool,
-    harmed: bool,
-}
-
-/// Works for so many simulated hours; `progress` is told the share done, from 0 to 1.
+/// Works for this many simulated hours. `progress` gets the share done, from 0 to 1.
 ///
 /// # Errors
 /// [`SoakError::Planting`].
@@ -203,443 +87,259 @@ pub fn hours(plan: Plan, hours: f64, mut progress: impl FnMut(f64)) -> Result<Ta
     }))
 }
 
-/// Works for an hour of a soak, with this number from 0, or for a part of it; `progress` is told how much of an hour is done.
+/// Works for an hour of a soak, with this number from 0, or for a part of it. `progress` gets the share of the hour.
 ///
 /// # Errors
 /// [`SoakError::Planting`].
 pub fn hour(plan: Plan, number: u64, part: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    let turns = (part * 3600.0 / TURN_S) as u64;
-    let field = Field::new(chance(plan, number), Machine::default());
-    let mut tally = field.work_until(turns, plan.faults_an_hour, &mut |share| progress(share * part))?;
+    let field = Field::new(chance(plan, number), plan.faults_an_hour);
+    let mut tally = field.work_for(part * 3600.0, &mut |share| progress(share * part))?;
     tally.violations = tally.violations.iter().map(|what| format!("hour {}, {what}", number + 1)).collect();
     Ok(tally)
 }
 
+/// A run without steps, over a row as each of the machine's beams sees it. Now and then one of two beams misses a canopy.
+fn run_over(row: &Row, machine: &Machine, rng: &mut ChaCha8Rng) -> Run {
+    let start_mm = row.span_mm().start - HEADLAND_MM;
+    let mut run = standing();
+    let mut end_mm = 0;
+    for canopy in row.things() {
+        let span = canopy.span_mm();
+        let [from, to] = [span.start, span.end].map(|mm| (mm - start_mm).round() as u32);
+        run.row.push((from - end_mm, to - from));
+        end_mm = to;
+        run.sights.push(match rng.random_range(0..MISSED_ONCE_IN) {
+            0 if machine.has_second_beam() => Sight::Second,
+            1 if machine.has_second_beam() => Sight::First,
+            _ => Sight::Both,
+        });
+    }
+    run.row.push(((HEADLAND_MM + machine.beam_to_tool_mm) as u32, 0));
+    run
+}
+
+/// A run without a row or a step.
+fn standing() -> Run {
+    let beginning = Beginning {
+        count: FIRST_COUNT,
+        steps: FIRST_STEPS,
+        turn_us: 1000,
+        reads_first: false,
+        mm_s2: 1000,
+        classification: Classification::Examples,
+    };
+    Run { beginning, row: vec![(1000, 0)], sights: Vec::new(), steps: Vec::new() }
+}
+
 impl Field {
-    fn new(rng: ChaCha8Rng, machine: Machine) -> Self {
-        let memories = [Shared::default(), Shared::default()];
-        let mut readings = Readings::new(Instant::new(FIRST_STEPS), Position::new(FIRST_COUNT));
-        readings.stack_free = STACK_FREE;
-        let weeder = init(&memories, readings, Beams::default(), Cause::PowerOn);
-        Self {
+    fn new(rng: ChaCha8Rng, faults_an_hour: f64) -> Self {
+        let mut field = Self {
             rng,
-            machine,
-            weeder,
-            memories,
-            turns: 0,
-            place: 0.0,
-            wheel: Wheel::default(),
-            speed: 0.0,
-            told: told(&machine, 0),
-            silent_turns: 0,
-            one_channel_lives: false,
-            lost_ticks: 0,
-            blind_until_turn: 0,
-            last_fault: ("nothing", 0),
-            order_turns: 0,
-            was_clear: true,
-            tool_out: true,
-            excused: Vec::new(),
+            drive: Drive::new(&standing()).expect("a new machine starts"),
+            typed: Vec::new(),
+            row_end: 0,
+            faults_a_second: faults_an_hour / 3600.0,
+            next_fault_s: 0.0,
+            last_fault: ("nothing", 0.0),
             tally: Tally::default(),
-        }
+        };
+        field.draw_fault_time();
+        // A new machine has an alarm about its settings until they are saved, which is no result of the soak.
+        field.type_in(&["save"]).expect("a machine in HOLD saves");
+        field.tally = Tally::default();
+        field
     }
 
-    fn time_s(&self) -> f64 {
-        self.turns as f64 * TURN_S
+    /// Draws the time of the next fault.
+    fn draw_fault_time(&mut self) {
+        let share: f64 = self.rng.random();
+        self.next_fault_s = self.drive.time_s() - (1.0 - share).ln() / self.faults_a_second;
     }
 
-    fn distance(&self) -> i64 {
-        (self.machine.beam_to_tool_mm / self.machine.tick_mm()).round() as i64
-    }
-
-    /// Works row after row until so many turns are done, or something was violated.
-    fn work_until(
-        mut self,
-        last_turn: u64,
-        faults_an_hour: f64,
-        progress: &mut impl FnMut(f64),
-    ) -> Result<Tally, SoakError> {
-        let chance = faults_an_hour * TURN_S / 3600.0;
-        while self.turns < last_turn && self.tally.violations.is_empty() {
-            let stem_zone_mm = self.take_a_machine();
-            let is_dense = self.machine.has_second_beam() && self.rng.random_bool(0.25);
+    /// Works row after row for this many seconds, or until a check fails.
+    fn work_for(mut self, last_s: f64, progress: &mut impl FnMut(f64)) -> Result<Tally, SoakError> {
+        while self.drive.time_s() < last_s && self.tally.violations.is_empty() {
+            let (machine, stem_zone_mm) = self.draw_machine();
+            let is_dense = machine.has_second_beam() && self.rng.random_bool(0.25);
             let row = if is_dense { DENSE } else { PLANTING }.grow(self.rng.random())?;
-            let ground = Ground::of(&row, &self.machine, stem_zone_mm, &mut self.rng);
-            self.work(&ground, chance, last_turn, progress);
+            self.work(&row, &machine, stem_zone_mm, last_s);
+            progress((self.drive.time_s() / last_s).min(1.0));
         }
-        self.tally.seconds = self.time_s();
         Ok(self.tally)
     }
 
-    /// Takes the machine for a row, and tells its firmware of it; the zone of a stem.
-    fn take_a_machine(&mut self) -> u16 {
-        (self.machine.beam_to_tool_mm, self.machine.second_beam_mm) = if self.rng.random() {
+    /// Draws a machine, and its stem zone in millimetres. The operator types its settings for the next row.
+    fn draw_machine(&mut self) -> (Machine, u16) {
+        let mut machine = Machine::default();
+        if self.rng.random() {
             let to_tool_mm = self.rng.random_range(470..=1000_u16);
             let apart_mm = self.rng.random_range(to_tool_mm * 7 / 20..=to_tool_mm - SECOND_BEAM_TO_TOOL_MM);
-            (to_tool_mm.into(), apart_mm.into())
-        } else {
-            (Machine::default().beam_to_tool_mm, 0.0)
-        };
+            (machine.beam_to_tool_mm, machine.second_beam_mm) = (to_tool_mm.into(), apart_mm.into());
+        }
         let stem_zone_mm = if self.rng.random_bool(0.25) { 90 } else { 0 };
-        self.told = told(&self.machine, stem_zone_mm);
-        self.weeder.hold();
-        self.tell();
-        if self.weeder.save().is_err() {
-            self.tally.violated(self.time_s(), "a machine in HOLD does not save");
-        }
-        while !self.weeder.carry_on() {}
-        stem_zone_mm
-    }
-
-    /// Tells the firmware what the machine is like.
-    fn tell(&mut self) {
-        self.weeder.clear();
-        let none = (Setting::SecondBeamMm, 0);
-        for (setting, value) in [none].into_iter().chain(self.told) {
-            if self.weeder.set(setting, value).is_err() {
-                self.tally.violated(self.time_s(), format_args!("{value} is refused for {}", setting as u8));
-            }
-        }
+        self.typed = vec![
+            (Setting::BeamToToolMm, machine.beam_to_tool_mm as u16),
+            (Setting::SecondBeamMm, machine.second_beam_mm as u16),
+            (Setting::StemZoneMm, stem_zone_mm),
+        ];
+        (machine, stem_zone_mm)
     }
 
     /// Works a row from its headland to its end, or to the soak's end.
-    fn work(&mut self, ground: &Ground, chance: f64, last_turn: u64, progress: &mut impl FnMut(f64)) {
-        self.tally.rows += 1;
-        self.excused = vec![Excuse::default(); ground.plants.len()];
-        // The machine was turned round and stands in the headland: the operator knows, and tells it.
-        self.weeder.hold();
-        (self.place, self.speed, self.wheel) = (0.0, 0.0, Wheel::default());
-        self.reset(Beams::default(), Cause::ResetPin);
-        let (mut target, mut leg_turns) = (0.0_f64, 0_u32);
-        while (self.place as usize) < ground.broken[0].len()
-            && self.turns < last_turn
-            && self.tally.violations.is_empty()
-        {
-            if leg_turns == 0 {
-                target = self.next_speed();
-                let most =
-                    most_slip(f64::from(self.weeder.settings().get(Setting::MarginMm)), self.machine.beam_to_tool_mm);
-                self.wheel.turns_a_tick = 1.0 + self.rng.random_range(-most..=most);
-                leg_turns =
-                    if target < 0.0 { self.rng.random_range(300..1500) } else { self.rng.random_range(500..6000) };
-                self.start_again();
-            }
-            leg_turns -= 1;
-            // A person pushes, and brakes, with 1 m/s2.
-            let most = 1000.0 / self.machine.tick_mm() * TURN_S;
-            self.speed += (target - self.speed).clamp(-most, most);
-            if self.rng.random_bool(chance) {
-                self.fail(ground);
-            }
-            self.turn(ground);
-            if self.turns.is_multiple_of(PROGRESS_TURNS) {
-                progress(self.turns as f64 / last_turn as f64);
-            }
-        }
-        for excuse in &self.excused {
-            self.tally.plants += u64::from(excuse.passed);
-            if excuse.harmed {
-                match excuse {
-                    Excuse { mistaken: true, .. } => self.tally.mistaken += 1,
-                    Excuse { blind: true, .. } => self.tally.blind += 1,
-                    _ => self.tally.harmed += 1,
-                }
-            }
+    fn work(&mut self, row: &Row, machine: &Machine, stem_zone_mm: u16, last_s: f64) {
+        let run = run_over(row, machine, &mut self.rng);
+        let outcome = self.work_run(&run, machine, stem_zone_mm, last_s);
+        let Score { metres, weeded_metres, plants, harmed, mistaken, blind } = self.drive.score();
+        self.tally += Tally { rows: 1, metres, weeded_metres, plants, harmed, mistaken, blind, ..Tally::default() };
+        self.tally.seconds = self.drive.time_s();
+        if let Err(Failure::Fail(failure) | Failure::Reject(failure)) = outcome {
+            let (fault, fault_s) = self.last_fault;
+            let (row, state, time_s) = (self.tally.rows, self.drive.state(), self.drive.time_s());
+            let what = format_args!("row {row}, in {state:?}, {:.3} s after {fault}: {failure}", time_s - fault_s);
+            self.tally.violated(time_s, what);
         }
     }
 
-    /// The next leg's speed in ticks/s: mostly a walk, now and then a stop or some way back.
-    fn next_speed(&mut self) -> f64 {
-        let km_h = match self.rng.random_range(0..10) {
-            0 => 0.0,
-            1 if self.place > 5000.0 => -self.rng.random_range(0.5..1.5),
-            _ => self.rng.random_range(0.8..3.0),
+    fn work_run(&mut self, run: &Run, machine: &Machine, stem_zone_mm: u16, last_s: f64) -> Checked {
+        let ticks = |mm: f64| (mm * TICKS_A_MM) as i64;
+        let us = |ms: f64| (ms * 1000.0) as u64;
+        let geometry = Geometry {
+            beam_to_tool: ticks(machine.beam_to_tool_mm),
+            second_beam: ticks(machine.second_beam_mm),
+            dead_us: us(machine.servo.dead_time_ms),
+            swing_us: us(machine.servo.dead_time_ms + machine.servo.travel_ms),
         };
-        mm_s(km_h) / self.machine.tick_mm()
+        self.drive.enter_row(run, geometry, ticks(stem_zone_mm.into()))?;
+        self.set_up()?;
+        self.row_end = run.period();
+        while self.drive.position() < self.row_end && self.drive.time_s() < last_s {
+            let most = most_slip(self.drive.settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
+            let permille = (1000.0 * self.rng.random_range(-most..=most)) as i32;
+            self.execute(&Step::Slip { permille })?;
+            let (mm_s, leg_s) = self.draw_leg();
+            self.start_again()?;
+            self.roll(mm_s, last_s.min(self.drive.time_s() + leg_s))?;
+        }
+        Ok(())
     }
 
-    /// The operator clears what is latched, and starts.
-    fn start_again(&mut self) {
-        if self.weeder.state() == State::Work {
-            return;
-        }
-        self.weeder.clear();
-        if self.weeder.start(false).is_err() || self.weeder.state() != State::Work {
-            self.tally.violated(self.time_s(), "the machine does not start when it is told to");
+    /// Draws a leg's speed in mm/s and its time in seconds: mostly a walk, now and then a stop or some distance back.
+    fn draw_leg(&mut self) -> (i32, f64) {
+        let rng = &mut self.rng;
+        match rng.random_range(0..10) {
+            0 => (0, rng.random_range(0.5..6.0)),
+            1 if self.drive.position() > 5000 => (-mm_s(rng.random_range(0.5..1.5)) as i32, rng.random_range(0.3..1.5)),
+            _ => (mm_s(rng.random_range(0.8..3.0)) as i32, rng.random_range(0.5..6.0)),
         }
     }
 
-    /// What the beams see with the machine at a place.
-    fn beams_at(&self, ground: &Ground, place: i64) -> Beams {
-        let apart = (self.machine.second_beam_mm / self.machine.tick_mm()).round() as i64;
-        Beams { broken: ground.is_broken(0, place), second_broken: ground.is_broken(1, place - apart) }
-    }
-
-    /// A turn of the loop.
-    fn turn(&mut self, ground: &Ground) {
-        self.turns += 1;
-        let from = self.place.floor() as i64;
-        self.place += self.speed * TURN_S;
-        let to = self.place.floor() as i64;
-        self.tally.metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
-        let direction = (to - from).signum();
-        for step in 1..=(to - from).abs() {
-            let place = from + step * direction;
-            let turned = self.wheel.roll(place - direction, direction > 0);
-            let counted = match (self.silent_turns, self.one_channel_lives) {
-                (0, _) => turned,
-                (_, true) => turned.abs() * (1 - 2 * (self.wheel.ticks() & 1)),
-                (_, false) => 0,
-            };
-            self.weeder.readings.position = self.weeder.readings.position + Ticks(counted as i32);
-            self.lost_ticks += turned - counted;
-            let beams = self.beams_at(ground, place);
-            self.weeder.see(beams);
-        }
-        if self.silent_turns > 0 {
-            self.silent_turns -= 1;
-            // The measured speed was wrong, and with it the leads: a swing may be late by that.
-            self.blind_until_turn = self.turns + self.swing_ms() as u64 + SPEED_SETTLES_TURNS;
-        }
-        self.weeder.turn_after(TURN_US);
-        if !self.weeder.tool_out() {
-            self.tally.weeded_metres += (to - from).abs() as f64 * self.machine.tick_mm() / 1000.0;
-        }
-        self.weeder.readings.stack_free = STACK_FREE;
-        self.listen(ground);
-        self.judge(ground, to - self.distance());
-    }
-
-    /// Takes what the machine tells.
-    fn listen(&mut self, ground: &Ground) {
-        while let Some(event) = self.weeder.next_event() {
-            match event {
-                Event::Alarm { alarm, .. } => {
-                    count(&mut self.tally.alarms, &link::advice::name(alarm));
-                    self.see_anew();
-                }
-                Event::Warning(warning) => count(&mut self.tally.warnings, &name(warning.text().bytes())),
-                Event::Detection { vote, leading, plan, .. } if vote.class == Class::Weed => {
-                    let behind = i64::from((leading - self.weeder.readings.position).0);
-                    let place = self.place as i64 + behind;
-                    let margin = self.weeder.settings().ticks(Setting::MarginMm);
-                    // Over ground the wheel has slipped since.
-                    let edge_ticks = EDGE_TICKS + behind.abs() / 16;
-                    let object = place - edge_ticks..place + i64::from(plan.hold.0 - 2 * margin.0) + edge_ticks;
-                    for (plant, excuse) in ground.plants.iter().zip(&mut self.excused) {
-                        excuse.mistaken |= plant.start < object.end && object.start < plant.end;
-                    }
-                }
-                _ => {}
+    /// Rolls at a speed until a time, or to the row's end, with the faults that are due meanwhile.
+    fn roll(&mut self, mm_s: i32, until_s: f64) -> Checked {
+        while self.drive.time_s() < until_s && self.drive.position() < self.row_end {
+            let ms = ((until_s.min(self.next_fault_s) - self.drive.time_s()) * 1000.0).ceil();
+            let rest_mm = (self.row_end - self.drive.position()) as f64 / TICKS_A_MM;
+            let mm = (f64::from(mm_s) * ms / 1000.0).min(rest_mm) as i32 + mm_s.signum();
+            self.execute(&if mm_s == 0 { Step::Stand { ms: ms as u32 } } else { Step::Roll { mm, mm_s } })?;
+            if self.drive.time_s() >= self.next_fault_s {
+                self.fail()?;
+                self.draw_fault_time();
             }
         }
+        Ok(())
     }
 
-    /// From here on only ground counts that the beam sees again as new. If the count was wrong until now, the tool is
-    /// still swinging out of a wrong position.
-    fn see_anew(&mut self) {
-        if self.is_blind() {
-            self.blind_until_turn = self.blind_until_turn.max(self.turns + self.swing_ms() as u64);
+    /// Executes a step. Counts the events that the machine wrote.
+    fn execute(&mut self, step: &Step) -> Checked {
+        let outcome = self.drive.execute(step);
+        for line in self.drive.take_events() {
+            self.tally.hear(&line);
         }
-        self.lost_ticks = 0;
+        outcome
     }
 
-    /// Whether the count is off the ground by more than the firmware can know. What it is off by between two beams is measured as slip,
-    /// and taken for the whole distance to the tool.
-    fn is_blind(&self) -> bool {
-        let share = if self.machine.has_second_beam() {
-            self.machine.second_beam_mm / self.machine.beam_to_tool_mm
+    fn type_in(&mut self, lines: &[&str]) -> Checked {
+        lines.iter().try_for_each(|&line| self.execute(&Step::Type(line.to_owned())))
+    }
+
+    /// Whether the firmware has the settings of the present machine.
+    fn is_set_up(&self) -> bool {
+        let settings = self.drive.settings();
+        self.typed.iter().all(|&(setting, value)| settings.get(setting) == value)
+    }
+
+    /// After a reset, the operator turns the events on. If the settings are those of another machine, or were lost, the
+    /// operator stops to type and save them.
+    fn set_up(&mut self) -> Checked {
+        self.type_in(&["events on"])?;
+        if self.is_set_up() {
+            return Ok(());
+        }
+        self.execute(&Step::Tremble { times: 0 })?;
+        self.type_in(&["clear", "set second_beam_mm 0"])?;
+        for (setting, value) in self.typed.clone() {
+            self.type_in(&[&format!("set {} {value}", settings::name(setting))])?;
+        }
+        self.type_in(&["save"])?;
+        if self.is_set_up() { Ok(()) } else { Err(Failure::fail("the machine refuses its settings")) }
+    }
+
+    /// The operator clears a latched alarm, and starts.
+    fn start_again(&mut self) -> Checked {
+        if self.drive.state() == State::Work {
+            return Ok(());
+        }
+        self.type_in(&["clear", "start"])?;
+        if self.drive.state() == State::Hold {
+            Err(Failure::fail("the machine does not start on command"))
         } else {
-            1.0
-        };
-        self.lost_ticks.abs() as f64 >= BLIND_TICKS * share
-    }
-
-    fn swing_ms(&self) -> f64 {
-        self.machine.servo.dead_time_ms + self.machine.servo.travel_ms
-    }
-
-    /// Whether the tool, which stands at a place of the row, does harm there.
-    fn judge(&mut self, ground: &Ground, tool: i64) {
-        let out = self.weeder.tool_out();
-        if !out && self.weeder.state() != State::Work {
-            self.tally.violated(self.time_s(), format_args!("the tool is in the row in {:?}", self.weeder.state()));
-        }
-        let (dead, swing) = (self.machine.servo.dead_time_ms, self.swing_ms());
-        let order_ms = self.order_turns as f64;
-        let clear = if self.tool_out {
-            order_ms >= swing || (self.was_clear && order_ms < swing)
-        } else {
-            self.was_clear && order_ms < dead
-        };
-        if out != self.tool_out {
-            // A tool that had not begun to move is still where it was.
-            (self.was_clear, self.tool_out, self.order_turns) = (clear, out, 0);
-        } else {
-            self.order_turns += 1;
-        }
-        let is_blind = self.is_blind();
-        let first = ground.kept.partition_point(|plant| plant.end <= tool);
-        let Some((plant, excuse)) = ground.kept.get(first).zip(self.excused.get_mut(first)) else { return };
-        if !plant.contains(&tool) {
-            return;
-        }
-        excuse.passed = true;
-        if clear {
-            return;
-        }
-        excuse.harmed = true;
-        excuse.blind |= is_blind || self.turns <= self.blind_until_turn;
-        // Rolled back onto ground that it has not seen since it woke up: there is no margin before what it does not know.
-        excuse.blind |= out && self.weeder.unseen_mm() > 0;
-        if !excuse.mistaken && !excuse.blind {
-            let state = self.weeder.state();
-            let (time_s, order_ms, row) = (self.time_s(), self.order_turns, self.tally.rows);
-            let (fault, fault_turn) = self.last_fault;
-            let ago_s = (self.turns - fault_turn) as f64 * TURN_S;
-            self.tally.violated(
-                time_s,
-                format_args!(
-                    "a plant was harmed at tick {tool} of row {row}, in {state:?}, {order_ms} ms after the last order, \
-                     {ago_s:.3} s after {fault}"
-                ),
-            );
+            Ok(())
         }
     }
 
-    /// Something goes wrong.
-    fn fail(&mut self, ground: &Ground) {
-        let fault = match self.rng.random_range(0..9) {
+    /// Injects a fault.
+    fn fail(&mut self) -> Checked {
+        let rng = &mut self.rng;
+        let mut lines = Vec::new();
+        let (fault, step) = match rng.random_range(0..9) {
             0 => {
-                let beams @ Beams { broken, second_broken } = self.weeder.beams();
-                let dusty = if self.machine.has_second_beam() && self.rng.random() {
-                    Beams { second_broken: !second_broken, ..beams }
-                } else {
-                    Beams { broken: !broken, ..beams }
-                };
-                for _ in 0..self.rng.random_range(1..40) {
-                    self.weeder.see(dusty);
-                    self.weeder.see(beams);
-                }
-                "dust"
+                ("dust", Step::Dust { times: rng.random_range(1..40), on_second: self.typed[1].1 > 0 && rng.random() })
             }
             1 => {
-                self.silent_turns = self.rng.random_range(5..600);
-                self.one_channel_lives = self.rng.random();
-                if self.one_channel_lives { "dead_channel" } else { "silent_encoder" }
+                let encoders = [("dead_channel", Encoder::OneChannel), ("silent_encoder", Encoder::Silent)];
+                let (fault, encoder) = encoders[rng.random_range(0..2)];
+                (fault, Step::Silence { ms: rng.random_range(5..600), encoder })
             }
-            2 => {
-                let jumps = &mut self.weeder.readings.jumps;
-                *jumps = jumps.wrapping_add(self.rng.random_range(1..60));
-                "encoder_jumps"
-            }
-            3 => {
-                let beams = self.beams_at(ground, self.place as i64);
-                self.weeder.lose_edges(beams);
-                "lost_edges"
-            }
-            4 => {
-                self.weeder.readings.stack_free = 20;
-                "low_stack"
-            }
+            2 => ("encoder_jumps", Step::Spike { ticks: 2, times: rng.random_range(1..60) }),
+            3 => ("lost_edges", Step::LoseEdges { turns: rng.random_range(0..3) }),
+            4 => ("low_stack", Step::LowerStack { turns: 1 }),
             5 => {
-                let cause =
-                    [Cause::PowerOn, Cause::BrownOut, Cause::Watchdog, Cause::LoopStalled][self.rng.random_range(0..4)];
-                self.reset(self.weeder.beams(), cause);
-                "reset"
+                let causes = [Cause::PowerOn, Cause::BrownOut, Cause::Watchdog, Cause::LoopStalled];
+                ("reset", Step::Reset(causes[rng.random_range(0..causes.len())]))
             }
             6 => {
-                self.lose_power_in_a_save();
-                "power_lost_in_a_save"
+                let no_plant_m = rng.random_range(1..8);
+                lines = vec!["hold".to_owned(), "clear".to_owned(), format!("set no_plant_m {no_plant_m}")];
+                let (turns, byte) = (rng.random_range(0..SAVE_TURNS), rng.random());
+                ("power_lost_in_a_save", Step::CutPower { line: "save", turns, byte })
             }
             7 => {
-                let address = self.rng.random_range(0..control::memory::SIZE);
-                let byte = self.rng.random();
-                self.memories[self.rng.random_range(0..2)].0.borrow_mut().bytes[address] = byte;
-                self.reset(self.weeder.beams(), Cause::PowerOn);
-                "spoiled_eeprom"
+                let (address, byte) = (rng.random_range(0..CHIP_SIZE), rng.random());
+                ("spoiled_eeprom", Step::Spoil { address, byte })
             }
             _ => {
-                self.noise();
-                "console_noise"
+                let mut noise: String = (0..rng.random_range(1..300))
+                    .map(|_| if rng.random_range(0..4) == 0 { '\n' } else { char::from(rng.random::<u8>()) })
+                    .collect();
+                noise += "\nstatus\nget\ndump\nexamples";
+                ("console_noise", Step::Type(noise))
             }
         };
-        self.last_fault = (fault, self.turns);
         count(&mut self.tally.faults, fault);
+        self.last_fault = (fault, self.drive.time_s());
+        lines.into_iter().try_for_each(|line| self.execute(&Step::Type(line)))?;
+        self.execute(&step)?;
+        if matches!(step, Step::Reset(_) | Step::CutPower { .. } | Step::Spoil { .. }) { self.set_up() } else { Ok(()) }
     }
-
-    /// The chip is reset.
-    fn reset(&mut self, beams: Beams, cause: Cause) {
-        self.memories.iter().for_each(Shared::recover);
-        self.weeder = init(&self.memories, self.weeder.readings, beams, cause);
-        self.see_anew();
-        if let State::Alarm(alarm) = self.weeder.state() {
-            count(&mut self.tally.alarms, &link::advice::name(alarm));
-        }
-        count(&mut self.tally.resets, &name(cause.text().bytes()));
-        if !self.weeder.tool_out() || self.weeder.state() == State::Work {
-            self.tally.violated(self.time_s(), "the machine woke up with the tool in the row");
-        }
-        // Settings that came back old or not at all are put right before it rolls on: the firmware knows the ground by its settings of that time.
-        if self.told.iter().any(|&(setting, value)| self.weeder.settings().get(setting) != value) {
-            self.tell();
-        }
-    }
-
-    /// The operator saves, and the power goes away at one of the bytes.
-    fn lose_power_in_a_save(&mut self) {
-        self.weeder.hold();
-        self.weeder.clear();
-        let old = self.saved();
-        let no_plant_m = self.rng.random_range(1..8);
-        if self.weeder.set(Setting::NoPlantM, no_plant_m).is_err() || self.weeder.save().is_err() {
-            self.tally.violated(self.time_s(), "a machine in HOLD does not save");
-        }
-        let new = self.weeder.settings().clone();
-        let bytes = self.rng.random_range(0..=COPY);
-        self.memories[0].0.borrow_mut().lose_power_after(bytes);
-        while !self.weeder.carry_on() {}
-        self.reset(self.weeder.beams(), Cause::BrownOut);
-        let found = self.saved();
-        if found.as_ref() != Some(&new) && (found != old || bytes == COPY) {
-            let time_s = self.time_s();
-            self.tally.violated(time_s, format_args!("a save cut short after {bytes} bytes left {found:?}"));
-        }
-    }
-
-    /// The settings as the memory has them.
-    fn saved(&self) -> Option<Settings> {
-        SavedSettings::new(self.memories[0].clone()).load()
-    }
-
-    /// Bytes by chance come along the line, and questions among them.
-    fn noise(&mut self) {
-        let bytes = (0..self.rng.random_range(1..300)).map(|_| match self.rng.random_range(0..4) {
-            0 => b'\n',
-            _ => self.rng.random(),
-        });
-        self.weeder.type_in(bytes.chain(*b"\nstatus\nget\ndump\nexamples\n"));
-    }
-}
-
-/// What the firmware is told of a machine, in this order.
-fn told(machine: &Machine, stem_zone_mm: u16) -> [(Setting, u16); 3] {
-    [
-        (Setting::BeamToToolMm, machine.beam_to_tool_mm as u16),
-        (Setting::SecondBeamMm, machine.second_beam_mm as u16),
-        (Setting::StemZoneMm, stem_zone_mm),
-    ]
-}
-
-fn init(memories: &[Shared; 2], readings: Readings, beams: Beams, cause: Cause) -> Weeder {
-    let nearest = Nearest::new(&EXAMPLES[..], memories[1].clone());
-    let mut weeder = Rig::wake_at(nearest, memories[0].clone(), readings, beams, cause);
-    weeder.tell_events(true);
-    weeder
-}
-
-fn name(bytes: impl Iterator<Item = u8>) -> String {
-    bytes.map(char::from).collect()
 }
 
 #[cfg(test)]
@@ -647,42 +347,39 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    /// Six minutes of work without faults by a machine that was told its leads wrongly.
+    fn field() -> Field {
+        Field::new(ChaCha8Rng::seed_from_u64(1), 0.0)
+    }
+
+    /// Six minutes of work without faults by a machine with these leads.
     fn with_leads(lead_out_ms: u16, lead_in_ms: u16) -> Tally {
-        let mut field = Field::new(ChaCha8Rng::seed_from_u64(1), Machine::default());
-        field.weeder.clear();
-        field.weeder.set(Setting::LeadInMs, lead_in_ms).expect("in HOLD");
-        field.weeder.set(Setting::LeadOutMs, lead_out_ms).expect("in HOLD");
-        field.weeder.save().expect("in HOLD");
-        while !field.weeder.carry_on() {}
-        field.work_until(360_000, 0.0, &mut |_| {}).expect("rows grow")
+        let mut field = field();
+        let lines = [&*format!("set lead_in_ms {lead_in_ms}"), &format!("set lead_out_ms {lead_out_ms}"), "save"];
+        field.type_in(&lines).expect("in HOLD");
+        field.work_for(360.0, &mut |_| {}).expect("rows grow")
     }
 
     #[test]
-    fn a_tool_that_is_told_too_late_is_seen_to_harm_a_plant() {
+    fn a_tool_that_leaves_too_late_is_seen_to_harm_a_plant() {
         let tally = with_leads(0, 0);
         assert!(tally.harmed > 0 && tally.violations[0].contains("a plant was harmed"), "{tally}");
     }
 
     #[test]
     fn a_plant_that_the_first_beam_misses_is_seen_to_be_harmed_where_the_firmware_ignores_the_second() {
-        let mut field = Field::new(ChaCha8Rng::seed_from_u64(1), Machine::default());
+        let mut field = field();
         while field.tally.violations.is_empty() && field.tally.rows < 20 {
-            let stem_zone_mm = field.take_a_machine();
-            // The beam is there, and its wire is not.
-            field.told[1].1 = 0;
-            field.tell();
-            field.weeder.save().expect("in HOLD");
-            while !field.weeder.carry_on() {}
+            let (machine, stem_zone_mm) = field.draw_machine();
+            // The beam is there, but its wire is not.
+            field.typed[1].1 = 0;
             let row = PLANTING.grow(field.rng.random()).expect("rows grow");
-            let ground = Ground::of(&row, &field.machine, stem_zone_mm, &mut field.rng);
-            field.work(&ground, 0.0, u64::MAX, &mut |_| {});
+            field.work(&row, &machine, stem_zone_mm, f64::INFINITY);
         }
         assert!(field.tally.violations.iter().any(|what| what.contains("a plant was harmed")), "{}", field.tally);
     }
 
     #[test]
-    fn a_tool_that_is_told_in_time_harms_none_and_weeds() {
+    fn a_tool_with_the_right_leads_harms_no_plant_and_weeds() {
         let tally = with_leads(180, 40);
         assert!(tally.harmed == 0 && tally.blind == 0 && tally.violations.is_empty(), "{tally}");
         assert!(tally.plants > 200 && tally.weeded_metres > 0.3 * tally.metres, "{tally}");

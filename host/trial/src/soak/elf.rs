@@ -5,7 +5,7 @@
 //! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row. From there on no plant
 //! may be harmed. Rows with a faulty encoder are checked only for their alarms.
 
-use super::core::MISSED_ONCE_IN;
+use super::core::{MISSED_ONCE_IN, PLANTING};
 use super::tally::{Plan, SoakError, Tally, chance, count, total};
 use crate::console::ask;
 use crate::run::{TrialError, boot, set_up};
@@ -23,18 +23,11 @@ use std::path::Path;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
 use uno::{Uno, UnoError};
 
-/// The rows.
-const PLANTING: Planting = Planting {
-    plants: 8,
-    spacing_mm: 500.0,
-    spacing_scatter_mm: 40.0,
-    canopy_mm: 150.0,
-    canopy_scatter_mm: 25.0,
-    weeds: 2,
-    ragged: false,
-};
+/// Plants and tall weeds in a row.
+const PLANTS: usize = 8;
+const WEEDS: usize = 2;
 
-/// A machine with a second beam, before which the tool swings out at 3 km/h.
+/// Distances of the tool and of a second beam: the tool swings out between them at 3 km/h.
 const TWO_BEAMS_MM: (f64, f64) = (500.0, 200.0);
 
 /// The longest time from a reset until the tool is out: the firmware starts, and the servo swings.
@@ -43,7 +36,7 @@ const RESTART_S: f64 = 0.7;
 /// Longest time from a reset to the greeting.
 const GREETING_CYCLES: u64 = CYCLES_PER_SECOND;
 
-/// What goes wrong in a row.
+/// The fault of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     Reset,
@@ -82,10 +75,10 @@ impl Fault {
     }
 }
 
-/// Works for so many simulated minutes with the firmware at `elf`; `progress` is told the share done, from 0 to 1.
+/// Works for this many simulated minutes with the firmware at `elf`. `progress` gets the share done, from 0 to 1.
 ///
 /// # Errors
-/// Where a row does not grow or the firmware does not answer.
+/// If a row does not grow, or the firmware does not answer.
 pub fn minutes(plan: Plan, minutes: f64, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
     let rows = rows(plan, minutes)?;
     total((0..rows).map(|number| {
@@ -95,10 +88,10 @@ pub fn minutes(plan: Plan, minutes: f64, elf: &Path, mut progress: impl FnMut(f6
     }))
 }
 
-/// How many rows take so many minutes, the last one perhaps some more.
+/// The number of rows that take at least this many minutes.
 ///
 /// # Errors
-/// Where a row does not grow.
+/// If a row does not grow.
 pub fn rows(plan: Plan, minutes: f64) -> Result<u64, SoakError> {
     let (mut rows, mut seconds) = (0, 0.0);
     while seconds < minutes * 60.0 {
@@ -108,8 +101,8 @@ pub fn rows(plan: Plan, minutes: f64) -> Result<u64, SoakError> {
     Ok(rows)
 }
 
-/// Works a row of a soak, with this number from 0, with the firmware at `elf`. It has a new Uno, which keeps what the simulation
-/// remembers short.
+/// Works a row of a soak, with this number from 0, with the firmware at `elf`. Each row has a new Uno, because an Uno
+/// stores every pulse.
 ///
 /// # Errors
 /// As [`minutes`].
@@ -122,7 +115,7 @@ pub fn row(plan: Plan, number: u64, elf: &Path) -> Result<Tally, SoakError> {
 
 /// Draws a row and the speed in it.
 fn draw(rng: &mut ChaCha8Rng) -> Result<Trial, SoakError> {
-    let row = PLANTING.grow(rng.random())?;
+    let row = Planting { plants: PLANTS, weeds: WEEDS, ..PLANTING }.grow(rng.random())?;
     let mut machine = Machine::default();
     if rng.random() {
         (machine.beam_to_tool_mm, machine.second_beam_mm) = TWO_BEAMS_MM;
@@ -134,21 +127,21 @@ fn draw(rng: &mut ChaCha8Rng) -> Result<Trial, SoakError> {
     Ok(trial)
 }
 
-/// The row as each beam sees it: of two, now and then one misses a thing.
+/// The row as each beam sees it. Now and then one of two beams misses a canopy.
 fn seen(rng: &mut ChaCha8Rng, trial: &Trial) -> [Row; 2] {
-    let things = trial.row.things();
+    let canopies = trial.row.things();
     let beams = if trial.machine.has_second_beam() { 2 } else { 0 };
-    let missed: Vec<usize> = things.iter().map(|_| rng.random_range(0..MISSED_ONCE_IN)).collect();
+    let missed: Vec<usize> = canopies.iter().map(|_| rng.random_range(0..MISSED_ONCE_IN)).collect();
     [0, 1].map(|beam| {
-        let seen = things.iter().zip(&missed).filter(|&(_, &missed)| missed != beam || missed >= beams);
-        Row::new(seen.map(|(thing, _)| thing.clone()).collect()).expect("a row without some of its things is one")
+        let seen = canopies.iter().zip(&missed).filter(|&(_, &missed)| missed != beam || missed >= beams);
+        Row::new(seen.map(|(canopy, _)| canopy.clone()).collect()).expect("a part of a row is a row")
     })
 }
 
 fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Result<(), SoakError> {
     let trial = draw(rng)?;
     let (machine, motion) = (trial.machine, &trial.motion);
-    // A fault for the time that a row takes, as often as there are to be.
+    // The chance of a fault during this row.
     let fails = rng.random_bool((plan.faults_an_hour * motion.duration_s() / 3600.0).min(1.0));
     let fault = fails.then(|| Fault::ALL[rng.random_range(0..Fault::ALL.len())]);
     if let Some(fault) = fault {
@@ -193,7 +186,7 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
         Some(Fault::SerialNoise) => {
             let mut noise = [0; 500];
             rng.fill_bytes(&mut noise);
-            // What would stop the machine is no noise, but a command.
+            // Noise must not be a command, which might stop the machine.
             uno.send(b"\n#");
             uno.send(&noise.map(|byte| if byte == b'\n' || byte == b'\r' { b'#' } else { byte }));
             uno.send(b"\nstatus\nget\n");
@@ -207,19 +200,7 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     tally.seconds += motion.duration_s();
     tally.metres += (motion.end_mm() - motion.start_mm()).abs() / 1000.0;
     tally.rows += 1;
-    for line in heard.lines() {
-        let named = |event: &str| line.strip_prefix(event)?.split_whitespace().next();
-        if let Some((code, rest)) = line.strip_prefix("alarm code=").and_then(|rest| rest.split_once(" name=")) {
-            let name = rest.split_whitespace().next().unwrap_or_default();
-            count(&mut tally.alarms, &format!("{code} {name}"));
-        }
-        if let Some(warning) = named("warning name=") {
-            count(&mut tally.warnings, warning);
-        }
-        if let Some((_, cause)) = line.split_once("reset by ") {
-            count(&mut tally.resets, cause.split(',').next().unwrap_or(cause));
-        }
-    }
+    heard.lines().for_each(|line| tally.hear(line));
     let was_reset = matches!(fault, Some(Fault::Reset | Fault::BrownOut | Fault::PowerCut));
     if was_reset != !uno.resets().iter().all(|reset| reset.cycle < start_cycle) {
         tally.violated(fails_at_s, format_args!("{fault:?} and resets {:?}", uno.resets()));
@@ -264,7 +245,7 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     Ok(())
 }
 
-/// Whether an event's position lies in a plant: the firmware counts from where the motion began, which is all forward.
+/// Whether an event's position lies in a plant. The motion is all forward, and the firmware counts from its beginning.
 fn is_of(line: &str, span_mm: &std::ops::Range<f64>, trial: &Trial) -> bool {
     let ticks = line.split_whitespace().find_map(|word| word.strip_prefix("pos=")?.parse::<f64>().ok());
     let passings = trial.motion.mark_passings(trial.machine.tick_mm());
@@ -276,7 +257,7 @@ fn is_of(line: &str, span_mm: &std::ops::Range<f64>, trial: &Trial) -> bool {
 
 /// After a reset no pulse has the tool in the row.
 fn still_out(pulses: &[Pulse], since: u64, time_s: f64, tally: &mut Tally) {
-    // The pulse that was on its way may end.
+    // A pulse that began before the reset may end.
     let after = pulses.iter().filter(|pulse| pulse.rise > since + CYCLES_PER_SECOND / 1000);
     if let Some(pulse) = after.into_iter().find(|pulse| (pulse.width_us() - 2000.0).abs() > 2.0) {
         let late_s = time_at_s(since, pulse.rise);
@@ -304,7 +285,7 @@ fn restart_with_spoiled_eeprom(
         count(&mut tally.alarms, "settings_lost");
     }
     if !greeting.contains("tool out") {
-        tally.violated(tally.seconds, format_args!("with spoiled bytes it wakes up by {greeting:?}"));
+        tally.violated(tally.seconds, format_args!("with a spoiled EEPROM it starts with {greeting:?}"));
     }
     ask(&mut uno, "clear").map_err(TrialError::from)?;
     Ok(uno)
@@ -332,7 +313,7 @@ fn add_dust(rng: &mut ChaCha8Rng, changes: &mut Vec<PinChange>, pin: Pin, from: 
     changes.sort_by_key(|change| change.cycle);
 }
 
-/// Both channels change at once, some thirty times.
+/// Both channels change at once, 10 to 59 times.
 fn jump(rng: &mut ChaCha8Rng, changes: &mut [PinChange], from: u64) {
     let mut left = rng.random_range(10..60);
     for place in 1..changes.len() {

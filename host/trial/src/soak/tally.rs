@@ -1,4 +1,4 @@
-//! What a soak is to be and what it has shown, hour by hour or row by row, and all of it together.
+//! The parameters of a soak, and the results of its hours, of its rows, and of all of them.
 
 use crate::run::TrialError;
 use field::planting::PlantingError;
@@ -10,16 +10,16 @@ use std::fmt;
 use std::ops::AddAssign;
 use thiserror::Error;
 
-/// What a soak is to be.
+/// The parameters of a soak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Which of all the possible ones.
+    /// The random seed.
     pub seed: u64,
     /// Faults in an hour, on average.
     pub faults_an_hour: f64,
 }
 
-/// Why a soak had no result.
+/// Why a soak has no result.
 #[derive(Debug, Error)]
 pub enum SoakError {
     /// A row did not grow.
@@ -30,7 +30,7 @@ pub enum SoakError {
     Trial(#[from] TrialError),
 }
 
-/// What a soak has shown.
+/// The result of a soak.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     /// Simulated seconds.
@@ -43,13 +43,13 @@ pub struct Tally {
     pub plants: u64,
     /// Distance rolled with the tool in the row, in metres.
     pub weeded_metres: f64,
-    /// Plants that were harmed although the firmware could know of them.
+    /// Plants that were harmed without an excuse.
     pub harmed: u64,
-    /// Plants that were harmed because they were taken for weeds.
+    /// Plants that were harmed because they were classified as weeds.
     pub mistaken: u64,
-    /// Plants that were harmed while the firmware could not know where it was.
+    /// Plants that were harmed while the firmware could not know its position.
     pub blind: u64,
-    /// Faults injected, alarms latched, resets and warnings, by name.
+    /// Injected faults by name.
     pub faults: BTreeMap<String, u64>,
     /// Alarms by name.
     pub alarms: BTreeMap<String, u64>,
@@ -57,14 +57,31 @@ pub struct Tally {
     pub resets: BTreeMap<String, u64>,
     /// Warnings by name.
     pub warnings: BTreeMap<String, u64>,
-    /// What must not be, each with its hour or row and the time in it.
+    /// Failed checks, each with its hour or row, and the time in it.
     pub violations: Vec<String>,
 }
 
 impl Tally {
-    /// Notes what must not be.
+    /// Adds a violation.
     pub(super) fn violated(&mut self, time_s: f64, what: impl fmt::Display) {
         self.violations.push(format!("at {time_s:.3} s: {what}"));
+    }
+
+    /// Counts an alarm, a warning or a reset in a line that the machine wrote.
+    pub(super) fn hear(&mut self, line: &str) {
+        let word = |rest: &str| rest.split_whitespace().next().unwrap_or_default().to_owned();
+        if let Some((code, rest)) = line.strip_prefix("alarm code=").and_then(|rest| rest.split_once(" name=")) {
+            count(&mut self.alarms, &format!("{code} {}", word(rest)));
+        }
+        if let Some(rest) = line.strip_prefix("warning name=") {
+            count(&mut self.warnings, &word(rest));
+        }
+        if let Some((_, cause)) = line.split_once("reset by ") {
+            count(&mut self.resets, cause.split(',').next().unwrap_or(cause));
+        }
+        if let Some((_, alarm)) = line.split_once(", state alarm ") {
+            count(&mut self.alarms, alarm.split(',').next().unwrap_or(alarm));
+        }
     }
 }
 
@@ -92,10 +109,10 @@ impl AddAssign for Tally {
     }
 }
 
-/// All hours or rows of a soak, up to the first in which something must not have been: nothing behind it is asked for.
+/// Adds the hours or rows of a soak, up to the first with a violation. Later ones are not computed.
 ///
 /// # Errors
-/// The first that one has.
+/// The first error of an hour or a row.
 pub fn total<E>(tallies: impl IntoIterator<Item = Result<Tally, E>>) -> Result<Tally, E> {
     let mut total = Tally::default();
     for tally in tallies {
@@ -107,7 +124,7 @@ pub fn total<E>(tallies: impl IntoIterator<Item = Result<Tally, E>>) -> Result<T
     Ok(total)
 }
 
-/// The chance of an hour or a row.
+/// The random numbers of an hour or a row.
 pub(super) fn chance(plan: Plan, number: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
     rng.set_stream(number);

@@ -1,14 +1,14 @@
 //! The console as in the firmware's main loop: a line runs once the one before it is answered.
 
-use crate::decisions::Weeder;
+use super::Weeder;
+use crate::machine::Checked;
 use control::say::{self, Answer, LINE, command::LineBuffer, line::Line};
-use model_test::machine::Checked;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
 /// The console.
 #[derive(Debug)]
-pub struct Console {
+pub(super) struct Console {
     line: LineBuffer,
     answer: Answer,
     /// Bytes on the line, and the lines that they make.
@@ -17,18 +17,18 @@ pub struct Console {
 }
 
 impl Console {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self { line: LineBuffer::new(), answer: Answer::Greeting, typed: VecDeque::new(), lines: VecDeque::new() }
     }
 
     /// Sends one or several lines.
-    pub fn put(&mut self, text: &str, lines: &[String]) {
+    pub(super) fn put(&mut self, text: &str, lines: &[String]) {
         self.typed.extend(text.bytes().chain(*b"\n"));
         self.lines.extend(lines.iter().cloned());
     }
 
     /// Runs a received line, if there is one.
-    pub fn carry_out(&mut self, machine: &mut Weeder) -> Option<String> {
+    pub(super) fn carry_out(&mut self, machine: &mut Weeder) -> Option<String> {
         while self.answer.is_done()
             && let Some(byte) = self.typed.pop_front()
         {
@@ -41,7 +41,7 @@ impl Console {
     }
 
     /// Sends as much as there is room for.
-    pub fn write(&mut self, machine: &mut Weeder) -> Result<String, TestCaseError> {
+    pub(super) fn write(&mut self, machine: &mut Weeder) -> Result<String, TestCaseError> {
         let mut line = Line::new();
         if !machine.carry_on() {
         } else if !self.answer.is_done() {
@@ -57,12 +57,12 @@ impl Console {
     }
 
     /// Whether all lines are answered.
-    pub fn is_done(&self) -> bool {
+    pub(super) fn is_done(&self) -> bool {
         self.typed.is_empty() && self.answer.is_done()
     }
 }
 
 fn check_length(written: &str) -> Checked {
-    prop_assert!(written.len() <= LINE, "{written:?} is too long a line");
+    prop_assert!(written.len() <= LINE, "the line {written:?} is too long");
     Ok(())
 }

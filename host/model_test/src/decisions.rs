@@ -1,9 +1,13 @@
-//! The decisions as a machine under test: the controller with a classifier by width, its console and an EEPROM, without a chip.
+//! The decisions as a machine under test: the controller with its console and an EEPROM, without a chip.
+
+mod console;
+mod eeprom;
 
 use crate::{
-    console::Console,
-    eeprom::{Eeprom, Half},
+    machine::{Attended, Checked, Machine, World},
+    run::{Beginning, Classification},
 };
+use console::Console;
 use control::{
     ground::{
         class::{Class, Classifier, ExamplesFull, Listed, Vote},
@@ -17,45 +21,51 @@ use control::{
     units::{Instant, Interval, Position},
     weeder::Orders,
 };
+pub use eeprom::CHIP_SIZE;
+use eeprom::{Eeprom, Half};
 use knn::Example;
-use model_test::{
-    machine::{Attended, Checked, Machine, World},
-    run::Beginning,
-};
 use proptest::prelude::*;
 use rig::{Beams, ByExamples, Rig};
 use std::{cell::Cell, rc::Rc};
 
-/// Narrower detections are weeds.
+/// Detections below this width are weeds, where width alone decides.
 const PLANT_MM: i16 = 60;
 
 /// Hold minus width, in millimetres.
 const MARGINS_MM: i16 = 100;
 
-/// Classifies by width, but keeps examples as the firmware does.
+/// Classifies by width or by the firmware's examples, stores examples as the firmware does, and reports weeds.
 #[derive(Debug)]
-pub struct ByWidth {
+struct Observed {
     nearest: ByExamples<Half>,
-    /// The width of what was last taken for a weed, in millimetres.
+    by: Classification,
+    /// The width of the last weed, in millimetres.
     weed: Rc<Cell<Option<i16>>>,
 }
 
-impl Classifier for ByWidth {
+impl Classifier for Observed {
     fn init(&mut self) {
         self.nearest.init();
     }
 
-    fn classify(&self, features: &Features, _: u8) -> Vote {
+    fn classify(&self, features: &Features, k: u8) -> Vote {
         let width_mm = features.hold_mm - MARGINS_MM;
-        if width_mm >= PLANT_MM {
-            return Vote { class: Class::Plant, votes: 1 };
+        let vote = match self.by {
+            Classification::Examples => self.nearest.classify(features, k),
+            Classification::Width if width_mm < PLANT_MM => Vote { class: Class::Weed, votes: 1 },
+            Classification::Width => Vote { class: Class::Plant, votes: 1 },
+        };
+        if vote.class == Class::Weed {
+            self.weed.set(Some(width_mm));
         }
-        self.weed.set(Some(width_mm));
-        Vote { class: Class::Weed, votes: 1 }
+        vote
     }
 
-    fn built_in_class(&mut self, _: &Features) -> Class {
-        Class::Unknown
+    fn built_in_class(&mut self, features: &Features) -> Class {
+        match self.by {
+            Classification::Examples => self.nearest.built_in_class(features),
+            Classification::Width => Class::Unknown,
+        }
     }
 
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
@@ -83,8 +93,7 @@ impl Classifier for ByWidth {
     }
 }
 
-/// Such a machine.
-pub type Weeder = Rig<ByWidth, Half>;
+type Weeder = Rig<Observed, Half>;
 
 /// The machine under test.
 #[derive(Debug)]
@@ -96,20 +105,18 @@ pub struct Decisions {
     /// The width of the weed classified just now.
     weed: Rc<Cell<Option<i16>>>,
     eeprom: Eeprom,
-    /// The clock at the start.
-    steps: u32,
-    /// Whether readings are taken before the edges that come with them.
-    reads_first: bool,
+    beginning: Beginning,
 }
 
-fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, steps: u32, world: &World, cause: Cause) -> Weeder {
+fn init(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, beginning: &Beginning, world: &World, cause: Cause) -> Weeder {
     let [for_settings, for_examples] = eeprom.halves();
-    let classifier = ByWidth { nearest: Nearest::asleep(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
-    let (readings, beams) = shown(steps, world);
+    let nearest = Nearest::asleep(&EXAMPLES[..], for_examples);
+    let classifier = Observed { nearest, by: beginning.classification, weed: Rc::clone(weed) };
+    let (readings, beams) = shown(beginning.steps, world);
     Rig::wake_at(classifier, for_settings, readings, beams, cause)
 }
 
-/// What the sensors show in a world; all of both by name, so that the compiler finds what is missing.
+/// Returns the readings in a world. It names every field of both, so that the compiler finds a missing sensor.
 fn shown(steps: u32, world: &World) -> (Readings, Beams) {
     let &World { time_us, count, jumps, broken, second_broken, switch_on, end_switch_on, stack_is_low } = world;
     let readings = Readings {
@@ -136,7 +143,7 @@ impl Machine for Decisions {
 
     fn new(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError> {
         let (eeprom, weed) = (Eeprom::new(), Rc::default());
-        let weeder = wake(&eeprom, &weed, beginning.steps, world, Cause::PowerOn);
+        let weeder = init(&eeprom, &weed, beginning, world, Cause::PowerOn);
         Ok(Self {
             odometer: Odometer::new(weeder.readings.position, world.jumps),
             orders: weeder.orders(),
@@ -144,8 +151,7 @@ impl Machine for Decisions {
             console: Console::new(),
             weed,
             eeprom,
-            steps: beginning.steps,
-            reads_first: beginning.reads_first,
+            beginning: beginning.clone(),
         })
     }
 
@@ -158,12 +164,12 @@ impl Machine for Decisions {
     }
 
     fn beam_edge(&mut self, world: &World) {
-        let (readings, beams) = shown(self.steps, world);
+        let (readings, beams) = shown(self.beginning.steps, world);
         self.weeder.edge(readings.position, beams);
     }
 
     fn lose_edges(&mut self, world: &World) -> Checked {
-        self.weeder.lose_edges(shown(self.steps, world).1);
+        self.weeder.lose_edges(shown(self.beginning.steps, world).1);
         Ok(())
     }
 
@@ -176,7 +182,7 @@ impl Machine for Decisions {
     }
 
     fn turn(&mut self, before: &World, now: &World) -> Result<i64, TestCaseError> {
-        let (readings, _) = shown(self.steps, if self.reads_first { before } else { now });
+        let (readings, _) = shown(self.beginning.steps, if self.beginning.reads_first { before } else { now });
         self.odometer.read(readings.position, readings.jumps, self.weeder.believes_jumps());
         let place = unwrapped(now.count, self.odometer.place(readings.position));
         self.orders = self.weeder.turn_with(readings);
@@ -191,7 +197,7 @@ impl Machine for Decisions {
         if !self.weeder.has_heartbeat() {
             prop_assert!(
                 pulse == outside && self.weeder.state() == State::Hold,
-                "a pulse of {pulse} when it tests the watchdog"
+                "a pulse of {pulse} during the watchdog test"
             );
         }
         let (state, out) = (self.weeder.state(), self.weeder.tool_out());
@@ -257,13 +263,17 @@ impl Machine for Decisions {
         from_the_field(self.weeder.classifier())
     }
 
+    fn spoil(&mut self, address: usize, byte: u8) {
+        self.eeprom.spoil(address, byte);
+    }
+
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
         match torn {
             Some(byte) => self.eeprom.lose_power(byte),
             None => self.eeprom.reset(),
         }
         self.console = Console::new();
-        self.weeder = wake(&self.eeprom, &self.weed, self.steps, world, cause);
+        self.weeder = init(&self.eeprom, &self.weed, &self.beginning, world, cause);
         self.orders = self.weeder.orders();
         prop_assert!(self.weeder.tool_out() && self.is_sent_out());
         self.odometer = Odometer::new(self.weeder.readings.position, world.jumps);

@@ -3,12 +3,15 @@
 use control::memory::{ERASED, Memory, SIZE};
 use std::{cell::RefCell, rc::Rc};
 
+/// Bytes of the whole chip.
+pub const CHIP_SIZE: usize = 2 * SIZE;
+
 /// Calls of `is_ready` until a byte is written: once a turn, for some milliseconds.
 const PATIENCE: u8 = 3;
 
 #[derive(Clone, Debug)]
 struct Chip {
-    bytes: [u8; 2 * SIZE],
+    bytes: [u8; CHIP_SIZE],
     /// The byte that is being written, its address, and the calls left.
     under_way: Option<(usize, u8)>,
     patience: u8,
@@ -26,7 +29,7 @@ impl Chip {
 #[derive(Clone, Debug)]
 pub struct Eeprom(Rc<RefCell<Chip>>);
 
-/// Half of the chip.
+/// Half of the chip: for the settings, or for the examples.
 #[derive(Clone, Debug)]
 pub struct Half {
     chip: Rc<RefCell<Chip>>,
@@ -36,7 +39,7 @@ pub struct Half {
 impl Eeprom {
     /// An erased half.
     pub fn new() -> Self {
-        Self(Rc::new(RefCell::new(Chip { bytes: [ERASED; 2 * SIZE], under_way: None, patience: 0 })))
+        Self(Rc::new(RefCell::new(Chip { bytes: [ERASED; CHIP_SIZE], under_way: None, patience: 0 })))
     }
 
     /// Both halves.
@@ -47,6 +50,11 @@ impl Eeprom {
     /// Resets the machine: a write in progress is completed.
     pub fn reset(&mut self) {
         self.0.borrow_mut().finish();
+    }
+
+    /// Changes a byte, as a failing cell would.
+    pub fn spoil(&mut self, address: usize, byte: u8) {
+        self.0.borrow_mut().bytes[address] = byte;
     }
 
     /// The power fails: a write in progress leaves this byte.
@@ -77,7 +85,7 @@ impl Memory for Half {
 
     fn write(&mut self, address: u16, byte: u8) {
         let mut chip = self.chip.borrow_mut();
-        assert!(chip.under_way.is_none(), "a byte is written over another that is under way");
+        assert!(chip.under_way.is_none(), "a byte is written while another is being written");
         chip.under_way = Some((self.begin + usize::from(address), byte));
         chip.patience = PATIENCE;
     }
