@@ -28,7 +28,7 @@ impl Conditions {
     /// The conditions of a preset, or of a file. `read` returns the file's text.
     ///
     /// # Errors
-    /// Where it is neither, or something in the file is wrong: with the line.
+    /// If it is neither, or something in the file is wrong: with the line.
     pub fn load(preset_or_file: &str, read: impl FnOnce(&Path) -> io::Result<String>) -> Result<Self, FileError> {
         let path = Path::new(preset_or_file);
         match Self::preset(preset_or_file) {

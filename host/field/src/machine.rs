@@ -31,7 +31,7 @@ pub struct Machine {
     pub ticks_per_rev: u32,
     /// Distance from the beam back to the tool: the paper's X.
     pub beam_to_tool_mm: f64,
-    /// Distance from the beam back to a second one; 0 where there is none.
+    /// Distance from the beam back to a second one; 0 if there is none.
     pub second_beam_mm: f64,
     /// Time after which the beam's sensor reports a change. A change that lasts less is not reported.
     pub beam_response_ms: f64,
@@ -163,7 +163,7 @@ impl Machine {
         self.level_before(wiring::BEAM, 0.0, row, motion)
     }
 
-    /// As [`beam_before`](Self::beam_before), of the second beam, where there is one.
+    /// As [`beam_before`](Self::beam_before), of the second beam, if there is one.
     pub fn second_beam_before(&self, row: &Row, motion: &Motion) -> Option<PinChange> {
         self.has_second_beam().then(|| self.level_before(wiring::SECOND_BEAM, self.second_beam_mm, row, motion))
     }
@@ -186,7 +186,7 @@ impl Machine {
         half_covered(leaves_mm, self.beam_mm)
     }
 
-    /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
+    /// The pin changes of encoder and beam while the machine rolls past the row, in order of time.
     ///
     /// The motion begins at `start_cycle`, with the encoder at rest and the beam as [`Machine::beam_before`] says.
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
@@ -233,7 +233,7 @@ impl Machine {
         self.changes(self.beam_before(row, motion), 0.0, row, motion, start_cycle)
     }
 
-    /// As [`beam_changes`](Self::beam_changes), of the second beam; none where there is none.
+    /// As [`beam_changes`](Self::beam_changes), of the second beam; none if there is none.
     pub fn second_beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let before = self.second_beam_before(row, motion);
         before.map_or_else(Vec::new, |before| self.changes(before, self.second_beam_mm, row, motion, start_cycle))

@@ -73,7 +73,7 @@ impl Rolling {
         }
     }
 
-    /// Rolls on until a cycle, and returns the pin changes on the way. The cycle must not be before that of the last
+    /// Rolls on until a cycle, and returns the pin changes until then. The cycle must not be before that of the last
     /// call.
     pub fn roll_until(&mut self, cycle: u64) -> Vec<PinChange> {
         let during_s = self.now_s()..time_at_s(self.start_cycle, cycle);
@@ -221,7 +221,7 @@ mod tests {
 
     const START_CYCLE: u64 = 1_000_000;
 
-    /// The changes on the way: from a time on, a speed and a slip.
+    /// The changes during the motion: from a time on, a speed and a slip.
     fn way() -> impl Strategy<Value = Vec<(f64, f64, f64)>> {
         prop::collection::vec((0.05..1.5, -500.0..1200.0, -0.05..0.2), 1..6)
     }

@@ -50,7 +50,7 @@ pub struct Stand {
     pub stems: Vec<Stem>,
     /// The crop plants of the next row on the side to which the tool swings.
     pub neighbours: Vec<Stem>,
-    /// The weeds, those that are tall included.
+    /// The weeds, including tall ones.
     pub weeds: Vec<Weed>,
     /// The ground, across the whole width, on which weeds are counted: the row's part of the plot's square metres.
     pub counted_mm: Range<f64>,
@@ -342,7 +342,7 @@ mod tests {
         }
         let high = grow(&conditions, 2);
         let seen = high.row.weeds().count();
-        // Half of the weeds in the row's 100 mm: 60 a square metre on 50 m2, less those that canopies hide.
+        // Half of the weeds in the row's 100 mm: 60 a square metre on 50 m2, without those hidden by canopies.
         assert!((800..1500).contains(&seen), "{seen}");
         assert!(high.row.weeds().filter(|weed| weed.width_mm > 60.0).count() > 20);
         assert_eq!(low.weeds, high.weeds);

@@ -6,14 +6,14 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A parameter, as the table has it.
+/// A parameter in the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Table and key, joined by a point.
     pub name: &'static str,
-    /// What it is, in the unit that its name carries.
+    /// Its meaning. Its name carries its unit.
     pub meaning: &'static str,
-    /// Where its default comes from.
+    /// The source of its default.
     pub source: &'static str,
     /// Least value.
     pub least: f64,
@@ -21,7 +21,7 @@ pub struct Parameter {
     pub greatest: f64,
 }
 
-/// The one table from which everything else about the parameters is made.
+/// The one table of parameters, from which all other code is made.
 macro_rules! parameters {
     ($($(#[doc = $about:literal])* $table:ident: $Table:ident {
         $($key:ident: $kind:ty = $default:literal, $least:literal to $greatest:literal, $meaning:literal, $source:literal;)*
