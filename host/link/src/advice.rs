@@ -30,7 +30,7 @@ pub fn alarm(alarm: Alarm) -> &'static str {
     }
 }
 
-/// What to do about a warning.
+/// What to do after a warning.
 pub fn warning(warning: Warning) -> &'static str {
     match warning {
         Warning::LateCommand => "drive evenly, look at the plant, or raise `lead_out_ms`",

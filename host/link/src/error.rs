@@ -54,7 +54,7 @@ pub enum LinkError {
     NotOpened {
         /// Its name.
         port: String,
-        /// What the system says.
+        /// The system's error.
         source: serialport::Error,
     },
     /// The port went away.

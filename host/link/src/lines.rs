@@ -11,7 +11,7 @@ pub(super) const STRANGE: char = '\u{FFFD}';
 /// The longest line in characters. The firmware's own lines are shorter than 128.
 const LIMIT: usize = 256;
 
-/// Lines that wait to be taken; when more come the oldest go.
+/// Most lines that wait to be taken. A further line drops the oldest.
 const WAITING: usize = 1024;
 
 /// Collects bytes to lines.

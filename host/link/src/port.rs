@@ -17,7 +17,7 @@ const READ_MS: u64 = 20;
 /// Longest wait of a write for room, and of a read.
 const PATIENCE: Duration = Duration::from_millis(READ_MS);
 
-/// USB vendors and products of the Uno, and of the converters on boards that are built like it.
+/// USB vendors and products of the Uno, and of the converters on compatible boards.
 const UNOS: [(u16, u16); 10] = [
     (0x2341, 0x0001),
     (0x2341, 0x0043),
@@ -97,7 +97,7 @@ pub fn open_other(name: &str) -> Result<Box<dyn crate::Port>, LinkError> {
     open(name).map(|(port, _)| Box::new(port) as Box<dyn crate::Port>)
 }
 
-/// Opens the port of something that only talks, such as a satellite receiver, at so many bits in a second.
+/// Opens the port of a device that only sends, such as a satellite receiver, at `baud` bits a second.
 ///
 /// # Errors
 /// If it is absent, in use, forbidden, or no serial port.

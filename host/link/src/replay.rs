@@ -97,7 +97,7 @@ struct Played {
     replayed: Vec<Heard>,
     /// Notes on skipped parts, with the reasons.
     notes: Vec<String>,
-    /// The last place.
+    /// The last position.
     end: i32,
 }
 
@@ -139,7 +139,7 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
     let mut logged: Vec<Heard> = Vec::new();
     let mut last = (stretch.first.clone(), stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms));
     let mut notes = Vec::new();
-    // Whether the start that is carried out next takes unseen ground for bare.
+    // Whether the next start treats unseen ground as bare.
     let mut starts_now = false;
     for (place, (entry, happened)) in stretch.happened.iter().enumerate() {
         progress.advance();

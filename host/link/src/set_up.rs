@@ -133,7 +133,7 @@ impl fmt::Display for Margin {
 /// The servo, timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Timing {
-    /// The leads in milliseconds, out and in. `None` if the operator judges them by eye.
+    /// The leads in milliseconds, out and in. `None` if the operator sets them by eye.
     leads: Option<(u16, u16)>,
     /// The pulse widths of the stroke.
     pulses: (u16, u16),

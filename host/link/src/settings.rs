@@ -1,4 +1,4 @@
-//! The machine's settings: reads all, and changes them without a contradiction on the way.
+//! The machine's settings: reads all, and changes them without an intermediate contradiction.
 //!
 //! Names, ranges and defaults are those of the firmware's own table ([`control::settings`]). The firmware refuses a
 //! value that contradicts the others. So the order of changes matters, and [`steps`] finds one.
@@ -32,9 +32,9 @@ pub enum SettingsError {
     NotTaken {
         /// The setting's name.
         setting: String,
-        /// What was sent.
+        /// The value sent.
         wanted: u16,
-        /// What the firmware has.
+        /// The firmware's value.
         found: u16,
     },
 }

@@ -12,7 +12,7 @@ const PAGE: &str = include_str!("../../../../docs/set-up.md");
 pub struct ManualStep {
     /// Its number, from 1.
     pub number: usize,
-    /// What it is called.
+    /// Its name.
     pub title: &'static str,
     /// The parts to fit and the values to set or measure. Empty if there is nothing to type.
     pub tasks: Vec<Task>,
