@@ -11,7 +11,7 @@ use std::path::Path;
 /// Reads a machine and checks it.
 ///
 /// # Errors
-/// If the file cannot be read, is no TOML, has unknown keys or units, or makes no machine that could be calculated.
+/// If the file cannot be read, is no TOML, has unknown keys or units, or makes no calculable machine.
 pub fn read(path: &Path) -> Result<Machine, FileError> {
     parse(path, &fs::read_to_string(path).map_err(|source| FileError::unread(path, source))?)
 }
@@ -28,7 +28,7 @@ fn parse(path: &Path, text: &str) -> Result<Machine, FileError> {
     Ok(machine)
 }
 
-/// What the TOML reader found wrong at a byte, with the key there and what the paper's machine has there.
+/// The TOML reader's error at a byte, with the key there and the paper's value.
 fn explain(text: &str, byte: usize, message: &str) -> String {
     let message = message.trim().replace('\n', ", ");
     let Some(entry) = toml_entry::around(text, byte) else { return message };

@@ -18,7 +18,7 @@ const GOOD_TEETH: RangeInclusive<u32> = 9..=120;
 /// Allowed relative deviation of the speed, before a warning.
 const SPEED_TOLERANCE: f64 = 0.05;
 
-/// Times the needed power from which an engine is too large.
+/// An engine with more than this multiple of the needed power is too large.
 const ENGINE_EXCESS: f64 = 2.0;
 
 /// The greatest wheel numerics of soft and of tilled soil. Above them it is firm.

@@ -164,7 +164,7 @@ impl Written for f64 {
     const UNITS: &'static [Unit<Self>] = &[FACTOR];
 }
 
-/// A number of things.
+/// A count.
 pub const COUNT: Unit<u32> = Unit { name: "", of: |value| value as u32, value: f64::from };
 
 impl Written for u32 {
