@@ -30,7 +30,7 @@ const MOST_NAMED: usize = 8;
 pub struct Shard {
     /// Which one, from 1.
     number: u64,
-    /// Of how many.
+    /// The number of shards.
     of: u64,
 }
 
@@ -41,7 +41,7 @@ impl Shard {
     /// The numbers of its plots, points or runs, ascending from 0.
     pub fn numbers(self, all: u64) -> impl ExactSizeIterator<Item = u64> {
         let count = all.saturating_sub(self.number - 1).div_ceil(self.of);
-        // A range of u64 does not know its length.
+        // A range of u64 is no exact-size iterator.
         (0..usize::try_from(count).unwrap_or(usize::MAX)).map(move |turn| self.number - 1 + turn as u64 * self.of)
     }
 
@@ -85,7 +85,7 @@ pub struct Program {
 pub struct Header {
     /// The format version: [`FORM`].
     weeder_part: u32,
-    /// Who computed it.
+    /// The program that computed it.
     pub program: Program,
     /// The command, such as `trial`.
     pub command: String,
@@ -113,7 +113,7 @@ pub struct Part<T> {
 pub struct Numbered<T> {
     /// Which one, from 0.
     pub number: u64,
-    /// What came of it.
+    /// The result.
     pub outcome: T,
 }
 
@@ -151,7 +151,7 @@ pub fn write<T: Serialize>(
 /// Reads the first line of a part, called `name`.
 ///
 /// # Errors
-/// Where it cannot be read, or is something else.
+/// If it cannot be read, or is no part.
 pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header> {
     let no_part = |problem: String| {
         anyhow!("{name} is no part of a study, as `weeder trial --shard 1/4 --out {name}` would write it: {problem}")
@@ -179,13 +179,13 @@ fn unreadable(name: &str) -> String {
     format!("{name} cannot be read")
 }
 
-/// Longest header that is read, in bytes: what is no part may have no end of a line.
+/// Longest header that is read, in bytes: another file may have no line end.
 const MOST_HEADER: u64 = 1 << 24;
 
-/// Reads the outcomes of a part behind its header: all of them, in the order of their numbers.
+/// Reads all outcomes after a part's header, in the order of their numbers.
 ///
 /// # Errors
-/// Where it cannot be read, a line is wrong, or one is missing or too many.
+/// If it cannot be read, a line is wrong, or an outcome is missing or surplus.
 pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut dyn BufRead) -> Result<Part<T>> {
     let shard = header.shard;
     let spoiled = |line: usize, problem: String| {
@@ -216,8 +216,7 @@ pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut
 /// Checks that parts, each with its name, make one whole study that this program computed.
 ///
 /// # Errors
-/// The first thing that is wrong: a part of another program, of another study, one that is there twice, or those that are
-/// missing.
+/// The first problem: a part of another program or another study, a duplicate, or the missing parts.
 pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
     let missing =
         |which: String| anyhow!("{which} missing: name all parts of the study, or compute what is missing by --shard");

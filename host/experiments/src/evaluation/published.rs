@@ -33,11 +33,11 @@ pub struct PublishedMachine {
     pub weeds_gone_percent: &'static str,
     /// Crop plants that were damaged.
     pub damaged_percent: &'static str,
-    /// Where it is published.
+    /// The publication.
     pub source: &'static str,
 }
 
-/// Where nothing is said.
+/// The text of a missing figure.
 const NOT_SAID: &str = "\u{2013}";
 
 /// Published machines, those with a beam first.

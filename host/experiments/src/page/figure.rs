@@ -9,7 +9,7 @@ use anyhow::Result;
 
 /// A chart with its texts.
 pub struct Figure {
-    /// What it shows.
+    /// The title.
     pub title: String,
     /// The unit of the y axis, or the total of its share.
     pub unit: String,
@@ -27,7 +27,7 @@ pub struct Figure {
 pub struct Key {
     /// Line and marker.
     pub svg: String,
-    /// Whose they are.
+    /// Their series.
     pub meaning: String,
 }
 
@@ -97,7 +97,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
     let treatments = analysis.treatments();
     let spacings = spacings_cm(analysis);
     let x = range_of(analysis.records.iter().map(|record| record.speed_km_h), false);
-    // So that plots of different spacings with the same value are both to be seen.
+    // An offset, so that equal values of different spacings stay visible.
     let step = (x.end - x.start) * 0.02;
     let aside = |index: usize| (index as f64 - (spacings.len() - 1) as f64 / 2.0) * step;
     let mut series = Vec::new();
@@ -137,7 +137,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
     })
 }
 
-/// What a model leaves of each plot, against what it says of it.
+/// A model's residuals against its fitted values.
 pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel) -> Result<Figure> {
     let x = range_of(model.fitted.iter().copied(), false);
     let mut series = vec![Series { look: Look::LIMIT, line: vec![(x.start, 0.0), (x.end, 0.0)], cloud: Vec::new() }];

@@ -21,7 +21,7 @@ use control::ground::{
 use knn::{Example, Kind, classify, squared_distance};
 use std::collections::HashSet;
 
-/// Checks that so many examples are not more than there is room for.
+/// Checks that there is room for this number of examples.
 fn check_room(needed: usize, most: usize) -> Result<()> {
     ensure!(
         needed <= most,
@@ -47,7 +47,7 @@ pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
 /// indices, in the order of choice.
 ///
 /// # Errors
-/// Where more are needed.
+/// If more are needed.
 pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u32, most: usize) -> Result<Vec<usize>> {
     let half = radius / 2;
     let is_mistreated = |index: usize, kept: &[Example<COUNT>]| {
@@ -76,7 +76,7 @@ pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u3
 /// examples are equal.
 ///
 /// # Errors
-/// Where that many leave a plant that is taken for a weed.
+/// If `most` examples still classify a plant as a weed.
 pub fn beside(
     given: &[Example<COUNT>],
     examples: &[Example<COUNT>],
