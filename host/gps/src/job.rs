@@ -45,7 +45,7 @@ impl Default for Wanted {
     }
 }
 
-/// What something is.
+/// The kinds of a position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// A detection that the beam has seen.
@@ -87,7 +87,7 @@ impl What {
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Thing {
-    /// What.
+    /// Its kind.
     pub what: What,
     /// The log's line.
     pub line: u64,

@@ -1,6 +1,6 @@
 //! A job in numbers: the stand, the ground, the time, and how many positions there are.
 //!
-//! A spacing is the distance between two neighbouring plants if the machine was at work all the way between. So a
+//! A spacing is the distance between two neighbouring plants if the machine was at work all the time between. So a
 //! headland is no gap in the stand: the work switch marks the row end. If a spacing is longer than one and a half of
 //! the usual one, plants are missing in it. Unknown detections count as plants.
 
@@ -25,7 +25,7 @@ pub struct Stand {
 pub struct Summary {
     /// Plants, including unknown detections.
     pub plants: u64,
-    /// Of them unknown.
+    /// Unknown detections among them.
     pub unknown: u64,
     /// Mean distance between neighbouring plants without a missing one between, in mm.
     pub spacing_mean_mm: Option<f64>,
@@ -43,7 +43,7 @@ pub struct Summary {
     pub labels: u64,
     /// Ground of the row over which the machine was at work, in metres.
     pub worked_m: f64,
-    /// Of it weeded.
+    /// The weeded part of it.
     pub weeded_m: f64,
     /// The same as a share.
     pub weeded_percent: Option<f64>,
@@ -61,13 +61,13 @@ pub struct Summary {
     pub without_place: u64,
     /// Fixes that are used.
     pub fixes: u64,
-    /// Times at which there was no fix any more.
+    /// How often the fix was lost.
     pub fix_losses: u64,
     /// Fixes that have jumped.
     pub jumps: u64,
     /// Lines of the receiver that came damaged.
     pub damaged_lines: u64,
-    /// Times at which the receiver was gone or silent.
+    /// How often the receiver was lost or silent.
     pub receiver_losses: u64,
 }
 
