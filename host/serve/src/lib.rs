@@ -69,7 +69,7 @@ const BACKLOG: u32 = 1024;
 /// Time between two checks whether to stop.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What to serve, and where.
+/// The machines and the addresses to serve.
 pub struct Setup {
     /// The machines: a name, and a function that opens its link.
     pub machines: Vec<(String, Opener)>,
@@ -111,7 +111,7 @@ pub enum ServeError {
     NotBound {
         /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The system lacks something.

@@ -14,14 +14,14 @@ use tokio::sync::oneshot::{self, Receiver, Sender};
 /// Connections in a stage. A browser opens six.
 const PLACES: usize = 32;
 
-/// What a connection does.
+/// The state of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// It has not sent a whole request of a known client: it is new, half open, or not paired.
     Opening,
     /// It waits for an answer, reads it, or stays open for the next request.
     Asking,
-    /// It hears the events.
+    /// It receives the events.
     Listening,
     /// It has requested HOLD.
     Holding,

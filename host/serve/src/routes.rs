@@ -64,13 +64,13 @@ const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; 
 /// All ports of an address share cookies.
 const COOKIE_NAME: &str = "weeder";
 
-/// What all requests share.
+/// The state that all requests share.
 pub struct Served {
     /// The page.
     pub page: Page,
     /// The machines, in the order of their numbers.
     pub machines: Vec<Machine>,
-    /// What they say.
+    /// Their output.
     pub hub: Arc<Hub>,
     /// Who is paired.
     pub pairing: Mutex<Pairing>,
