@@ -81,7 +81,7 @@ impl Wiring {
     }
 }
 
-/// What is said to have stopped.
+/// The name of what stopped, for errors.
 const SECOND: &str = "the second simulator";
 
 /// The weeder's virtual Uno, of this project's simulator or of another one.

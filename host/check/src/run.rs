@@ -11,10 +11,10 @@ use crate::tester::Tester;
 use crate::wiring::{self, Weeder};
 use tester_core::pins::Line;
 
-/// What to check.
+/// The checks to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
-    /// Less of everything.
+    /// A shorter check.
     pub brief: bool,
     /// Whether the boards are virtual ones.
     pub simulated: bool,
