@@ -115,7 +115,7 @@ enum Command {
     Design(design::Arguments),
     /// Create a randomised plan of a field trial, as a table to fill in.
     Plan(plan::Arguments),
-    /// Judge a field trial from the counts of its plots.
+    /// Evaluate a field trial from the counts of its plots.
     Evaluate(evaluate::Arguments),
     /// Update or check the manual's figures.
     Figures(figures::Arguments),
@@ -253,7 +253,7 @@ mod tests {
     const NAMES: &str = "examples.diff examples.pull examples.push flash monitor record serve set-up settings.diff settings.pull \
         settings.push";
 
-    /// Of words that name no file.
+    /// Arguments with words that name no file.
     const NO_FILE: &str = "bounds:chip bounds:function check-board:board check-board:port check-board:tester examples.diff:port examples.pull:port examples.push:port flash:port rows.forget:name rows.name:name \
         rows.name:port set-up:port sim:channel_a sim:channel_b sim:channel_beam";
 
@@ -295,7 +295,7 @@ mod tests {
         commands.iter().flat_map(of_one).collect()
     }
 
-    /// Whether it takes free text or a path, not a number, a list of known words, or a value with its own parser.
+    /// Whether it takes free text or a path, without its own parser or list of values.
     fn is_free(argument: &Arg) -> bool {
         let parser = argument.get_value_parser();
         let found = parser.type_id();

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// Time between two tries to open the port again.
 const RETRY: Duration = Duration::from_secs(1);
 
-/// Where beam and tool stand beside the antenna, as the user has measured it.
+/// The measured positions of beam and tool relative to the antenna.
 #[derive(Args)]
 pub struct AntennaArguments {
     /// Distance from the antenna forward to the beam in mm, -20000 to 20000; negative behind it. Default: 0.
@@ -73,10 +73,10 @@ pub struct GpsArguments {
 }
 
 impl GpsArguments {
-    /// The receiver, where there is to be one, and the first lines of the record.
+    /// The receiver, if the user named one, and the first lines of the record.
     ///
     /// # Errors
-    /// If its row is not among those that are recorded, or its port cannot be opened now: later that is no error.
+    /// If its row is not recorded, or its port cannot be opened now. A later loss of the port is no error.
     pub fn open(&self, chosen: &Chosen) -> Result<Option<(Gps, Lines)>> {
         let antenna = self.antenna.over(Antenna::default());
         let Some(Named { name, port }) = &self.gps else {
@@ -174,7 +174,7 @@ impl Source {
         })?))
     }
 
-    /// How many bytes have come.
+    /// The number of bytes received.
     fn read(&mut self, bytes: &mut [u8], now: Instant) -> io::Result<usize> {
         match self {
             Self::Port(port) => match port.read(bytes) {

@@ -352,7 +352,7 @@ impl Guide {
         }
     }
 
-    /// Measures the wheel until that was done often enough.
+    /// Measures the wheel until there are enough measurements.
     fn measure_wheel(&mut self, length_mm: u16) -> Result<bool> {
         loop {
             let stretches = self.state.measured.stretches();

@@ -146,11 +146,11 @@ impl From<ControllerName> for Treatment {
 
 /// How to show a sweep's points.
 pub struct Shown {
-    /// Where they are written.
+    /// The output file.
     pub out: Option<FileName>,
     /// Whether to replace existing files.
     pub replace: Replace,
-    /// Whether for programs.
+    /// Whether to print JSON.
     pub json: bool,
     /// The result to show, if there are two axes.
     pub result: String,
@@ -192,7 +192,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     show(&sweep, &points, &shown, out.as_ref())
 }
 
-/// Prints the result of all points' plots, which were weeded somewhere.
+/// Prints the result of all points' plots, from this or other machines.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -290,7 +290,7 @@ fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
         writer.write_record(columns(sweep))?;
         for point in points {
             let values = place(point).chain(point.results.values());
-            // A result that there is not has an empty cell.
+            // A missing result has an empty cell.
             writer
                 .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;
         }

@@ -103,7 +103,7 @@ impl FromStr for Votes {
     }
 }
 
-/// Trains, and prints what came of it.
+/// Trains, and prints the result.
 ///
 /// # Errors
 /// If a file or its contents are wrong, or the table would not fit.
@@ -254,7 +254,7 @@ fn counts_in_json(classified: &Confusion) -> Value {
     json!({ "objects": classified.total(), "plants_taken_for_weeds": classified.plants_taken_for_weeds() })
 }
 
-/// How a table is written.
+/// The format of a written table.
 enum Form {
     Rust,
     Csv,
