@@ -44,7 +44,7 @@ impl Capture {
     ///
     /// # Errors
     ///
-    /// Where the file is no VCD, has no such channels, or leaves their levels open.
+    /// If the file is no VCD, has no such channels, or leaves their levels open.
     pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, FileError> {
         let file = File::open(path).map_err(|source| FileError::unread(path, source))?;
         Capture::parse(path, BufReader::new(file), channels)
