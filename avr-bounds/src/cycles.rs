@@ -268,7 +268,7 @@ impl<'a> Timer<'a> {
         turn
     }
 
-    /// The time of a way, with the called functions: the whole time, or the part in one stretch.
+    /// The time of an edge, with the called functions: the whole time, or the part in one stretch.
     fn time_of(&mut self, node: &Node, way: &Way, stretch: Option<Stretch>) -> Option<Time> {
         let called = match (&way.through, stretch) {
             (None, _) => Time::default(),
@@ -298,7 +298,7 @@ impl<'a> Timer<'a> {
     pub(crate) fn loops_without_bound(&mut self, routine: &Routine) -> BTreeSet<u32> {
         let nodes = &routine.nodes;
         let mut found = BTreeSet::new();
-        // Of a loop that is never left, the loops within.
+        // For a loop that is never left: its inner loops.
         let mut sets = vec![(0..nodes.len()).collect::<BTreeSet<usize>>()];
         while let Some(set) = sets.pop() {
             let ways = |node: usize| nodes[node].ways.iter().map(|way| way.to).filter(|to| set.contains(to)).collect();
@@ -416,7 +416,7 @@ impl Paths<'_> {
 
     /// Propagates the times at a loop's entries to all of its places.
     fn turn(&self, circle: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
-        // In a loop with several entries, a turn is the way from one entry to the next. The loop turns as often as the
+        // In a loop with several entries, a turn is the path from one entry to the next. The loop turns as often as the
         // program passes any entry. A bound stated at one place is not valid for all of them.
         let heads: BTreeSet<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
         let mut passes = Some(0);

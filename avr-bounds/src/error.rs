@@ -24,9 +24,9 @@ pub enum BoundsError {
     /// The program has an instruction that cannot be followed.
     #[error("{} {problem}, at {:#06x}{}{}", place.function, place.address, Line(place), problem.advice(place))]
     At {
-        /// Where.
+        /// The address.
         place: Place,
-        /// What it does.
+        /// The instruction's effect.
         problem: Problem,
     },
     /// Functions that call each other in a circle.
@@ -49,7 +49,7 @@ pub enum BoundsError {
     HandlerEnables {
         /// The vector.
         vector: u8,
-        /// Where.
+        /// The address.
         place: Place,
     },
     /// A loop without a bound, where the time must have one.
@@ -59,9 +59,9 @@ pub enum BoundsError {
         place.address, Line(place), place.function, place.function
     )]
     Unbounded {
-        /// What has no bound.
+        /// The quantity without a bound.
         what: String,
-        /// Where the loop begins.
+        /// The loop's first address.
         place: Place,
     },
     /// Functions clobber live registers.
@@ -122,7 +122,7 @@ impl fmt::Display for Line<'_> {
     }
 }
 
-/// What cannot be followed.
+/// Why the analysis stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Problem {
     /// A word that is no instruction of this chip.
@@ -165,7 +165,7 @@ impl fmt::Display for Problem {
 }
 
 impl Problem {
-    /// What to write, after a colon.
+    /// The advice, after a colon.
     fn advice(self, place: &Place) -> String {
         match self {
             Problem::Indirect => {

@@ -67,16 +67,16 @@ pub(crate) struct Place {
     pub(crate) interrupts: Interrupts,
 }
 
-/// A way from a place to the next.
+/// An edge from a place to the next.
 #[derive(Clone)]
 pub(crate) struct Way {
     /// The place's number in its routine.
     pub(crate) to: usize,
-    /// Cycles of the instruction on this way, including those of a call itself.
+    /// Cycles of the instruction on this edge, including the call instruction itself.
     pub(crate) cycles: u32,
-    /// The routine that is called on this way.
+    /// The routine called on this edge.
     pub(crate) through: Option<Rc<Routine>>,
-    /// The number in R21 and R20 at the beginning of the way, if it is known: the length argument of `memcpy` and
+    /// The number in R21 and R20 at the beginning of the edge, if it is known: the length argument of `memcpy` and
     /// similar functions.
     pub(crate) length: Option<u16>,
     /// Registers with known constants after the instruction.

@@ -246,7 +246,7 @@ fn a_path_that_waits_for_the_reset_is_no_critical_section() {
     assert_eq!(bounds.critical_section.cycles, Some(1));
 }
 
-/// INT0's input: one handler reads PIND, and two edges between its looks are told apart.
+/// INT0's input: one handler reads PIND, and it can count two edges between two reads.
 const INPUT: fn() -> Input = || Input { vectors: [1].into(), port: 0x29, edges_between_looks: 2, clock_hz: 16_000_000 };
 
 #[test]
@@ -398,7 +398,7 @@ fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_go
         let bounds = try_to_prove_with(&program, None, &[("waits".into(), bound)].into()).expect("it has bounds");
         bounds.turn.expect("the watchdog is fed").cycles
     };
-    // wdr 1, rcall 3, ldi 1, so many turns and the way out, ret 4, rjmp 2.
+    // wdr 1, rcall 3, ldi 1, the turns and the exit, ret 4, rjmp 2.
     assert_eq!(cycles("3: dec r24\n brne 3b\n", &[9]), Some(11 + 9 * 3 + 2));
     assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), &[9]), Some(11 + 8 * 3 + 2));
     // Entered in its middle as well: by the longer way, sbrc 1 and rjmp 2; nine times by either beginning, and three cycles from
