@@ -1,4 +1,4 @@
-//! Encoder and beam fail on the way: the firmware detects and names the fault, and has the tool out of the row.
+//! Encoder and beam fail during work: the firmware detects and names the fault, and has the tool out of the row.
 
 use crate::common::{
     Run, ask, bare_ground, is_out_at_the_pin, named, number, run_for_ms, status, steady, trial, value, woken_up,

@@ -33,7 +33,7 @@ pub struct Rolling {
     /// Events, and the first beam's position at each.
     pub told: Vec<(Event, f64)>,
     wheel_mm: f64,
-    /// What each beam sees, from and to.
+    /// The stretches that each beam sees, from and to.
     first_mm: Vec<(f64, f64)>,
     second_mm: Vec<(f64, f64)>,
     /// How far the second beam and the tool are behind the first.

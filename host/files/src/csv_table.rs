@@ -102,7 +102,7 @@ fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
     goes_on.then(|| behind.find(|(_, line)| is_odd(line)).map_or(before + 1, |(number, _)| number))
 }
 
-/// What stands in a file.
+/// The content of a file.
 ///
 /// # Errors
 /// If it cannot be read.

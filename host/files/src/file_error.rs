@@ -16,9 +16,9 @@ pub enum FileError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong, behind its name.
+        /// The problem, after the name.
         problem: String,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// A line of it.

@@ -73,7 +73,7 @@ impl Replace {
 }
 
 impl FileName {
-    /// Whether it could be written, and nothing is lost by it.
+    /// Checks that it can be written without losing a file.
     ///
     /// # Errors
     /// If it could not, and why.
@@ -122,7 +122,7 @@ impl OutFile<'_> {
 }
 
 impl FolderName {
-    /// Whether files could be written there, and nothing is lost by those of these names.
+    /// Checks that files of these names can be written there without losing a file.
     ///
     /// # Errors
     /// If they could not, and why.
@@ -152,7 +152,7 @@ impl FolderName {
         &self.0
     }
 
-    /// Makes it where there is none.
+    /// Makes the folder if necessary.
     ///
     /// # Errors
     /// If it cannot be made.
@@ -162,7 +162,7 @@ impl FolderName {
 }
 
 impl OutFolder<'_> {
-    /// Writes a file there whole, or leaves what was there; makes the folder where there is none.
+    /// Writes a whole file there, or leaves the old file. Makes the folder if necessary.
     ///
     /// # Errors
     /// If folder or file cannot be written, or this name was not checked.

@@ -45,9 +45,9 @@ pub struct Trouble {
     pub every_s: f64,
     /// When there is no fix, in seconds of that.
     pub outage_s: Range<f64>,
-    /// When the fixes are somewhere else.
+    /// The time during which fixes are displaced.
     pub jump_s: Range<f64>,
-    /// How far that is, in metres to the north.
+    /// The displacement, in metres to the north.
     pub jump_m: f64,
     /// The share of lines with a changed byte.
     pub damaged: f64,

@@ -265,7 +265,7 @@ fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::
     Ok(())
 }
 
-/// What is about to be tried, in a line.
+/// The trial, in a line.
 pub fn introduction(row: &row::Row, machine: &Machine, motion: &Motion) -> String {
     let span = row.span_mm();
     format!(

@@ -179,7 +179,7 @@ impl Board {
             Command::CalibrateServo => self.times_the_servo = true,
             Command::Hold | Command::Start { .. } | Command::Servo(_) | Command::ServoIn | Command::ServoOut => {
                 self.in_doubt |= std::mem::take(&mut self.times_the_servo);
-                // What was moved by hand has yet to come back.
+                // The tool has yet to come back from a manual move.
                 self.rest_anew();
             }
             Command::TestRow { .. } => self.in_doubt |= std::mem::take(&mut self.times_the_servo),
