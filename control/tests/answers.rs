@@ -395,7 +395,7 @@ fn curves_show_speed_and_beam_and_status_shows_the_speed() {
 #[test]
 fn status_counts_dropped_events() {
     let mut machine = machine();
-    machine.tell_events(true);
+    machine.enable_events(true);
     for _ in 0..5 {
         machine.start(false).expect("no alarm is latched");
         machine.hold();
@@ -407,7 +407,7 @@ fn status_counts_dropped_events() {
 #[test]
 fn events_and_curves_wait_until_an_answer_is_complete() {
     let mut machine = machine();
-    machine.tell_events(true);
+    machine.enable_events(true);
     machine.set_plot(Plot::Arduino);
     let (mut console, mut typed) = (Console::new(), LineBuffer::new());
     let mut to_type = b"help\nnonsense\nget\nversion\n".iter();

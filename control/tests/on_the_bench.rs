@@ -202,7 +202,7 @@ fn a_dry_run_ignores_the_sensors() {
     let mut machine = machine();
     machine.at(77).stand(300);
     machine.test_row(500).unwrap();
-    machine.tell_events(true);
+    machine.enable_events(true);
     let mut swings = Vec::new();
     for now in 300..10_000 {
         // Nothing is wired: the beam flickers faster than the loop can count, and the encoder's contacts pick up hum.

@@ -40,7 +40,7 @@ fn greeted(uno: &mut Uno) {
 
 /// An EEPROM with an example in every slot.
 fn full_eeprom() -> Vec<u8> {
-    let mut store = FieldExamples::asleep(Volatile::new());
+    let mut store = FieldExamples::uninit(Volatile::new());
     store.init();
     for number in 0..field_examples::CAPACITY {
         store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");

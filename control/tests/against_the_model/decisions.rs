@@ -104,7 +104,7 @@ pub struct Decisions {
 
 fn wake(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, steps: u32, world: &World, cause: Cause) -> Weeder {
     let [for_settings, for_examples] = eeprom.halves();
-    let classifier = ByWidth { nearest: Nearest::asleep(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
+    let classifier = ByWidth { nearest: Nearest::uninit(&EXAMPLES[..], for_examples), weed: Rc::clone(weed) };
     let (readings, beams) = shown(steps, world);
     Rig::wake_at(classifier, for_settings, readings, beams, cause)
 }

@@ -57,7 +57,7 @@ impl Rolling {
         for &(setting, value) in [(Setting::BeamResponseMs, 0)].iter().chain(settings) {
             machine.set(setting, value).unwrap();
         }
-        machine.tell_events(true);
+        machine.enable_events(true);
         machine.start(true).unwrap();
         let set_mm = |setting| f64::from(machine.settings().get(setting));
         let (second_beam_mm, beam_to_tool_mm) = (set_mm(Setting::SecondBeamMm), set_mm(Setting::BeamToToolMm));

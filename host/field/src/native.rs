@@ -290,7 +290,7 @@ pub fn slips_permille(trial: &Trial, sensors: &Sensors) -> Result<Vec<i16>, Refu
     let (mut slips, mut tells) = (Vec::new(), false);
     run(trial, sensors, |weeder| {
         if !tells {
-            weeder.tell_events(true);
+            weeder.enable_events(true);
             tells = true;
         }
         while let Some(event) = weeder.next_event() {
@@ -313,7 +313,7 @@ fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) ->
         type_line(&mut weeder, &format!("set {} {value}", setting.text()))?;
     }
     for example in &trial.examples {
-        example.features.into_iter().for_each(|feature| weeder.tell_feature(feature));
+        example.features.into_iter().for_each(|feature| weeder.enter_feature(feature));
         type_line(&mut weeder, if example.label == label::PLANT { "teach plant" } else { "teach weed" })?;
     }
     type_line(&mut weeder, if trial.start == Start::Now { "start now" } else { "start" })?;

@@ -133,7 +133,7 @@ impl<'a> Player<'a> {
         if stretch.first.mode == Mode::Work {
             let _ = player.rig.start(stretch.first.unseen_mm <= 0);
         }
-        player.rig.tell_events(true);
+        player.rig.enable_events(true);
         player
     }
 
@@ -313,7 +313,7 @@ impl<'a> Player<'a> {
             Ok(Command::Label { label, force }) => {
                 let _ = self.rig.label(label, force);
             }
-            Ok(Command::Feature(feature)) => self.rig.tell_feature(feature),
+            Ok(Command::Feature(feature)) => self.rig.enter_feature(feature),
             Ok(Command::Teach(label)) => {
                 let _ = self.rig.teach(label);
             }

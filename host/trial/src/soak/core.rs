@@ -634,7 +634,7 @@ fn told(machine: &Machine, stem_zone_mm: u16) -> [(Setting, u16); 3] {
 fn init(memories: &[Shared; 2], readings: Readings, beams: Beams, cause: Cause) -> Weeder {
     let nearest = Nearest::new(&EXAMPLES[..], memories[1].clone());
     let mut weeder = Rig::wake_at(nearest, memories[0].clone(), readings, beams, cause);
-    weeder.tell_events(true);
+    weeder.enable_events(true);
     weeder
 }
 
