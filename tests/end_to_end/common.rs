@@ -27,7 +27,7 @@ pub fn elf() -> PathBuf {
 
 /// An Uno after its start, with inputs at rest, the switch off and the beam clear. The alarm for missing saved settings
 /// is cleared.
-pub fn woken_up() -> Uno {
+pub fn started() -> Uno {
     trial::boot(&elf(), &[]).expect("the firmware wakes up")
 }
 

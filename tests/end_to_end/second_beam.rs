@@ -1,7 +1,7 @@
 //! A second beam: it measures the wheel's slip plant by plant. A torn wire of either beam is reported before it costs a
 //! plant.
 
-use crate::common::{Run, is_out_at_the_pin, named, number, status, steady, trial, value, woken_up};
+use crate::common::{Run, is_out_at_the_pin, named, number, started, status, steady, trial, value};
 use field::machine::{Machine, cycle_at};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
@@ -95,7 +95,7 @@ fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
 
 #[test]
 fn without_a_second_beam_its_pin_may_do_what_it_likes() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let begin = uno.cycle();
     uno.drive((0..5000).map(|edge| PinChange {
         cycle: begin + edge * 320,

@@ -107,7 +107,7 @@ impl Rolling {
     }
 
     /// The events of a kind.
-    pub fn told_of<T>(&self, of: impl Fn(Event) -> Option<T>) -> Vec<T> {
+    pub fn events_of<T>(&self, of: impl Fn(Event) -> Option<T>) -> Vec<T> {
         self.told.iter().filter_map(|&(event, _)| of(event)).collect()
     }
 }

@@ -89,7 +89,7 @@ fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<()> {
         pair.received(side).clear();
         pair.reset(side)?;
     }
-    let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.bytes_on_their_way(side));
+    let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.bytes_pending(side));
     let mut bytes = [0; MOST_BYTES_ON_THEIR_WAY];
     let count = pty.read(&mut bytes[..room])?;
     if count > 0 {

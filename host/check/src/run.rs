@@ -4,7 +4,7 @@ use crate::alarms::{self, Scene};
 use crate::error::CheckError;
 use crate::rates::{self, Turning};
 use crate::report::{Figure, Report};
-use crate::resets::{self, Kept, Way};
+use crate::resets::{self, Kept, ResetBy};
 use crate::row;
 use crate::servo::{self, Steady};
 use crate::tester::Tester;
@@ -200,9 +200,9 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
         let before = Kept::read(weeder, tester)?;
         let mut figures = Vec::new();
         for (way, id, words) in [
-            (Way::Pin, "pin", "reset by its pin, at work and rolling"),
-            (Way::Port, "port", "reset by opening the port, at work and rolling"),
-            (Way::Watchdog, "watchdog", "restarted by the watchdog, in hold"),
+            (ResetBy::Pin, "pin", "reset by its pin, at work and rolling"),
+            (ResetBy::Port, "port", "reset by opening the port, at work and rolling"),
+            (ResetBy::Watchdog, "watchdog", "restarted by the watchdog, in hold"),
         ] {
             let restart = resets::restart(way, weeder, tester, ratio, extent.simulated)?;
             let what = |what: &str| format!("{words}: {what}");

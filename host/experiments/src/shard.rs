@@ -188,7 +188,7 @@ const MOST_HEADER: u64 = 1 << 24;
 /// If it cannot be read, a line is wrong, or an outcome is missing or surplus.
 pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut dyn BufRead) -> Result<Part<T>> {
     let shard = header.shard;
-    let spoiled = |line: usize, problem: String| {
+    let damaged = |line: usize, problem: String| {
         anyhow!("{name}, line {line}: {problem}; compute part {shard} again, with --force")
     };
     let mut expected = shard.numbers(header.all);
@@ -197,18 +197,18 @@ pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut
     for (line, text) in (2..).zip(from.lines()) {
         let text = text.with_context(|| unreadable(name))?;
         let outcome: Numbered<T> = serde_json::from_str(&text)
-            .map_err(|_| spoiled(line, "this is not an outcome of this study, or was cut".to_owned()))?;
+            .map_err(|_| damaged(line, "this is not an outcome of this study, or was cut".to_owned()))?;
         match expected.next() {
             Some(number) if number == outcome.number => outcomes.push(outcome),
             Some(number) => {
-                return Err(spoiled(line, format!("this is number {}, but has to be {number}", outcome.number)));
+                return Err(damaged(line, format!("this is number {}, but has to be {number}", outcome.number)));
             }
-            None => return Err(spoiled(line, "this is one more than the part has".to_owned())),
+            None => return Err(damaged(line, "this is one more than the part has".to_owned())),
         }
         last = line;
     }
     match expected.next() {
-        Some(number) => Err(spoiled(last + 1, format!("the part ends before number {number}"))),
+        Some(number) => Err(damaged(last + 1, format!("the part ends before number {number}"))),
         None => Ok(Part { name: name.to_owned(), header, outcomes }),
     }
 }

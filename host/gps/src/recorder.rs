@@ -6,7 +6,7 @@
 //! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
-use crate::job::{LONGEST_WAY, tick_mm};
+use crate::job::{LONGEST_DISTANCE, tick_mm};
 use crate::receiver::{Heard, Receiver};
 use crate::sentence::Line;
 use link::LineReader;
@@ -58,7 +58,7 @@ impl Recorder {
             Happening::Lost(_) => self.wheel_lost(),
             Happening::Status(status, _) => {
                 let step = |last: i32| status.position.wrapping_sub(last);
-                if self.wheel.is_some_and(|(last, _)| step(last).unsigned_abs() > LONGEST_WAY) {
+                if self.wheel.is_some_and(|(last, _)| step(last).unsigned_abs() > LONGEST_DISTANCE) {
                     self.wheel_lost();
                 }
                 let ticks = self.wheel.map_or(0, |(last, ticks)| ticks + i64::from(step(last)));

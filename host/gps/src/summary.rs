@@ -104,7 +104,7 @@ impl Summary {
         for stretch in &job.stretches {
             record_ms += stretch.time_ms.end - stretch.time_ms.start;
             for ground in stretch.ground.iter().filter(|ground| ground.did != Did::Rolled) {
-                let length_m = ground.way_m.end - ground.way_m.start;
+                let length_m = ground.distance_m.end - ground.distance_m.start;
                 summary.worked_m += length_m;
                 summary.weeded_m += if ground.did == Did::Weeded { length_m } else { 0.0 };
                 work_ms += ground.time_ms.end - ground.time_ms.start;
@@ -150,14 +150,14 @@ fn spacings_mm(job: &Job) -> Vec<f64> {
     let mut spacings = Vec::new();
     for stretch in &job.stretches {
         let is_plant = |thing: &&Thing| matches!(thing.what, What::Object { class: Class::Plant | Class::Unknown, .. });
-        let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.way_m).collect();
+        let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.distance_m).collect();
         // Both are known by the wheel's distance.
         let rests: Vec<_> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
         for pair in plants.windows(2) {
-            let is_between = |way_m: f64| (pair[0]..pair[1]).contains(&way_m);
+            let is_between = |distance_m: f64| (pair[0]..pair[1]).contains(&distance_m);
             let rested = rests.iter().any(|rest| {
-                let contains_both = rest.way_m.start <= pair[0] && pair[1] <= rest.way_m.end;
-                contains_both || is_between(rest.way_m.start) || is_between(rest.way_m.end)
+                let contains_both = rest.distance_m.start <= pair[0] && pair[1] <= rest.distance_m.end;
+                contains_both || is_between(rest.distance_m.start) || is_between(rest.distance_m.end)
             });
             if !rested && pair[1] > pair[0] {
                 spacings.push(1000.0 * (pair[1] - pair[0]));

@@ -314,13 +314,13 @@ impl Pieces {
         let (mut above, mut any) = (self.lines, false);
         for line in text.split_inclusive('\n') {
             self.lines += 1;
-            let is_told = line != "\n" && !line.starts_with('#');
+            let is_text = line != "\n" && !line.starts_with('#');
             // A comment replaces each skipped line, so that line numbers stay right.
             if !self.has_header {
-                self.head.push_str(if is_told { line } else { "#\n" });
-                self.has_header = is_told;
+                self.head.push_str(if is_text { line } else { "#\n" });
+                self.has_header = is_text;
                 above = self.lines;
-            } else if is_told && is_wanted(line) {
+            } else if is_text && is_wanted(line) {
                 below.push_str(line);
                 any = true;
             } else {

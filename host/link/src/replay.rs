@@ -113,11 +113,11 @@ fn replay_stretch(
             .push("a machine with a second beam is not replayed: the log does not hold what that saw".to_owned());
         return Ok(());
     }
-    let judged_from = stretch.judged_from();
-    if judged_from > i32::MIN {
+    let compared_from = stretch.compared_from();
+    if compared_from > i32::MIN {
         replayed
             .notes
-            .push(format!("the log begins with ground already seen: swings before pos={judged_from} are not judged"));
+            .push(format!("the log begins with ground already seen: swings before pos={compared_from} are not judged"));
     }
 
     let mut played = Vec::new();
@@ -127,7 +127,7 @@ fn replay_stretch(
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // The logged values are the same at every pace.
     let Played { logged, notes, end, .. } = &played[0];
-    let bounds = Bounds { first: stretch.first.position, judged_from, end: *end };
+    let bounds = Bounds { first: stretch.first.position, compared_from, end: *end };
     compare(logged, &heard, &bounds, replayed);
     replayed.notes.extend_from_slice(notes);
     Ok(())
@@ -153,7 +153,7 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
             }
             Happened::Event(event) => {
                 let mut is_given = false;
-                if let Some(at) = stretch.place_of_change(place) {
+                if let Some(at) = stretch.position_of_change(place) {
                     player.roll_to(at, &last.0, stretch.next_status(place));
                     last.0.position = player.position();
                     last.0.speed_mm_s = player.speed_mm_s;
@@ -169,11 +169,11 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
             Happened::Command { is_refused: true, .. } => {}
             Happened::Command { line, .. } => {
                 // The status that shows the new state must come nearer to the command.
-                if stretch.is_told_by_state(place) {
+                if stretch.is_reported_by_event(place) {
                     starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
                     continue;
                 }
-                if let Some(at) = stretch.place_of_command(entry.time_ms, &last, place) {
+                if let Some(at) = stretch.position_of_command(entry.time_ms, &last, place) {
                     player.roll_to(at, &last.0, stretch.next_status(place));
                     last.0.position = player.position();
                     last.0.speed_mm_s = player.speed_mm_s;

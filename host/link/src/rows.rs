@@ -157,7 +157,7 @@ impl Talk {
                     Ok(Order::Type(command)) => {
                         // In the order of arrival: a `hold` does not drop commands that came after it.
                         self.hold_where_owed(&mut session);
-                        self.type_or_tell(&mut session, command);
+                        self.type_or_report(&mut session, command);
                     }
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
@@ -183,7 +183,7 @@ impl Talk {
         }
     }
 
-    fn type_or_tell(&mut self, session: &mut Session, command: String) {
+    fn type_or_report(&mut self, session: &mut Session, command: String) {
         if !session.is_connected() {
             self.tell(What::NotTyped { command, why: "the row is not there".to_owned() });
         } else if !session.command(&command) {

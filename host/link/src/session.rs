@@ -90,7 +90,7 @@ pub struct Session {
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
     /// Whether the reason for the missing Uno was not reported yet.
-    is_lost_untold: bool,
+    is_loss_unreported: bool,
     happened: VecDeque<Happening>,
 }
 
@@ -115,7 +115,7 @@ impl Session {
         }
         let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
         if opened.is_err() {
-            (self.retry_at, self.is_lost_untold) = (Some(now + RETRY), false);
+            (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
         }
         opened
     }
@@ -131,7 +131,7 @@ impl Session {
             own: BTreeSet::new(),
             poll_at: None,
             retry_at: None,
-            is_lost_untold: true,
+            is_loss_unreported: true,
             happened: VecDeque::new(),
         }
     }
@@ -176,7 +176,7 @@ impl Session {
                 self.retry_at = Some(now + RETRY);
                 let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
                 // The reason was reported when it was lost.
-                if self.is_lost_untold { opened } else { Ok(()) }
+                if self.is_loss_unreported { opened } else { Ok(()) }
             }
             None => {
                 std::thread::sleep(Duration::from_millis(20));
@@ -195,7 +195,7 @@ impl Session {
         self.asked.clear();
         self.waiting.clear();
         self.own.clear();
-        (self.is_to_hold, self.is_lost_untold) = (false, false);
+        (self.is_to_hold, self.is_loss_unreported) = (false, false);
         self.happened.push_back(Happening::Lost(why));
     }
 
@@ -207,9 +207,9 @@ impl Session {
         link.ask(EVENTS)?;
         self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, shown, examples });
         // Before the first command, so that a log begins with the machine's state.
-        self.happened.extend(told(STATUS, link.ask(STATUS)?)?);
+        self.happened.extend(parse_answer(STATUS, link.ask(STATUS)?)?);
         self.link = Some(link);
-        (self.poll_at, self.is_lost_untold) = (None, false);
+        (self.poll_at, self.is_loss_unreported) = (None, false);
         Ok(())
     }
 
@@ -263,7 +263,7 @@ impl Session {
         // The end of an abandoned answer is ignored.
         let Some(asked) = self.asked.front_mut() else { return };
         match &mut asked.own {
-            Some(lines) if is_end => match told(&asked.line, std::mem::take(lines)) {
+            Some(lines) if is_end => match parse_answer(&asked.line, std::mem::take(lines)) {
                 Ok(happening) if said == ConsoleLine::Done => self.happened.extend(happening),
                 // Noise has damaged a line: ask again.
                 _ => drop(self.own.insert(asked.line.clone())),
@@ -287,7 +287,7 @@ impl Session {
 }
 
 /// Parses the answer to one of the session's own questions.
-fn told(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
+fn parse_answer(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
     Ok(match question {
         STATUS => answer.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line))),
         SETTINGS => Some(Happening::Settings(settings::shown_by(&answer)?, answer)),

@@ -415,7 +415,7 @@ impl LiveUno {
         }
 
         let mut buffer = [0; MOST_BYTES_ON_THEIR_WAY];
-        let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(self.uno.bytes_on_their_way());
+        let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(self.uno.bytes_pending());
         let count = pty.read(&mut buffer[..room])?;
         self.uno.send(&buffer[..count]);
 

@@ -121,14 +121,14 @@ fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
 
 impl Served {
     /// Whether the output for the operator contains these words.
-    fn has_told(&self, words: &str) -> bool {
+    fn has_reported(&self, words: &str) -> bool {
         self.told.lock().expect("no thread has panicked").contains(words)
     }
 
     #[track_caller]
     fn wait_until_told(&self, words: &str) {
         for _ in 0..PATIENCE.as_millis() / LOOK.as_millis() {
-            if self.has_told(words) {
+            if self.has_reported(words) {
                 return;
             }
             thread::sleep(LOOK);

@@ -27,7 +27,7 @@ pub(super) struct Bounds {
     /// The first position.
     pub(super) first: i32,
     /// Swings before this position are not compared.
-    pub(super) judged_from: i32,
+    pub(super) compared_from: i32,
     /// The last position.
     pub(super) end: i32,
 }
@@ -43,7 +43,7 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
     let is_judged = |heard: &&Heard| match heard.event {
         // The replay cuts a detection that was in the beam at the start of the log.
         EventLine::Detection { position, .. } => position.wrapping_sub(bounds.first) >= 0,
-        EventLine::Swing { position, .. } => position >= bounds.judged_from,
+        EventLine::Swing { position, .. } => position >= bounds.compared_from,
         _ => !heard.is_given,
     };
     // At the very end an event may be in only one of log and replay: a detection is reported some distance behind it.
@@ -59,8 +59,8 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
     // At the very beginning an event may lie within the limit in only one of log and replay.
     let is_at_beginning = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
-            bounds.judged_from > i32::MIN
-                && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
+            bounds.compared_from > i32::MIN
+                && position.wrapping_sub(bounds.compared_from).saturating_abs() <= swing_ticks(heard, heard)
         }
         // Both have it, but only one of them within the compared range.
         EventLine::Detection { position, .. } => {

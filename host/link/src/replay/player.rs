@@ -40,7 +40,7 @@ const EXTREME: f64 = 7.0 / 8.0;
 const UNSURE: f64 = 0.02;
 
 /// Longest distance between two lines of a log. A machine at 10 km/h rolls it in some minutes.
-const LONGEST_WAY: i32 = 1_000_000;
+const LONGEST_DISTANCE: i32 = 1_000_000;
 
 /// Faster than any machine, and as far as [`control::units::Wheel::ticks`] goes with every encoder.
 const FASTEST_MM_S: u16 = 3_800;
@@ -140,11 +140,11 @@ impl<'a> Player<'a> {
     /// Rolls from the position where watching began to the log's first position, at the log's first speed. If the machine
     /// stands there, it rolls so slowly that its stop raises no encoder alarm.
     fn roll_in(&mut self, first: &Status) {
-        let way = first.position.wrapping_sub(self.position());
+        let distance = first.position.wrapping_sub(self.position());
         let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { SLOWLY_MM_S };
-        let way_mm = i64::from(self.rig.settings().wheel().millimetres(Ticks(way)));
-        let time_ms = (way_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
-        self.roll_by(way, speed_mm_s, speed_mm_s, time_ms);
+        let distance_mm = i64::from(self.rig.settings().wheel().millimetres(Ticks(distance)));
+        let time_ms = (distance_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
+        self.roll_by(distance, speed_mm_s, speed_mm_s, time_ms);
         self.speed_mm_s = first.speed_mm_s;
     }
 
@@ -162,11 +162,11 @@ impl<'a> Player<'a> {
 
     /// Rolls from one status to the next, `host_ms` later by the PC's clock.
     pub(super) fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
-        let way = to.position.wrapping_sub(self.position());
-        if way.saturating_abs() > LONGEST_WAY {
+        let distance = to.position.wrapping_sub(self.position());
+        if distance.saturating_abs() > LONGEST_DISTANCE {
             return Err(());
         }
-        if way == 0 {
+        if distance == 0 {
             self.speed_mm_s = to.speed_mm_s;
             // A line between the two may have moved it here already.
             if f64::from(to.speed_mm_s.saturating_abs()) < SURE_MM_S {
@@ -174,38 +174,38 @@ impl<'a> Player<'a> {
             }
             return Ok(());
         }
-        self.roll_by(way, from.speed_mm_s, to.speed_mm_s, host_ms);
+        self.roll_by(distance, from.speed_mm_s, to.speed_mm_s, host_ms);
         Ok(())
     }
 
     /// Rolls to a position, if it lies before the next status.
     pub(super) fn roll_to(&mut self, place: i32, from: &Status, next: Option<&Status>) {
-        let way = place.wrapping_sub(self.position());
+        let distance = place.wrapping_sub(self.position());
         let Some(next) = next else { return };
         let whole = next.position.wrapping_sub(self.position());
-        if way == 0 || way.signum() != whole.signum() || way.unsigned_abs() > whole.unsigned_abs() {
+        if distance == 0 || distance.signum() != whole.signum() || distance.unsigned_abs() > whole.unsigned_abs() {
             return;
         }
-        if way.unsigned_abs() > LONGEST_WAY as u32 {
+        if distance.unsigned_abs() > LONGEST_DISTANCE as u32 {
             return;
         }
-        let share = f64::from(way) / f64::from(whole);
+        let share = f64::from(distance) / f64::from(whole);
         let speed = self.pace.speed(from.speed_mm_s.into(), next.speed_mm_s.into(), share);
-        self.roll_by(way, from.speed_mm_s, way.signum() * speed.round() as i32, 0);
+        self.roll_by(distance, from.speed_mm_s, distance.signum() * speed.round() as i32, 0);
     }
 
     /// Rolls a distance, tick by tick. The time follows from the speeds, because a busy PC reads lines late and together.
     /// Near standstill it follows from the PC's clock.
-    fn roll_by(&mut self, way: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
+    fn roll_by(&mut self, distance: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
         let tick_mm = 100.0 / f64::from(self.rig.settings().wheel().ticks(100).0.max(1));
-        let way_mm = f64::from(way) * tick_mm;
+        let distance_mm = f64::from(distance) * tick_mm;
         let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
         let mean = (from + to) / 2.0;
-        let by_speed_s = way_mm / mean;
+        let by_speed_s = distance_mm / mean;
         self.witness.speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
-        let host_s = (host_ms as f64 / 1000.0).max(way_mm.abs() / MOST_MM_S);
+        let host_s = (host_ms as f64 / 1000.0).max(distance_mm.abs() / MOST_MM_S);
         let is_known = by_speed_s > 0.0 && (by_speed_s < 3.0 * host_s.max(0.1) || mean.abs() > SURE_MM_S);
-        let steps = way.unsigned_abs();
+        let steps = distance.unsigned_abs();
         let start = self.position();
         let mut speed = from.abs();
         for step in 1..=steps {
@@ -214,7 +214,7 @@ impl<'a> Player<'a> {
             let interval_s = if is_known { 2.0 * tick_mm / (before + speed) } else { host_s / f64::from(steps) };
             self.speed_mm_s = (from_mm_s.signum() | to_mm_s.signum()) * speed.round() as i32;
             self.wait(Interval::from_steps((interval_s * f64::from(Interval::STEPS_PER_SECOND)) as u32));
-            self.rig.at(start.wrapping_add(way.signum() * step as i32));
+            self.rig.at(start.wrapping_add(distance.signum() * step as i32));
             self.step();
         }
         self.speed_mm_s = to_mm_s;

@@ -119,7 +119,7 @@ impl HostPort {
         Ok(())
     }
 
-    fn look_at_clock(&mut self) {
+    fn sample_clock(&mut self) {
         self.ms.store(self.port.uno().cycle() * 1000 / CYCLES_PER_SECOND, Ordering::Relaxed);
     }
 }
@@ -128,14 +128,14 @@ impl Read for HostPort {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.pause(20)?;
         let read = self.port.read(buffer);
-        self.look_at_clock();
+        self.sample_clock();
         read
     }
 }
 
 impl Write for HostPort {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.look_at_clock();
+        self.sample_clock();
         self.pause(10)?;
         self.port.write(bytes)
     }
