@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn an_instruction_changes_and_reads_in_the_simulator_what_it_is_said_to() {
+    fn an_instruction_changes_and_reads_the_same_in_the_simulator() {
         /// An address in SRAM for instructions that have it in their second word, and GPIOR0, which does nothing, for `in`.
         const ADDRESS: u16 = 0x0300;
         const GPIOR0: u16 = 0x3E;

@@ -518,7 +518,7 @@ mod tests {
     }
 
     #[test]
-    fn of_what_is_not_known_to_be_a_plant_all_is_kept() {
+    fn an_unclassified_detection_keeps_its_full_width() {
         for (class, trim) in [(Class::Plant, 38), (Class::Unknown, 0)] {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::StemZoneMm, 100).expect("within its range");
@@ -537,7 +537,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_forgotten_is_closed_up_to_a_margin_ahead_of_the_frontier() {
+    fn forgotten_ground_is_closed_up_to_a_margin_ahead_of_the_frontier() {
         let margin = 95;
         let (mut known, _) = ground();
         assert_eq!(opens(&mut known, 1000), 1300 + margin + 1);
@@ -616,7 +616,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_is_remembered_as_far_back_as_the_memory_reaches_and_told_once_where_it_ends() {
+    fn the_end_of_remembered_ground_is_reported_once() {
         let (mut ground, _) = ground();
         let memory = i32::from(ground.geometry.memory.0);
         for position in (1400..=40_000).step_by(100) {
@@ -634,7 +634,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_that_was_left_for_want_of_room_is_told_once_by_the_tool_that_comes_back_to_it() {
+    fn rolling_back_to_dropped_ground_is_reported_once() {
         let mut ground = Ground::NONE;
         ground.begin(&Settings::new(), Position::new(0), false);
         let plants = 20;
@@ -670,7 +670,7 @@ mod tests {
     }
 
     #[test]
-    fn the_beam_is_outrun_where_the_lead_reaches_from_the_tool_to_the_margin_of_what_it_has_not_seen() {
+    fn the_beam_is_outrun_if_the_lead_reaches_the_margin_of_unseen_ground() {
         let (mut ground, _) = ground();
         let reach = ground.geometry.beam_to_tool - ground.geometry.margin;
         let outruns = |ground: &mut Ground, out, tool_out| {
@@ -684,7 +684,7 @@ mod tests {
     }
 
     #[test]
-    fn the_spacing_is_no_longer_than_what_is_remembered() {
+    fn the_spacing_is_at_most_the_remembered_length() {
         let (mut ground, _) = ground();
         for position in (1400..200_000).step_by(50) {
             ground.roll_to(Position::new(position));

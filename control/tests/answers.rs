@@ -323,7 +323,7 @@ fn get_shows_the_saved_value_if_it_differs() {
 }
 
 #[test]
-fn a_calibration_answers_its_result_or_what_is_allowed() {
+fn a_calibration_answers_its_result_or_the_allowed_values() {
     let mut machine = machine();
     assert_eq!(machine.ask("calibrate 10000"), ["error: calibrate start first, then roll"]);
     assert_eq!(machine.ask("calibrate start"), ["ok"]);
@@ -337,7 +337,7 @@ fn a_calibration_answers_its_result_or_what_is_allowed() {
 }
 
 #[test]
-fn manual_tests_are_refused_at_work_with_what_to_do() {
+fn manual_tests_are_refused_at_work_with_advice() {
     let mut machine = machine();
     let speed = "error: test row takes a speed in mm/s from 100 to 1300";
     assert_eq!(machine.ask("test row 1401"), [speed]);

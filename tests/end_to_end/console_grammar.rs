@@ -45,7 +45,7 @@ fn every_command_is_answered_by_its_lines_and_one_ok() {
 }
 
 #[test]
-fn the_firmware_names_itself_and_its_state_when_it_wakes_up() {
+fn the_firmware_sends_its_name_and_state_at_start() {
     let mut uno = Uno::boot(&crate::common::elf()).expect("the firmware can be run").wired(&wiring::WIRES);
     run_for_ms(&mut uno, 300);
     let greeting = uno.received();
@@ -101,7 +101,7 @@ fn help_names_every_command_and_explains_every_setting() {
 }
 
 #[test]
-fn a_bad_line_is_answered_by_one_error_that_says_what_would_be_right() {
+fn a_wrong_line_is_answered_by_one_error_with_what_would_be_right() {
     let mut uno = started();
     for (line, remedy) in [
         (&b"hepl"[..], "help"),

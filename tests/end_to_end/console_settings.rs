@@ -70,7 +70,7 @@ fn every_setting_takes_the_ends_of_its_range() {
 }
 
 #[test]
-fn every_setting_refuses_what_is_beyond_its_range_and_keeps_its_value() {
+fn every_setting_refuses_values_beyond_its_range_and_keeps_its_value() {
     let mut uno = started();
     for (setting, name) in settings() {
         let Description { least, greatest, default, .. } = setting.description();

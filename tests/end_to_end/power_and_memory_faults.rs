@@ -190,7 +190,7 @@ fn settings_are_saved_and_outlive_the_power() {
 }
 
 #[test]
-fn any_spoiled_byte_of_a_copy_leaves_the_other_copy() {
+fn any_corrupted_byte_of_a_copy_leaves_the_other_copy() {
     let eeprom = eeprom_with(&[with(&[(Setting::K, 5)]), with(&[(Setting::K, 7)])]);
     for (begin, left) in [(0, "k=7 "), (SIZE / 2, "k=5 ")] {
         for byte in 0..COPY {
@@ -204,7 +204,7 @@ fn any_spoiled_byte_of_a_copy_leaves_the_other_copy() {
 }
 
 #[test]
-fn two_spoiled_copies_or_another_tables_are_lost_settings() {
+fn two_corrupted_copies_or_another_tables_are_lost_settings() {
     let eeprom = eeprom_with(&[with(&[(Setting::K, 5)]), with(&[(Setting::K, 7)])]);
     // Both copies' values, both copies' table marks, and settings of an older table.
     for places in [[10, SIZE / 2 + 20], [0, SIZE / 2]] {

@@ -50,7 +50,7 @@ fn a_wheel_that_slips_by_a_tenth_keeps_every_plant_that_comes_behind_the_second(
 }
 
 #[test]
-fn the_slip_is_told_plant_by_plant_and_dropped_by_an_alarm() {
+fn the_slip_is_reported_plant_by_plant_and_dropped_by_an_alarm() {
     let mut run = Run::begin(slipping(1.0, SECOND_BEAM_MM, || 0.1), &[]);
     run.roll_to(600.0);
     assert_eq!(value(&status(&mut run.uno), "slip_permille"), "none");

@@ -90,7 +90,7 @@ fn the_status_says_how_far_seen_ground_still_is() {
 }
 
 #[test]
-fn told_to_start_now_the_tool_enters_the_row_over_unseen_ground() {
+fn with_start_now_the_tool_enters_the_row_over_unseen_ground() {
     let mut uno = started();
     uno.send(b"start now\n");
     run_for_ms(&mut uno, FRAME_MS);

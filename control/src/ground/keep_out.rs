@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_schedule_forgets_only_what_lies_behind_the_tool() {
+    fn a_full_schedule_forgets_only_ground_behind_the_tool() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         for plant in 0..CAPACITY as i16 {
             keep_out.push(canopy(plant * 1000, plant * 1000 + 200), WrappedPosition::new(0), MARGIN).unwrap();

@@ -227,7 +227,7 @@ fn a_swing_that_is_late_by_10_ms_is_measured() {
 }
 
 #[test]
-fn a_channel_that_falls_silent_on_the_way_costs_counts_in_a_row() {
+fn a_channel_that_fails_in_a_row_loses_counts() {
     let position = Rc::new(RefCell::new(0_u32));
     let seen = Rc::clone(&position);
     let drops = move |change: PinChange| {

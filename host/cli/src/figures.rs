@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_without_its_block_is_told_with_its_line() {
+    fn a_figure_without_its_block_is_named_with_its_line() {
         for (page, complaint) in [
             ("<!-- figures: weeder hex -->\nno block\n", "page.md:2: a block ```text has to stand"),
             ("\n<!-- figures: weeder hex -->\n```text\n", "page.md:3: the figure's block has no end"),
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_is_told_line_by_line() {
+    fn differences_are_listed_line_by_line() {
         assert_eq!(difference("same\nold\n", "same\nnew\nmore\n"), "- old\n+ new\n+ more\n");
     }
 }

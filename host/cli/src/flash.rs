@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_that_comes_ten_times_is_said_once_and_progress_as_it_comes() {
+    fn a_repeated_message_is_printed_once_and_progress_at_once() {
         let mut words = String::from("avrdude: ser_open(): no modem lines\n\n");
         for attempt in 1..=10 {
             words += &format!("avrdude: stk500_getsync() attempt {attempt} of 10: not in sync: resp=0x{attempt:02x}\n");

@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn two_rows_of_one_name_have_to_be_told_apart() {
+    fn two_rows_of_one_name_are_refused() {
         let port = ["a/uno", "b/uno"].map(|text| named(text).unwrap()).to_vec();
         let ports = Ports { port, all: false, names: NamesFile { rows_file: None } };
         let error = ports.choose().err().unwrap().to_string();

@@ -442,7 +442,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_kept_is_taken_up() {
+    fn saved_progress_is_continued() {
         let kept = [
             HEAD,
             "done 2",

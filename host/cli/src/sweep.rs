@@ -303,7 +303,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn in_the_help_blanks_stand_between_an_axis_s_name_its_range_and_what_it_is() {
+    fn the_help_separates_an_axis_s_name_range_and_meaning() {
         let help = long_help();
         let (_, list) = help.split_once("What an axis can be:\n").expect("there is a list");
         let mut columns = list.lines().map(|line| line.trim_start().split("  ").filter(|part| !part.is_empty()));

@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_axis_says_what_would_be_right() {
+    fn an_invalid_axis_is_refused_with_what_would_be_right() {
         let error = |text: &str| text.parse::<Axis>().unwrap_err().to_string();
         for text in ["lead_out_ms", "lead_out_ms=0..300", "=", "speed=a..b:c", "speed=0..inf:1"] {
             assert!(error(text).contains("has to be NAME=FROM..TO:STEP"), "{text}");

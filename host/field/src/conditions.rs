@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_says_what_differs_from_the_default() {
+    fn a_file_has_only_differences_from_the_default() {
         let conditions = parse("[crop]\nspacing_scatter_mm = 12.5\n[plot]\nrows = 2\n[settings]\nk = 5\n").unwrap();
         let mut expected = Conditions::default();
         expected.set("crop.spacing_scatter_mm", 12.5).unwrap();
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn margin_and_leads_are_told_once_as_the_timing() {
+    fn margin_and_leads_are_set_once_as_the_timing() {
         let conditions = parse("[settings]\nlead_out_ms = 200\nmargin_mm = 40\n").unwrap();
         assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Conditions::default().timing() });
         assert!(conditions.firmware_settings().is_empty());

@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_dirt_hides_is_missing_from_the_pins_as_from_the_count() {
+    fn hidden_pulses_are_missing_from_the_pins_and_from_the_count() {
         let machine = Machine { dirt: Dirt { share: 0.05, seed: 3 }, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
         let changes = machine.encoder_changes(&motion, START_CYCLE);
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn the_beam_reports_each_thing_at_its_edges_a_millisecond_late() {
+    fn the_beam_reports_each_plant_and_weed_at_its_edges_a_millisecond_late() {
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1200.0);
         let beam = beam(&Machine::default().pin_changes(&row(), &motion, START_CYCLE));
         let levels: Vec<bool> = beam.iter().map(|change| change.high).collect();
@@ -419,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn the_second_beam_sees_what_the_first_saw_as_far_behind_it_as_it_stands() {
+    fn the_second_beam_has_the_first_s_edges_at_the_beams_distance() {
         let machine = Machine { second_beam_mm: 220.0, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1300.0).with_slip(|| 0.2);
         let second = machine.second_beam_changes(&row(), &motion, START_CYCLE);

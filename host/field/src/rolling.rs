@@ -228,7 +228,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rolling_piece_by_piece_gives_what_the_whole_motion_gives(way in way(), slice_cycles in 1_000_u64..400_000) {
+        fn rolling_piece_by_piece_equals_the_whole_motion(way in way(), slice_cycles in 1_000_u64..400_000) {
             let row = vec![Thing::plant(300.0, 150.0), Thing::weed(500.0, 14.0), Thing::plant(800.0, 120.0)];
             let machine = Machine { second_beam_mm: 220.0, beam_mm: 6.0, ..Machine::default() };
             let mut rolling = Rolling::new(machine, row.clone(), 0.0, START_CYCLE);
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_servo_hears_what_changes_and_what_is_over_is_forgotten() {
+    fn the_servo_takes_changes_and_past_motion_is_dropped() {
         let mut rolling = Rolling::new(Machine::default(), Vec::new(), 0.0, 0);
         rolling.roll_at(500.0);
         for frame in 0..200_u64 {

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn stems_stand_off_the_middle_of_their_canopies_as_far_as_they_are_told() {
+    fn stems_stand_off_the_middle_of_their_canopies_by_the_given_distance() {
         let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
         conditions.set("crop.stem_off_mm", 20.0).unwrap();
         let stand = grow(&conditions, 4);
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_touches_is_one_thing_and_a_plant_if_any_of_it_is() {
+    fn touching_canopies_are_one_and_a_plant_if_any_of_them_is() {
         let things = vec![Thing::weed(100.0, 20.0), Thing::plant(150.0, 100.0), Thing::weed(300.0, 20.0)];
         let together = grown_together(things);
         assert_eq!(together, [Thing { across_mm: 100.0, ..Thing::plant(145.0, 110.0) }, Thing::weed(300.0, 20.0)]);

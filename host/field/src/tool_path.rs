@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn weeding_efficiency_is_the_share_that_is_gone() {
+    fn weeding_efficiency_is_the_removed_share() {
         assert_eq!(WeedCount { before: 8, after: 2 }.efficiency_percent(), Some(75.0));
         assert_eq!(WeedCount::default().efficiency_percent(), None);
     }

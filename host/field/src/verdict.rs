@@ -519,7 +519,7 @@ mod tests {
     }
 
     #[test]
-    fn rolling_back_with_the_tool_in_damages_a_plant_that_was_kept_on_the_way_there() {
+    fn rolling_back_with_the_tool_in_damages_a_plant_that_was_kept_before() {
         let places = ideal_mm(Timing::default());
         let there = motion();
         let pulses = pulses(&there, &places);

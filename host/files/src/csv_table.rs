@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quotation_mark_that_is_not_closed_is_told_with_its_own_line() {
+    fn an_open_quotation_mark_is_named_with_its_own_line() {
         for text in
             ["place_mm,width_mm\n7,1\n# 5\" pot\n8,\"1\n9,1\n", "place_mm,width_mm\n7,1\n\n8,\"1\n9,1\n10,1\n\"11,1"]
         {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_system_says_of_a_missing_file_is_said_once() {
+    fn the_system_s_error_for_a_missing_file_is_printed_once() {
         let error = CsvTable::read(Path::new("no/such/table.csv"), &[]).err().unwrap();
         assert_eq!(error.to_string(), "no/such/table.csv cannot be read");
         assert!(error.source().is_some());

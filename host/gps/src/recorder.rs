@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_alone_as_with_another_baud_rate_is_told_once() {
+    fn noise_alone_as_with_another_baud_rate_is_reported_once() {
         let (mut recorder, _) = Recorder::new(&Antenna::default());
         recorder.found(0, "a port");
         let lines: Lines = (0..200).flat_map(|_| recorder.take(10, &[0x80, b'x', 0xFF, b'\n'])).collect();
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_record_says_of_the_antenna_is_read_again() {
+    fn the_antenna_s_line_in_a_record_is_read_again() {
         for antenna in [
             Antenna::default(),
             Antenna { beam_ahead_mm: -250.5, beam_right_mm: 30.0, delay_ms: 80.0, ..Antenna::default() },

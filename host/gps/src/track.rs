@@ -320,7 +320,7 @@ mod tests {
         }
 
         #[test]
-        fn what_happened_in_an_outage_is_between_the_fixes_on_both_sides_where_the_way_may_be_so_long(
+        fn events_in_an_outage_are_between_the_fixes_on_both_sides_if_the_distance_allows(
             lost in 2..50_u32, length in 1..40_u32, distance_m in 0.0..29.0_f64,
         ) {
             let fixes = driven(every_half_metre(60), |distance_m| Metres { east: distance_m, north: 0.0 });
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_standing_machine_is_at_the_mean_of_its_fixes_and_two_alone_tell_no_heading_through_noise() {
+    fn a_standing_machine_is_at_the_mean_of_its_fixes_and_two_noisy_fixes_give_no_heading() {
         let mut fixes = driven([0.0, 0.0, 0.0, 0.5], |distance_m| Metres { east: distance_m, north: 0.0 });
         let plane = Plane::around(FIELD);
         for (at, north) in [(0, 0.3), (1, -0.3), (2, 0.6)] {

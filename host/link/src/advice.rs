@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_alarm_and_what_to_do_fit_on_a_line_of_80_characters() {
+    fn an_alarm_and_its_advice_fit_on_a_line_of_80_characters() {
         for alarm in (0..).map_while(Alarm::from_index) {
             let line = format!("alarm {}: {}", name(alarm), super::alarm(alarm));
             assert!(line.len() <= 80, "{line}");

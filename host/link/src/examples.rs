@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn an_object_is_told_within_what_a_byte_leaves_open() {
+    fn features_are_recovered_within_a_byte_s_resolution() {
         for (spacing_mm, width_mm) in [(60, 12), (500, 100), (600, 150), (700, 180)] {
             let features = Features::describe(417, spacing_mm, width_mm);
             let told = features_of(&example_of(&features, label::PLANT)).expect("it is an object's");

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_without_an_end_is_cut_and_what_is_kept_is_bounded() {
+    fn a_line_without_an_end_is_cut_and_the_buffer_is_bounded() {
         let mut reader = LineReader::new();
         for _ in 0..10_000 {
             reader.take(&[b'x'; 1000]);

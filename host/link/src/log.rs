@@ -347,7 +347,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_log_is_read_as_it_was_written_and_gone_on_with_behind_a_line_cut_off() {
+    fn a_log_is_read_back_and_continued_after_a_cut_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let answer = "speed_mm_s,spacing_mm \"quoted\"";

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_typed_is_told_without_what_a_terminal_obeys() {
+    fn typed_text_is_shown_without_control_characters() {
         let typed = |status| if status == 2 { vec![(Kind::Command, "test \u{1b}[2J")] } else { Vec::new() };
         assert_eq!(replay(&log(20, typed)).unwrap().notes, [r"line 6: not replayed from `test \u{1b}[2J` on"]);
     }

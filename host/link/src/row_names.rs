@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_in_a_file_is_said_with_its_line() {
+    fn an_error_in_a_file_has_its_line() {
         let path = Path::new("rows.toml");
         for (text, problem) in [
             ("\nleft = 3\n", "rows.toml, line 2: left is `3`: it has to be { serial_number"),

@@ -430,7 +430,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_second_beam_plants_tell_what_is_left_of_the_slip() {
+    fn with_a_second_beam_plants_show_the_remaining_slip() {
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::SecondBeamMm, 200)];
         let mut lines = [&TIMED[..], &MEASURED, &MEASURED].concat();
         assert_eq!(
@@ -499,7 +499,7 @@ mod tests {
     }
 
     #[test]
-    fn a_margin_below_what_was_measured_is_warned_of() {
+    fn a_margin_below_the_measured_one_gives_a_warning() {
         let ready = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::TicksPerM, 1920)];
         let with_margin = |margin_mm| settings(&[&ready[..], &[(Setting::MarginMm, margin_mm)]].concat());
         let third = ["> calibrate 10000", "ticks_per_m=1920"];
@@ -519,7 +519,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_measured_is_the_same_behind_its_lines() {
+    fn measurements_are_the_same_after_writing_and_reading() {
         let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
         let heard = [&["servo_out_us=1795"][..], &TIMED, &MEASURED, &[by_eye, "slip permille=-4"]].concat();
         let (set_up, settings) = (SetUp::of_lines(heard), settings(&[(Setting::ServoOutUs, 1795)]));

@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_room_goes_before_what_takes_it() {
+    fn changes_that_widen_a_range_come_first() {
         let near = settings(&[(Setting::TopSpeedMmS, 100), (Setting::BeamToToolMm, 100), (Setting::MarginMm, 10)]);
         let far = settings(&[(Setting::BeamToToolMm, 2000), (Setting::MarginMm, 200), (Setting::LeadOutMs, 500)]);
         assert_leads(&near, &far);
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_wheel_is_told_after_the_wheel() {
+    fn a_measured_wheel_is_set_after_the_wheel() {
         let one = settings(&[(Setting::WheelMm, 400), (Setting::TicksPerM, 1950)]);
         let other = settings(&[(Setting::WheelMm, 410), (Setting::TicksPerM, 1950)]);
         assert_leads(&one, &other);

@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_in_a_file_is_said_with_its_line_and_what_would_be_right() {
+    fn an_error_in_a_file_has_its_line_and_what_would_be_right() {
         for (text, wrong) in [
             (
                 "k = 3\nwheel = 400\n",

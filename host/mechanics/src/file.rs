@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_as_on_the_papers_machine() {
+    fn omitted_values_are_the_papers() {
         let parse = |text| parse(Path::new("my.toml"), text).unwrap();
         assert_eq!(parse(""), Machine::default());
         let mut larger = Machine::default();
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mistake_between_the_keys_of_another_section_is_found() {
+    fn an_error_between_the_keys_of_another_section_is_found() {
         let scattered = "wheel.width = \"35 mm\"\nsoil.depth = \"2 kg\"\nwheel.diameter = \"400 mm\"";
         assert_refused(scattered, 2, "soil.depth: \"2 kg\" is not a length");
     }
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_toml_is_refused_with_its_line() {
+    fn invalid_toml_is_refused_with_its_line() {
         assert_refused("[wheel]\ndiameter = 400 mm", 2, "");
         assert_refused("wheel = 5", 1, "expected a section");
     }

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_begins_with_how_all_machines_are_and_hears_what_comes_after() {
+    fn a_new_page_gets_the_state_of_all_machines_and_then_the_changes() {
         let hub = Hub::new(2);
         hub.there(0, "0.2.0", &["k=5".to_owned()], &["field 0".to_owned()]);
         hub.know(0, "status", "state=hold".into());

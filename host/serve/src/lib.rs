@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn several_networks_have_to_be_told_apart_and_none_is_said_with_the_way_out() {
+    fn several_networks_and_no_network_are_errors_with_a_remedy() {
         let error = found(&[[192, 168, 4, 1], [172, 17, 0, 1]]).unwrap_err();
         assert!(error.ends_with("as in `--lan 192.168.4.1`, of 192.168.4.1, 172.17.0.1"), "{error}");
         let error = found(&[[127, 0, 0, 1]]).unwrap_err();
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_that_cannot_be_had_is_said_with_what_to_do() {
+    fn an_address_that_cannot_be_bound_is_an_error_with_advice() {
         let runtime = runtime::Builder::new_current_thread().enable_io().build().unwrap();
         let _inside = runtime.enter();
         let error = |lan: [u8; 4], port| listen(Some(lan.into()), port, false).err().unwrap().to_string();

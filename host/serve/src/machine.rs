@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn hold_drops_what_others_have_waiting_and_is_typed_once_for_all_who_ask() {
+    fn hold_drops_waiting_commands_and_is_typed_once_for_all_clients() {
         run(async {
             let (machine, hub, desk) = machine();
             until(|| hub.why_lost(0).is_none()).await;
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_gets_all_at_once_when_it_connects_and_then_what_others_change() {
+    fn a_page_gets_everything_when_it_connects_and_then_the_changes() {
         run(async {
             let (machine, hub, _) = machine();
             let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_typed_to_a_machine_that_is_lost_is_not_typed_when_it_is_back() {
+    fn commands_to_a_lost_machine_are_not_typed_when_it_is_back() {
         run(async {
             let (machine, hub, desk) = machine();
             until(|| hub.why_lost(0).is_none()).await;

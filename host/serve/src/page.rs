@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_without_a_page_is_said_with_the_way_to_one() {
+    fn a_folder_without_a_page_is_an_error_with_a_remedy() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
         let error = Page::read(folder).err().expect("there is no page there").to_string();
         assert!(error.contains("index.html of the page cannot be read"), "{error}");

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn of_as_many_addresses_as_there_are_places_the_oldest_goes_and_the_newest_stays() {
+    fn if_each_place_has_another_address_the_oldest_goes_and_the_newest_stays() {
         let places = Places::default();
         let mut connections: Vec<_> = (0..=PLACES as u8).map(|last| take(&places, last)).collect();
         assert_eq!(open(&mut connections), (1..=PLACES).collect::<Vec<_>>());

@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_holds_the_curve_over_its_ground_alone() {
+    fn a_lane_has_the_curve_over_its_own_ground() {
         let path = [(-1000.0, 45.0), (500.0, 45.0), (1500.0, 0.0), (9000.0, 0.0)];
         assert_eq!(parts_within(&path, &(0.0..1000.0)), [[(0.0, 45.0), (500.0, 45.0), (1000.0, 22.5)]]);
         assert_eq!(parts_within(&path, &(1000.0..3000.0)), [[(1000.0, 22.5), (1500.0, 0.0), (3000.0, 0.0)]]);

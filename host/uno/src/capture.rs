@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_choice_of_channels_is_told_what_there_is() {
+    fn a_wrong_choice_of_channels_is_an_error_with_the_available_ones() {
         let file = recording("1 us", "#0 0! 0\"");
         let error = |channels: &[(Pin, &str)]| parse(&file, channels).unwrap_err();
         let with_b = |b| [CHANNELS[0], (Pin::D3, b)];

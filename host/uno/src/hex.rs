@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_named_with_what_is_wrong() {
+    fn other_files_are_refused_with_the_reason() {
         let path = tempfile::NamedTempFile::new().unwrap();
         let error = Bootloader::read(path.path()).unwrap_err().to_string();
         assert!(error.contains("is empty"), "{error}");
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_reads_back() {
+    fn written_flash_reads_back() {
         let flash: Vec<u8> = (0..=255).cycle().take(1000).collect();
         let mut read = Vec::new();
         for (address, bytes) in pieces(&text(&flash)).unwrap() {

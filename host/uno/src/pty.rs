@@ -205,7 +205,7 @@ mod tests {
     use std::fs::OpenOptions;
 
     #[test]
-    fn bytes_pass_both_ways_as_they_are() {
+    fn bytes_pass_both_ways_unchanged() {
         let mut pty = Pty::open().unwrap();
         let mut program = open(&pty);
         let bytes = [0, 3, 4, b'\r', b'\n', 17, 19, 127, 255];

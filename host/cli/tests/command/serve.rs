@@ -476,7 +476,7 @@ fn clients_that_never_read_are_let_go_of_and_hold_up_neither_the_machine_nor_the
 }
 
 #[test]
-fn a_port_that_is_pulled_is_told_and_opened_again_and_the_machine_beside_it_works_on() {
+fn a_pulled_port_is_reported_and_opened_again_and_the_other_machine_works_on() {
     let folder = folder();
     let (left, left_port) = uno(&folder, "left", &["--stand"]);
     let (_right, right_port) = uno(&folder, "right", &["--stand"]);
@@ -566,7 +566,7 @@ fn it_opens_its_page_in_the_browser_where_that_is_asked_for() {
 }
 
 #[test]
-fn what_keeps_it_from_serving_is_said_with_the_way_out() {
+fn a_failure_to_serve_is_explained_with_a_remedy() {
     let folder = folder();
     let page = folder.path().join("page");
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("there is a free port");

@@ -131,7 +131,7 @@ fn parts_that_are_no_whole_study_are_refused_by_name() {
 }
 
 #[test]
-fn what_does_not_go_with_parts_is_refused() {
+fn options_that_contradict_parts_are_refused() {
     let folder = folder();
     let path = folder.path();
     for shard in ["0/4", "5/4", "2", "x/y"] {

@@ -24,7 +24,7 @@ fn assert_not_taken(lines: &str, arguments: &[&str], words: &str) {
 }
 
 #[test]
-fn the_built_in_table_is_what_the_command_writes() {
+fn the_built_in_table_is_the_command_s_output() {
     let folder = TempDir::new().unwrap();
     let said = said(folder.path(), &["train", "--synthetic", "--out", "table.rs", "--picture", "regions.svg"]);
     let written = fs::read_to_string(folder.path().join("table.rs")).unwrap();

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read_again() {
+    fn a_written_table_is_read_again() {
         let plots = read(&format!("{HEADER}{LINE}2,2.25,60,10,0,7,7,1.5,0.1,0.055,0.5\n")).unwrap();
         let mut text = Vec::new();
         write_csv(&plots, &mut text).unwrap();

@@ -76,7 +76,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_no_shard_says_what_would_be_right() {
+fn an_invalid_shard_is_refused_with_what_would_be_right() {
     for text in ["", "1", "0/4", "5/4", "1/0", "a/b", "1/2/3", "-1/4", "1/100001"] {
         assert!(text.parse::<Shard>().unwrap_err().to_string().contains("has to be I/N"), "{text}");
     }
@@ -103,7 +103,7 @@ fn a_part_that_is_there_twice_is_named_with_its_double() {
 }
 
 #[test]
-fn a_part_of_another_study_is_named_with_what_differs() {
+fn a_part_of_another_study_is_named_with_the_difference() {
     let other = |change: &dyn Fn(&mut Header)| {
         let mut changed = header("2/2", 5);
         change(&mut changed);

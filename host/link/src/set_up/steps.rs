@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_task_is_not_taken_for_one() {
+    fn text_that_is_no_task_is_not_a_task() {
         for code in ["calibrate", "calibrate much", "servo_out_us", "no_such_setting = 3", "servo_out_us = 99999", ""] {
             assert_eq!(Task::parse(code), None, "{code}");
         }

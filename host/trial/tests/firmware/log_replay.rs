@@ -253,7 +253,7 @@ fn start_now_over_unseen_ground_is_known_from_start() {
 }
 
 #[test]
-fn an_alarm_of_the_beam_is_raised_again_and_what_is_left_of_the_object_is_cut() {
+fn an_alarm_of_the_beam_is_raised_again_and_the_rest_of_the_detection_is_cut() {
     let things = vec![Thing::plant(600.0, 150.0), Thing::plant(1500.0, 700.0), Thing::plant(2300.0, 150.0)];
     let row = Row::new(things).expect("plants are a row");
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
