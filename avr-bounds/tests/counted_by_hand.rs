@@ -152,7 +152,7 @@ fn a_frame_is_made_by_arithmetic_on_the_stack_pointer() {
 fn a_function_that_clobbers_the_frame_s_pointer_leaves_the_stack_unknown() {
     assert_refused(
         "start:\n in r28, 0x3d\n in r29, 0x3e\n rcall clobbers\n out 0x3e, r29\n out 0x3d, r28\n rjmp start\nclobbers:\n ldi r28, 1\n ret",
-        "start sets the stack pointer to what cannot be followed",
+        "start sets the stack pointer to an unknown value",
     );
 }
 
@@ -564,10 +564,7 @@ fn a_handler_puts_every_register_and_every_flag_back() {
 
 #[test]
 fn words_that_are_no_instructions_are_refused() {
-    assert_refused(
-        "start:\n .word 0xFFFF",
-        "start comes to a place where there is no instruction of the chip, at 0x0068",
-    );
+    assert_refused("start:\n .word 0xFFFF", "start reaches an address without an instruction of the chip, at 0x0068");
 }
 
 #[test]

@@ -90,7 +90,7 @@ impl GpsArguments {
             Some(name) => chosen.find(name)?,
             None if chosen.rows.len() == 1 => 0,
             None => bail!(
-                "of several rows, one has the receiver in its record: say which, as in `--gps {}={port}`",
+                "with several rows, name the row that records the receiver, as in `--gps {}={port}`",
                 chosen.names().join("|")
             ),
         };
@@ -169,7 +169,9 @@ impl Source {
             LinkError::Absent(port) => {
                 anyhow!("there is no port {port} for --gps: plug the receiver in, and name its port")
             }
-            LinkError::Busy(port) => anyhow!("{port} is in use: end what else listens to the receiver, such as gpsd"),
+            LinkError::Busy(port) => {
+                anyhow!("{port} is in use: end the other program that reads the receiver, such as gpsd")
+            }
             other => other.into(),
         })?))
     }

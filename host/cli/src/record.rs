@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(20);
 #[derive(Args)]
 #[command(after_help = "\
 It records plants, swings and alarms, and the status ten times a second, until Ctrl-C.\n\
-It continues after a pulled cable, and goes on with the other rows meanwhile.\n\
+It continues after a pulled cable, and records the other rows meanwhile.\n\
 Opening the port resets most Unos: start before you work.\n\
 With a satellite receiver, `weeder map` draws a map of one row; see docs/map.md.\n\n\
 Examples:\n  \

@@ -228,7 +228,7 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
         None => format!("{}\n", list(sweep, points)),
     };
     if points.iter().any(|point| point.results.alarms_percent > 0.0) {
-        text += "! an alarm took the tool out in some of the rows: --result alarms says in how many\n";
+        text += "! an alarm took the tool out in some of the rows: --result alarms shows in how many\n";
     }
     text
 }

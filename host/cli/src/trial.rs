@@ -409,7 +409,7 @@ fn by_speed(totals: &[Total], contents: Contents) -> Table {
 }
 
 /// The heading of the loss budget.
-const LOSS_BUDGET: &str = "Where the row's ground goes with this firmware, %";
+const LOSS_BUDGET: &str = "Loss budget of the row's ground with this firmware, %";
 
 /// The firmware's loss budget, a line a speed: each adds up to 100 %.
 fn loss_budget(totals: &[Total]) -> Table {

@@ -366,7 +366,7 @@ impl Experiment {
         let stand =
             Stand::grow(&self.conditions, spacing_cm * 10.0, &mut chance(0)).map_err(|problem| match problem {
                 Problem::Empty => anyhow!(
-                    "nothing for the beam stands in a row of {} m with plants {spacing_cm} cm apart: \
+                    "the beam would see nothing in a row of {} m with plants {spacing_cm} cm apart: \
                      ask for a longer row or a smaller spacing",
                     self.conditions.plot.row_m
                 ),

@@ -187,5 +187,5 @@ fn beside_others(work: &[Work]) -> Table {
 
 fn parameters(parameters: &[(String, String)]) -> Table {
     let rows = parameters.iter().map(|(name, value)| vec![name.clone(), value.clone()]).collect();
-    Table { rows, is_prose: true, ..Table::new("What the trial was made with", ["parameter", "value"]) }
+    Table { rows, is_prose: true, ..Table::new("Parameters of the trial", ["parameter", "value"]) }
 }

@@ -219,7 +219,7 @@ pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut
 /// The first problem: a part of another program or another study, a duplicate, or the missing parts.
 pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
     let missing =
-        |which: String| anyhow!("{which} missing: name all parts of the study, or compute what is missing by --shard");
+        |which: String| anyhow!("{which} missing: name all parts of the study, or compute the missing ones by --shard");
     let (other, first) = parts.first().ok_or_else(|| missing("all parts are".to_owned()))?;
     for (name, header) in parts {
         let theirs = &header.program;
@@ -234,7 +234,7 @@ pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
         let ours = ours.into_iter().chain(counts(first));
         let differs = theirs.zip(ours).find_map(|((what, theirs), (_, ours))| difference(what, &theirs, &ours));
         if let Some((what, theirs, ours)) = differs {
-            bail!("{name} is of another study than {other}: its {what} is {theirs}, and there it is {ours}");
+            bail!("{name} belongs to another study than {other}: its {what} is {theirs}, not {ours}");
         }
     }
     let mut holders: Vec<Option<&str>> = vec![None; first.shard.of as usize];

@@ -38,7 +38,7 @@ pub const DEFAULT_MOST_EXAMPLES: usize = 64;
 pub struct Training {
     /// The values of each feature that map onto 0 and 255.
     pub ranges: [Range; COUNT],
-    /// Squared distance from which on an example is not near enough.
+    /// Squared distance beyond which no example is near enough.
     pub radius: u32,
     /// Examples that vote.
     pub k: u8,

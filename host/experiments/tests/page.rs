@@ -201,7 +201,7 @@ fn every_plot_is_in_the_table_with_its_measures() {
     let xml = closed(&full_page());
     let page = parse(&xml);
     let analysis = trial(true);
-    let rows = cells(&page, "Each plot, counted and measured, and what follows");
+    let rows = cells(&page, "Each plot: counts, measurements and results");
     assert_eq!(rows.len(), 24);
     for ((record, performance), row) in analysis.records.iter().zip(&analysis.performances).zip(rows) {
         let number = |index: usize| row[index].parse::<f64>().unwrap();
@@ -372,7 +372,7 @@ fn a_trial_of_one_plot_has_a_page() {
     let html = plain_page("One plot", &[], &Analysis::of(records).unwrap());
     let xml = closed(&html);
     let page = parse(&xml);
-    assert_eq!(cells(&page, "Each plot, counted and measured, and what follows").len(), 1);
+    assert_eq!(cells(&page, "Each plot: counts, measurements and results").len(), 1);
     assert!(!html.contains("NaN"));
 }
 

@@ -137,7 +137,7 @@ impl Motion {
         let duration_s = (place_mm - self.end_mm) / self.end_speed_mm_s;
         assert!(
             duration_s.is_finite() && duration_s >= 0.0,
-            "at {} mm with {} mm/s the machine never comes to {place_mm} mm",
+            "at {} mm with {} mm/s the machine never reaches {place_mm} mm",
             self.end_mm,
             self.end_speed_mm_s
         );

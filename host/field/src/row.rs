@@ -150,7 +150,7 @@ pub enum Problem {
     /// Two things overlap.
     #[error(
         "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
-         each has to end before the next begins (what has grown together is one line)"
+         each has to end before the next begins (plants that have grown together are one line)"
     )]
     Overlap {
         /// The later thing.
@@ -166,7 +166,7 @@ pub enum Problem {
     #[error("the row is {} m long: it has to be at most {} m", (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0)]
     Length(f64),
     /// The row is empty.
-    #[error("nothing stands in the row: it has to have at least one plant or weed")]
+    #[error("the row is empty: it needs at least one plant or weed")]
     Empty,
 }
 

@@ -57,10 +57,7 @@ impl CsvTable {
         }
         let is_twice = |column: &&&str| header.iter().filter(|name| name == *column).count() > 1;
         if let Some(twice) = columns.iter().find(is_twice) {
-            return Err(at(
-                header_line,
-                format!("the column `{twice}` stands there twice: each has a name of its own"),
-            ));
+            return Err(at(header_line, format!("the column `{twice}` occurs twice: each column needs its own name")));
         }
         let mut lines = Vec::new();
         let mut before = header_line;
@@ -80,7 +77,7 @@ impl CsvTable {
             before = line;
         }
         if lines.is_empty() {
-            return Err(at(header_line, "nothing stands below the header: at least one line has to".to_owned()));
+            return Err(at(header_line, "no line is below the header: add at least one".to_owned()));
         }
         Ok(Self { path: path.into(), header, lines })
     }
@@ -182,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_column_that_stands_there_twice_is_refused() {
-        let wrong = "table.csv, line 1: the column `place_mm` stands there twice: each has a name of its own";
+        let wrong = "table.csv, line 1: the column `place_mm` occurs twice: each column needs its own name";
         assert_eq!(read("place_mm,width_mm,place_mm\n7,1,8\n"), Err(wrong.to_owned()));
         assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
     }

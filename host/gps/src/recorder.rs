@@ -112,12 +112,12 @@ impl Recorder {
             lines.push((kind, line));
             lines.extend(marks(&heard));
             if self.damaged == DAMAGED_IN_A_ROW {
-                let why = "nothing that comes is NMEA 0183: see that --gps-baud is the receiver's, and to its cable";
+                let why = "no received line is NMEA 0183: check --gps-baud and the cable";
                 lines.push((Kind::GpsMark, why.to_owned()));
             }
         }
         if self.heard_ms.is_some_and(|heard_ms| time_ms.saturating_sub(heard_ms) > SILENCE_MS) {
-            lines.extend(self.lost("the receiver says nothing"));
+            lines.extend(self.lost("the receiver is silent"));
         }
         lines
     }

@@ -79,7 +79,7 @@ impl Missing {
             Self::NoFixBehind => "no fix behind it",
             Self::OutageTooLong => "the outage is too long",
             Self::Jumped => "the fixes have jumped there",
-            Self::NoHeading => "the fixes do not tell the heading",
+            Self::NoHeading => "the fixes do not show the heading",
         }
     }
 }

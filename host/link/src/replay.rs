@@ -108,16 +108,14 @@ fn replay_stretch(
     progress: &mut Progress<impl FnMut(f64)>,
 ) -> Result<(), ReplayError> {
     if stretch.settings.get(Setting::SecondBeamMm) > 0 {
-        replayed
-            .notes
-            .push("a machine with a second beam is not replayed: the log does not hold what that saw".to_owned());
+        replayed.notes.push("a machine with a second beam is not replayed: the log lacks its edges".to_owned());
         return Ok(());
     }
     let compared_from = stretch.compared_from();
     if compared_from > i32::MIN {
-        replayed
-            .notes
-            .push(format!("the log begins with ground already seen: swings before pos={compared_from} are not judged"));
+        replayed.notes.push(format!(
+            "the log begins with ground already seen: swings before pos={compared_from} are not compared"
+        ));
     }
 
     let mut played = Vec::new();
@@ -146,7 +144,7 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
         match happened {
             Happened::Status(status) => {
                 player.roll(&last.0, status, entry.time_ms.saturating_sub(last.1)).map_err(|()| {
-                    let problem = "the machine cannot have come so far since the status before".to_owned();
+                    let problem = "the machine cannot have rolled so far since the status before".to_owned();
                     ReplayError::Line { line: entry.number, problem }
                 })?;
                 last = (status.clone(), entry.time_ms);

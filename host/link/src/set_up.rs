@@ -111,7 +111,7 @@ impl fmt::Display for Step {
                 write!(f, "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {STRETCHES} done)")
             }
             Self::PassPlants(done) => {
-                write!(f, "have the beams tell the slip: roll past {PLANTS} plants ({done} done)")
+                write!(f, "measure the slip with both beams: roll past {PLANTS} plants ({done} done)")
             }
             Self::SetMargin(margin) => {
                 let word = if margin.least_mm() < margin.in_use_mm { "lower" } else { "raise" };
@@ -334,9 +334,8 @@ impl SetUp {
         let in_use_mm = settings.get(Setting::MarginMm);
         let safe_mm = Setting::MarginMm.description().default;
         match self.margin(settings) {
-            Ok(margin) => (in_use_mm < margin.least_mm()).then(|| {
-                format!("margin_mm {in_use_mm} is too small: what was measured asks for {}", margin.least_mm())
-            }),
+            Ok(margin) => (in_use_mm < margin.least_mm())
+                .then(|| format!("margin_mm {in_use_mm} is too small: the measurements need {}", margin.least_mm())),
             Err(missing) => (in_use_mm < safe_mm).then(|| {
                 let missing: Vec<&str> = missing.iter().map(Step::name).collect();
                 format!("margin_mm {in_use_mm} is not measured: {} first; {safe_mm} is safe", missing.join(" and "))
@@ -507,7 +506,7 @@ mod tests {
         let measured = SetUp::of_lines([&TIMED[..], &MEASURED, &third, &typed].concat());
         assert_eq!(measured.warning(&with_margin(30)), None);
         let warning = measured.warning(&with_margin(29)).expect("it is too small");
-        assert_eq!(warning, "margin_mm 29 is too small: what was measured asks for 30");
+        assert_eq!(warning, "margin_mm 29 is too small: the measurements need 30");
         let in_part = SetUp::of_lines([&TIMED[..], &typed].concat());
         let warning = in_part.warning(&with_margin(49)).expect("the wheel was not measured");
         assert_eq!(warning, "margin_mm 49 is not measured: measure the wheel first; 50 is safe");

@@ -15,7 +15,7 @@ pub enum SettingsError {
     Link(#[from] LinkError),
     /// The firmware lacks a setting that this program has, or gives an impossible value.
     #[error(
-        "the firmware gives no good value for {setting}: it is of another version, put this one on it by `weeder flash`"
+        "the firmware gives no valid value for {setting}: it has another version; flash this one by `weeder flash`"
     )]
     Unknown {
         /// The setting's name.
@@ -78,8 +78,7 @@ pub fn explain(contradiction: Contradiction) -> String {
                 .to_owned()
         }
         Contradiction::EncoderTooCoarse => {
-            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and what ticks_per_rev \
-             and wheel_mm give, are to be that many; take an encoder with more counts"
+            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; take an encoder with more counts"
                 .to_owned()
         }
         Contradiction::BeamTooNear { needed_mm } => format!(

@@ -344,7 +344,7 @@ impl Machine {
     pub fn to_toml(&self) -> String {
         let mut file = String::from(
             "# A machine for `weeder design --machine FILE.toml`.\n\
-             # What is left out is as on the paper's machine. Units may be changed with their values:\n\
+             # Omitted values are those of the paper's machine. Units may be changed with their values:\n\
              # \"0.4 m\" is \"400 mm\".\n",
         );
         let inputs = self.inputs();

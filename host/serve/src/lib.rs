@@ -96,15 +96,13 @@ pub enum ServeError {
         .0[0], .0.iter().map(Ipv4Addr::to_string).collect::<Vec<_>>().join(", "))]
     SeveralNetworks(Vec<Ipv4Addr>),
     /// An address that means all networks, or only this computer.
-    #[error(
-        "{0} is no address for a phone to open: name this computer's own in the phone's network, or say --lan alone"
-    )]
+    #[error("{0} cannot be opened by a phone: name this computer's address in the phone's network, or use --lan alone")]
     NoAddress(Ipv4Addr),
     /// Another program uses the port.
-    #[error("port {} of {} is in use: end what has it, or choose another by --http-port", .0.port(), .0.ip())]
+    #[error("port {} of {} is in use: end the other program, or choose another port by --http-port", .0.port(), .0.ip())]
     InUse(SocketAddr),
     /// The address is another computer's.
-    #[error("{0} is none of this computer's addresses: say --lan alone, or name one that it has")]
+    #[error("{0} is no address of this computer: use --lan alone, or name one of its addresses")]
     NotMine(Ipv4Addr),
     /// The address cannot be had.
     #[error("no connection can be taken at {address}")]
@@ -317,7 +315,7 @@ mod tests {
         let taken = listen(None, 0, false).unwrap();
         assert!(
             error([127, 0, 0, 2], taken.here.port())
-                .contains("is in use: end what has it, or choose another by --http-port")
+                .contains("is in use: end the other program, or choose another port by --http-port")
         );
     }
 }

@@ -232,18 +232,18 @@ async fn pair(
         }
         Try::Wrong { left: 0 } => {
             (served.tell)(&format!(
-                "{address} has sent a wrong code, the last of five: no code is taken for a minute, the right one included."
+                "{address} has sent the fifth wrong code: no code is accepted for a minute, not even the right one."
             ));
-            (StatusCode::FORBIDDEN, "That is not the code. No code is taken for a minute now.\n").into_response()
+            (StatusCode::FORBIDDEN, "That is not the code. No code is accepted for a minute now.\n").into_response()
         }
         Try::Wrong { left } => {
             (served.tell)(&format!("{address} has sent a wrong code. Tries left: {left}."));
-            let said = format!("That is not the code. It stands on the computer's screen. Tries left: {left}.\n");
+            let said = format!("That is not the code. The computer's screen shows it. Tries left: {left}.\n");
             (StatusCode::FORBIDDEN, said).into_response()
         }
         Try::Locked(wait) => {
             let seconds = wait.as_secs() + 1;
-            let said = format!("There were too many wrong codes: none is taken for {seconds} s.\n");
+            let said = format!("Too many wrong codes: no code is accepted for {seconds} s.\n");
             (StatusCode::TOO_MANY_REQUESTS, [(RETRY_AFTER, seconds.to_string())], said).into_response()
         }
     }

@@ -37,7 +37,7 @@ pub enum Forbidden {
     #[error("that is no command: it has to be one line of 1 to {} printable ASCII characters", link::COMMAND_LENGTH)]
     NoLine,
     /// The command is unknown.
-    #[error("`weeder serve` does not know that command, and passes on only those that it knows: `help` lists them")]
+    #[error("`weeder serve` does not know that command, and passes on only known commands: `help` lists them")]
     Unknown,
     /// The operator has not allowed it.
     #[error("this is not allowed from here: go to the machine, or have `weeder serve` started with --allow-start")]
@@ -57,7 +57,7 @@ pub enum Forbidden {
     ChangesMachine,
     /// It changes the output for all other clients.
     #[error(
-        "this changes what everybody hears, and is never allowed over the network: go to the computer that has the port"
+        "this changes the events for all clients, and is never allowed over the network: type it at the computer with the port"
     )]
     ChangesWire,
 }

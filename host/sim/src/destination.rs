@@ -78,7 +78,7 @@ impl FileName {
     /// # Errors
     /// If it could not, and why.
     pub fn check(&self, replace: Replace) -> Result<OutFile<'_>> {
-        ensure!(!self.0.is_dir(), "{} is a folder, and a file has to be named", self.0.display());
+        ensure!(!self.0.is_dir(), "{} is a folder: name a file", self.0.display());
         replace.check(&self.0)?;
         whole_file::check(&self.0).with_context(|| cannot_be_written(&self.0))?;
         Ok(OutFile(&self.0))
@@ -132,10 +132,10 @@ impl FolderName {
         replace: Replace,
     ) -> Result<OutFolder<'_>> {
         let folder = &self.0;
-        ensure!(!folder.exists() || folder.is_dir(), "{} is a file, and a folder has to be named", folder.display());
+        ensure!(!folder.exists() || folder.is_dir(), "{} is a file: name a folder", folder.display());
         let ending = folder.extension().and_then(|ending| ending.to_str());
         if !folder.exists() && ending.is_some_and(|ending| FILE_ENDINGS.contains(&ending)) {
-            bail!("{} is named like a file, and a folder has to be named: several files go there", folder.display());
+            bail!("{} is named like a file: name a folder, for several files", folder.display());
         }
         let there = folder.ancestors().find(|part| part.exists()).unwrap_or(Path::new("."));
         whole_file::check_folder(there).with_context(|| cannot_be_written(folder))?;

@@ -29,7 +29,7 @@ pub enum TrialError {
     #[error(transparent)]
     Console(#[from] ConsoleError),
     /// The firmware restarted during the trial.
-    #[error("the firmware restarted {} during the trial, so that its position means nothing", counted(.0, "time"))]
+    #[error("the firmware restarted {} during the trial, so its position is invalid", counted(.0, "time"))]
     Restarted(usize),
 }
 

@@ -96,7 +96,7 @@ impl Capture {
                         let cycle = to_cycles(time, timescale);
                         if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
                             return Err(wrong(format!(
-                                "goes on beyond {MOST_HOURS} h at line {}: cut the recording, or look at its $timescale",
+                                "is longer than {MOST_HOURS} h at line {}: cut the recording, or check its $timescale",
                                 parser.line()
                             )));
                         }
@@ -138,16 +138,12 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
                 _ => {}
             }
             if scopes > MOST_SCOPES {
-                return wrong(format!("more than {MOST_SCOPES} scopes stand within each other"));
+                return wrong(format!("more than {MOST_SCOPES} scopes are nested"));
             }
         }
     }
     // The reader reports an error in a shorter head.
-    if rest.limit() == 0 {
-        wrong("no $enddefinitions stands in its first MiB".to_owned())
-    } else {
-        Ok(io::Cursor::new(head))
-    }
+    if rest.limit() == 0 { wrong("its first MiB has no $enddefinitions".to_owned()) } else { Ok(io::Cursor::new(head)) }
 }
 
 /// The nearest cycle to a time of the file.

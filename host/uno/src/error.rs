@@ -58,7 +58,7 @@ pub enum UnoError {
     #[error("the firmware has no function `{0}`: give its path from the crate on")]
     NoFunction(String),
     /// The firmware did not reach a function.
-    #[error("the firmware did not come to `{symbol}` within {timeout_cycles} cycles")]
+    #[error("the firmware did not reach `{symbol}` within {timeout_cycles} cycles")]
     NotReached {
         /// The function.
         symbol: String,

@@ -235,9 +235,9 @@ export class Session implements Link {
         const strange = [...this.#strange];
         const unreadable = strange.filter((character) => character === "\u{fffd}").length;
         if (strange.length === 0)
-            return "nothing answers at this port: choose another, or press the Uno's reset; a new board is to be flashed first";
+            return "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first";
         if (unreadable * 4 > strange.length)
-            return "what comes from this port is no text: choose another; on an Uno see that D0 and D1 are free, and flash it again";
+            return "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again";
         return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
     }
 

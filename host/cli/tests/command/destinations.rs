@@ -59,13 +59,13 @@ fn a_folder_is_no_file_and_a_file_is_no_folder() {
         let (name, wrong) = match kind {
             Kind::Folder => {
                 fs::write(folder.path().join("report"), "mine").unwrap();
-                ("report", "report is a file, and a folder has to be named")
+                ("report", "report is a file: name a folder")
             }
             // An existing log is continued, and has its own error.
             Kind::File("log.csv") => continue,
             Kind::File(name) => {
                 fs::create_dir(folder.path().join(name)).unwrap();
-                (name, " is a folder, and a file has to be named")
+                (name, " is a folder: name a file")
             }
         };
         let output = weeder(folder.path(), &[arguments, &[name]].concat());

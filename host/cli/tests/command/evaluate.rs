@@ -157,6 +157,6 @@ fn a_file_that_does_not_exist_is_named() {
 fn a_report_that_cannot_be_written_is_an_error() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("report"), "a file, no folder").unwrap();
-    let file = "report is a file, and a folder has to be named";
+    let file = "report is a file: name a folder";
     assert_refused(folder.path(), &["evaluate", EXAMPLE, "--out", "report"], file);
 }

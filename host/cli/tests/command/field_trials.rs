@@ -96,7 +96,7 @@ fn a_machine_that_outruns_its_beam_is_reported_and_is_no_success() {
     assert_eq!(output.status.code(), Some(1), "{words}");
     assert!(words.contains("an alarm took the firmware's tool out"), "{words}");
     let words = said(folder.path(), &["sweep", "--field", "small.toml", "--x", "speed=2..7:5"]);
-    assert!(words.contains(" ! ") && words.contains("--result alarms says in how many"), "{words}");
+    assert!(words.contains(" ! ") && words.contains("--result alarms shows in how many"), "{words}");
 }
 
 #[test]

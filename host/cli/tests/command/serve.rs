@@ -580,7 +580,7 @@ fn a_failure_to_serve_is_explained_with_a_remedy() {
         ),
         (&page, &["--http-port", "0", "--allow-start"], "--lan"),
         (&page, &["--http-port", "0", "--lan", "192.0.2.1"], "192.0.2.1 is none of this computer's addresses"),
-        (&page, &["--http-port", &taken], "is in use: end what has it, or choose another by --http-port"),
+        (&page, &["--http-port", &taken], "is in use: end the other program, or choose another port by --http-port"),
         (&page, &["--port", "a/uno", "--port", "b/uno"], "two machines are called uno: name them"),
     ] {
         let output = weeder().arg("serve").arg("--page").arg(page).args(words).output().expect("cargo has built it");

@@ -152,10 +152,7 @@ fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
         record.arg(&logs).spawn().expect("it is built")
     };
     for (gps, right) in [
-        (
-            sentences.clone(),
-            "of several rows, one has the receiver in its record: say which, as in `--gps left|middle=",
-        ),
+        (sentences.clone(), "with several rows, name the row that records the receiver, as in `--gps left|middle="),
         (format!("right={sentences}"), "there is no row right: there are left, middle"),
     ] {
         let error = printed(&record(&gps).wait_with_output().expect("it ends"), 2);

@@ -146,8 +146,8 @@ fn options_that_contradict_parts_are_refused() {
     let soak = ["soak", "--hours", "1", "--uno-minutes", "0", "--shard", "1/1", "--out", "soak.part"];
     said(path, &soak);
     assert_reports_nothing(path, &["merge", "soak.part", "--out", "report"], "a soak, which writes no file");
-    assert_reports_nothing(path, &["merge", "soak.part", "--brief"], "--brief is for those of a trial");
-    assert_reports_nothing(path, &["merge", "soak.part", "--result", "alarms"], "--result is for those of a sweep");
+    assert_reports_nothing(path, &["merge", "soak.part", "--brief"], "--brief is for parts of a trial");
+    assert_reports_nothing(path, &["merge", "soak.part", "--result", "alarms"], "--result is for parts of a sweep");
     let nowhere = [&TRIAL[..], &["--shard", "1/4", "--out", "no/such/folder/p"]].concat();
     assert_reports_nothing(path, &nowhere, "no/such/folder/p cannot be written");
 }

@@ -117,7 +117,7 @@ impl Analysis {
             "power, hp",
         ];
         let mut table =
-            Table::new("Each plot, counted and measured, and what follows", written_down.into_iter().chain(MEASURES));
+            Table::new("Each plot: counts, measurements and results", written_down.into_iter().chain(MEASURES));
         for (index, (record, performance)) in self.records.iter().zip(&self.performances).enumerate() {
             let cells = [(index + 1).to_string()].into_iter().chain(counted(record)).chain(measures(performance));
             table.rows.push(cells.collect());

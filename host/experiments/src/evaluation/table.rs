@@ -49,7 +49,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
         };
         if let Some((first, _)) = plots.iter().find(|(_, other)| same(other)) {
             return Err(line.error(format!(
-                "replication {} of {} km/h and {} cm stands in line {first} already: each plot has a replication of its own",
+                "replication {} of {} km/h and {} cm is already in line {first}: each plot needs its own replication",
                 plot.replication, plot.speed_km_h, plot.spacing_cm
             )));
         }

@@ -239,7 +239,7 @@ fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
                 ),
                 Err(error) => {
                     let place = format!("{} = {end}", parameter.name);
-                    let told = ["nothing for the beam stands in a row of", "grow together to more than"];
+                    let told = ["the beam would see nothing in a row of", "grow together to more than"];
                     let is_told = told.iter().any(|words| error.to_string().contains(words));
                     assert!(is_told, "{place}: {error}");
                 }

@@ -88,7 +88,7 @@ fn an_invalid_shard_is_refused_with_what_would_be_right() {
 fn parts_that_are_missing_are_named() {
     assert_eq!(
         refusal(&[header("1/3", 5), header("3/3", 5)]),
-        "part 2/3 is missing: name all parts of the study, or compute what is missing by --shard"
+        "part 2/3 is missing: name all parts of the study, or compute the missing ones by --shard"
     );
     assert!(refusal(&[header("2/4", 5)]).starts_with("parts 1/4, 3/4 and 4/4 are missing"));
     let many = refusal(&[header("1/12", 5)]);

@@ -25,8 +25,7 @@ use std::collections::HashSet;
 fn check_room(needed: usize, most: usize) -> Result<()> {
     ensure!(
         needed <= most,
-        "too many examples for the flash budget: these objects cannot be told apart with fewer than {needed} examples, \
-         and there is room for {most}: take out objects with a wrong label, or objects that are like no other"
+        "too many examples for the flash budget: these detections need {needed} examples, and there is room for {most}: remove detections with a wrong label, or unlike all others"
     );
     Ok(())
 }

@@ -25,7 +25,7 @@ pub const fn class_of<const CLASSES: usize>(answer: &Answer<CLASSES>) -> Class {
 pub struct Model {
     /// From features to bytes.
     pub scale: Scale<COUNT>,
-    /// Squared distance from which on an example is not near enough.
+    /// Squared distance beyond which no example is near enough.
     pub radius: u32,
     /// Examples that vote.
     pub k: u8,
