@@ -288,7 +288,7 @@ fn a_handler_that_does_not_read_the_port_gives_no_bound_for_an_edge() {
     let second = Input { vectors: [16].into(), ..INPUT() };
     let program = format!("{main}handler:\n reti\nother:\n in r2, 9\n reti");
     let error = try_to_prove(&program, Some(&second)).expect_err("INT0 goes before it").to_string();
-    assert!(error.contains("vector 1 goes before vector 16"), "{error}");
+    assert!(error.contains("vector 1 has priority over vector 16"), "{error}");
 }
 
 #[test]
@@ -555,11 +555,11 @@ fn a_handler_puts_every_register_and_every_flag_back() {
     let flags = "push r24\n in r24, 0x3f\n out 0x1e, r24\n inc r24\n in r24, 0x1e\n out 0x3f, r24\n pop r24\n reti";
     proved(&format!("{main}handler:\n {flags}"));
     let without = |line: &str| format!("{main}handler:\n {}", flags.replacen(line, "nop\n", 1));
-    assert_refused(&without("out 0x3f, r24\n"), "does not put back what it found in flag Z, flag N, flag V, flag S");
+    assert_refused(&without("out 0x3f, r24\n"), "does not restore flag Z, flag N, flag V, flag S");
     assert_refused(&without("out 0x1e, r24\n"), "a value that is not a saved SREG");
-    assert_refused(&format!("{main}handler:\n in r24, 0x09\n reti"), "handler, does not put back what it found in r24");
+    assert_refused(&format!("{main}handler:\n in r24, 0x09\n reti"), "handler, does not restore r24");
     // On one of two paths.
-    assert_refused(&format!("{main}handler:\n sbic 0x09, 2\n in r24, 0x09\n reti"), "what it found in r24");
+    assert_refused(&format!("{main}handler:\n sbic 0x09, 2\n in r24, 0x09\n reti"), "does not restore r24");
 }
 
 #[test]
@@ -715,7 +715,7 @@ fn a_function_that_breaks_the_convention_is_found() {
     try_to_prove_by(&calling("rcall called", frame), &convention).expect("it is kept");
     let handler = |body: &str| format!("start:\n clr r1\n sei\n1: rjmp 1b\nhandler:\n {body}\n reti");
     let error = try_to_prove_by(&handler("in r24, 0x09"), &convention).expect_err("it is broken").to_string();
-    assert!(error.contains("does not put back what it found in r24"), "{error}");
+    assert!(error.contains("does not restore r24"), "{error}");
 }
 
 #[test]

@@ -252,7 +252,7 @@ fn a_bad_line_is_named_with_what_would_be_right() {
             "694,500,226,250,573,weed\n",
             "line 2: up to here there is no label plant: some objects of either class are needed",
         ),
-        ("", "line 1: nothing stands below the header"),
+        ("", "line 1: no line is below the header"),
     ] {
         let error = read_text(&[&format!("{HEADER}{lines}")]).unwrap_err();
         assert!(error.starts_with(&format!("0.csv, {message}")), "{error}");

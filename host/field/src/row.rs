@@ -368,7 +368,7 @@ mod tests {
                 "750,150,plant\n250,150,plant\n700,20,weed\n",
                 "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",
             ),
-            ("", "row.csv, line 1: nothing stands below the header"),
+            ("", "row.csv, line 1: no line is below the header"),
         ] {
             for end in ["\n", "\r\n"] {
                 let said = read(&format!("{header}{text}").replace('\n', end)).unwrap_err();

@@ -211,7 +211,7 @@ mod tests {
             }
         }
         assert!(read("place_mm,width_mm\nok\n7,1\n").unwrap_err().starts_with("table.csv, line 2: fields: 1"));
-        assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: nothing stands below"));
+        assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: no line is below"));
     }
 
     #[test]

@@ -56,8 +56,8 @@ fn a_wheel_is_safe_or_fails() {
 fn a_shank_bends_or_bears_its_load() {
     let shank =
         |mm: f64| figure_with("inter_row_shank_diameter", |machine| machine.inter_row.shank_diameter = MM.of(mm));
-    assert_sense(&shank(16.0), true, "427 MPa, 7.6 times what is allowed: it bends");
-    assert_sense(&shank(32.0), false, "95 % of what is allowed");
+    assert_sense(&shank(16.0), true, "427 MPa, 7.6 times the allowed stress: it bends");
+    assert_sense(&shank(32.0), false, "95 % of the allowed stress");
 }
 
 #[test]

@@ -309,9 +309,9 @@ mod tests {
         let runtime = runtime::Builder::new_current_thread().enable_io().build().unwrap();
         let _inside = runtime.enter();
         let error = |lan: [u8; 4], port| listen(Some(lan.into()), port, false).err().unwrap().to_string();
-        assert!(error([0, 0, 0, 0], 0).contains("no address for a phone to open"));
-        assert!(error([127, 0, 0, 1], 0).contains("no address for a phone to open"));
-        assert!(error([192, 0, 2, 1], 0).contains("192.0.2.1 is none of this computer's addresses"));
+        assert!(error([0, 0, 0, 0], 0).contains("cannot be opened by a phone"));
+        assert!(error([127, 0, 0, 1], 0).contains("cannot be opened by a phone"));
+        assert!(error([192, 0, 2, 1], 0).contains("192.0.2.1 is no address of this computer"));
         let taken = listen(None, 0, false).unwrap();
         assert!(
             error([127, 0, 0, 2], taken.here.port())

@@ -312,8 +312,8 @@ fn of_a_hundred_wrong_codes_five_are_looked_at_and_the_operator_knows() {
     let looked_at = statuses.iter().filter(|&&status| status == 403).count();
     assert!(looked_at % 5 == 0 && looked_at < 20 && statuses[5] == 429, "{statuses:?}");
     let (status, said, cookie) = served.try_code(&served.code);
-    assert!(status == 429 && said.contains("too many wrong codes") && cookie.is_none(), "{status} {said}");
-    served.wait_until_told("127.0.0.1 has sent a wrong code, the last of five: no code is taken for a minute");
+    assert!(status == 429 && said.contains("Too many wrong codes") && cookie.is_none(), "{status} {said}");
+    served.wait_until_told("127.0.0.1 has sent the fifth wrong code: no code is accepted for a minute");
     // A phone that was paired before is not locked out.
     assert_eq!(served.get(&served.lan, "/machines", &phone).0, 200);
 }
@@ -579,7 +579,7 @@ fn a_failure_to_serve_is_explained_with_a_remedy() {
             "index.html of the page cannot be read: name a release's folder `page` by --page",
         ),
         (&page, &["--http-port", "0", "--allow-start"], "--lan"),
-        (&page, &["--http-port", "0", "--lan", "192.0.2.1"], "192.0.2.1 is none of this computer's addresses"),
+        (&page, &["--http-port", "0", "--lan", "192.0.2.1"], "192.0.2.1 is no address of this computer"),
         (&page, &["--http-port", &taken], "is in use: end the other program, or choose another port by --http-port"),
         (&page, &["--port", "a/uno", "--port", "b/uno"], "two machines are called uno: name them"),
     ] {

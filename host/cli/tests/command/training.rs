@@ -107,7 +107,7 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
 #[test]
 fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
     let train = ["train", "objects.csv"];
-    assert_not_taken("", &train, "objects.csv, line 1: nothing stands below the header");
+    assert_not_taken("", &train, "objects.csv, line 1: no line is below the header");
     assert_not_taken("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
     assert_not_taken("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
 }
