@@ -131,7 +131,7 @@ fn a_wrong_line_is_named_and_nothing_is_written() {
         ("2,1.5,50,200,30,50,1,a lot,180,0.4,2.5", "trial.csv, line 3: area_m2 is `a lot`: it has to be a number"),
         (
             "1,1.5,50,200,30,50,1,24,180,0.4,2.5",
-            "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm stands in line 2",
+            "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm is already in line 2",
         ),
     ] {
         assert_not_judged(&folder_with(&format!("{good}{wrong}\n")), message);

@@ -103,11 +103,11 @@ fn parts_that_are_no_whole_study_are_refused_by_name() {
     );
     let other = ["trial", "--field", "small.toml", "--seed", "8", "--shard", "2/3", "--out", "other.part"];
     said(path, &other);
-    let seed = "other.part is of another study than 1.part: its experiment.seed is 8, and there it is 7";
+    let seed = "other.part belongs to another study than 1.part: its experiment.seed is 8, not 7";
     assert_reports_nothing(path, &merge(&["1.part", "other.part", "3.part"]), seed);
     let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..9:1", "--shard", "2/3", "--out", "sweep.part"];
     said(path, &sweep);
-    let command = "sweep.part is of another study than 1.part: its command is \"sweep\", and there it is \"trial\"";
+    let command = "sweep.part belongs to another study than 1.part: its command is \"sweep\", not \"trial\"";
     assert_reports_nothing(path, &merge(&["1.part", "sweep.part", "3.part"]), command);
 
     let text = fs::read_to_string(path.join("2.part")).unwrap();

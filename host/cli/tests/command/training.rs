@@ -94,7 +94,7 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
     };
     let chessboard: String = (0..400).map(square).collect();
     for most in ["64".to_owned(), MOST_EXAMPLES.to_string()] {
-        let room = format!("and there is room for {most}: take out objects with a wrong label");
+        let room = format!("and there is room for {most}: remove detections with a wrong label");
         assert_not_taken(
             &chessboard,
             &["train", "objects.csv", "--max", &most],

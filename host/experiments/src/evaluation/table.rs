@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn a_replication_that_stands_there_twice_is_named_with_both_lines() {
         let said = read(&format!("{HEADER}{LINE}\n{LINE}")).unwrap_err();
-        let right = "trial.csv, line 4: replication 1 of 1.5 km/h and 50 cm stands in line 2 already: ";
+        let right = "trial.csv, line 4: replication 1 of 1.5 km/h and 50 cm is already in line 2: ";
         assert!(said.starts_with(right), "{said}");
     }
 

@@ -110,15 +110,15 @@ fn a_part_of_another_study_is_named_with_the_difference() {
         refusal(&[header("1/2", 5), changed])
     };
     let seed = other(&|header| header.settings["experiment"]["seed"] = 7.into());
-    assert_eq!(seed, "b is of another study than a: its experiment.seed is 7, and there it is 18446744073709551615");
+    assert_eq!(seed, "b belongs to another study than a: its experiment.seed is 7, not 18446744073709551615");
     let speeds = other(&|header| header.settings["experiment"]["speeds"] = json!([1.0]));
-    assert!(speeds.ends_with("its experiment.speeds is [1.0], and there it is [1.0,2.5]"), "{speeds}");
+    assert!(speeds.ends_with("its experiment.speeds is [1.0], not [1.0,2.5]"), "{speeds}");
     let command = other(&|header| header.command = "sweep".to_owned());
-    assert!(command.ends_with("its command is \"sweep\", and there it is \"trial\""), "{command}");
+    assert!(command.ends_with("its command is \"sweep\", not \"trial\""), "{command}");
     let of = refusal(&[header("1/2", 5), header("2/3", 5)]);
-    assert!(of.ends_with("its number of parts is 3, and there it is 2"), "{of}");
+    assert!(of.ends_with("its number of parts is 3, not 2"), "{of}");
     let size = other(&|header| header.all = 6);
-    assert!(size.ends_with("its size is 6, and there it is 5"), "{size}");
+    assert!(size.ends_with("its size is 6, not 5"), "{size}");
 }
 
 #[test]
