@@ -379,7 +379,7 @@ fn a_bend_an_outlier_and_uneven_scatter_are_each_described() {
         Checks::of(&design, &values, &model).sentences("It").join(" ")
     };
     assert!(said(|_, speed| (speed - 1.75).powi(2)).contains("does not follow straight lines"));
-    assert!(said(|plot, speed| speed + if plot == 4 { 3.0 } else { 0.0 }).contains("Plot 5 is farther off"));
+    assert!(said(|plot, speed| speed + if plot == 4 { 3.0 } else { 0.0 }).contains("Plot 5 is farther from the model"));
     let fan = said(|plot, speed| [-1.0, 0.0, 1.0][plot % 3] * (speed - 0.9));
     assert!(fan.contains("scatters more at some speeds"), "{fan}");
 }
