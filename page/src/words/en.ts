@@ -237,8 +237,7 @@ export const en = {
         timedSet: "The end switch has timed it, and both leads are set. Not saved yet.",
         timedNotSet:
             "The end switch has timed it, but these leads need the beam farther ahead, or a lower top speed: nothing is set.",
-        timedByEye:
-            "It has swung three times. Enter the longest swing out, and the shortest wait before the swing in.",
+        timedByEye: "It has swung three times. Enter the longest swing out, and the shortest wait before the swing in.",
         notTimed: "The end switch did not follow: see to it, or set end_switch off and go by eye.",
         leadOut: "Longest way out, and some more: lead_out_ms",
         leadIn: "Shortest wait before it comes in: lead_in_ms",

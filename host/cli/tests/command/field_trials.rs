@@ -27,7 +27,7 @@ fn a_trial_prints_each_controller_s_damage_and_writes_its_report() {
     let folder = folder();
     let words = said(folder.path(), &["trial", "--field", "small.toml", "--out", "report"]);
     assert!(words.contains("Plants damaged by this firmware: none of "), "{words}");
-    assert!(words.contains("Where the row's ground goes") && !words.contains("contradict"), "{words}");
+    assert!(words.contains("Loss budget of the row's ground") && !words.contains("contradict"), "{words}");
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(
         page.contains("weeder trial --field small.toml --out report") && page.contains("a queue without look-ahead")
