@@ -58,7 +58,7 @@ static mut CONSOLE: Console = Console::new();
 static mut UNINIT: UninitWeeder = {
     // SAFETY: these are the only halves, and only the entry point takes the static, once.
     let (settings, examples) = unsafe { (eeprom::Lower::new(), eeprom::Upper::new()) };
-    Uninit::new(Nearest::asleep(examples::BuiltIn, examples), settings)
+    Uninit::new(Nearest::uninit(examples::BuiltIn, examples), settings)
 };
 
 /// Sets up the peripherals and runs the loop.

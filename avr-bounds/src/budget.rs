@@ -91,9 +91,9 @@ pub enum BudgetsProblem {
 pub struct Held {
     /// The budget's name.
     pub name: &'static str,
-    /// What was proved.
+    /// The proved value.
     pub proved: u64,
-    /// What is allowed.
+    /// The budget.
     pub budget: u64,
     /// Whether the bound keeps to the budget.
     pub keeps: bool,

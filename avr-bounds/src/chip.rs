@@ -98,7 +98,7 @@ mod tests {
     use std::process::Command;
 
     #[test]
-    fn the_table_is_what_avr_libc_s_headers_say() {
+    fn the_table_agrees_with_avr_libc_s_headers() {
         for chip in CHIPS {
             let gpior =
                 if chip.gpior.is_empty() { "" } else { "(unsigned)&GPIOR0, (unsigned)&GPIOR1, (unsigned)&GPIOR2," };

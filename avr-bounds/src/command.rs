@@ -11,7 +11,7 @@ use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What the user asks.
+/// The arguments.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
@@ -133,7 +133,7 @@ pub fn report(elf: &Path, options: &Options) -> Result<Report> {
         let named: Vec<_> = bounds.functions.iter().filter(|function| function.function == *name).collect();
         ensure!(
             !named.is_empty(),
-            "no function called {name} is come to from the reset or a handler: take a name that `--dot` shows"
+            "no function called {name} is reached from the reset or a handler: take a name that `--dot` shows"
         );
         if options.json { format!("{:#}\n", json!(named)) } else { named.into_iter().map(of_function).collect() }
     } else if options.dot {

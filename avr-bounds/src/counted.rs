@@ -20,12 +20,13 @@ const MOST_TURNS: u64 = 1 << 22;
 /// The most returns to `head` for each entry to its loop. `circle` is a strongly connected part of a routine.
 pub(crate) fn turns(code: &Code, nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
     let within = |set: &BTreeSet<usize>, node: usize| -> Vec<usize> {
-        nodes[node].ways.iter().map(|way| way.to).filter(|to| set.contains(to)).collect()
+        nodes[node].edges.iter().map(|edge| edge.to).filter(|to| set.contains(to)).collect()
     };
     // Where it is entered.
     let mut entries: Vec<(usize, Constants)> = Vec::new();
     for (_, node) in nodes.iter().enumerate().filter(|(number, _)| !circle.contains(number)) {
-        entries.extend(node.ways.iter().filter(|way| circle.contains(&way.to)).map(|way| (way.to, way.constants)));
+        entries
+            .extend(node.edges.iter().filter(|edge| circle.contains(&edge.to)).map(|edge| (edge.to, edge.constants)));
     }
     let first = entries.first()?.0;
     if circle.contains(&0) || entries.iter().any(|(to, _)| *to != first) {
@@ -56,14 +57,14 @@ pub(crate) fn turns(code: &Code, nodes: &[Node], circle: &BTreeSet<usize>, head:
         order
     };
     let only_before = |node: usize| {
-        let mut before = circle.iter().copied().filter(|&other| nodes[other].ways.iter().any(|way| way.to == node));
+        let mut before = circle.iter().copied().filter(|&other| nodes[other].edges.iter().any(|edge| edge.to == node));
         let only = before.next()?;
         (node != first && before.next().is_none()).then_some(only)
     };
     let leaving = ordered.iter().copied().filter(|&node| {
         let is_out = |to: usize| !circle.contains(&to);
-        let ways = &nodes[node].ways;
-        ways.len() == 2 && ways.iter().filter(|way| is_out(way.to)).count() == 1
+        let edges = &nodes[node].edges;
+        edges.len() == 2 && edges.iter().filter(|edge| is_out(edge.to)).count() == 1
     });
     let loops = Loop { code, nodes, circle, ordered: &ordered };
     leaving
@@ -106,7 +107,7 @@ impl Loop<'_> {
             while let Some((mut node, mut flags)) = flags_of.pop() {
                 while !flags.is_empty() {
                     node = only_before(node)?;
-                    if self.nodes[node].ways.iter().any(|way| way.through.is_some()) {
+                    if self.nodes[node].edges.iter().any(|edge| edge.through.is_some()) {
                         return None;
                     }
                     let effects = self.instruction(node)?.effects();
@@ -123,7 +124,7 @@ impl Loop<'_> {
             for &node in self.circle {
                 let instruction = self.instruction(node)?;
                 let effects = instruction.effects();
-                if self.nodes[node].ways.iter().any(|way| clobbers(way.through.as_deref(), needed)) {
+                if self.nodes[node].edges.iter().any(|edge| clobbers(edge.through.as_deref(), needed)) {
                     return None;
                 }
                 if !(effects.changes & needed).is_empty() && slice.insert(node) {
@@ -142,7 +143,7 @@ impl Loop<'_> {
             .filter(|node| slice.contains(node) || **node == exit)
             .map(|&node| self.instruction(node))
             .collect::<Option<_>>()?;
-        let stays = self.nodes[exit].ways.iter().find(|way| self.circle.contains(&way.to))?;
+        let stays = self.nodes[exit].edges.iter().find(|edge| self.circle.contains(&edge.to))?;
         let stays_when_next = self.nodes[stays.to].place.address == branch.next();
         let mut most = 0;
         for (_, constants) in entries {

@@ -10,7 +10,7 @@
 //! routine.
 
 use crate::counted;
-use crate::flow::{Code, Node, Routine, Way};
+use crate::flow::{Code, Edge, Node, Routine};
 use crate::paths::{circles, is_circle, reaching};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
@@ -125,9 +125,9 @@ impl<'a> Timer<'a> {
         let places: Vec<usize> = (0..routine.nodes.len()).filter(|&node| is_place(&routine.nodes[node])).collect();
         let (mut to, mut behind) = (None, Vec::new());
         for &place in &places {
-            for way in &routine.nodes[place].ways {
-                to = longer(to, before[place].as_ref().map(|time| time.and_cycles(way.cycles)));
-                behind.push((way.to, Time::default()));
+            for edge in &routine.nodes[place].edges {
+                to = longer(to, before[place].as_ref().map(|time| time.and_cycles(edge.cycles)));
+                behind.push((edge.to, Time::default()));
             }
         }
         let after = self.times(&routine.nodes, &|node| returning[node], behind, None);
@@ -168,21 +168,21 @@ impl<'a> Timer<'a> {
             for (_, called) in &node.ends_in {
                 found.inner = longer(found.inner, self.stretches(called, kind).inner);
             }
-            for way in &node.ways {
-                let called = way.through.as_ref().map(|called| self.stretches(called, kind));
+            for edge in &node.edges {
+                let called = edge.through.as_ref().map(|called| self.stretches(called, kind));
                 if let Some(called) = called {
                     found.inner = longer(found.inner, called.inner);
-                    if is_inside(&nodes[way.to])
+                    if is_inside(&nodes[edge.to])
                         && let Some(last) = called.last
                     {
-                        begins.push((way.to, last));
+                        begins.push((edge.to, last));
                     }
                 }
                 if !is_inside(node) {
-                    let own = if kind == Stretch::Closed { way.cycles } else { 0 };
+                    let own = if kind == Stretch::Closed { edge.cycles } else { 0 };
                     let alone = (kind == Stretch::Closed).then(|| Time::of(own.into()));
-                    if way.through.is_none() && is_inside(&nodes[way.to]) {
-                        begins.push((way.to, Time::of(own.into())));
+                    if edge.through.is_none() && is_inside(&nodes[edge.to]) {
+                        begins.push((edge.to, Time::of(own.into())));
                     } else {
                         found.inner = longer(found.inner, alone);
                     }
@@ -218,10 +218,10 @@ impl<'a> Timer<'a> {
         let mut ending = Vec::new();
         for node in nodes {
             let mut ends = Vec::new();
-            for way in &node.ways {
-                match &way.through {
-                    Some(called) => ends.extend(opens(self, called).map(|first| first.and_cycles(way.cycles))),
-                    None if !is_inside(&nodes[way.to]) => ends.push(Time::of(way.cycles.into())),
+            for edge in &node.edges {
+                match &edge.through {
+                    Some(called) => ends.extend(opens(self, called).map(|first| first.and_cycles(edge.cycles))),
+                    None if !is_inside(&nodes[edge.to]) => ends.push(Time::of(edge.cycles.into())),
                     None => {}
                 }
             }
@@ -256,23 +256,23 @@ impl<'a> Timer<'a> {
         let mut turn = None;
         for fed in (0..nodes.len()).filter(|&node| is_fed(&nodes[node])) {
             let circle = reaching(nodes, |node| node == fed);
-            let begins = nodes[fed].ways.iter().map(|way| (way.to, Time::of(way.cycles.into()))).collect();
+            let begins = nodes[fed].edges.iter().map(|edge| (edge.to, Time::of(edge.cycles.into()))).collect();
             let times = self.times(nodes, &|node| node != fed && circle[node], begins, None);
             for (node, time) in nodes.iter().zip(&times) {
                 let Some(time) = time else { continue };
-                for way in node.ways.iter().filter(|way| way.to == fed) {
-                    turn = longer(turn, self.time_of(node, way, None).map(|own| time.and(&own)));
+                for edge in node.edges.iter().filter(|edge| edge.to == fed) {
+                    turn = longer(turn, self.time_of(node, edge, None).map(|own| time.and(&own)));
                 }
             }
         }
         turn
     }
 
-    /// The time of a way, with the called functions: the whole time, or the part in one stretch.
-    fn time_of(&mut self, node: &Node, way: &Way, stretch: Option<Stretch>) -> Option<Time> {
-        let called = match (&way.through, stretch) {
+    /// The time of an edge, with the called functions: the whole time, or the part in one stretch.
+    fn time_of(&mut self, node: &Node, edge: &Edge, stretch: Option<Stretch>) -> Option<Time> {
+        let called = match (&edge.through, stretch) {
             (None, _) => Time::default(),
-            (Some(called), None) => match way.length {
+            (Some(called), None) => match edge.length {
                 Some(length) if self.passes.by_length.contains(&called.entry.address) => {
                     self.of_length(called, length)?
                 }
@@ -280,7 +280,7 @@ impl<'a> Timer<'a> {
             },
             (Some(called), Some(kind)) => self.stretches(called, kind).through?,
         };
-        let mut time = called.and_cycles(way.cycles);
+        let mut time = called.and_cycles(edge.cycles);
         if node.waits {
             time.unbounded.insert(node.place.address);
         }
@@ -298,17 +298,18 @@ impl<'a> Timer<'a> {
     pub(crate) fn loops_without_bound(&mut self, routine: &Routine) -> BTreeSet<u32> {
         let nodes = &routine.nodes;
         let mut found = BTreeSet::new();
-        // Of a loop that is never left, the loops within.
+        // For a loop that is never left: its inner loops.
         let mut sets = vec![(0..nodes.len()).collect::<BTreeSet<usize>>()];
         while let Some(set) = sets.pop() {
-            let ways = |node: usize| nodes[node].ways.iter().map(|way| way.to).filter(|to| set.contains(to)).collect();
-            for circle in circles(&set, &ways).into_iter().filter(|circle| is_circle(circle, &ways)) {
+            let edges =
+                |node: usize| nodes[node].edges.iter().map(|edge| edge.to).filter(|to| set.contains(to)).collect();
+            for circle in circles(&set, &edges).into_iter().filter(|circle| is_circle(circle, &edges)) {
                 let is_left = circle.iter().any(|&node| {
-                    nodes[node].returns.is_some() || nodes[node].ways.iter().any(|way| !circle.contains(&way.to))
+                    nodes[node].returns.is_some() || nodes[node].edges.iter().any(|edge| !circle.contains(&edge.to))
                 });
                 let heads: BTreeSet<usize> = (nodes.iter().enumerate())
                     .filter(|(number, _)| !circle.contains(number))
-                    .flat_map(|(_, node)| node.ways.iter().map(|way| way.to))
+                    .flat_map(|(_, node)| node.edges.iter().map(|edge| edge.to))
                     .chain([0])
                     .filter(|to| circle.contains(to))
                     .collect();
@@ -334,10 +335,14 @@ impl<'a> Timer<'a> {
         begins: Vec<(usize, Time)>,
     ) -> Vec<Option<Time>> {
         let own = |node: &Node| -> Vec<(usize, Time)> {
-            node.ways.iter().filter(|way| within(way.to)).map(|way| (way.to, Time::of(way.cycles.into()))).collect()
+            node.edges
+                .iter()
+                .filter(|edge| within(edge.to))
+                .map(|edge| (edge.to, Time::of(edge.cycles.into())))
+                .collect()
         };
-        let ways = nodes.iter().enumerate().map(|(number, node)| if within(number) { own(node) } else { Vec::new() });
-        self.fill(nodes, &ways.collect::<Vec<_>>(), within, begins)
+        let edges = nodes.iter().enumerate().map(|(number, node)| if within(number) { own(node) } else { Vec::new() });
+        self.fill(nodes, &edges.collect::<Vec<_>>(), within, begins)
     }
 
     /// The longest time to the beginning of each place that can be reached from the starting places, over places that
@@ -349,21 +354,21 @@ impl<'a> Timer<'a> {
         begins: Vec<(usize, Time)>,
         stretch: Option<Stretch>,
     ) -> Vec<Option<Time>> {
-        let mut ways: Vec<Vec<(usize, Time)>> = Vec::with_capacity(nodes.len());
+        let mut edges: Vec<Vec<(usize, Time)>> = Vec::with_capacity(nodes.len());
         for (number, node) in nodes.iter().enumerate() {
             let mut leading = Vec::new();
-            for way in node.ways.iter().filter(|way| within(number) && within(way.to)) {
-                leading.extend(self.time_of(node, way, stretch).map(|time| (way.to, time)));
+            for edge in node.edges.iter().filter(|edge| within(number) && within(edge.to)) {
+                leading.extend(self.time_of(node, edge, stretch).map(|time| (edge.to, time)));
             }
-            ways.push(leading);
+            edges.push(leading);
         }
-        self.fill(nodes, &ways, within, begins)
+        self.fill(nodes, &edges, within, begins)
     }
 
     fn fill(
         &self,
         nodes: &[Node],
-        ways: &[Vec<(usize, Time)>],
+        edges: &[Vec<(usize, Time)>],
         within: &dyn Fn(usize) -> bool,
         begins: Vec<(usize, Time)>,
     ) -> Vec<Option<Time>> {
@@ -372,7 +377,7 @@ impl<'a> Timer<'a> {
             times[node] = longer(times[node].take(), Some(time));
         }
         let all = (0..nodes.len()).filter(|&node| within(node)).collect();
-        Paths { code: self.code, nodes, ways, passes: &self.passes }.fill(all, &BTreeSet::new(), 0, &mut times);
+        Paths { code: self.code, nodes, edges, passes: &self.passes }.fill(all, &BTreeSet::new(), 0, &mut times);
         times
     }
 }
@@ -383,11 +388,11 @@ fn ends(nodes: &[Node], times: &[Option<Time>]) -> Option<Time> {
     ends.fold(None, |longest, end| longer(longest, Some(end)))
 }
 
-/// Longest paths over places and ways.
+/// Longest paths over places and edges.
 struct Paths<'a> {
     code: &'a Code<'a>,
     nodes: &'a [Node],
-    ways: &'a [Vec<(usize, Time)>],
+    edges: &'a [Vec<(usize, Time)>],
     passes: &'a Passes,
 }
 
@@ -399,15 +404,15 @@ impl Paths<'_> {
     /// Propagates the times of the starting places to all others of a set at this loop depth. Ways back to `heads` are
     /// left out.
     fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
-        let ways = |node: usize| self.ways[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
-        for circle in circles(&set, &|node| ways(node).map(|(to, _)| *to).collect()) {
-            let is_loop = circle.len() > 1 || circle.iter().any(|&node| ways(node).any(|(to, _)| *to == node));
+        let edges = |node: usize| self.edges[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
+        for circle in circles(&set, &|node| edges(node).map(|(to, _)| *to).collect()) {
+            let is_loop = circle.len() > 1 || circle.iter().any(|&node| edges(node).any(|(to, _)| *to == node));
             if is_loop {
                 self.turn(&circle, depth, times);
             }
             for &node in &circle {
                 let Some(time) = times[node].clone() else { continue };
-                for (to, own) in ways(node).filter(|(to, _)| !circle.contains(to)) {
+                for (to, own) in edges(node).filter(|(to, _)| !circle.contains(to)) {
                     times[*to] = longer(times[*to].take(), Some(time.and(own)));
                 }
             }
@@ -416,7 +421,7 @@ impl Paths<'_> {
 
     /// Propagates the times at a loop's entries to all of its places.
     fn turn(&self, circle: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
-        // In a loop with several entries, a turn is the way from one entry to the next. The loop turns as often as the
+        // In a loop with several entries, a turn is the path from one entry to the next. The loop turns as often as the
         // program passes any entry. A bound stated at one place is not valid for all of them.
         let heads: BTreeSet<usize> = circle.iter().copied().filter(|&node| times[node].is_some()).collect();
         let mut passes = Some(0);
@@ -438,7 +443,7 @@ impl Paths<'_> {
         self.fill(circle.clone(), &heads, depth + 1, &mut inside);
         let mut turn = Time::default();
         for &node in circle {
-            for (_, own) in self.ways[node].iter().filter(|(to, _)| heads.contains(to)) {
+            for (_, own) in self.edges[node].iter().filter(|(to, _)| heads.contains(to)) {
                 turn = inside[node].as_ref().map_or(turn.clone(), |time| turn.or(&time.and(own)));
             }
         }
@@ -457,7 +462,7 @@ impl Paths<'_> {
     fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
         let saying = |node: usize| self.passes.stated.get(&self.address(node)).map(|passes| (node, *passes));
         let within = |node: usize, set: &BTreeSet<usize>| -> Vec<usize> {
-            self.ways[node].iter().map(|(to, _)| *to).filter(|to| set.contains(to)).collect()
+            self.edges[node].iter().map(|(to, _)| *to).filter(|to| set.contains(to)).collect()
         };
         let without_head: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != head).collect();
         let inner = circles(&without_head, &|node| within(node, &without_head));

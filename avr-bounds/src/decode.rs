@@ -343,7 +343,7 @@ mod tests {
     const SPM_WITH_INCREMENT: u32 = 0x95F8;
 
     #[test]
-    fn every_word_is_what_avr_objdump_takes_it_for() {
+    fn every_word_is_decoded_as_by_avr_objdump() {
         let file = tempfile::NamedTempFile::new().expect("there is room for a file");
         // A second word behind each, for those that have one; 0 is `nop`.
         let words: Vec<u8> = (0..=u16::MAX).flat_map(|word| [word.to_le_bytes(), [0, 0]].concat()).collect();

@@ -107,7 +107,7 @@ const fn flags(bits: u64) -> Registers {
     Registers(bits << REGISTERS)
 }
 
-// Flags by their bit in SREG, and those that instructions of a kind change.
+// Flags by their bit in SREG, and the flags that each kind of instruction changes.
 const C: Registers = flags(1);
 const Z: Registers = flags(1 << 1);
 const T: Registers = flags(1 << 6);
@@ -115,17 +115,17 @@ const SVNZ: Registers = flags(0b01_1110);
 const SVNZC: Registers = flags(0b01_1111);
 const HSVNZC: Registers = flags(0b11_1111);
 
-/// What an instruction does.
+/// The effects of an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Effects {
     pub(crate) reads: Registers,
     pub(crate) changes: Registers,
-    /// It does something else as well: to memory, to a peripheral, to the stack, or to where the program goes.
+    /// It does something else as well: to memory, to a peripheral, to the stack, or to the control flow.
     pub(crate) acts: bool,
 }
 
 impl Instruction {
-    /// What it reads and changes.
+    /// The registers and flags that it reads and changes.
     pub(crate) fn effects(&self) -> Effects {
         use Registers as R;
 
@@ -164,13 +164,13 @@ impl Instruction {
             Brbs | Brbc => (flag, R::NONE, true),
             Cpse => (to | from, R::NONE, true),
             Sbrc | Sbrs => (from, R::NONE, true),
-            // Functions read the status register for its interrupt flag, handlers to put it back, which is followed by itself.
+            // Functions read SREG for its interrupt flag, handlers to restore it; another analysis follows this.
             In | Lds => (R::NONE, to, false),
             Out | Sts => (from, R::NONE, true),
             Ld | Ldd => (pointer, to | moved, false),
             Lpm | Elpm => (pointer, to | moved, false),
             St | Std => (pointer | from, moved, true),
-            // What is on the stack is followed by itself.
+            // Another analysis follows the stack.
             Push => (R::NONE, R::NONE, true),
             Pop => (R::NONE, to, true),
             Break | Call | Cbi | Eicall | Eijmp | Icall | Ijmp | Jmp | Nop | Rcall | Ret | Reti | Rjmp | Sbi | Sbic
@@ -215,7 +215,7 @@ mod tests {
 
         /// Carries an instruction of these two words out and returns what registers and flags hold then.
         fn run(&mut self, words: [u16; 2], before: &Contents) -> Contents {
-            /// Where it stands: no vector lies there.
+            /// Its address: no vector lies there.
             const PLACE: usize = 0x100;
 
             let mut behind = *before;
@@ -251,8 +251,8 @@ mod tests {
     }
 
     #[test]
-    fn an_instruction_changes_and_reads_in_the_simulator_what_it_is_said_to() {
-        /// An address in SRAM for those that have it in their second word, and GPIOR0, which does nothing, for `in`.
+    fn an_instruction_changes_and_reads_the_same_in_the_simulator() {
+        /// An address in SRAM for instructions that have it in their second word, and GPIOR0, which does nothing, for `in`.
         const ADDRESS: u16 = 0x0300;
         const GPIOR0: u16 = 0x3E;
 
@@ -294,7 +294,7 @@ mod tests {
                     let all: Vec<u8> = concrete.registers.into_iter().chain(flags).collect();
                     assert_eq!(all, behind, "{} from {before:?}", instruction.mnemonic());
                 }
-                // What is not read may hold anything else.
+                // Unread registers get other values.
                 let other = any_contents(&mut random);
                 let other =
                     std::array::from_fn(|place| if reads.contains(place) { before[place] } else { other[place] });

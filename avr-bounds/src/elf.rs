@@ -48,10 +48,7 @@ pub enum ElfError {
         architecture: Architecture,
     },
     /// The file does not name its chip, and neither did the caller.
-    #[error(
-        "{path} does not say what chip it is for: name it with --chip or `chip = ..` in the budgets, as one of {}",
-        names()
-    )]
+    #[error("{path} does not name its chip: name it with --chip or `chip = ..` in the budgets, as one of {}", names())]
     NoChip {
         /// The file.
         path: PathBuf,

@@ -24,16 +24,16 @@ pub enum BoundsError {
     /// The program has an instruction that cannot be followed.
     #[error("{} {problem}, at {:#06x}{}{}", place.function, place.address, Line(place), problem.advice(place))]
     At {
-        /// Where.
+        /// The address.
         place: Place,
-        /// What it does.
+        /// The instruction's effect.
         problem: Problem,
     },
     /// Functions that call each other in a circle.
     #[error(
-        "there is recursion, which has no deepest stack: {} calls itself: say in the budgets how many calls are active at once, \
-         as in [recursion] {:?} = {{ depth = 3, because = \"..\" }}; if a call by a pointer is taken for one of these, link with \
-         -Wl,--emit-relocs, which tells the functions whose address is taken",
+        "there is recursion, which has no deepest stack: {} calls itself: set in the budgets how many calls are active at once, \
+         as in [recursion] {:?} = {{ depth = 3, because = \"..\" }}; if a call by a pointer only seems to be one of these, link with \
+         -Wl,--emit-relocs, which lists the functions whose address is taken",
         circle.join(", which calls "),
         circle.first().map_or("", String::as_str)
     )]
@@ -49,19 +49,19 @@ pub enum BoundsError {
     HandlerEnables {
         /// The vector.
         vector: u8,
-        /// Where.
+        /// The address.
         place: Place,
     },
     /// A loop without a bound, where the time must have one.
     #[error(
-        "{what} has a loop without a bound, at {:#06x}{} in {}: say how often it turns, by a record in .loop_bounds or for the function, \
+        "{what} has a loop without a bound, at {:#06x}{} in {}: give its bound, by a record in .loop_bounds or for the function, \
          as in [loops] {:?} = {{ passes = 9, because = \"..\" }}",
         place.address, Line(place), place.function, place.function
     )]
     Unbounded {
-        /// What has no bound.
+        /// The quantity without a bound.
         what: String,
-        /// Where the loop begins.
+        /// The loop's first address.
         place: Place,
     },
     /// Functions clobber live registers.
@@ -82,7 +82,7 @@ pub enum BoundsError {
         registers: String,
     },
     /// A handler changes registers or flags.
-    #[error("the handler of vector {vector}, {function}, does not put back what it found in {registers}")]
+    #[error("the handler of vector {vector}, {function}, does not restore {registers}")]
     HandlerSpoils {
         /// The vector.
         vector: u8,
@@ -93,7 +93,7 @@ pub enum BoundsError {
     },
     /// The input's vectors do not rank before all others.
     #[error(
-        "vector {other} goes before vector {vector} and is not among those whose edges are watched, so their longest wait is not bounded"
+        "vector {other} has priority over vector {vector} and is no vector of the input, so an edge's longest wait has no bound"
     )]
     NotFirst {
         /// One that is watched.
@@ -103,7 +103,7 @@ pub enum BoundsError {
     },
     /// A vector of the input has no handler, or its handler does not read the port exactly once.
     #[error(
-        "the handler of vector {vector} does not read the port at {port:#04x} exactly once on every path, or there is none"
+        "the handler of vector {vector} is missing, or does not read the port at {port:#04x} exactly once on every path"
     )]
     DoesNotLook {
         /// The vector.
@@ -122,7 +122,7 @@ impl fmt::Display for Line<'_> {
     }
 }
 
-/// What cannot be followed.
+/// Why the analysis stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Problem {
     /// A word that is no instruction of this chip.
@@ -150,10 +150,10 @@ pub enum Problem {
 impl fmt::Display for Problem {
     fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
         to.write_str(match self {
-            Problem::NoInstruction => "comes to a place where there is no instruction of the chip",
+            Problem::NoInstruction => "reaches an address without an instruction of the chip",
             Problem::Indirect => "calls or jumps to an address that it works out",
             Problem::UnknownStatus => "sets the interrupt flag by a value that is not a saved SREG",
-            Problem::UnknownStack => "sets the stack pointer to what cannot be followed",
+            Problem::UnknownStack => "sets the stack pointer to an unknown value",
             Problem::HalfAStackPointer => "lets an interrupt come in between the two halves of the stack pointer",
             Problem::GrowsForEver => "puts more onto the stack in every turn of a loop",
             Problem::TakesTooMuch => "takes more from the stack than it has put there",
@@ -165,7 +165,7 @@ impl fmt::Display for Problem {
 }
 
 impl Problem {
-    /// What to write, after a colon.
+    /// The advice, after a colon.
     fn advice(self, place: &Place) -> String {
         match self {
             Problem::Indirect => {
@@ -174,7 +174,7 @@ impl Problem {
             Problem::UnknownStack => {
                 ": alloca and arrays of unknown length have no bound, take an array of fixed length".into()
             }
-            Problem::NoInstruction => ": check that --chip is the one that the program was built for".into(),
+            Problem::NoInstruction => ": check that the program was built for the chip of --chip".into(),
             _ => String::new(),
         }
     }

@@ -67,27 +67,27 @@ pub(crate) struct Place {
     pub(crate) interrupts: Interrupts,
 }
 
-/// A way from a place to the next.
+/// An edge from a place to the next.
 #[derive(Clone)]
-pub(crate) struct Way {
+pub(crate) struct Edge {
     /// The place's number in its routine.
     pub(crate) to: usize,
-    /// Cycles of the instruction on this way, including those of a call itself.
+    /// Cycles of the instruction on this edge, including the call instruction itself.
     pub(crate) cycles: u32,
-    /// The routine that is called on this way.
+    /// The routine called on this edge.
     pub(crate) through: Option<Rc<Routine>>,
-    /// The number in R21 and R20 at the beginning of the way, if it is known: the length argument of `memcpy` and
+    /// The number in R21 and R20 at the beginning of the edge, if it is known: the length argument of `memcpy` and
     /// similar functions.
     pub(crate) length: Option<u16>,
     /// Registers with known constants after the instruction.
     pub(crate) constants: Constants,
 }
 
-/// An instruction at a place, and its ways.
+/// An instruction at a place, and its edges.
 #[derive(Clone)]
 pub(crate) struct Node {
     pub(crate) place: Place,
-    pub(crate) ways: Vec<Way>,
+    pub(crate) edges: Vec<Edge>,
     /// If the routine returns here, the cycles of the return.
     pub(crate) returns: Option<u32>,
     /// Functions that are called from here and never return, and the cycles of the call.
@@ -293,7 +293,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         let node = |place: &Place| {
             let Step { next, returns, ends_in, waits } = &steps[place];
             let length = self.known[place].length();
-            let way = |next: &Next| Way {
+            let edge = |next: &Next| Edge {
                 to: numbers[&next.place],
                 cycles: next.cycles,
                 through: next.through.clone(),
@@ -302,7 +302,7 @@ impl<'p, 'a> Follower<'p, 'a> {
             };
             Node {
                 place: *place,
-                ways: next.iter().map(way).collect(),
+                edges: next.iter().map(edge).collect(),
                 returns: *returns,
                 ends_in: ends_in.clone(),
                 waits: *waits,
@@ -338,7 +338,7 @@ impl<'p, 'a> Follower<'p, 'a> {
         let own = nodes.iter().filter(|node| counts(&node.place)).map(|node| (node.place.depth, None));
         let calls = nodes.iter().flat_map(|node| {
             let ends_in = node.ends_in.iter().map(|(_, called)| called);
-            let called = node.ways.iter().filter_map(|way| way.through.as_ref()).chain(ends_in);
+            let called = node.edges.iter().filter_map(|edge| edge.through.as_ref()).chain(ends_in);
             called.map(|routine| {
                 (node.place.depth + self.program.elf.chip.return_address_bytes(), Some(Rc::clone(routine)))
             })

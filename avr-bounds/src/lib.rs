@@ -238,9 +238,9 @@ fn watch(
     for &vector in &input.vectors {
         let look = handlers.get(&vector).and_then(|handler| timer.around(handler, looks));
         let (to, behind) = look.ok_or(BoundsError::DoesNotLook { vector, port: input.port })?;
-        let to = to.longest(code).or_refuse("the way to a look")?.unwrap_or_default();
+        let to = to.longest(code).or_refuse("the path to a read")?.unwrap_or_default();
         to_look = to_look.max(code.elf.chip.response_cycles() + to);
-        busy = busy.max(behind.longest(code).or_refuse("the way from a look")?.unwrap_or_default());
+        busy = busy.max(behind.longest(code).or_refuse("the path from a read")?.unwrap_or_default());
     }
     for other in of_handlers.iter().filter(|handler| !input.vectors.contains(&handler.vector)) {
         let longest = Longest { cycles: other.cycles, without_bound: other.without_bound.clone() };
@@ -276,7 +276,7 @@ fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
     let mut found: BTreeMap<u32, (FunctionBounds, Option<Time>)> = BTreeMap::new();
     for routine in code.routines() {
         let called = |node: &Node| {
-            let through = node.ways.iter().filter_map(|way| way.through.clone());
+            let through = node.edges.iter().filter_map(|edge| edge.through.clone());
             through.chain(node.ends_in.iter().map(|(_, called)| Rc::clone(called))).collect::<Vec<_>>()
         };
         let calls = routine.nodes.iter().flat_map(called).map(|called| code.name_of(called.entry));

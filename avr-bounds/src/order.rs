@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_other_machines_number_otherwise_is_left_out_of_a_name() {
+    fn numbers_that_differ_between_machines_are_left_out_of_a_name() {
         assert_eq!(without_numbers("_RNvMs_NtCsfdqj_7control6ground4look"), "_RNvMs_NtCs*_7control6ground4look");
         assert_eq!(without_numbers("_RNvCs1_1aCs2_1b"), "_RNvCs*_1aCs*_1b");
         let long = "_RINvXs_NtCs1a_3abc8examplesNtB5_7BuiltInINtNtCs2_3knn4Kj5_8ExamplesKj5_E4keepKtc8_EB1f_";

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (number, node) in nodes.iter().enumerate() {
-        for way in &node.ways {
-            from[way.to].push(number);
+        for edge in &node.edges {
+            from[edge.to].push(number);
         }
     }
     let mut reaches = vec![false; nodes.len()];
@@ -22,13 +22,13 @@ pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bo
 }
 
 /// Whether a strongly connected part is a loop: several places, or one that leads to itself.
-pub(crate) fn is_circle(part: &BTreeSet<usize>, ways: &dyn Fn(usize) -> Vec<usize>) -> bool {
-    part.len() > 1 || part.iter().any(|&node| ways(node).contains(&node))
+pub(crate) fn is_circle(part: &BTreeSet<usize>, edges: &dyn Fn(usize) -> Vec<usize>) -> bool {
+    part.len() > 1 || part.iter().any(|&node| edges(node).contains(&node))
 }
 
 /// The strongly connected parts of a set, each before the parts that it leads to (Tarjan's algorithm, without
 /// recursion).
-pub(crate) fn circles(set: &BTreeSet<usize>, ways: &dyn Fn(usize) -> Vec<usize>) -> Vec<BTreeSet<usize>> {
+pub(crate) fn circles(set: &BTreeSet<usize>, edges: &dyn Fn(usize) -> Vec<usize>) -> Vec<BTreeSet<usize>> {
     #[derive(Clone, Copy)]
     struct Mark {
         number: usize,
@@ -46,7 +46,7 @@ pub(crate) fn circles(set: &BTreeSet<usize>, ways: &dyn Fn(usize) -> Vec<usize>)
             let number = marks.len();
             marks.insert(node, Mark { number, lowest: number, is_open: true });
             open.push(node);
-            (node, ways(node).into_iter())
+            (node, edges(node).into_iter())
         };
         let mut path = vec![begin(start, &mut marks, &mut open)];
         while let Some((node, rest)) = path.last_mut() {

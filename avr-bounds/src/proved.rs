@@ -105,7 +105,7 @@ pub struct Lasting {
 pub struct FunctionBounds {
     /// Its name.
     pub function: String,
-    /// Where it begins.
+    /// Its first address.
     pub address: u32,
     /// Its deepest stack, without its return address.
     pub stack_bytes: usize,
@@ -118,11 +118,11 @@ pub struct FunctionBounds {
 /// A call or a jump to an address that the program works out.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Indirect {
-    /// Where it is.
+    /// Its address.
     pub place: Place,
     /// How its targets were found.
     pub found: Found,
-    /// Where it can lead.
+    /// Its possible targets.
     pub targets: BTreeSet<String>,
 }
 

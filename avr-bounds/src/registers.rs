@@ -359,19 +359,19 @@ impl Survey<'_> {
             }
             let instruction = self.program.instruction(node.place.address)?;
             keeping.carry_out(&instruction);
-            for way in &node.ways {
+            for edge in &node.edges {
                 let mut behind = keeping.clone();
-                if let Some(called) = &way.through {
+                if let Some(called) = &edge.through {
                     behind.clobber(Registers::ALL - self.of(called).keeps);
                     behind.gpior = [Content::Unknown; 3];
                 }
                 if let Some(counted) =
-                    keeping.counted.filter(|_| is_way_of_zero(&instruction, nodes[way.to].place.address))
+                    keeping.counted.filter(|_| branches_on_zero(&instruction, nodes[edge.to].place.address))
                 {
                     behind.registers[counted] = Content::Zero;
                 }
-                behind.stack.resize(nodes[way.to].place.depth, Content::Unknown);
-                let is_less = match &mut known[way.to] {
+                behind.stack.resize(nodes[edge.to].place.depth, Content::Unknown);
+                let is_less = match &mut known[edge.to] {
                     Some(before) => before.meet(&behind),
                     new @ None => {
                         *new = Some(behind);
@@ -379,7 +379,7 @@ impl Survey<'_> {
                     }
                 };
                 if is_less {
-                    to_do.push(way.to);
+                    to_do.push(edge.to);
                 }
             }
         }
@@ -407,7 +407,7 @@ impl Survey<'_> {
                 }
                 // Bytes that the stack pointer moves past were written to be read through a pointer.
                 Out if what != What::Lasting && instruction.data_address() == Some(SPL) => {
-                    let least = node.ways.iter().map(|way| nodes[way.to].place.depth).min();
+                    let least = node.edges.iter().map(|edge| nodes[edge.to].place.depth).min();
                     before.stack.extend(least.unwrap_or(depth)..depth);
                 }
                 _ => {
@@ -431,9 +431,9 @@ impl Survey<'_> {
     /// The live registers before a call at a place, after the instruction itself.
     fn in_front(&self, node: &Node, needs: &[LiveIn], what: What) -> LiveIn {
         let mut all = LiveIn::default();
-        for way in &node.ways {
-            let mut behind = needs[way.to].clone();
-            if let Some(called) = &way.through {
+        for edge in &node.edges {
+            let mut behind = needs[edge.to].clone();
+            if let Some(called) = &edge.through {
                 behind.registers = behind.registers & self.of(called).keeps;
             }
             all.join(&behind);
@@ -455,8 +455,8 @@ impl Survey<'_> {
         let mut gives = Registers::NONE;
         for node in &routine.nodes {
             let (needed, reaching) = (behind(node, &needs), behind(node, &reaching));
-            for way in &node.ways {
-                if let Some(called) = &way.through {
+            for edge in &node.edges {
+                if let Some(called) = &edge.through {
                     gives |= (self.of(called).gives & reaching) - needed;
                 }
             }
@@ -483,13 +483,13 @@ impl Survey<'_> {
         while let Some(number) = to_do.pop() {
             let node = &nodes[number];
             let instruction = self.program.instruction(node.place.address)?;
-            let ways = node.ways.iter().map(|way| match &way.through {
-                Some(called) => (sure[way.to] & self.of(called).keeps) | self.of(called).surely_reads,
-                None => sure[way.to],
+            let edges = node.edges.iter().map(|edge| match &edge.through {
+                Some(called) => (sure[edge.to] & self.of(called).keeps) | self.of(called).surely_reads,
+                None => sure[edge.to],
             });
             let ends = node.ends_in.iter().map(|(_, called)| self.of(called).surely_reads);
             let returns = node.returns.map(|_| Registers::NONE);
-            let all = ways.chain(ends).chain(returns).fold(Registers::ALL, |all, way| all & way);
+            let all = edges.chain(ends).chain(returns).fold(Registers::ALL, |all, edge| all & edge);
             let before = (all - instruction.effects().changes) | reads(&instruction, behind(node, needs));
             if before != sure[number] {
                 sure[number] = before;
@@ -511,15 +511,15 @@ impl Survey<'_> {
             let effects = self.program.instruction(node.place.address)?.effects();
             let new = if effects.acts { Registers::NONE } else { effects.changes };
             let behind = (unread[number] - effects.reads - effects.changes) | new;
-            for way in &node.ways {
-                let behind = way.through.as_ref().map_or(behind, |called| {
+            for edge in &node.edges {
+                let behind = edge.through.as_ref().map_or(behind, |called| {
                     let Summary { keeps, reads, .. } = *self.of(called);
                     behind & (keeps - reads)
                 });
-                let both = unread[way.to] & behind;
-                if both != unread[way.to] || !is_seen[way.to] {
-                    (unread[way.to], is_seen[way.to]) = (both, true);
-                    to_do.push(way.to);
+                let both = unread[edge.to] & behind;
+                if both != unread[edge.to] || !is_seen[edge.to] {
+                    (unread[edge.to], is_seen[edge.to]) = (both, true);
+                    to_do.push(edge.to);
                 }
             }
         }
@@ -536,15 +536,15 @@ impl Survey<'_> {
         while let Some(number) = to_do.pop() {
             let node = &nodes[number];
             let behind = clobbered[number] - self.program.instruction(node.place.address)?.effects().changes;
-            for way in &node.ways {
-                let behind = way
+            for edge in &node.edges {
+                let behind = edge
                     .through
                     .as_ref()
                     .map_or(behind, |called| (behind - self.of(called).gives) | self.clobbers(called));
-                let both = clobbered[way.to] & behind;
-                if both != clobbered[way.to] || !is_seen[way.to] {
-                    (clobbered[way.to], is_seen[way.to]) = (both, true);
-                    to_do.push(way.to);
+                let both = clobbered[edge.to] & behind;
+                if both != clobbered[edge.to] || !is_seen[edge.to] {
+                    (clobbered[edge.to], is_seen[edge.to]) = (both, true);
+                    to_do.push(edge.to);
                 }
             }
         }
@@ -618,7 +618,7 @@ impl Survey<'_> {
         while let Some(to) = to_do.pop() {
             for &number in &from[to] {
                 let node = &routine.nodes[number];
-                let through = node.ways.iter().filter(|way| way.to == to).filter_map(|way| way.through.as_ref());
+                let through = node.edges.iter().filter(|edge| edge.to == to).filter_map(|edge| edge.through.as_ref());
                 let clobbering: Vec<_> = through.filter(|called| self.clobbers(called).contains(register)).collect();
                 found.extend(clobbering.iter().map(|called| (node.place.address, called.entry.address)));
                 let changes = self.program.instruction(node.place.address)?.effects().changes;
@@ -641,22 +641,22 @@ fn reads(instruction: &Instruction, needed: Registers) -> Registers {
 
 /// The registers that are live after an instruction, and after its called function.
 fn behind(node: &Node, needs: &[LiveIn]) -> Registers {
-    node.ways.iter().fold(Registers::NONE, |all, way| all | needs[way.to].registers)
+    node.edges.iter().fold(Registers::NONE, |all, edge| all | needs[edge.to].registers)
 }
 
 /// The predecessors of each place.
 fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
     let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (number, node) in nodes.iter().enumerate() {
-        for way in &node.ways {
-            from[way.to].push(number);
+        for edge in &node.edges {
+            from[edge.to].push(number);
         }
     }
     from
 }
 
 /// Whether a branch leads there if the last result was zero.
-fn is_way_of_zero(branch: &Instruction, to: u32) -> bool {
+fn branches_on_zero(branch: &Instruction, to: u32) -> bool {
     let is_of_zero = Registers::ZERO_FLAG == branch.effects().reads;
     match branch.operation {
         Brbs if is_of_zero => to != branch.next(),
@@ -667,5 +667,5 @@ fn is_way_of_zero(branch: &Instruction, to: u32) -> bool {
 
 /// The routines that a place calls.
 fn called(node: &Node) -> impl Iterator<Item = &Rc<Routine>> {
-    node.ways.iter().filter_map(|way| way.through.as_ref()).chain(node.ends_in.iter().map(|(_, called)| called))
+    node.edges.iter().filter_map(|edge| edge.through.as_ref()).chain(node.ends_in.iter().map(|(_, called)| called))
 }

@@ -36,7 +36,7 @@ pub(crate) enum Interrupts {
     On,
 }
 
-/// What a register holds.
+/// The known content of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Value {
     Unknown,

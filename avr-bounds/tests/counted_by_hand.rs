@@ -74,7 +74,7 @@ fn assert_refused(program: &str, words: &str) {
 }
 
 #[test]
-fn a_stack_is_what_is_pushed_and_called_on_the_deepest_path() {
+fn the_stack_counts_pushes_and_calls_on_the_deepest_path() {
     let bounds = proved(
         "start:
             rcall flat
@@ -152,7 +152,7 @@ fn a_frame_is_made_by_arithmetic_on_the_stack_pointer() {
 fn a_function_that_clobbers_the_frame_s_pointer_leaves_the_stack_unknown() {
     assert_refused(
         "start:\n in r28, 0x3d\n in r29, 0x3e\n rcall clobbers\n out 0x3e, r29\n out 0x3d, r28\n rjmp start\nclobbers:\n ldi r28, 1\n ret",
-        "start sets the stack pointer to what cannot be followed",
+        "start sets the stack pointer to an unknown value",
     );
 }
 
@@ -246,11 +246,11 @@ fn a_path_that_waits_for_the_reset_is_no_critical_section() {
     assert_eq!(bounds.critical_section.cycles, Some(1));
 }
 
-/// INT0's input: one handler reads PIND, and two edges between its looks are told apart.
+/// INT0's input: one handler reads PIND, and it can count two edges between two reads.
 const INPUT: fn() -> Input = || Input { vectors: [1].into(), port: 0x29, edges_between_looks: 2, clock_hz: 16_000_000 };
 
 #[test]
-fn an_edge_waits_for_the_other_handler_for_a_critical_section_and_for_the_way_to_the_look() {
+fn an_edge_waits_for_the_other_handler_a_critical_section_and_the_path_to_the_read() {
     let program = "start:
             sei
         1:  nop
@@ -275,7 +275,7 @@ fn an_edge_waits_for_the_other_handler_for_a_critical_section_and_for_the_way_to
 }
 
 #[test]
-fn an_edge_that_a_handler_does_not_look_at_once_has_no_bound() {
+fn a_handler_that_does_not_read_the_port_gives_no_bound_for_an_edge() {
     let main = "start:\n sei\n1: rjmp 1b\n";
     let refused = |handler: &str| {
         try_to_prove(&format!("{main}{handler}"), Some(&INPUT())).expect_err("it has no bound").to_string()
@@ -288,7 +288,7 @@ fn an_edge_that_a_handler_does_not_look_at_once_has_no_bound() {
     let second = Input { vectors: [16].into(), ..INPUT() };
     let program = format!("{main}handler:\n reti\nother:\n in r2, 9\n reti");
     let error = try_to_prove(&program, Some(&second)).expect_err("INT0 goes before it").to_string();
-    assert!(error.contains("vector 1 goes before vector 16"), "{error}");
+    assert!(error.contains("vector 1 has priority over vector 16"), "{error}");
 }
 
 #[test]
@@ -300,7 +300,7 @@ fn recursion_is_refused_with_its_circle() {
 }
 
 #[test]
-fn what_is_called_by_an_address_is_refused() {
+fn a_call_of_an_unknown_address_is_refused() {
     assert_refused("start:\n icall\n rjmp start", "start calls or jumps to an address that it works out");
     assert_refused("start:\n ijmp", "start calls or jumps to an address that it works out");
     assert_refused(
@@ -359,7 +359,7 @@ fn at_most(turns: u32) -> String {
 }
 
 #[test]
-fn a_loop_that_says_how_often_it_turns_takes_so_many_turns_and_the_way_out() {
+fn a_loop_with_a_stated_bound_takes_its_turns_and_the_exit() {
     let saved = "push r24\n push r25\n in r24, 0x3f\n push r24\n";
     let restored = "pop r24\n out 0x3f, r24\n pop r25\n pop r24\n";
     let handler =
@@ -391,14 +391,14 @@ fn a_record_that_a_turn_can_go_round_bounds_nothing() {
 }
 
 #[test]
-fn what_is_said_of_a_function_holds_for_each_of_its_loops_and_a_record_at_one_goes_before_it() {
+fn a_bound_of_a_function_holds_for_each_of_its_loops_unless_a_record_is_at_one() {
     let cycles = |body: &str, passes: &[u64]| {
         let program = format!("start:\n clr r1\n1: wdr\n rcall waits\n rjmp 1b\nwaits:\n ldi r24, 8\n{body} ret");
         let bound = LoopBound { passes: passes.into(), by_length: false, because: "it counts".into() };
         let bounds = try_to_prove_with(&program, None, &[("waits".into(), bound)].into()).expect("it has bounds");
         bounds.turn.expect("the watchdog is fed").cycles
     };
-    // wdr 1, rcall 3, ldi 1, so many turns and the way out, ret 4, rjmp 2.
+    // wdr 1, rcall 3, ldi 1, the turns and the exit, ret 4, rjmp 2.
     assert_eq!(cycles("3: dec r24\n brne 3b\n", &[9]), Some(11 + 9 * 3 + 2));
     assert_eq!(cycles(&format!("3:\n {} dec r24\n brne 3b\n", at_most(8)), &[9]), Some(11 + 8 * 3 + 2));
     // Entered in its middle as well: by the longer way, sbrc 1 and rjmp 2; nine times by either beginning, and three cycles from
@@ -430,7 +430,7 @@ fn a_function_that_goes_over_as_many_bytes_as_its_caller_says_does_so_where_that
 }
 
 #[test]
-fn a_bound_for_the_loops_of_a_function_that_is_gone_is_refused() {
+fn a_bound_for_a_missing_function_is_refused() {
     let bound = LoopBound { passes: vec![3], by_length: false, because: "it counted".into() };
     let loops = LoopBounds::from([("gone".to_owned(), bound)]);
     let error = try_to_prove_with("start: rjmp start", None, &loops).expect_err("it has no such function").to_string();
@@ -476,7 +476,7 @@ fn a_value_lasts_over_a_call_where_the_function_leaves_it_alone_or_puts_it_back(
 }
 
 #[test]
-fn a_register_that_only_a_convention_would_keep_is_found_where_it_is_clobbered() {
+fn a_clobbered_register_that_only_the_convention_preserves_is_found() {
     let clobbers = "lds r16, 0x0101\n inc r16\n sts 0x0101, r16";
     let program = calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", clobbers);
     assert_refused(&program, "caller calls called, which clobbers r16");
@@ -503,7 +503,7 @@ fn a_register_that_only_a_convention_would_keep_is_found_where_it_is_clobbered()
 }
 
 #[test]
-fn a_result_is_no_clobbered_value_and_what_a_function_uses_itself_is_no_result() {
+fn a_result_is_no_clobbered_value_and_a_scratch_register_is_no_result() {
     // A result, in one byte and in several.
     proved(&calling("ldi r24, 5\n rcall called\n sts 0x0100, r24", "lds r24, 0x0101\n inc r24"));
     proved(&calling(
@@ -555,23 +555,20 @@ fn a_handler_puts_every_register_and_every_flag_back() {
     let flags = "push r24\n in r24, 0x3f\n out 0x1e, r24\n inc r24\n in r24, 0x1e\n out 0x3f, r24\n pop r24\n reti";
     proved(&format!("{main}handler:\n {flags}"));
     let without = |line: &str| format!("{main}handler:\n {}", flags.replacen(line, "nop\n", 1));
-    assert_refused(&without("out 0x3f, r24\n"), "does not put back what it found in flag Z, flag N, flag V, flag S");
+    assert_refused(&without("out 0x3f, r24\n"), "does not restore flag Z, flag N, flag V, flag S");
     assert_refused(&without("out 0x1e, r24\n"), "a value that is not a saved SREG");
-    assert_refused(&format!("{main}handler:\n in r24, 0x09\n reti"), "handler, does not put back what it found in r24");
+    assert_refused(&format!("{main}handler:\n in r24, 0x09\n reti"), "handler, does not restore r24");
     // On one of two paths.
-    assert_refused(&format!("{main}handler:\n sbic 0x09, 2\n in r24, 0x09\n reti"), "what it found in r24");
+    assert_refused(&format!("{main}handler:\n sbic 0x09, 2\n in r24, 0x09\n reti"), "does not restore r24");
 }
 
 #[test]
 fn words_that_are_no_instructions_are_refused() {
-    assert_refused(
-        "start:\n .word 0xFFFF",
-        "start comes to a place where there is no instruction of the chip, at 0x0068",
-    );
+    assert_refused("start:\n .word 0xFFFF", "start reaches an address without an instruction of the chip, at 0x0068");
 }
 
 #[test]
-fn a_bound_over_its_budget_is_told_and_so_is_a_rate_under_it() {
+fn a_bound_over_its_budget_and_a_rate_under_it_are_reported() {
     let budgets = |stack: u64, rate: u64| {
         let file = tempfile::NamedTempFile::new().expect("there is room for a file");
         let text = format!(
@@ -718,7 +715,7 @@ fn a_function_that_breaks_the_convention_is_found() {
     try_to_prove_by(&calling("rcall called", frame), &convention).expect("it is kept");
     let handler = |body: &str| format!("start:\n clr r1\n sei\n1: rjmp 1b\nhandler:\n {body}\n reti");
     let error = try_to_prove_by(&handler("in r24, 0x09"), &convention).expect_err("it is broken").to_string();
-    assert!(error.contains("does not put back what it found in r24"), "{error}");
+    assert!(error.contains("does not restore r24"), "{error}");
 }
 
 #[test]

@@ -210,7 +210,7 @@ fn row(sample: &Sample) -> (String, Option<f64>) {
 }
 
 #[test]
-fn what_is_measured_never_exceeds_what_is_proved() {
+fn measured_values_never_exceed_proved_bounds() {
     let samples = samples();
     let halves: Vec<Vec<(String, Option<f64>)>> = std::thread::scope(|scope| {
         let threads: Vec<_> = samples

@@ -55,11 +55,11 @@ impl Alarm {
     pub const fn code(self) -> (u8, u8) {
         // The first alarm of each digit. A list of codes would cost SRAM.
         let (digit, first) = match self as u8 {
-            place if place < Self::EncoderSilent as u8 => (1, Self::BeamBlocked),
-            place if place < Self::TooFast as u8 => (2, Self::EncoderSilent),
-            place if place < Self::ToolStuck as u8 => (3, Self::TooFast),
-            place if place < Self::SettingsLost as u8 => (4, Self::ToolStuck),
-            place if place < Self::StackLow as u8 => (5, Self::SettingsLost),
+            number if number < Self::EncoderSilent as u8 => (1, Self::BeamBlocked),
+            number if number < Self::TooFast as u8 => (2, Self::EncoderSilent),
+            number if number < Self::ToolStuck as u8 => (3, Self::TooFast),
+            number if number < Self::SettingsLost as u8 => (4, Self::ToolStuck),
+            number if number < Self::StackLow as u8 => (5, Self::SettingsLost),
             _ => (6, Self::StackLow),
         };
         (digit, 1 + self as u8 - first as u8)

@@ -30,7 +30,7 @@ use self::{
     keep_out::{Canopy, KeepOut, Plan, ScheduleFull},
     reach::{Geometry, Leads},
     second_beam::{Blind, SecondBeam},
-    slip::News,
+    slip::SlipChange,
 };
 use crate::{
     settings::Settings,
@@ -122,9 +122,9 @@ impl Ground {
     /// Starts detection on unknown ground. The beam is at `position`; `broken` is its level.
     pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
         self.correct(settings);
-        self.beam = self.geometry.scale.place(position);
+        self.beam = self.geometry.scale.wrap(position);
         self.detector.begin(self.beam, broken);
-        self.keep_out.trust_from(self.beam);
+        self.keep_out.set_known_from(self.beam);
         self.last_plant = self.beam;
         self.second_beam.begin(self.beam);
     }
@@ -139,24 +139,24 @@ impl Ground {
             self.guard = Guard::NONE;
         }
         if self.geometry.scale != scale {
-            self.beam = self.geometry.scale.place(position);
+            self.beam = self.geometry.scale.wrap(position);
             self.begin_here();
         }
     }
 
     /// Whether the measured slip differs from the slip that the distances use.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn is_to_be_corrected(&self) -> bool {
-        self.corrected_by != self.second_beam.slip().believed()
+    pub fn needs_correction(&self) -> bool {
+        self.corrected_by != self.second_beam.slip().present_and_last()
     }
 
     /// Recalculates the distances with the measured slip.
     pub fn correct(&mut self, settings: &Settings) {
-        self.corrected_by = self.second_beam.slip().believed();
-        let (excess, believed) = self.corrected_by;
+        self.corrected_by = self.second_beam.slip().present_and_last();
+        let (excess, last) = self.corrected_by;
         self.geometry.follow(settings, excess);
         // A slip that is no longer trusted may still be right. The margin grows so that the zones hold for both values.
-        let doubted = u32::from(self.geometry.beam_to_tool.0 as u16) * u32::from(excess.abs_diff(believed));
+        let doubted = u32::from(self.geometry.beam_to_tool.0 as u16) * u32::from(excess.abs_diff(last));
         self.geometry.margin = self.geometry.margin + Length((doubted >> 8) as i16);
     }
 
@@ -173,19 +173,19 @@ impl Ground {
 
     /// Takes a beam edge and its position. Returns the detection that was complete before this edge.
     pub fn edge(&mut self, position: Position, broken: bool) -> Option<Detection> {
-        let place = self.geometry.scale.place(position) - self.leads.response;
-        self.detector.edge(place, broken, self.geometry.merge_gap)
+        let wrapped = self.geometry.scale.wrap(position) - self.leads.response;
+        self.detector.edge(wrapped, broken, self.geometry.merge_gap)
     }
 
     /// Takes the second beam's level at a position of the machine. Returns its detection, unless a known canopy explains it.
     pub fn match_second_beam(&mut self, position: Position, broken: bool) -> Option<Detection> {
         let Geometry { scale, second_beam: apart, merge_gap, .. } = self.geometry;
         let least = self.geometry.least_seen();
-        let place = scale.place(position) - self.leads.response - apart;
+        let wrapped = scale.wrap(position) - self.leads.response - apart;
         if broken != self.second_beam.is_broken() {
-            self.widen(place, place, self.second_beam.end(place));
+            self.widen(wrapped, wrapped, self.second_beam.end(wrapped));
         }
-        let mut detection = self.second_beam.look(place, broken, apart, merge_gap, least)?;
+        let mut detection = self.second_beam.take_level(wrapped, broken, apart, merge_gap, least)?;
         // A detection behind the last plant has no spacing, so it cannot be classified.
         detection.cut |= !detection.leading.is_ahead_of(self.last_plant);
         if self.widen(detection.leading, detection.trailing, End::None) {
@@ -211,7 +211,7 @@ impl Ground {
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn roll_to(&mut self, position: Position) -> Option<Detection> {
         let had_left = self.has_left();
-        self.beam = self.geometry.scale.place(position);
+        self.beam = self.geometry.scale.wrap(position);
         let memory = self.geometry.memory;
         // After rolling back this far, the beam sees the same ground again.
         let is_beyond_memory = self.detector.frontier() - self.beam > memory;
@@ -245,7 +245,7 @@ impl Ground {
         }
         self.guard = Guard::NONE;
         self.forget_slip();
-        self.keep_out.spoil(self.detector.frontier());
+        self.keep_out.invalidate(self.detector.frontier());
     }
 
     /// Edges of the beam were lost, so this ground is unknown. The beam's level is now `broken`.
@@ -263,10 +263,10 @@ impl Ground {
     }
 
     /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground.
-    pub fn trust(&mut self) {
+    pub fn assume_bare(&mut self) {
         if self.is_unseen() {
             // A margin behind the tool too, so that it does not stand on the border of the known ground.
-            self.keep_out.trust_from(self.tool() - self.geometry.margin);
+            self.keep_out.set_known_from(self.tool() - self.geometry.margin);
         }
     }
 
@@ -360,9 +360,9 @@ impl Ground {
         self.geometry.scale.ticks(length)
     }
 
-    /// The odometer's position at a place, if `position` is the beam's.
-    pub fn position_of(&self, place: WrappedPosition, position: Position) -> Position {
-        position + self.ticks(place - self.beam)
+    /// The odometer's position at a wrapped position, if `position` is the beam's.
+    pub fn position_of(&self, wrapped: WrappedPosition, position: Position) -> Position {
+        position + self.ticks(wrapped - self.beam)
     }
 
     /// Whether there is a second beam.
@@ -378,8 +378,8 @@ impl Ground {
     }
 
     /// What has changed about the slip since the last call.
-    pub fn take_news(&mut self) -> News {
-        self.second_beam.take_news()
+    pub fn take_slip_change(&mut self) -> SlipChange {
+        self.second_beam.take_slip_change()
     }
 
     /// The wheel's slip in thousandths; `None` if it is unknown.
@@ -433,7 +433,7 @@ impl Ground {
 
     /// Why the tool is in or out at its position, if the odometer shows `position`.
     pub fn at_tool(&self, position: Position) -> AtTool {
-        let of = |place| self.position_of(place, position);
+        let of = |wrapped| self.position_of(wrapped, position);
         match self.keep_out.zone_at(self.tool(), self.geometry.margin) {
             Some((begin, end)) => AtTool::Kept { tool: of(self.tool()), begin: of(begin), end: of(end) },
             None if self.is_closed_at_tool() => AtTool::Unknown,
@@ -518,7 +518,7 @@ mod tests {
     }
 
     #[test]
-    fn of_what_is_not_known_to_be_a_plant_all_is_kept() {
+    fn an_unclassified_detection_keeps_its_full_width() {
         for (class, trim) in [(Class::Plant, 38), (Class::Unknown, 0)] {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::StemZoneMm, 100).expect("within its range");
@@ -537,7 +537,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_forgotten_is_closed_up_to_a_margin_ahead_of_the_frontier() {
+    fn forgotten_ground_is_closed_up_to_a_margin_ahead_of_the_frontier() {
         let margin = 95;
         let (mut known, _) = ground();
         assert_eq!(opens(&mut known, 1000), 1300 + margin + 1);
@@ -616,7 +616,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_is_remembered_as_far_back_as_the_memory_reaches_and_told_once_where_it_ends() {
+    fn the_end_of_remembered_ground_is_reported_once() {
         let (mut ground, _) = ground();
         let memory = i32::from(ground.geometry.memory.0);
         for position in (1400..=40_000).step_by(100) {
@@ -634,7 +634,7 @@ mod tests {
     }
 
     #[test]
-    fn ground_that_was_left_for_want_of_room_is_told_once_by_the_tool_that_comes_back_to_it() {
+    fn rolling_back_to_dropped_ground_is_reported_once() {
         let mut ground = Ground::NONE;
         ground.begin(&Settings::new(), Position::new(0), false);
         let plants = 20;
@@ -670,7 +670,7 @@ mod tests {
     }
 
     #[test]
-    fn the_beam_is_outrun_where_the_lead_reaches_from_the_tool_to_the_margin_of_what_it_has_not_seen() {
+    fn the_beam_is_outrun_if_the_lead_reaches_the_margin_of_unseen_ground() {
         let (mut ground, _) = ground();
         let reach = ground.geometry.beam_to_tool - ground.geometry.margin;
         let outruns = |ground: &mut Ground, out, tool_out| {
@@ -684,7 +684,7 @@ mod tests {
     }
 
     #[test]
-    fn the_spacing_is_no_longer_than_what_is_remembered() {
+    fn the_spacing_is_at_most_the_remembered_length() {
         let (mut ground, _) = ground();
         for position in (1400..200_000).step_by(50) {
             ground.roll_to(Position::new(position));

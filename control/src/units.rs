@@ -151,7 +151,7 @@ impl LengthScale {
 
     /// Converts an odometer position.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub const fn place(self, position: Position) -> WrappedPosition {
+    pub const fn wrap(self, position: Position) -> WrappedPosition {
         WrappedPosition((position.0 >> self.shift) as i16)
     }
 

@@ -18,7 +18,7 @@ use crate::{
         features,
         keep_out::ScheduleFull,
         second_beam::Blind,
-        slip::News,
+        slip::SlipChange,
     },
     measure::{
         readings::{Edge, Readings, Startup},
@@ -197,10 +197,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if let Some(detection) = seen {
             self.classify(detection, true);
         }
-        self.events.add(match self.ground.take_news() {
-            News::None => return,
-            News::Told => Event::Slip { permille: self.ground.slip_permille().unwrap_or(0) },
-            News::Lost => Event::Warning(Warning::SlipUnknown),
+        self.events.add(match self.ground.take_slip_change() {
+            SlipChange::None => return,
+            SlipChange::Measured => Event::Slip { permille: self.ground.slip_permille().unwrap_or(0) },
+            SlipChange::Lost => Event::Warning(Warning::SlipUnknown),
         });
     }
 
@@ -306,7 +306,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             // That was one.
         } else if self.configuration.has_changed() {
             self.follow_settings();
-        } else if self.ground.is_to_be_corrected() {
+        } else if self.ground.needs_correction() {
             self.ground.correct(self.configuration.settings());
         } else if self.leads_are_old {
             self.ground.lead(self.configuration.settings(), self.sensors.meter.expected());
@@ -344,8 +344,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Latches an alarm, and forgets the ground, because its detections are no longer trustworthy.
     fn raise(&mut self, alarm: Alarm) {
         self.ground.forget();
-        let nobody_asks = alarm.is_of_a_sensor() && self.bench.needs_no_sensor();
-        if nobody_asks || matches!(self.state, State::Alarm(_)) {
+        let is_ignored = alarm.is_of_a_sensor() && self.bench.needs_no_sensor();
+        if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
         self.events.add(Event::Alarm { alarm, position: self.sensors.readings.position });

@@ -323,7 +323,7 @@ fn get_shows_the_saved_value_if_it_differs() {
 }
 
 #[test]
-fn a_calibration_answers_its_result_or_what_is_allowed() {
+fn a_calibration_answers_its_result_or_the_allowed_values() {
     let mut machine = machine();
     assert_eq!(machine.ask("calibrate 10000"), ["error: calibrate start first, then roll"]);
     assert_eq!(machine.ask("calibrate start"), ["ok"]);
@@ -337,7 +337,7 @@ fn a_calibration_answers_its_result_or_what_is_allowed() {
 }
 
 #[test]
-fn manual_tests_are_refused_at_work_with_what_to_do() {
+fn manual_tests_are_refused_at_work_with_advice() {
     let mut machine = machine();
     let speed = "error: test row takes a speed in mm/s from 100 to 1300";
     assert_eq!(machine.ask("test row 1401"), [speed]);
@@ -395,7 +395,7 @@ fn curves_show_speed_and_beam_and_status_shows_the_speed() {
 #[test]
 fn status_counts_dropped_events() {
     let mut machine = machine();
-    machine.tell_events(true);
+    machine.enable_events(true);
     for _ in 0..5 {
         machine.start(false).expect("no alarm is latched");
         machine.hold();
@@ -407,7 +407,7 @@ fn status_counts_dropped_events() {
 #[test]
 fn events_and_curves_wait_until_an_answer_is_complete() {
     let mut machine = machine();
-    machine.tell_events(true);
+    machine.enable_events(true);
     machine.set_plot(Plot::Arduino);
     let (mut console, mut typed) = (Console::new(), LineBuffer::new());
     let mut to_type = b"help\nnonsense\nget\nversion\n".iter();

@@ -48,21 +48,21 @@ fn an_unclassified_detection_is_closed_from_its_beginning_and_a_weed_is_open_aft
     // So near that the servo needs its command.
     late.roll_to(weed_mm.0 + BEAM_TO_TOOL_MM - MARGIN_MM, 500.0);
     assert!(late.machine.tool_out(), "it is not yet classified as a weed");
-    assert_eq!((late.told_of(detection).len(), late.machine.zones()), (0, 1));
+    assert_eq!((late.events_of(detection).len(), late.machine.zones()), (0, 1));
     late.roll_to(weed_mm.0 + BEAM_TO_TOOL_MM, 100.0);
     assert!(!late.machine.tool_out());
-    assert_eq!((late.told_of(detection).len(), late.machine.zones()), (1, 0));
+    assert_eq!((late.events_of(detection).len(), late.machine.zones()), (1, 0));
 }
 
 #[test]
 fn a_detection_forgotten_during_classification_is_reported_and_not_kept() {
     let mut late = rolling(20, &[(600.0, 700.0)], usize::MAX, &[]);
     late.roll_to(725.0, 500.0);
-    assert_eq!((late.told_of(detection).len(), late.machine.zones()), (0, 1));
+    assert_eq!((late.events_of(detection).len(), late.machine.zones()), (0, 1));
     late.lose_edges();
     assert_eq!(late.machine.zones(), 0);
     late.roll_to(800.0, 500.0);
-    assert_eq!(late.told_of(detection).len(), 1);
+    assert_eq!(late.events_of(detection).len(), 1);
     assert_eq!((late.machine.zones(), late.machine.state()), (0, State::Alarm(Alarm::BeamEdgesLost)));
 }
 
@@ -70,9 +70,9 @@ fn a_detection_forgotten_during_classification_is_reported_and_not_kept() {
 fn a_detection_still_unclassified_when_the_next_comes_is_kept() {
     let mut late = rolling(u16::MAX, &[(600.0, 620.0), (660.0, 680.0)], usize::MAX, &[]);
     late.roll_to(690.0, 1000.0);
-    assert_eq!((late.told_of(detection).len(), late.machine.zones()), (0, 2));
+    assert_eq!((late.events_of(detection).len(), late.machine.zones()), (0, 2));
     late.roll_to(710.0, 1000.0);
-    assert_eq!(late.told_of(detection).iter().map(|&(vote, ..)| vote).collect::<Vec<_>>(), [Vote::UNKNOWN]);
+    assert_eq!(late.events_of(detection).iter().map(|&(vote, ..)| vote).collect::<Vec<_>>(), [Vote::UNKNOWN]);
     assert_eq!(late.machine.zones(), 2);
 }
 
@@ -82,7 +82,7 @@ fn dust_does_not_end_a_classification() {
     let mut late = rolling(100, &[(600.0, 620.0), (660.0, 663.0)], usize::MAX, &settings);
     late.roll_to(800.0, 1000.0);
     assert_eq!(late.machine.dust(), 1);
-    assert_eq!(late.told_of(detection).iter().map(|(vote, ..)| vote.class).collect::<Vec<_>>(), [Class::Weed]);
+    assert_eq!(late.events_of(detection).iter().map(|(vote, ..)| vote.class).collect::<Vec<_>>(), [Class::Weed]);
 }
 
 proptest! {
@@ -119,17 +119,17 @@ proptest! {
         ];
         let unseen = if second { unseen } else { usize::MAX };
         let [mut quick, mut late] = [0, turns].map(|turns| rolling(turns, &things, unseen, &settings));
-        for (speed_mm_s, way_mm) in legs {
-            let to_mm = quick.place_mm + way_mm;
+        for (speed_mm_s, rolled_mm) in legs {
+            let to_mm = quick.place_mm + rolled_mm;
             // Turn by turn.
-            let step_mm = f64::signum(way_mm) * speed_mm_s / 1000.0;
+            let step_mm = f64::signum(rolled_mm) * speed_mm_s / 1000.0;
             while (to_mm - quick.place_mm) * step_mm > 0.0 {
                 let next_mm = quick.place_mm + step_mm;
                 quick.roll_to(next_mm, speed_mm_s);
                 late.roll_to(next_mm, speed_mm_s);
                 // The beams may report two detections in the same turn. The quick machine then keeps the one that it has no time
                 // for, and the late machine the other.
-                let keeps_unknown = second && quick.told_of(detection).iter().any(|&(vote, ..)| vote == Vote::UNKNOWN);
+                let keeps_unknown = second && quick.events_of(detection).iter().any(|&(vote, ..)| vote == Vote::UNKNOWN);
                 prop_assert!(
                     keeps_unknown || late.machine.tool_out() || !quick.machine.tool_out(),
                     "in the row at {next_mm} mm, but the other is out"
@@ -149,7 +149,7 @@ proptest! {
         }
         // The second beam may report a detection while another is being classified.
         if !second {
-            prop_assert_eq!(quick.told_of(detection), late.told_of(detection));
+            prop_assert_eq!(quick.events_of(detection), late.events_of(detection));
             prop_assert_eq!(quick.machine.zones(), late.machine.zones());
         }
         prop_assert_eq!(quick.machine.state(), late.machine.state());

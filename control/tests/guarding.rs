@@ -30,7 +30,7 @@ fn with_plants(seen: &[bool]) -> Rolling {
 impl Rolling {
     /// Positions of the `guarded` events.
     fn guarded_mm(&self) -> Vec<f64> {
-        self.told_of(|event| match event {
+        self.events_of(|event| match event {
             Event::Guarded(place) => Some(f64::from(place.count()) / TICKS_A_MM),
             _ => None,
         })
@@ -68,7 +68,7 @@ fn a_missed_plant_is_kept_with_its_own_swing() {
     rolling.roll_to(3950.0, 400.0);
     assert!([1500.0, 2500.0, 3000.0].iter().all(|&middle_mm| rolling.has_kept(middle_mm)));
     assert!((1..7).all(|gap| rolling.has_weeded(f64::from(gap) * 500.0 + 200.0, f64::from(gap) * 500.0 + 300.0)));
-    let out = rolling.told_of(|event| matches!(event, Event::Swing { out: true, .. }).then_some(()));
+    let out = rolling.events_of(|event| matches!(event, Event::Swing { out: true, .. }).then_some(()));
     assert_eq!(out.len(), 7);
 }
 

@@ -80,7 +80,7 @@ fn roll(distance_mm: u16, plants: &[(f64, f64)], legs: &[Leg], paper: bool) -> R
     ] {
         machine.set(setting, value).unwrap();
     }
-    machine.tell_events(true);
+    machine.enable_events(true);
     machine.start(true).unwrap();
     let distance = f64::from(machine.settings().ticks(Setting::BeamToToolMm).0);
     let margin = f64::from(machine.settings().ticks(Setting::MarginMm).0);

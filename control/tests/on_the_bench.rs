@@ -141,7 +141,7 @@ fn a_rolled_distance_calibrates_the_wheel() {
     assert_eq!(machine.calibrate(10_000, false), Err(CommandError::NotInHold));
 }
 
-/// Has the servo timed, with a tool that is out so long after it was told to, and leaves that long after.
+/// Times the servo with a tool that is out this time after the command, and leaves that time after it.
 fn swings(machine: &mut Machine, out_ms: u32, in_ms: u32) -> Vec<Event> {
     machine.readings.end_switch_on = true;
     machine.stand(1_000);
@@ -202,10 +202,10 @@ fn a_dry_run_ignores_the_sensors() {
     let mut machine = machine();
     machine.at(77).stand(300);
     machine.test_row(500).unwrap();
-    machine.tell_events(true);
+    machine.enable_events(true);
     let mut swings = Vec::new();
     for now in 300..10_000 {
-        // Nothing is wired: the beam flickers faster than anybody can count, and the encoder's contacts pick up hum.
+        // Nothing is wired: the beam flickers faster than the loop can count, and the encoder's contacts pick up hum.
         let beams = Beams::one(now % 2 == 0);
         machine.see(beams);
         if now % 5 == 0 {

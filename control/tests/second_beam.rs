@@ -41,7 +41,7 @@ impl Rolling {
 
     /// The reported slips, in thousandths.
     fn slips(&self) -> Vec<i16> {
-        self.told_of(|event| match event {
+        self.events_of(|event| match event {
             Event::Slip { permille } => Some(permille),
             _ => None,
         })
@@ -242,7 +242,7 @@ fn a_stand_too_dense_for_the_beams_makes_the_slip_unknown_with_a_warning() {
     assert!(rolling.machine.slip_permille().is_some_and(|slip| (75..=85).contains(&slip)));
     rolling.roll_to(8800.0, 500.0);
     assert_eq!((rolling.machine.slip_permille(), &rolling.alarms()[..]), (None, &[][..]));
-    let warnings = rolling.told_of(|event| matches!(event, Event::Warning(Warning::SlipUnknown)).then_some(()));
+    let warnings = rolling.events_of(|event| matches!(event, Event::Warning(Warning::SlipUnknown)).then_some(()));
     assert_eq!(warnings.len(), 1);
     assert!(rolling.least_margin_mm(&plants[3..]) > 0.0, "the zones with the last slip and without it are both kept");
     assert!(rolling.slips().iter().all(|slip| (75..=85).contains(slip)), "{:?}", rolling.slips());
@@ -257,7 +257,7 @@ fn weeds_reported_by_both_beams_count_once_toward_an_unknown_crop() {
             (0..count).map(|weed| 600.0 + 60.0 * f64::from(weed)).map(|from| (from, from + 20.0)).collect();
         let mut rolling = along(&weeds);
         rolling.roll_to(2000.0, 500.0);
-        let told = rolling.told_of(|event| matches!(event, Event::Detection { .. }).then_some(()));
+        let told = rolling.events_of(|event| matches!(event, Event::Detection { .. }).then_some(()));
         assert!(told.len() > usize::from(count), "{} of {count}", told.len());
         let alarms: Vec<_> = rolling.alarms().iter().map(|&(alarm, _)| alarm).collect();
         assert_eq!(alarms, if count < enough { vec![] } else { vec![Alarm::CropUnknown] });

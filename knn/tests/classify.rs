@@ -306,7 +306,7 @@ fn an_impossible_question_is_an_error_and_not_a_class() {
 }
 
 #[test]
-fn an_error_says_what_to_do() {
+fn an_error_has_advice() {
     for (error, advice) in [
         (ClassifyError::KOutOfRange, "choose 1 to 15"),
         (ClassifyError::NoExamples, "add at least k"),

@@ -22,7 +22,7 @@ fn operation() -> impl Strategy<Value = Operation> {
 
 proptest! {
     #[test]
-    fn a_table_does_what_a_vec_of_limited_length_does(operations in proptest::collection::vec(operation(), 0..80)) {
+    fn a_table_behaves_like_a_vec_of_limited_length(operations in proptest::collection::vec(operation(), 0..80)) {
         let mut table: Table<3, CAPACITY> = Table::default();
         let mut model = Vec::new();
         for operation in operations {

@@ -90,7 +90,7 @@ test("the address with the code pairs by itself, and machines side by side are s
     await part(page, "right", "hold").click();
     await part(here.page, "right", "state").filter({ hasText: "hold" }).waitFor();
 
-    // What is changed on one page is seen on another, and on one that comes later, which has its help too.
+    // A change on one page is visible on another, and on a page opened later, with its help.
     await part(here.page, "right", "typed").fill("set k 5");
     await part(here.page, "right", "typed").press("Enter");
     const late = await openAt(browser, served.here);

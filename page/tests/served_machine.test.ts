@@ -9,7 +9,7 @@ import { type Happening, NoMachine, Refused } from "../src/link/session.ts";
 interface Sent {
     readonly line: string;
     answer(text: string): void;
-    /** Its answer is lost on the way back. */
+    /** Its answer is lost. */
     lose(): void;
 }
 
@@ -113,7 +113,7 @@ test("a machine that is lost answers no command, and says why", async () => {
     await goOn();
     machine.tell({ is: "lost", why: "the port is gone" });
     assert.deepEqual(happened.at(-1), { is: "lost", why: "the port is gone", forGood: true, isWanted: false });
-    // What waited is not sent when it is back.
+    // A waiting command is not sent when the machine is back.
     await Promise.all([
         assert.rejects(dump, new NoMachine("the port is gone")),
         assert.rejects(start, new NoMachine("the machine is not there")),

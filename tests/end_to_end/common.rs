@@ -1,6 +1,6 @@
 //! Shared code of the tests: a started Uno, an operator at its console, and a run along a row.
 //!
-//! A [`Run`] is a trial that a test can inspect and operate on the way. This file makes no verdicts: the tests do.
+//! A [`Run`] is a trial that a test can inspect and operate meanwhile. This file makes no verdicts: the tests do.
 
 use field::machine::{Machine, cycle_at};
 use field::motion::Motion;
@@ -27,7 +27,7 @@ pub fn elf() -> PathBuf {
 
 /// An Uno after its start, with inputs at rest, the switch off and the beam clear. The alarm for missing saved settings
 /// is cleared.
-pub fn woken_up() -> Uno {
+pub fn started() -> Uno {
     trial::boot(&elf(), &[]).expect("the firmware wakes up")
 }
 

@@ -1,6 +1,6 @@
 //! The console's grammar over the serial line.
 
-use crate::common::{exchange, refusal, run_for_ms, status, value, woken_up};
+use crate::common::{exchange, refusal, run_for_ms, started, status, value};
 use control::say::command::Word;
 use control::settings::Setting;
 use field::wiring;
@@ -21,7 +21,7 @@ fn assert_answer(uno: &mut Uno, command: &str, lines: u8) {
 
 #[test]
 fn every_command_is_answered_by_its_lines_and_one_ok() {
-    let mut uno = woken_up();
+    let mut uno = started();
     for (command, lines) in [
         ("help", Word::COUNT),
         ("help wheel_mm", 2),
@@ -45,7 +45,7 @@ fn every_command_is_answered_by_its_lines_and_one_ok() {
 }
 
 #[test]
-fn the_firmware_names_itself_and_its_state_when_it_wakes_up() {
+fn the_firmware_sends_its_name_and_state_at_start() {
     let mut uno = Uno::boot(&crate::common::elf()).expect("the firmware can be run").wired(&wiring::WIRES);
     run_for_ms(&mut uno, 300);
     let greeting = uno.received();
@@ -63,7 +63,7 @@ fn the_firmware_names_itself_and_its_state_when_it_wakes_up() {
 
 #[test]
 fn the_status_has_every_figure() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let status = &status(&mut uno);
     for (key, expected) in [
         ("state", "hold"),
@@ -85,7 +85,7 @@ fn the_status_has_every_figure() {
 
 #[test]
 fn help_names_every_command_and_explains_every_setting() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let help = exchange(&mut uno, b"help\n");
     for word in (0..).map_while(Word::from_index) {
         let name = String::from_utf8(word.text().bytes().collect()).expect("ASCII");
@@ -101,8 +101,8 @@ fn help_names_every_command_and_explains_every_setting() {
 }
 
 #[test]
-fn a_bad_line_is_answered_by_one_error_that_says_what_would_be_right() {
-    let mut uno = woken_up();
+fn a_wrong_line_is_answered_by_one_error_with_what_would_be_right() {
+    let mut uno = started();
     for (line, remedy) in [
         (&b"hepl"[..], "help"),
         (b"HELP", "help"),
@@ -135,13 +135,13 @@ fn a_bad_line_is_answered_by_one_error_that_says_what_would_be_right() {
 
 #[test]
 fn an_empty_line_is_not_answered() {
-    let mut uno = woken_up();
+    let mut uno = started();
     assert_eq!(exchange(&mut uno, b"\n\r\n\r \t \n"), [""; 0]);
 }
 
 #[test]
 fn eighty_characters_are_a_line_and_eighty_one_are_too_long() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let line = format!("{:80}\n", "hold");
     assert_eq!(exchange(&mut uno, line.as_bytes()), ["ok"]);
     let line = format!("{:81}\n", "hold");
@@ -153,7 +153,7 @@ fn eighty_characters_are_a_line_and_eighty_one_are_too_long() {
 
 #[test]
 fn a_line_may_take_its_time() {
-    let mut uno = woken_up();
+    let mut uno = started();
     assert_eq!(exchange(&mut uno, b"ho"), [""; 0]);
     run_for_ms(&mut uno, 2000);
     assert_eq!(exchange(&mut uno, b"ld\n"), ["ok"]);
@@ -161,7 +161,7 @@ fn a_line_may_take_its_time() {
 
 #[test]
 fn commands_that_come_while_one_is_being_answered_wait_for_their_turn() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let answer = exchange(&mut uno, b"help\nversion\nhepl\nhold\n");
     assert_eq!(answer.len(), usize::from(Word::COUNT) + 5, "{answer:#?}");
     let end: Vec<&str> = answer[usize::from(Word::COUNT)..].iter().map(|line| &line[..2]).collect();
@@ -170,7 +170,7 @@ fn commands_that_come_while_one_is_being_answered_wait_for_their_turn() {
 
 #[test]
 fn every_line_ends_with_carriage_return_and_line_feed_and_is_plain_text() {
-    let mut uno = woken_up();
+    let mut uno = started();
     uno.send(b"help\nget\nstatus\nhepl\n");
     run_for_ms(&mut uno, 400);
     let text = uno.received();
@@ -183,7 +183,7 @@ fn every_line_ends_with_carriage_return_and_line_feed_and_is_plain_text() {
 
 #[test]
 fn start_is_refused_by_nothing_but_an_alarm() {
-    let mut uno = woken_up();
+    let mut uno = started();
     assert_eq!(exchange(&mut uno, b"start\nstart\nstart now\nhold\nhold\nclear\n"), ["ok"; 6]);
     assert!(refusal(&mut uno, "begin").contains("help"));
 }

@@ -1,6 +1,6 @@
 //! Every setting over the console: its range, values out of range, and changes while the machine works.
 
-use crate::common::{ask, refusal, run_for_ms, woken_up};
+use crate::common::{ask, refusal, run_for_ms, started};
 use control::settings::{Description, Setting};
 use uno::Uno;
 
@@ -33,7 +33,7 @@ fn get(uno: &mut Uno, name: &str) -> String {
 
 /// An Uno with settings that no value of another setting contradicts.
 fn easily_set() -> Uno {
-    let mut uno = woken_up();
+    let mut uno = started();
     for line in ["set lead_out_ms 0", "set margin_mm 0", "set beam_to_tool_mm 1000", "set wheel_mm 200"] {
         ask(&mut uno, line);
     }
@@ -42,7 +42,7 @@ fn easily_set() -> Uno {
 
 #[test]
 fn get_lists_every_setting_with_value_unit_range_and_default() {
-    let listed = ask(&mut woken_up(), "get");
+    let listed = ask(&mut started(), "get");
     let expected: Vec<String> = settings()
         .map(|(setting, name)| {
             let Description { least, greatest, default, .. } = setting.description();
@@ -70,8 +70,8 @@ fn every_setting_takes_the_ends_of_its_range() {
 }
 
 #[test]
-fn every_setting_refuses_what_is_beyond_its_range_and_keeps_its_value() {
-    let mut uno = woken_up();
+fn every_setting_refuses_values_beyond_its_range_and_keeps_its_value() {
+    let mut uno = started();
     for (setting, name) in settings() {
         let Description { least, greatest, default, .. } = setting.description();
         let below = i32::from(least) - 1;
@@ -92,7 +92,7 @@ fn every_setting_refuses_what_is_beyond_its_range_and_keeps_its_value() {
 
 #[test]
 fn settings_that_contradict_each_other_are_refused() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let answer = refusal(&mut uno, "set beam_to_tool_mm 300");
     assert!(answer.contains("beam_to_tool_mm 389 or more"), "{answer}");
     let answer = refusal(&mut uno, "set servo_out_us 1500");

@@ -1,6 +1,6 @@
 //! The encoder at its full rate, a hundred times walking speed, with the rest of the firmware busy.
 
-use crate::common::{ask, elf, encoder_steps, number, run_for_ms, status, woken_up};
+use crate::common::{ask, elf, encoder_steps, number, run_for_ms, started, status};
 use field::wiring;
 use std::path::Path;
 use trial::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
@@ -44,7 +44,7 @@ const STEP_CYCLES: u64 = CYCLES_PER_SECOND / 20_000;
 
 #[test]
 fn no_count_is_lost_when_a_fast_wheel_turns_back() {
-    let mut uno = woken_up();
+    let mut uno = started();
     ask(&mut uno, "events on");
     ask(&mut uno, "start now");
     let begin = uno.cycle() + STEP_CYCLES;

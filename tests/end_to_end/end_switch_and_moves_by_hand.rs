@@ -1,6 +1,6 @@
 //! A tool that was driven directly must not count as stuck when the machine moves it back: its time limit restarts.
 
-use crate::common::{ask, run_for_ms, status, throw_switch, value, woken_up};
+use crate::common::{ask, run_for_ms, started, status, throw_switch, value};
 use field::wiring;
 use uno::Uno;
 
@@ -18,7 +18,7 @@ fn moved(uno: &mut Uno, line: &str, out: bool) {
 #[test]
 fn a_tool_that_follows_every_move_by_hand_is_not_stuck() {
     for back in ["servo out", "hold", "start", "the switch"] {
-        let mut uno = woken_up();
+        let mut uno = started();
         uno.set(wiring::END_SWITCH, false);
         run_for_ms(&mut uno, 100);
         ask(&mut uno, "set end_switch on");

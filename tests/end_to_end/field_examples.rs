@@ -1,6 +1,6 @@
 //! Examples taught in the field: they change the class of later detections, and survive a power failure.
 
-use crate::common::{ask, elf, refusal, run_for_ms, woken_up};
+use crate::common::{ask, elf, refusal, run_for_ms, started};
 use control::ground::field_examples::{self, FieldExamples};
 use control::memory::{ERASED, SIZE, Volatile};
 use field::machine::Machine;
@@ -28,7 +28,7 @@ fn roll_past_odd_objects(uno: &mut Uno, count: usize) {
 }
 
 /// An Uno that wakes up with this in its EEPROM.
-fn waking_up_with(eeprom: &[u8]) -> Uno {
+fn started_with(eeprom: &[u8]) -> Uno {
     let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up").wired(&wiring::WIRES);
     greeted(&mut uno);
     uno
@@ -40,7 +40,7 @@ fn greeted(uno: &mut Uno) {
 
 /// An EEPROM with an example in every slot.
 fn full_eeprom() -> Vec<u8> {
-    let mut store = FieldExamples::asleep(Volatile::new());
+    let mut store = FieldExamples::uninit(Volatile::new());
     store.init();
     for number in 0..field_examples::CAPACITY {
         store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");
@@ -66,7 +66,7 @@ fn field_examples(uno: &mut Uno) -> Vec<String> {
 
 #[test]
 fn an_object_that_was_labelled_is_known_when_it_comes_again() {
-    let mut uno = woken_up();
+    let mut uno = started();
     roll_past_odd_objects(&mut uno, 1);
     let seen = answers(&mut uno);
     assert_eq!(seen.len(), 1);
@@ -92,7 +92,7 @@ fn an_object_that_was_labelled_is_known_when_it_comes_again() {
 
 #[test]
 fn a_label_that_the_built_in_examples_contradict_wants_force() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let row = Row::new(vec![Thing::plant(600.0, 150.0)]).expect("a plant is a row");
     let motion = Motion::steady(0.0, 3000.0, 500.0, 900.0);
     let start = uno.cycle();
@@ -107,8 +107,8 @@ fn a_label_that_the_built_in_examples_contradict_wants_force() {
 }
 
 #[test]
-fn what_was_taught_survives_a_loss_of_power_and_a_spoiled_one_is_dropped_and_counted() {
-    let mut uno = woken_up();
+fn taught_examples_survive_a_power_loss_and_a_corrupted_one_is_dropped_and_counted() {
+    let mut uno = started();
     roll_past_odd_objects(&mut uno, 1);
     ask(&mut uno, "label plant");
     let taught = field_examples(&mut uno);
@@ -121,14 +121,14 @@ fn what_was_taught_survives_a_loss_of_power_and_a_spoiled_one_is_dropped_and_cou
 
     let mut eeprom = uno.eeprom();
     eeprom[SLOTS_BEGIN + 2] ^= 0x10;
-    let mut uno = waking_up_with(&eeprom);
+    let mut uno = started_with(&eeprom);
     assert!(field_examples(&mut uno).is_empty());
     assert!(ask(&mut uno, "examples").contains(&"spoiled=1".to_owned()));
 }
 
 #[test]
 fn examples_are_forgotten_one_by_one_or_all_at_once() {
-    let mut uno = waking_up_with(&full_eeprom());
+    let mut uno = started_with(&full_eeprom());
     assert_eq!(field_examples(&mut uno).len(), usize::from(field_examples::CAPACITY));
     ask(&mut uno, "forget 31");
     assert_eq!(refusal(&mut uno, "forget 31"), "error: no field example has this number, examples lists them");
@@ -140,7 +140,7 @@ fn examples_are_forgotten_one_by_one_or_all_at_once() {
 
 #[test]
 fn a_full_store_refuses_to_learn_until_something_is_forgotten() {
-    let mut uno = waking_up_with(&full_eeprom());
+    let mut uno = started_with(&full_eeprom());
     roll_past_odd_objects(&mut uno, 1);
     assert_eq!(refusal(&mut uno, "label plant"), "error: all 32 places are taken, forget one first");
     ask(&mut uno, "forget 5");
@@ -150,7 +150,7 @@ fn a_full_store_refuses_to_learn_until_something_is_forgotten() {
 
 #[test]
 fn without_an_object_there_is_nothing_to_label() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let none = "error: there is no object without a label, let the beam see one first";
     assert_eq!(refusal(&mut uno, "label plant"), none);
     assert_eq!(answers(&mut uno), [""; 0]);
@@ -158,7 +158,7 @@ fn without_an_object_there_is_nothing_to_label() {
 
 #[test]
 fn the_last_sixteen_objects_are_dumped() {
-    let mut uno = woken_up();
+    let mut uno = started();
     roll_past_odd_objects(&mut uno, 18);
     assert_eq!(answers(&mut uno).len(), 16);
 }

@@ -4,7 +4,7 @@
 //! and for the critical section that the loop may enter directly after it. So each has a budget in cycles, including
 //! entry and return.
 
-use crate::common::{ask, encoder_steps, number, run_for_ms, status, woken_up};
+use crate::common::{ask, encoder_steps, number, run_for_ms, started, status};
 use field::wiring;
 use uno::{CYCLES_PER_SECOND, PinChange};
 use uno::{InterruptStatistics, Uno};
@@ -62,7 +62,7 @@ pub fn roll(uno: &mut Uno, counts_per_second: u64) -> String {
 
 #[test]
 fn no_interrupt_and_no_critical_section_exceeds_its_budget() {
-    let mut uno = woken_up();
+    let mut uno = started();
     uno.measure_interrupts();
     roll(&mut uno, 150_000);
     let InterruptStatistics { handlers, longest_off, longest_critical_section } =
@@ -79,7 +79,7 @@ fn no_interrupt_and_no_critical_section_exceeds_its_budget() {
 
 #[test]
 fn no_count_is_lost_at_250_000_a_second() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let status = roll(&mut uno, 250_000);
     // If every read were in time, the resolved jumps would not be tested.
     assert!(number(&status, "jumps") > 0, "{status}");

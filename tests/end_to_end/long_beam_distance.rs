@@ -7,7 +7,7 @@ use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::Timing;
 
-/// Rolls along plants every 500 mm, and asks for the status on the way.
+/// Rolls along plants every 500 mm, and asks for the status meanwhile.
 fn run_with_beam_at(beam_to_tool_mm: f64, speed_km_h: f64) -> Run {
     let planting = Planting { plants: 8, spacing_scatter_mm: 20.0, ..Planting::default() };
     let row = planting.grow(1).expect("the plants have room");

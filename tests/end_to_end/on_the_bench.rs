@@ -1,6 +1,6 @@
 //! Bench commands on the real ELF: the servo driven directly and timed, and a row without sensors.
 
-use crate::common::{Run, ask, assert_all_kept, exchange, refusal, run_for_ms, status, trial, value, woken_up};
+use crate::common::{Run, ask, assert_all_kept, exchange, refusal, run_for_ms, started, status, trial, value};
 use field::machine::Machine;
 use field::motion::{Motion, mm_s};
 use field::row::{Row, Thing};
@@ -24,7 +24,7 @@ fn what_moves_the_tool_in_hold_waits_until_the_machine_stands_and_ends_when_it_r
     for (command, width_us) in
         [("calibrate servo", 1500.0), ("servo in", 1500.0), ("servo 1720", 1720.0), ("test row", 1500.0)]
     {
-        let mut uno = woken_up();
+        let mut uno = started();
         roll(&mut uno);
         run_for_ms(&mut uno, 500);
         assert!(refusal(&mut uno, command).contains("the machine rolls, stop first"), "{command}");
@@ -58,7 +58,7 @@ fn swing(uno: &mut Uno, duration_ms: u64, out_ms: u64, in_ms: u64) {
 
 #[test]
 fn the_end_switch_times_the_servo() {
-    let mut uno = woken_up();
+    let mut uno = started();
     uno.set(wiring::END_SWITCH, false);
     run_for_ms(&mut uno, 50);
     ask(&mut uno, "set end_switch on");
@@ -76,7 +76,7 @@ fn the_end_switch_times_the_servo() {
 
 #[test]
 fn a_row_without_sensors_swings_the_servo_for_each_plant() {
-    let mut uno = woken_up();
+    let mut uno = started();
     ask(&mut uno, "events on");
     let before = uno.pulses(wiring::SERVO).len();
     ask(&mut uno, "test row 400");
@@ -100,7 +100,7 @@ fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone
     for (command, off_us) in
         [("servo in", -600), ("servo in", -200), ("servo in", 0), ("servo in", 300), ("calibrate servo", 0)]
     {
-        let mut uno = woken_up();
+        let mut uno = started();
         ask(&mut uno, "hold");
         let typed = "test row 1300\n";
         uno.send(typed.as_bytes());
@@ -125,7 +125,7 @@ fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone
 
 #[test]
 fn curves_come_twenty_times_a_second_and_nothing_else_carries_a_colon() {
-    let mut uno = woken_up();
+    let mut uno = started();
     ask(&mut uno, "events on");
     ask(&mut uno, "plot on");
     uno.received();
@@ -146,7 +146,7 @@ fn curves_come_twenty_times_a_second_and_nothing_else_carries_a_colon() {
 
 #[test]
 fn settings_are_taken_back_from_the_memory_or_the_table() {
-    let mut uno = woken_up();
+    let mut uno = started();
     assert!(refusal(&mut uno, "revert").contains("save"));
     for line in ["set k 5", "save", "set k 9"] {
         ask(&mut uno, line);

@@ -3,7 +3,7 @@
 
 use crate::common::{
     Run, ask, assert_a_swing_each, assert_all_kept, assert_commands_in_place, bare_ground, elf, is_out_at_the_pin,
-    number, refusal, run_for_ms, status, steady, trial, value, woken_up,
+    number, refusal, run_for_ms, started, status, steady, trial, value,
 };
 use control::memory::{SIZE, Volatile};
 use control::operate::saved::{COPY, SavedSettings};
@@ -117,8 +117,8 @@ fn a_stack_that_nearly_reaches_the_variables_is_an_alarm() {
     let mut run = at_work();
     let free = number(&status(&mut run.uno), "stack_free");
     assert!((200..1000).contains(&free), "{free}");
-    let spoiled = run.uno.first_stack_address() + 40;
-    run.uno.write_sram(spoiled, &[0]).expect("an address in SRAM");
+    let corrupted = run.uno.first_stack_address() + 40;
+    run.uno.write_sram(corrupted, &[0]).expect("an address in SRAM");
     run.roll_to_the_end();
     let said = status(&mut run.uno);
     assert_eq!(
@@ -149,7 +149,7 @@ fn with(values: &[(Setting, u16)]) -> Settings {
 }
 
 /// Starts with this EEPROM. Returns the greeting and the Uno.
-fn waking_up_with(eeprom: &[u8]) -> (String, Uno) {
+fn started_with(eeprom: &[u8]) -> (String, Uno) {
     let mut uno = Uno::boot_with_eeprom(&elf(), eeprom).expect("the firmware wakes up").wired(&wiring::WIRES);
     let greeting = uno.run_until_serial("commands\r\n", GREETING_CYCLES).expect("the firmware greets");
     (greeting, uno)
@@ -176,7 +176,7 @@ fn an_erased_eeprom_gives_the_defaults_and_an_alarm_that_is_to_be_cleared_before
 
 #[test]
 fn settings_are_saved_and_outlive_the_power() {
-    let mut uno = woken_up();
+    let mut uno = started();
     for line in ["set k 5", "set beam_to_tool_mm 620", "set end_switch on", "set end_switch off", "save"] {
         ask(&mut uno, line);
     }
@@ -190,13 +190,13 @@ fn settings_are_saved_and_outlive_the_power() {
 }
 
 #[test]
-fn any_spoiled_byte_of_a_copy_leaves_the_other_copy() {
+fn any_corrupted_byte_of_a_copy_leaves_the_other_copy() {
     let eeprom = eeprom_with(&[with(&[(Setting::K, 5)]), with(&[(Setting::K, 7)])]);
     for (begin, left) in [(0, "k=7 "), (SIZE / 2, "k=5 ")] {
         for byte in 0..COPY {
-            let mut spoiled = eeprom.clone();
-            spoiled[begin + byte] ^= 1 << (byte % 8);
-            let (greeting, mut uno) = waking_up_with(&spoiled);
+            let mut corrupted = eeprom.clone();
+            corrupted[begin + byte] ^= 1 << (byte % 8);
+            let (greeting, mut uno) = started_with(&corrupted);
             assert!(greeting.contains("state hold,"), "{greeting:?}");
             assert!(k(&mut uno).starts_with(left), "byte {byte} from {begin} on");
         }
@@ -204,13 +204,13 @@ fn any_spoiled_byte_of_a_copy_leaves_the_other_copy() {
 }
 
 #[test]
-fn two_spoiled_copies_or_another_tables_are_lost_settings() {
+fn two_corrupted_copies_or_another_tables_are_lost_settings() {
     let eeprom = eeprom_with(&[with(&[(Setting::K, 5)]), with(&[(Setting::K, 7)])]);
     // Both copies' values, both copies' table marks, and settings of an older table.
     for places in [[10, SIZE / 2 + 20], [0, SIZE / 2]] {
-        let mut spoiled = eeprom.clone();
-        places.into_iter().for_each(|place| spoiled[place] ^= 0x20);
-        let (greeting, mut uno) = waking_up_with(&spoiled);
+        let mut corrupted = eeprom.clone();
+        places.into_iter().for_each(|place| corrupted[place] ^= 0x20);
+        let (greeting, mut uno) = started_with(&corrupted);
         assert!(greeting.contains("state alarm 5-1 settings_lost,"), "{greeting:?}");
         assert!(k(&mut uno).starts_with("k=3 "));
     }
@@ -222,7 +222,7 @@ fn power_lost_at_any_byte_of_a_save_leaves_the_old_settings_or_the_new() {
     let (mut olds, mut news) = (0, 0);
     // A byte takes 3.4 ms.
     for wait_ms in (0..).step_by(3) {
-        let (_, mut uno) = waking_up_with(&before);
+        let (_, mut uno) = started_with(&before);
         for line in ["set k 9", "set margin_mm 45", "set no_plant_m 20"] {
             ask(&mut uno, line);
         }
@@ -249,7 +249,7 @@ fn power_lost_at_any_byte_of_a_save_leaves_the_old_settings_or_the_new() {
 #[test]
 fn saved_settings_that_contradict_each_other_are_an_alarm_and_never_start() {
     let eeprom = eeprom_with(&[with(&[(Setting::BeamToToolMm, 150)])]);
-    let (greeting, mut uno) = waking_up_with(&eeprom);
+    let (greeting, mut uno) = started_with(&eeprom);
     assert!(greeting.contains("state alarm 5-2 settings_contradict,"), "{greeting:?}");
     ask(&mut uno, "clear");
     for command in ["start", "start now", "save"] {
@@ -264,7 +264,7 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_never_start() {
 fn the_saved_pulse_has_the_tool_out_from_the_first_one_on() {
     // A machine with a mirrored servo.
     let eeprom = eeprom_with(&[with(&[(Setting::ServoOutUs, 1000), (Setting::ServoInUs, 2000)])]);
-    let (_, mut uno) = waking_up_with(&eeprom);
+    let (_, mut uno) = started_with(&eeprom);
     run_for_ms(&mut uno, 50);
     let widths: Vec<f64> = uno.pulses(wiring::SERVO).iter().map(|pulse| pulse.width_us()).collect();
     assert!(!widths.is_empty() && widths.iter().all(|width| (width - 1000.0).abs() < 1.0), "{widths:?}");

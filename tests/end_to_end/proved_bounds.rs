@@ -3,7 +3,7 @@
 //!
 //! The proofs analyse the ELF (`avr_bounds`). The measurements run it under full load.
 
-use crate::common::{Run, ask, elf, run_for_ms, woken_up};
+use crate::common::{Run, ask, elf, run_for_ms, started};
 use crate::interrupt_budgets::roll;
 use avr_bounds::{Bounds, BoundsError, Budgets, Program, instruction_at, prove};
 use control::ground::detection::Detection;
@@ -116,7 +116,7 @@ fn instructions_that_take_a_pair_of_registers_name_it() {
 #[test]
 fn a_console_that_is_flooded_beside_a_fast_encoder_and_a_flickering_beam_stays_within_the_bounds() {
     let bounds = proved();
-    let mut uno = woken_up();
+    let mut uno = started();
     uno.measure_interrupts();
     uno.measure_turns();
     roll(&mut uno, BUSY_PER_S);
@@ -151,7 +151,7 @@ fn no_count_is_lost_at_the_rate_that_is_never_lost() {
     let edges = proved().edges.expect("the encoder is watched");
     println!("{} counts a second, {} cycles of wait", edges.never_lost_per_s, edges.wait_cycles);
     // A rate that is a multiple of 100.
-    roll(&mut woken_up(), edges.never_lost_per_s / 100 * 100);
+    roll(&mut started(), edges.never_lost_per_s / 100 * 100);
 }
 
 #[test]

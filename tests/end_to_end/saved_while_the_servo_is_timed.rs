@@ -1,7 +1,7 @@
 //! A save that is answered with `ok` keeps its values, even if the settings change during the write to the EEPROM: the
 //! servo's swings end, and set the leads.
 
-use crate::common::{ask, run_for_ms, woken_up};
+use crate::common::{ask, run_for_ms, started};
 use field::servo::Servo;
 use field::wiring;
 use uno::Uno;
@@ -25,7 +25,7 @@ fn follow(uno: &mut Uno, duration_ms: u64) {
 fn settings_that_were_saved_are_whole_although_the_servos_swings_end_meanwhile() {
     let mut meanwhile = 0;
     for save_at_ms in [8850, 8900, 8950, 8980, 9000] {
-        let mut uno = woken_up();
+        let mut uno = started();
         uno.set(wiring::END_SWITCH, false);
         run_for_ms(&mut uno, 50);
         for line in ["set end_switch on", "set k 5", "events on", "calibrate servo"] {

@@ -1,7 +1,7 @@
 //! A second beam: it measures the wheel's slip plant by plant. A torn wire of either beam is reported before it costs a
 //! plant.
 
-use crate::common::{Run, is_out_at_the_pin, named, number, status, steady, trial, value, woken_up};
+use crate::common::{Run, is_out_at_the_pin, named, number, started, status, steady, trial, value};
 use field::machine::{Machine, cycle_at};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
@@ -50,7 +50,7 @@ fn a_wheel_that_slips_by_a_tenth_keeps_every_plant_that_comes_behind_the_second(
 }
 
 #[test]
-fn the_slip_is_told_plant_by_plant_and_dropped_by_an_alarm() {
+fn the_slip_is_reported_plant_by_plant_and_dropped_by_an_alarm() {
     let mut run = Run::begin(slipping(1.0, SECOND_BEAM_MM, || 0.1), &[]);
     run.roll_to(600.0);
     assert_eq!(value(&status(&mut run.uno), "slip_permille"), "none");
@@ -95,7 +95,7 @@ fn a_torn_wire_of_either_beam_is_an_alarm_within_three_plants_and_costs_none() {
 
 #[test]
 fn without_a_second_beam_its_pin_may_do_what_it_likes() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let begin = uno.cycle();
     uno.drive((0..5000).map(|edge| PinChange {
         cycle: begin + edge * 320,

@@ -1,7 +1,7 @@
-//! Encoder and beam fail on the way: the firmware detects and names the fault, and has the tool out of the row.
+//! Encoder and beam fail during work: the firmware detects and names the fault, and has the tool out of the row.
 
 use crate::common::{
-    Run, ask, bare_ground, is_out_at_the_pin, named, number, run_for_ms, status, steady, trial, value, woken_up,
+    Run, ask, bare_ground, is_out_at_the_pin, named, number, run_for_ms, started, status, steady, trial, value,
 };
 use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
@@ -286,7 +286,7 @@ fn an_end_switch_that_does_not_follow_is_an_alarm() {
 
 #[test]
 fn a_beam_that_chatters_faster_than_it_can_be_heard_is_known_as_it_is_afterwards() {
-    let mut uno = woken_up();
+    let mut uno = started();
     ask(&mut uno, "plot on");
     // More edges than can wait, 10 us apart, ending with the beam broken or clear.
     for edges in 18..=90_u64 {

@@ -1,7 +1,7 @@
 //! Noise on the serial line while the machine weeds: the swings are those of a run without noise, and each bad line
 //! gets an error.
 
-use crate::common::{Run, ask, assert_all_kept, exchange, number, run_for_ms, status, woken_up};
+use crate::common::{Run, ask, assert_all_kept, exchange, number, run_for_ms, started, status};
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
@@ -122,7 +122,7 @@ fn a_flood_without_a_line_end_changes_no_swing_and_is_one_bad_line() {
 
 #[test]
 fn a_command_after_a_flood_is_carried_out() {
-    let mut uno = woken_up();
+    let mut uno = started();
     uno.send(&b"hodl\n".repeat(1000));
     run_for_ms(&mut uno, 1000);
     // Ends the line that the flood may have left incomplete.

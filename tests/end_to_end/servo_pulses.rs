@@ -1,6 +1,6 @@
 //! The servo's signal at the pin: widths to a tenth of a microsecond, frames of 20 ms, and shorter frames for a swing.
 
-use crate::common::{Run, ask, run_for_ms, steady, trial, woken_up};
+use crate::common::{Run, ask, run_for_ms, started, steady, trial};
 use field::motion::mm_s;
 use field::row::{Row, Thing};
 use field::wiring;
@@ -71,7 +71,7 @@ fn settled_pulses(uno: &mut Uno) -> Vec<Pulse> {
 
 #[test]
 fn servo_settings_take_effect_in_hold_at_the_pin() {
-    let mut uno = woken_up();
+    let mut uno = started();
     for width_us in [500, 1900, 2100, 2500] {
         ask(&mut uno, &format!("set servo_out_us {width_us}"));
         let pulses = settled_pulses(&mut uno);

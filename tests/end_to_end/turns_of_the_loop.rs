@@ -4,7 +4,7 @@
 //! millisecond. In that time a machine at 5 km/h rolls 1.4 mm. Longer work is divided over several turns. The time is
 //! counted in cycles from one reset of the watchdog to the next, interrupts included.
 
-use crate::common::{Run, run_for_ms, steady, trial, woken_up};
+use crate::common::{Run, run_for_ms, started, steady, trial};
 use control::ground::field_examples;
 use control::say::command::{LINE_LENGTH, Word};
 use control::settings::Setting;
@@ -141,7 +141,7 @@ fn under_way_after(commands: &[&str], plants: usize) -> Run {
 
 #[test]
 fn no_turn_takes_more_than_a_millisecond_for_all_commands_and_output() {
-    let mut uno = woken_up();
+    let mut uno = started();
     let mut worst = (0, String::new());
     for line in lines() {
         let cycles = typed_takes(&mut uno, &line);

@@ -2,8 +2,8 @@
 //! the beam has seen.
 
 use crate::common::{
-    Run, SWING_TOLERANCE_TICKS, assert_all_kept, bare_ground, elf, is_out_at_the_pin, number, run_for_ms, status,
-    steady, throw_switch, trial, value, woken_up,
+    Run, SWING_TOLERANCE_TICKS, assert_all_kept, bare_ground, elf, is_out_at_the_pin, number, run_for_ms, started,
+    status, steady, throw_switch, trial, value,
 };
 use field::machine::Machine;
 use field::motion::mm_s;
@@ -52,7 +52,7 @@ fn a_switch_that_is_on_at_power_up_starts_nothing_until_it_has_been_off() {
 
 #[test]
 fn the_servo_has_its_signal_from_the_first_frame_on() {
-    let uno = woken_up();
+    let uno = started();
     let first = uno.pulses(wiring::SERVO)[0];
     assert!((first.width_us() - 2000.0).abs() < 0.1, "{first:?}");
     assert!(first.rise < CYCLES_PER_SECOND / 10, "{first:?}");
@@ -90,8 +90,8 @@ fn the_status_says_how_far_seen_ground_still_is() {
 }
 
 #[test]
-fn told_to_start_now_the_tool_enters_the_row_over_unseen_ground() {
-    let mut uno = woken_up();
+fn with_start_now_the_tool_enters_the_row_over_unseen_ground() {
+    let mut uno = started();
     uno.send(b"start now\n");
     run_for_ms(&mut uno, FRAME_MS);
     assert!(!is_out_at_the_pin(&uno));

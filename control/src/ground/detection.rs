@@ -18,8 +18,8 @@ impl Detection {
     pub const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), cut: false };
 
     /// An empty detection at the border of unseen ground: a plant there may reach into seen ground.
-    pub(super) const fn cut_at(place: WrappedPosition) -> Self {
-        Self { leading: place, trailing: place, cut: true }
+    pub(super) const fn cut_at(position: WrappedPosition) -> Self {
+        Self { leading: position, trailing: position, cut: true }
     }
 
     /// How far the machine rolled while the beam was broken, the paper's `t S`.
@@ -28,7 +28,7 @@ impl Detection {
     }
 
     /// Whether a cut detection turned out to be empty.
-    pub(super) fn is_nothing(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.cut && self.leading == self.trailing
     }
 }

@@ -36,10 +36,10 @@ impl Detector {
         parted: false,
     };
 
-    /// Starts at a place. `broken` is the beam's level.
+    /// Starts at a position. `broken` is the beam's level.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn begin(&mut self, place: WrappedPosition, broken: bool) {
-        (self.frontier, self.parted) = (place, false);
+    pub fn begin(&mut self, position: WrappedPosition, broken: bool) {
+        (self.frontier, self.parted) = (position, false);
         self.lose_edges(broken);
     }
 
@@ -65,10 +65,10 @@ impl Detector {
         self.broken
     }
 
-    /// Which end of a detection the next edge is, if it comes at this place. On known ground or inside a detection it may be a
+    /// Which end of a detection the next edge is, if it comes at this position. On known ground or inside a detection it may be a
     /// leaf's, so neither.
-    pub fn end(&self, place: WrappedPosition) -> End {
-        if self.frontier.is_ahead_of(place) {
+    pub fn end(&self, position: WrappedPosition) -> End {
+        if self.frontier.is_ahead_of(position) {
             End::None
         } else if self.broken {
             End::Trailing
@@ -93,7 +93,7 @@ impl Detector {
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn open(&self) -> Option<WrappedPosition> {
         self.detection
-            .filter(|detection| self.broken_at_frontier || !detection.is_nothing())
+            .filter(|detection| self.broken_at_frontier || !detection.is_empty())
             .map(|detection| detection.leading)
     }
 
@@ -105,28 +105,28 @@ impl Detector {
         }
     }
 
-    /// Takes a beam edge at a place. Returns the detection that was complete before it.
-    pub fn edge(&mut self, place: WrappedPosition, broken: bool, merge_gap: Length) -> Option<Detection> {
-        let complete = self.roll_to(place, merge_gap);
+    /// Takes a beam edge at a position. Returns the detection that was complete before it.
+    pub fn edge(&mut self, position: WrappedPosition, broken: bool, merge_gap: Length) -> Option<Detection> {
+        let complete = self.roll_to(position, merge_gap);
         self.broken = broken;
-        if place == self.frontier {
+        if position == self.frontier {
             self.turn(merge_gap);
         }
         complete
     }
 
-    /// The machine has rolled to a place without an edge. Returns the detection that this completes.
+    /// The machine has rolled to a position without an edge. Returns the detection that this completes.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn roll_to(&mut self, place: WrappedPosition, merge_gap: Length) -> Option<Detection> {
-        if !place.is_ahead_of(self.frontier) {
+    pub fn roll_to(&mut self, position: WrappedPosition, merge_gap: Length) -> Option<Detection> {
+        if !position.is_ahead_of(self.frontier) {
             return None;
         }
         // The machine may return to the frontier with another level than it left with.
         self.turn(merge_gap);
-        self.frontier = place;
+        self.frontier = position;
         let clear = !self.broken_at_frontier;
-        let complete = self.detection.take_if(|detection| clear && place - detection.trailing >= merge_gap);
-        complete.filter(|detection| !detection.is_nothing())
+        let complete = self.detection.take_if(|detection| clear && position - detection.trailing >= merge_gap);
+        complete.filter(|detection| !detection.is_empty())
     }
 
     /// Applies the beam's level to the frontier.
@@ -156,25 +156,25 @@ mod tests {
 
     const GAP: Length = Length(40);
 
-    fn begun(place: i16, broken: bool) -> Detector {
+    fn begun(position: i16, broken: bool) -> Detector {
         let mut detector = Detector::NONE;
-        detector.begin(WrappedPosition::new(place), broken);
+        detector.begin(WrappedPosition::new(position), broken);
         detector
     }
 
-    /// Rolls tick by tick through `places`, with the beam broken inside `canopies`, and collects the detections.
-    fn detections(canopies: &[(i16, i16)], places: impl IntoIterator<Item = i16>) -> Vec<(i16, i16)> {
-        let broken_at = |place: i16| canopies.iter().any(|&(from, to)| (from..to).contains(&place));
-        let mut places = places.into_iter();
-        let first = places.next().expect("a place to start from");
+    /// Rolls tick by tick through `positions`, with the beam broken inside `canopies`, and collects the detections.
+    fn detections(canopies: &[(i16, i16)], positions: impl IntoIterator<Item = i16>) -> Vec<(i16, i16)> {
+        let broken_at = |position: i16| canopies.iter().any(|&(from, to)| (from..to).contains(&position));
+        let mut positions = positions.into_iter();
+        let first = positions.next().expect("a position to start from");
         let mut detector = begun(first, broken_at(first));
         let mut found = Vec::new();
-        for place in places {
-            let ground = WrappedPosition::new(place);
-            found.extend(if broken_at(place) == detector.is_broken() {
+        for position in positions {
+            let ground = WrappedPosition::new(position);
+            found.extend(if broken_at(position) == detector.is_broken() {
                 detector.roll_to(ground, GAP)
             } else {
-                detector.edge(ground, broken_at(place), GAP)
+                detector.edge(ground, broken_at(position), GAP)
             });
         }
         found.into_iter().map(|detection| (detection.leading.count(), detection.trailing.count())).collect()
@@ -213,9 +213,10 @@ mod tests {
     fn a_gap_wider_than_between_leaves_is_reported_once() {
         for (gap, parted) in [(1, false), (GAP.0 / 2, false), (GAP.0 / 2 + 1, true), (GAP.0 - 1, true)] {
             let mut detector = begun(-100, false);
-            for (place, broken) in [(0, true), (100, false), (100 + gap, true), (200, false), (201, true), (300, false)]
+            for (position, broken) in
+                [(0, true), (100, false), (100 + gap, true), (200, false), (201, true), (300, false)]
             {
-                assert_eq!(detector.edge(WrappedPosition::new(place), broken, GAP), None);
+                assert_eq!(detector.edge(WrappedPosition::new(position), broken, GAP), None);
             }
             detector.roll_to(WrappedPosition::new(300) + GAP, GAP).expect("the gap has been seen");
             assert_eq!((detector.is_parted(), detector.is_parted()), (parted, false), "{gap}");
@@ -298,8 +299,8 @@ mod tests {
     fn clear_ground_is_no_detection() {
         let mut detector = begun(0, false);
         assert_eq!(detector.open(), None);
-        for place in 1..200 {
-            assert_eq!(detector.roll_to(WrappedPosition::new(place), GAP), None);
+        for position in 1..200 {
+            assert_eq!(detector.roll_to(WrappedPosition::new(position), GAP), None);
         }
     }
 

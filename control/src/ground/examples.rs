@@ -34,7 +34,7 @@ pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
     bytes
 };
 
-/// Squared distance beyond which a detection is like no example.
+/// Squared distance beyond which no example is near enough.
 pub const RADIUS: u32 = table::RADIUS;
 
 /// k of the training.

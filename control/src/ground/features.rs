@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn features_beyond_what_16_bits_hold_are_limited() {
+    fn features_beyond_16_bits_are_limited() {
         let features = Features::describe(278, i16::MAX, i16::MAX);
         assert_eq!((features.hold_mm, features.actuation_mm), (i16::MAX, i16::MAX));
     }

@@ -44,7 +44,7 @@ pub struct FieldExamples<M> {
 
 impl<M: Memory> FieldExamples<M> {
     /// The store before [`init`](Self::init).
-    pub const fn asleep(memory: M) -> Self {
+    pub const fn uninit(memory: M) -> Self {
         // Zeros take no flash. `used` is 0, so none of them counts.
         let examples = [Example::new([0; features::COUNT], 0); CAPACITY as usize];
         Self {
@@ -217,7 +217,7 @@ mod tests {
     }
 
     fn init(memory: Volatile) -> FieldExamples<Volatile> {
-        let mut store = FieldExamples::asleep(memory);
+        let mut store = FieldExamples::uninit(memory);
         store.init();
         store
     }

@@ -24,7 +24,7 @@ enum Behind {
     /// The beam never saw it.
     Unseen,
     /// The beam saw it, but a fault made the detections invalid.
-    Spoiled,
+    Invalid,
     /// The beam saw it, but it was dropped for distance or lack of room.
     Left,
 }
@@ -103,7 +103,7 @@ impl Canopy {
 #[derive(Clone, Debug)]
 pub struct KeepOut {
     canopies: Vec<Canopy, CAPACITY, u8>,
-    /// All ground behind this place is unknown.
+    /// All ground behind this position is unknown.
     known_from: WrappedPosition,
     behind: Behind,
 }
@@ -126,21 +126,21 @@ impl KeepOut {
         self.known_from
     }
 
-    /// Whether the ground at a place was seen, and dropped.
+    /// Whether the ground at a position was seen, and dropped.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn has_left(&self, place: WrappedPosition) -> bool {
-        self.behind == Behind::Left && self.known_from.is_ahead_of(place)
+    pub fn has_left(&self, position: WrappedPosition) -> bool {
+        self.behind == Behind::Left && self.known_from.is_ahead_of(position)
     }
 
-    /// Declares the ground known from `place` on. `place` lies behind the frontier.
-    pub fn trust_from(&mut self, place: WrappedPosition) {
-        (self.known_from, self.behind) = (place, Behind::Unseen);
+    /// Declares the ground known from `position` on. `position` lies behind the frontier.
+    pub fn set_known_from(&mut self, position: WrappedPosition) {
+        (self.known_from, self.behind) = (position, Behind::Unseen);
     }
 
-    /// Forgets all canopies, because they are not reliable. The ground is known from `place` on.
-    pub fn spoil(&mut self, place: WrappedPosition) {
+    /// Forgets all canopies, because they are not reliable. The ground is known from `position` on.
+    pub fn invalidate(&mut self, position: WrappedPosition) {
         self.canopies.clear();
-        (self.known_from, self.behind) = (place, Behind::Spoiled);
+        (self.known_from, self.behind) = (position, Behind::Invalid);
     }
 
     /// Adds a canopy. If all places are taken, drops the oldest canopy behind the tool, and the ground up to its end.
@@ -153,8 +153,8 @@ impl KeepOut {
             if !tool.is_ahead_of(oldest.trailing + margin) {
                 return Err(ScheduleFull);
             }
-            let place = oldest.trailing;
-            self.leave(place);
+            let position = oldest.trailing;
+            self.leave(position);
         }
         self.canopies.push(canopy).map_err(|_| ScheduleFull)
     }
@@ -175,20 +175,20 @@ impl KeepOut {
         }
     }
 
-    /// Drops the canopies that end at a place or behind it.
+    /// Drops the canopies that end at a position or behind it.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn leave(&mut self, place: WrappedPosition) {
-        if !place.is_ahead_of(self.known_from) {
+    pub fn leave(&mut self, position: WrappedPosition) {
+        if !position.is_ahead_of(self.known_from) {
             return;
         }
-        (self.known_from, self.behind) = (place, Behind::Left);
+        (self.known_from, self.behind) = (position, Behind::Left);
         // They are in order, so only the first can lie behind.
-        while self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(place)) {
+        while self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(position)) {
             self.canopies.remove(0);
         }
     }
 
-    /// Whether any of the ground between two places is closed: unknown, or within `margin` of a canopy.
+    /// Whether any of the ground between two positions is closed: unknown, or within `margin` of a canopy.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_closed(&self, near: WrappedPosition, far: WrappedPosition, margin: Length) -> bool {
         let open_from = if self.behind == Behind::Unseen { self.known_from } else { self.known_from + margin };
@@ -201,11 +201,12 @@ impl KeepOut {
         self.canopies.iter().any(|canopy| (canopy.to() - near) >= -margin && (canopy.from() - near) <= length)
     }
 
-    /// The canopy or stem zone whose margin covers a place, from its beginning to its end; the nearest one if there are several.
-    pub fn zone_at(&self, place: WrappedPosition, margin: Length) -> Option<(WrappedPosition, WrappedPosition)> {
+    /// The canopy or stem zone whose margin covers a position, from its beginning to its end; the nearest one if there are several.
+    pub fn zone_at(&self, position: WrappedPosition, margin: Length) -> Option<(WrappedPosition, WrappedPosition)> {
         let zones = self.canopies.iter().map(|canopy| (canopy.from(), canopy.to()));
-        let off =
-            |&(begin, end): &(WrappedPosition, WrappedPosition)| (begin - place).max(place - end).max(Length::ZERO);
+        let off = |&(begin, end): &(WrappedPosition, WrappedPosition)| {
+            (begin - position).max(position - end).max(Length::ZERO)
+        };
         zones.min_by_key(off).filter(|zone| off(zone) <= margin)
     }
 
@@ -293,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_schedule_forgets_only_what_lies_behind_the_tool() {
+    fn a_full_schedule_forgets_only_ground_behind_the_tool() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         for plant in 0..CAPACITY as i16 {
             keep_out.push(canopy(plant * 1000, plant * 1000 + 200), WrappedPosition::new(0), MARGIN).unwrap();
@@ -303,8 +304,8 @@ mod tests {
         assert!(keep_out.has_left(WrappedPosition::new(199)) && !keep_out.has_left(WrappedPosition::new(200)));
         assert!(closed(&keep_out, 294, 294), "forgotten ground is unknown");
         assert!(!closed(&keep_out, 295, 295));
-        let (place, wider) = (WrappedPosition::new(299), Length(100));
-        assert!(keep_out.is_closed(place, place, wider), "its margin is kept, even one that was set later");
+        let (position, wider) = (WrappedPosition::new(299), Length(100));
+        assert!(keep_out.is_closed(position, position, wider), "its margin is kept, even one that was set later");
         assert!(closed(&keep_out, 20_000, 20_000));
     }
 
@@ -334,14 +335,14 @@ mod tests {
     }
 
     #[test]
-    fn spoiled_ground_is_closed_with_a_margin_ahead_of_it() {
+    fn invalid_ground_is_closed_with_a_margin_ahead_of_it() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
-        keep_out.spoil(WrappedPosition::new(1310));
+        keep_out.invalidate(WrappedPosition::new(1310));
         assert!(closed(&keep_out, 0, 0) && closed(&keep_out, 1310, 1310));
         assert!(closed(&keep_out, 1404, 1404));
         assert!(!closed(&keep_out, 1405, 1405));
-        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "spoiled, not dropped");
+        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "invalid, not dropped");
     }
 
     #[test]

@@ -42,16 +42,16 @@ enum Asked {
 impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     /// A classifier with the built-in examples and those in the memory.
     pub fn new(built_in: B, memory: M) -> Self {
-        let mut nearest = Self::asleep(built_in, memory);
+        let mut nearest = Self::uninit(built_in, memory);
         nearest.init();
         nearest
     }
 
     /// A classifier that has not read its memory yet.
-    pub const fn asleep(built_in: B, memory: M) -> Self {
+    pub const fn uninit(built_in: B, memory: M) -> Self {
         Self {
             built_in,
-            field: FieldExamples::asleep(memory),
+            field: FieldExamples::uninit(memory),
             query: [0; features::COUNT],
             found: Found::new([Neighbour::NONE; MAX_K as usize]),
             asked: Asked::Nobody,
@@ -59,7 +59,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     }
 
     /// Adds the nearest built-in examples to those found.
-    fn ask_built_in(&mut self) {
+    fn search_built_in(&mut self) {
         self.built_in.keep_nearest(&self.query, &mut self.found);
         self.asked = Asked::FieldBefore(0);
     }
@@ -108,7 +108,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
 
     fn go_on(&mut self) -> Option<Vote> {
         let Asked::FieldBefore(slot) = self.asked else {
-            self.ask_built_in();
+            self.search_built_in();
             return None;
         };
         let (_, rest) = self.field.places().split_at_checked(slot.into()).unwrap_or_default();
@@ -126,7 +126,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
         match self.begin(features, examples::K) {
             Some(vote) => vote.class,
             None => {
-                self.ask_built_in();
+                self.search_built_in();
                 self.vote().class
             }
         }

@@ -13,7 +13,7 @@
 use super::{
     detection::{Detection, End},
     detector::Detector,
-    slip::{News, Slip},
+    slip::{Slip, SlipChange},
 };
 use crate::units::{Length, WrappedPosition};
 
@@ -71,12 +71,12 @@ impl SecondBeam {
         slip: Slip::NONE,
     };
 
-    /// Starts at a place. Forgets earlier detections, and the slip measured with them.
+    /// Starts at a position. Forgets earlier detections, and the slip measured with them.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn begin(&mut self, place: WrappedPosition) {
-        self.detector.begin(place, false);
+    pub fn begin(&mut self, position: WrappedPosition) {
+        self.detector.begin(position, false);
         (self.awaited, self.missed, self.is_crowded) = (0, 0, false);
-        self.expected_to = place;
+        self.expected_to = position;
         self.slip = Slip::NONE;
     }
 
@@ -86,8 +86,8 @@ impl SecondBeam {
     }
 
     /// What has changed about the slip since the last call.
-    pub fn take_news(&mut self) -> News {
-        self.slip.take_news()
+    pub fn take_slip_change(&mut self) -> SlipChange {
+        self.slip.take_change()
     }
 
     /// Whether the beam is broken.
@@ -95,9 +95,9 @@ impl SecondBeam {
         self.detector.is_broken()
     }
 
-    /// Which end of a detection an edge at this place is.
-    pub fn end(&self, place: WrappedPosition) -> End {
-        self.detector.end(place)
+    /// Which end of a detection an edge at this position is.
+    pub fn end(&self, position: WrappedPosition) -> End {
+        self.detector.end(position)
     }
 
     /// Where the open detection begins.
@@ -128,24 +128,24 @@ impl SecondBeam {
         self.claimed <<= 1;
     }
 
-    /// Takes the beam's level at a place. `apart` is the beams' distance, `gap` the merging gap, and `least` the width that both
+    /// Takes the beam's level at a position. `apart` is the beams' distance, `gap` the merging gap, and `least` the width that both
     /// beams see for certain. Returns a complete detection that the first beam has not seen.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn look(
+    pub fn take_level(
         &mut self,
-        place: WrappedPosition,
+        position: WrappedPosition,
         broken: bool,
         apart: Length,
         gap: Length,
         least: Length,
     ) -> Option<Detection> {
-        let detection = self.detector.edge(place, broken, gap).unwrap_or(Detection::cut_at(place));
+        let detection = self.detector.edge(position, broken, gap).unwrap_or(Detection::cut_at(position));
         // An open detection has no width yet.
         let is_over = detection.width() >= least;
         let is_expected = !detection.trailing.is_ahead_of(self.expected_to);
-        let begins = self.detector.open() == Some(place);
+        let begins = self.detector.open() == Some(position);
         if begins {
-            self.expected_to = place;
+            self.expected_to = position;
         } else if !is_over {
             self.miss(apart, gap);
             return None;
@@ -156,9 +156,9 @@ impl SecondBeam {
         let (mut bit, mut fitting, mut travel, mut is_near) = (1_u8, 0_u8, Length::ZERO, false);
         for first in self.passed.iter().take(self.awaited.into()) {
             let (off, wider) = (detection.leading - first.leading, detection.width() - first.width);
-            // At the expected place, with a tolerance for a change of slip.
+            // At the expected position, with a tolerance for a change of slip.
             if !is_over && self.slip.is_known() && off.0.unsigned_abs() <= near {
-                self.expected_to = place + first.width + same;
+                self.expected_to = position + first.width + same;
             }
             // From 25 % less to 50 % more: slip of 30 % in either direction.
             if (off.0 as u16).wrapping_add(2 * near) <= 6 * near {
@@ -244,9 +244,9 @@ mod tests {
     fn compare(second: &mut SecondBeam, stretches: &[Stretches]) -> Vec<Report> {
         let mut reports = Vec::new();
         let end = stretches.iter().flat_map(|(first, second)| [first, second]).flatten().map(|&(_, to)| to).max();
-        for place in 0..end.unwrap_or(0) + 2 * APART.0 {
+        for position in 0..end.unwrap_or(0) + 2 * APART.0 {
             // The first beam's detection is complete after the gap behind it.
-            let over = stretches.iter().filter_map(|&(first, _)| first).find(|&(_, to)| to + GAP.0 == place);
+            let over = stretches.iter().filter_map(|&(first, _)| first).find(|&(_, to)| to + GAP.0 == position);
             if let Some((from, to)) = over {
                 let detection = Detection {
                     leading: WrappedPosition::new(from),
@@ -256,20 +256,20 @@ mod tests {
                 second.await_detection(detection, LEAST);
             }
             let broken =
-                stretches.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&place));
+                stretches.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&position));
             // The machine's distances follow the slip.
             let apart = Length((i32::from(APART.0) * (256 + i32::from(second.slip().excess())) / 256) as i16);
-            let seen = second.look(WrappedPosition::new(place) - apart, broken, apart, GAP, LEAST);
+            let seen = second.take_level(WrappedPosition::new(position) - apart, broken, apart, GAP, LEAST);
             if let Some(blind) = second.blind() {
                 reports.push(Report::Blind(blind));
                 second.missed = 0;
                 continue;
             }
             reports.extend(seen.map(Report::Alone));
-            match second.take_news() {
-                News::None => {}
-                News::Told => reports.push(Report::Slip),
-                News::Lost => reports.push(Report::Lost),
+            match second.take_slip_change() {
+                SlipChange::None => {}
+                SlipChange::Measured => reports.push(Report::Slip),
+                SlipChange::Lost => reports.push(Report::Lost),
             }
         }
         reports
@@ -369,27 +369,27 @@ mod tests {
     #[test]
     fn an_unexpected_detection_is_open_from_its_edge_and_an_expected_one_beyond_its_known_end() {
         let mut second = begun();
-        let look = |second: &mut SecondBeam, place, broken| {
-            second.look(WrappedPosition::new(place), broken, APART, GAP, LEAST);
+        let take = |second: &mut SecondBeam, position, broken| {
+            second.take_level(WrappedPosition::new(position), broken, APART, GAP, LEAST);
             second.open_alone()
         };
-        assert_eq!(look(&mut second, 100, true), Some(WrappedPosition::new(100)));
-        assert_eq!(look(&mut second, 200, false), Some(WrappedPosition::new(100)));
-        assert_eq!(look(&mut second, 241, false), None);
+        assert_eq!(take(&mut second, 100, true), Some(WrappedPosition::new(100)));
+        assert_eq!(take(&mut second, 200, false), Some(WrappedPosition::new(100)));
+        assert_eq!(take(&mut second, 241, false), None);
         // The slip is known, and the first beam has seen the detection.
-        second.slip.be_known();
+        second.slip.mark_known();
         let detection =
             Detection { leading: WrappedPosition::new(950), trailing: WrappedPosition::new(1050), ..Detection::NONE };
         second.await_detection(detection, LEAST);
-        assert_eq!(look(&mut second, 880, true), Some(WrappedPosition::new(880)), "too early for the expected one");
-        look(&mut second, 900, false);
-        look(&mut second, 945, false);
-        assert_eq!(look(&mut second, 950, true), None);
+        assert_eq!(take(&mut second, 880, true), Some(WrappedPosition::new(880)), "too early for the expected one");
+        take(&mut second, 900, false);
+        take(&mut second, 945, false);
+        assert_eq!(take(&mut second, 950, true), None);
         let mut ends = second.clone();
-        assert_eq!(look(&mut ends, 1060, false), None);
-        assert_eq!(look(&mut ends, 1090, false), None, "clear ground behind it does not belong to it");
-        assert_eq!(look(&mut second, 1069, true), None);
-        assert_eq!(look(&mut second, 1070, true), Some(WrappedPosition::new(950)), "wider than the first beam saw");
+        assert_eq!(take(&mut ends, 1060, false), None);
+        assert_eq!(take(&mut ends, 1090, false), None, "clear ground behind it does not belong to it");
+        assert_eq!(take(&mut second, 1069, true), None);
+        assert_eq!(take(&mut second, 1070, true), Some(WrappedPosition::new(950)), "wider than the first beam saw");
     }
 
     proptest! {
@@ -400,16 +400,16 @@ mod tests {
             mean in -40_i16..45,
         ) {
             let mut second = begun();
-            let (mut place, mut stretches, mut travels) = (0, Vec::new(), Vec::new());
+            let (mut position, mut stretches, mut travels) = (0, Vec::new(), Vec::new());
             for &(gap, width, more, has_insect) in &plants {
-                place += gap;
+                position += gap;
                 let travel = APART.0 + mean + more;
-                stretches.push((Some((place, place + width)), Some((place + travel, place + travel + width))));
+                stretches.push((Some((position, position + width)), Some((position + travel, position + travel + width))));
                 travels.push(travel);
                 if has_insect {
-                    stretches.push((Some((place - 400, place - 385)), Some((place - 400 + APART.0, place - 385 + APART.0))));
+                    stretches.push((Some((position - 400, position - 385)), Some((position - 400 + APART.0, position - 385 + APART.0))));
                 }
-                place += width;
+                position += width;
             }
             stretches.sort_by_key(|(first, _)| *first);
             let reports = news(&mut second, &stretches);

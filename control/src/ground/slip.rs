@@ -27,24 +27,25 @@ pub struct Slip {
     is_known: bool,
     /// Consecutive detections without agreement.
     without_slip: u8,
-    news: News,
+    change: SlipChange,
 }
 
 /// What has changed about the slip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum News {
+pub enum SlipChange {
     /// No change.
     None,
     /// A detection confirmed a slip.
-    Told,
+    Measured,
     /// Too many detections gave none: the slip is unknown.
     Lost,
 }
 
 impl Slip {
     /// No slip measured.
-    pub const NONE: Self = Self { last: 0, agreeing: 0, excess: 0, is_known: false, without_slip: 0, news: News::None };
+    pub const NONE: Self =
+        Self { last: 0, agreeing: 0, excess: 0, is_known: false, without_slip: 0, change: SlipChange::None };
 
     /// Units in the whole: `excess` is in 256ths.
     pub const WHOLE: i16 = 256;
@@ -65,13 +66,13 @@ impl Slip {
 
     /// Marks the slip as known.
     #[cfg(test)]
-    pub(super) fn be_known(&mut self) {
+    pub(super) fn mark_known(&mut self) {
         (self.is_known, self.without_slip) = (true, 0);
     }
 
     /// What has changed since the last call.
-    pub(super) fn take_news(&mut self) -> News {
-        core::mem::replace(&mut self.news, News::None)
+    pub(super) fn take_change(&mut self) -> SlipChange {
+        core::mem::replace(&mut self.change, SlipChange::None)
     }
 
     /// The next detections start a new run of agreement.
@@ -80,7 +81,7 @@ impl Slip {
     }
 
     /// [`excess`](Self::excess), and the last trusted slip even if it is now unknown.
-    pub fn believed(&self) -> (i8, i8) {
+    pub fn present_and_last(&self) -> (i8, i8) {
         (self.excess(), self.excess)
     }
 
@@ -96,8 +97,8 @@ impl Slip {
     /// between them; 0 if ambiguous.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn measure(&mut self, apart: Length, travel: Length) {
-        let believed = self.excess();
-        let turned = (Self::WHOLE + i16::from(believed)) as u16;
+        let trusted = self.excess();
+        let turned = (Self::WHOLE + i16::from(trusted)) as u16;
         let turned = u32::from(turned) * u32::from(travel.0 as u16) / u32::from((apart.0 as u16).max(1));
         let excess = turned as i16 - Self::WHOLE;
         let (last, now) = (self.last, excess as i8);
@@ -109,15 +110,15 @@ impl Slip {
         } else if self.agreeing < 3 {
             self.agreeing += 1;
         }
-        if self.agreeing > 1 + u8::from(now.abs_diff(believed) > JUMP) {
+        if self.agreeing > 1 + u8::from(now.abs_diff(trusted) > JUMP) {
             self.excess = ((i16::from(last) + i16::from(now)) >> 1) as i8;
-            (self.is_known, self.without_slip, self.news) = (true, 0, News::Told);
+            (self.is_known, self.without_slip, self.change) = (true, 0, SlipChange::Measured);
             return;
         }
         if self.without_slip < WITHOUT_SLIP {
             self.without_slip += 1;
             if self.without_slip == WITHOUT_SLIP {
-                (self.is_known, self.news) = (false, News::Lost);
+                (self.is_known, self.change) = (false, SlipChange::Lost);
             }
         }
     }

@@ -149,8 +149,8 @@ impl EncoderMonitor {
 
     /// Starts with the machine standing at `position`.
     pub const fn init(&mut self, now: Instant, position: Position) {
-        let (now, place) = (now.coarse(), position.count() as u16);
-        (self.anchor, self.last) = (place, place);
+        let (now, count) = (now.coarse(), position.count() as u16);
+        (self.anchor, self.last) = (count, count);
         (self.progress_at, self.read_at, self.period_since) = (now, now, now);
         (self.took, self.took_before, self.stands) = (Short::MAX, Short::MAX, true);
     }
@@ -164,7 +164,7 @@ impl EncoderMonitor {
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
         let now = now.coarse();
-        let place = position.count() as u16;
+        let count = position.count() as u16;
         if now.since(self.period_since) >= PERIOD {
             self.period_since = now;
             self.reversals = 0;
@@ -172,10 +172,10 @@ impl EncoderMonitor {
                 self.losses = 0;
             }
         }
-        let step = place.wrapping_sub(self.last).cast_signed();
+        let step = count.wrapping_sub(self.last).cast_signed();
         let turn = shortened(now.since(self.read_at));
-        (self.last, self.read_at) = (place, now);
-        let moved = place.wrapping_sub(self.anchor).cast_signed();
+        (self.last, self.read_at) = (count, now);
+        let moved = count.wrapping_sub(self.anchor).cast_signed();
         let time = now.since(self.progress_at);
         let short = shortened(time);
         let mut lost = doubted;
@@ -186,7 +186,7 @@ impl EncoderMonitor {
             self.took = if self.stands { Short::MAX } else { short - turn };
             // A machine that stood without a silence has stopped: that was no gap.
             self.took_before = if self.stands && !self.silent { Short::MAX } else { gap };
-            (self.anchor, self.progress_at) = (place, now);
+            (self.anchor, self.progress_at) = (count, now);
             self.backwards = moved < 0;
             (self.stands, self.quiet, self.silent) = (false, false, false);
             (self.reversals, self.breaks) = (0, 0);
@@ -222,7 +222,7 @@ impl EncoderMonitor {
                     alarm = Alarm::EncoderChannelDead;
                     lost += REVERSAL_LOSS;
                     if steady {
-                        (self.anchor, self.progress_at) = (place, now);
+                        (self.anchor, self.progress_at) = (count, now);
                     } else {
                         self.silent = self.reversals >= FALTERING_REVERSALS;
                     }

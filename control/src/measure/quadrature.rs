@@ -25,7 +25,7 @@ pub struct Quadrature {
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The wheel turned by so many ticks, -2 to 2; 0 is no change.
+    /// The wheel turned by this number of ticks, -2 to 2; 0 is no change.
     Ticks(i8),
     /// Both channels changed, and the direction is unknown: two ticks are lost.
     Lost,

@@ -36,9 +36,9 @@ pub struct Sensors {
 impl Sensors {
     /// Sensors before [`init`](Self::init).
     pub const NONE: Self = {
-        let (start, place) = (Instant::ZERO, Position::new(0));
+        let (start, position) = (Instant::ZERO, Position::new(0));
         Self {
-            readings: Readings { stack_free: 0, ..Readings::new(start, place) },
+            readings: Readings { stack_free: 0, ..Readings::new(start, position) },
             switch: Switch::NONE,
             end_switch: Switch::NONE,
             odometer: Odometer::NONE,

@@ -30,7 +30,7 @@ const _: () = assert!(SAMPLES as u32 * (STANDSTILL as u32) < u16::MAX as u32);
 /// A position and a time. The lower halves are enough: in the longest averaging time, 4 s, no machine rolls 32,767 ticks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
-    place: u16,
+    ticks: u16,
     time: Coarse,
 }
 
@@ -55,10 +55,10 @@ pub struct SpeedMeter {
 impl SpeedMeter {
     /// A meter before its first reading.
     pub const NONE: Self = Self {
-        samples: [Sample { place: 0, time: Coarse::ZERO }; SAMPLES as usize],
+        samples: [Sample { ticks: 0, time: Coarse::ZERO }; SAMPLES as usize],
         count: 0,
         next: 0,
-        last: Sample { place: 0, time: Coarse::ZERO },
+        last: Sample { ticks: 0, time: Coarse::ZERO },
         patience: 0,
         speed: TicksPerSecond(0),
         trend: 0,
@@ -74,7 +74,7 @@ impl SpeedMeter {
 
     /// Starts with the machine standing at `position`.
     pub const fn init(&mut self, position: Position, now: Instant) {
-        self.last = Sample { place: position.count() as u16, time: now.coarse() };
+        self.last = Sample { ticks: position.count() as u16, time: now.coarse() };
         self.patience = STANDSTILL;
     }
 
@@ -95,8 +95,8 @@ impl SpeedMeter {
     /// Takes a reading. Returns whether it may have changed the speeds. The caller calls it at least every few milliseconds.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, position: Position) -> bool {
-        let reading = Sample { place: position.count() as u16, time: now.coarse() };
-        if reading.place != self.last.place {
+        let reading = Sample { ticks: position.count() as u16, time: now.coarse() };
+        if reading.ticks != self.last.ticks {
             self.moved(reading)
         } else {
             self.silent(reading.time.since(self.last.time))
@@ -117,7 +117,7 @@ impl SpeedMeter {
         }
         let oldest = self.samples[usize::from((self.next + SAMPLES - self.count) % SAMPLES)];
         self.remember(reading);
-        let distance = reading.place.wrapping_sub(oldest.place).cast_signed();
+        let distance = reading.ticks.wrapping_sub(oldest.ticks).cast_signed();
         let time = reading.time.since(oldest.time);
         let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
         self.speed = TicksPerSecond(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });

@@ -59,7 +59,7 @@ impl Tool {
     }
 
     /// Whether the servo has had this pulse for this many milliseconds.
-    pub fn has_had(&self, pulse: HalfMicros, now: Instant, milliseconds: u16) -> bool {
+    pub fn has_held(&self, pulse: HalfMicros, now: Instant, milliseconds: u16) -> bool {
         pulse == self.pulse && self.is_settled(now, milliseconds)
     }
 

@@ -54,7 +54,7 @@ where
         Command::Start { now } => done(controller.start(now), None),
         Command::Label { label, force } => done(controller.label(label, force), None),
         Command::Feature(feature) => {
-            controller.tell_feature(feature);
+            controller.enter_feature(feature);
             Answer::Ok
         }
         Command::Teach(label) => done(controller.teach(label), None),
@@ -72,7 +72,7 @@ where
             Answer::Ok
         }
         Command::Events(on) => {
-            controller.tell_events(on);
+            controller.enable_events(on);
             Answer::Ok
         }
     }

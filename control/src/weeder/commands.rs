@@ -27,7 +27,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.follow_settings();
         }
         if now {
-            self.ground.trust();
+            self.ground.assume_bare();
         }
         self.go_to_work();
         Ok(())
@@ -136,7 +136,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Takes the next feature of an example that the operator enters.
-    pub fn tell_feature(&mut self, feature: u8) {
+    pub fn enter_feature(&mut self, feature: u8) {
         self.told.add(feature);
     }
 
@@ -173,7 +173,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     }
 
     /// Turns event lines on or off.
-    pub fn tell_events(&mut self, on: bool) {
+    pub fn enable_events(&mut self, on: bool) {
         self.events.turn(on);
     }
 

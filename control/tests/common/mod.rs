@@ -1,4 +1,4 @@
-//! What the tests of the decisions share: a machine with a classifier that knows the truth.
+//! Shared code of the decisions' tests: a machine with a classifier that knows the true classes.
 
 use control::ground::{
     class::{Class, Classifier, ExamplesFull, Listed, Vote},

@@ -33,7 +33,7 @@ pub struct Rolling {
     /// Events, and the first beam's position at each.
     pub told: Vec<(Event, f64)>,
     wheel_mm: f64,
-    /// What each beam sees, from and to.
+    /// The stretches that each beam sees, from and to.
     first_mm: Vec<(f64, f64)>,
     second_mm: Vec<(f64, f64)>,
     /// How far the second beam and the tool are behind the first.
@@ -57,7 +57,7 @@ impl Rolling {
         for &(setting, value) in [(Setting::BeamResponseMs, 0)].iter().chain(settings) {
             machine.set(setting, value).unwrap();
         }
-        machine.tell_events(true);
+        machine.enable_events(true);
         machine.start(true).unwrap();
         let set_mm = |setting| f64::from(machine.settings().get(setting));
         let (second_beam_mm, beam_to_tool_mm) = (set_mm(Setting::SecondBeamMm), set_mm(Setting::BeamToToolMm));
@@ -107,7 +107,7 @@ impl Rolling {
     }
 
     /// The events of a kind.
-    pub fn told_of<T>(&self, of: impl Fn(Event) -> Option<T>) -> Vec<T> {
+    pub fn events_of<T>(&self, of: impl Fn(Event) -> Option<T>) -> Vec<T> {
         self.told.iter().filter_map(|&(event, _)| of(event)).collect()
     }
 }

@@ -22,7 +22,7 @@ impl Drive {
     pub fn at_work() -> Self {
         let mut drive = Self::in_hold();
         drive.machine.start(false).unwrap();
-        drive.machine.tell_events(true);
+        drive.machine.enable_events(true);
         drive.roll(0.5, 1.0);
         assert!(drive.tool_is_in());
         drive.machine.events();

@@ -213,7 +213,7 @@ fn plants_that_pass_a_rolling_machine_raise_no_doubt_in_the_encoder() {
     }
 }
 
-/// Has the encoder go to and fro between two counts, so many edges a second, for two seconds.
+/// Moves the encoder to and fro between two counts, at a rate in edges a second, for two seconds.
 fn tremble(drive: &mut Drive, edges_a_second: u32) {
     let count = drive.place.floor() as i32;
     for turn in 0..2_000_000 / TURN_US {

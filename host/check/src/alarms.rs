@@ -30,7 +30,7 @@ const QUARTER_MS: f64 = 262.144;
 /// A width between the factory settings' in (1500 us) and out (2000 us).
 const MIDDLE_US: f64 = 1750.0;
 
-/// What goes wrong.
+/// The faults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
     /// The beam stays broken while the machine rolls on.
@@ -220,7 +220,7 @@ fn code(records: &[Record], clock_ratio: f64) -> Option<(u8, u8)> {
 pub fn switch_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
     let switch = Line::WorkSwitch.bit();
     tester.set(switch, 0)?;
-    // `start now` at work would leave the ground unseen, so `to_work` first goes to hold.
+    // `start now` at work would skip the unseen ground, so `to_work` first goes to hold.
     to_work(weeder, tester, false)?;
     let mut plan = Plan::new();
     plan.at(u64::from(ms(2 * STILL_MS)), Action::Levels { mask: switch, levels: switch });

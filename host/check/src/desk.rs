@@ -14,7 +14,7 @@ use uno::pty::Pty;
 /// Greatest number of bytes on their way to a board. Others stay in the terminal.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
 
-/// What is said if their thread could not be started, or panicked.
+/// The message if their thread could not be started, or panicked.
 const STOPPED: &str = "the virtual Unos do not run";
 
 /// Two virtual Unos. Dropped, they stop.
@@ -68,7 +68,7 @@ impl Desk {
     /// Stops both.
     ///
     /// # Errors
-    /// If one of them had stopped by itself.
+    /// If one of them had stopped already.
     pub fn stop(mut self) -> Result<()> {
         self.stop.store(true, Ordering::Relaxed);
         let panicked = |_| Err(anyhow!("{STOPPED}: the thread panicked"));
@@ -89,7 +89,7 @@ fn take_turn(pair: &mut Pair, side: Side, pty: &mut Pty) -> Result<()> {
         pair.received(side).clear();
         pair.reset(side)?;
     }
-    let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.bytes_on_their_way(side));
+    let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(pair.bytes_pending(side));
     let mut bytes = [0; MOST_BYTES_ON_THEIR_WAY];
     let count = pty.read(&mut bytes[..room])?;
     if count > 0 {

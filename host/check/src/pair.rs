@@ -81,7 +81,7 @@ impl Wiring {
     }
 }
 
-/// What is said to have stopped.
+/// The name of what stopped, for errors.
 const SECOND: &str = "the second simulator";
 
 /// The weeder's virtual Uno, of this project's simulator or of another one.
@@ -218,7 +218,7 @@ impl Pair {
             self.carry_to_weeder(change);
         }
         if self.steps.is_multiple_of(STEPS_TO_RESET) {
-            self.look_at_reset()?;
+            self.check_reset()?;
         }
         self.steps += 1;
         if self.is_reset_pulled {
@@ -232,16 +232,16 @@ impl Pair {
     }
 
     /// While the reset is pulled, the weeder's clock stands still, and both are counted from there on.
-    fn look_at_reset(&mut self) -> Result<()> {
+    fn check_reset(&mut self) -> Result<()> {
         if self.is_reset_pulled {
             self.shared = (self.tester.cycle(), self.weeder.cycle());
         }
         let pulled = self.wiring.has_reset && self.tester.output(TESTER_RESET) == Some(false);
         if pulled && !self.is_reset_pulled {
             self.resets += 1;
-            if let (Some(spoil), WeederUno::Own(weeder)) = (&mut self.wiring.eeprom_at_reset, &mut self.weeder) {
+            if let (Some(corrupt), WeederUno::Own(weeder)) = (&mut self.wiring.eeprom_at_reset, &mut self.weeder) {
                 let mut eeprom = weeder.eeprom();
-                spoil(&mut eeprom);
+                corrupt(&mut eeprom);
                 *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&field::wiring::WIRES);
             }
             self.shared = (self.tester.cycle(), self.weeder.cycle());
@@ -279,11 +279,11 @@ impl Pair {
     }
 
     /// Bytes that were typed into a board's port and have not reached it.
-    pub fn bytes_on_their_way(&self, side: Side) -> usize {
+    pub fn bytes_pending(&self, side: Side) -> usize {
         match (side, &self.weeder) {
-            (Side::Tester, _) => self.tester.bytes_on_their_way(),
-            (Side::Weeder, WeederUno::Own(weeder)) => weeder.bytes_on_their_way(),
-            (Side::Weeder, WeederUno::Second(weeder)) => weeder.bytes_on_their_way(),
+            (Side::Tester, _) => self.tester.bytes_pending(),
+            (Side::Weeder, WeederUno::Own(weeder)) => weeder.bytes_pending(),
+            (Side::Weeder, WeederUno::Second(weeder)) => weeder.bytes_pending(),
         }
     }
 

@@ -42,9 +42,9 @@ const ANSWER_READS: usize = 100;
 pub struct Turning {
     /// Mean cycles between two counts, 13 or more.
     pub cycles: u32,
-    /// Which way.
+    /// The direction.
     pub forward: bool,
-    /// Whether edges come early and late.
+    /// Whether edges jitter.
     pub jittered: bool,
     /// Whether the weeder prints and the beam changes.
     pub busy: bool,

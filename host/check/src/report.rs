@@ -42,7 +42,7 @@ impl Verdict {
 pub struct Line {
     /// Its name in files, which never changes.
     pub id: String,
-    /// What it is.
+    /// Its name.
     pub what: String,
     /// Its unit; empty for a count.
     pub unit: String,
@@ -58,7 +58,7 @@ pub struct Line {
     pub highest: Option<f64>,
     /// The tolerance against the simulated value.
     pub tolerance: f64,
-    /// What came of it.
+    /// The result.
     pub verdict: Verdict,
 }
 

@@ -44,7 +44,7 @@ const SETTING: &str = "max_width_mm";
 
 /// How the weeder is reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum ResetBy {
     /// The tester pulls the reset.
     Pin,
     /// The computer opens the port, which resets the weeder through the modem line DTR.
@@ -53,7 +53,7 @@ pub enum Way {
     Watchdog,
 }
 
-impl Way {
+impl ResetBy {
     /// Whether the weeder works and rolls then. The watchdog can be tested only in hold.
     pub const fn is_at_work(self) -> bool {
         !matches!(self, Self::Watchdog)
@@ -75,14 +75,14 @@ pub struct Restart {
 /// # Errors
 /// If a board does not answer.
 pub fn restart(
-    way: Way,
+    reset_by: ResetBy,
     weeder: &mut Weeder,
     tester: &mut Tester,
     clock_ratio: f64,
     is_simulated: bool,
 ) -> Result<Restart, CheckError> {
     weeder.to_hold()?;
-    if way.is_at_work() {
+    if reset_by.is_at_work() {
         weeder.ask("start now")?;
         let mut plan = Plan::new();
         plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
@@ -90,18 +90,18 @@ pub fn restart(
     }
     let mut records = tester.record_for_ms(300)?;
     let reset = tester.command(&Command::Clock)?.time;
-    match way {
-        Way::Pin => {
+    match reset_by {
+        ResetBy::Pin => {
             tester.command(&Command::Reset { pulled: true })?;
             records.extend(tester.record_for_ms(PULLED_MS)?);
             tester.command(&Command::Reset { pulled: false })?;
         }
-        Way::Port => weeder.open_again()?,
-        Way::Watchdog => weeder.send("test watchdog")?,
+        ResetBy::Port => weeder.open_again()?,
+        ResetBy::Watchdog => weeder.send("test watchdog")?,
     }
     records.extend(tester.record_for_ms(if is_simulated { SIMULATED_START_MS } else { START_MS })?);
     let ended = tester.command(&Command::Clock)?.time;
-    if way != Way::Port && weeder.greeting()?.is_none() {
+    if reset_by != ResetBy::Port && weeder.greeting()?.is_none() {
         // If the weeder does not restart, the check still goes on.
         wiring::reset(weeder, tester)?;
     }

@@ -4,17 +4,17 @@ use crate::alarms::{self, Scene};
 use crate::error::CheckError;
 use crate::rates::{self, Turning};
 use crate::report::{Figure, Report};
-use crate::resets::{self, Kept, Way};
+use crate::resets::{self, Kept, ResetBy};
 use crate::row;
 use crate::servo::{self, Steady};
 use crate::tester::Tester;
 use crate::wiring::{self, Weeder};
 use tester_core::pins::Line;
 
-/// What to check.
+/// The checks to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
-    /// Less of everything.
+    /// A shorter check.
     pub brief: bool,
     /// Whether the boards are virtual ones.
     pub simulated: bool,
@@ -200,9 +200,9 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
         let before = Kept::read(weeder, tester)?;
         let mut figures = Vec::new();
         for (way, id, words) in [
-            (Way::Pin, "pin", "reset by its pin, at work and rolling"),
-            (Way::Port, "port", "reset by opening the port, at work and rolling"),
-            (Way::Watchdog, "watchdog", "restarted by the watchdog, in hold"),
+            (ResetBy::Pin, "pin", "reset by its pin, at work and rolling"),
+            (ResetBy::Port, "port", "reset by opening the port, at work and rolling"),
+            (ResetBy::Watchdog, "watchdog", "restarted by the watchdog, in hold"),
         ] {
             let restart = resets::restart(way, weeder, tester, ratio, extent.simulated)?;
             let what = |what: &str| format!("{words}: {what}");

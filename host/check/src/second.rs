@@ -111,7 +111,7 @@ impl SecondUno {
     }
 
     /// Typed bytes that have not reached it.
-    pub fn bytes_on_their_way(&self) -> usize {
+    pub fn bytes_pending(&self) -> usize {
         self.typed.len()
     }
 

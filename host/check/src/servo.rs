@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_frame_tells_the_clocks_apart() {
+    fn the_frame_distinguishes_the_clocks() {
         // The weeder's clock is faster by 0.3 %: its frame is shorter by the tester's.
         let frame = FRAME_CYCLES / 1.003;
         let record = |number: u32| {

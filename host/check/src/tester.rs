@@ -21,7 +21,7 @@ const READS: usize = 30;
 /// Tries of a command. A board that was reset by opening its port needs up to 2 s to start.
 const TRIES: usize = 8;
 
-/// What the tester answered.
+/// The tester's answers.
 #[derive(Clone, Copy, Debug)]
 pub struct Done {
     /// Pieces that have room.

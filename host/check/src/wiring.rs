@@ -104,7 +104,7 @@ impl Weeder {
         self.ask("defaults").map(drop)
     }
 
-    /// Drops the lines that the machine has sent by itself.
+    /// Drops the lines that the machine has sent without a question.
     ///
     /// # Errors
     /// If the port is gone.
@@ -113,7 +113,7 @@ impl Weeder {
         Ok(())
     }
 
-    /// The next line that the machine sends by itself; `None` if none came within 20 ms.
+    /// The next line that the machine sends without a question; `None` if none came within 20 ms.
     ///
     /// # Errors
     /// If the port is gone.

@@ -76,7 +76,7 @@ fn the_shipped_firmware_passes_and_is_as_recorded() {
 }
 
 #[test]
-fn a_row_is_measured_as_the_simulation_judges_it() {
+fn a_measured_row_agrees_with_the_simulation() {
     let (mut weeder, mut tester) = boards(Wiring::right());
     let trial = check::row::trial(8, 2, 2.5).expect("the row grows");
     let measured = check::row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("the row is weeded").judgement;
@@ -108,7 +108,7 @@ fn the_boards_are_found_at_two_terminals() {
 }
 
 #[test]
-fn an_interrupted_check_leaves_what_was_saved() {
+fn an_interrupted_check_restores_the_saved_settings() {
     let (mut weeder, mut tester) = boards(Wiring::right());
     let before = Kept::read(&mut weeder, &mut tester).expect("both answer");
     let interrupt = Arc::new(AtomicBool::new(false));

@@ -5,7 +5,7 @@ mod common;
 use check::alarms::{Scene, play};
 use check::pair::Wiring;
 use check::rates::{self, Turning};
-use check::resets::Way;
+use check::resets::ResetBy;
 use check::{resets, row, servo, wiring};
 use common::{boards, boards_with};
 use field::wiring as pins;
@@ -227,7 +227,7 @@ fn a_swing_that_is_late_by_10_ms_is_measured() {
 }
 
 #[test]
-fn a_channel_that_falls_silent_on_the_way_costs_counts_in_a_row() {
+fn a_channel_that_fails_in_a_row_loses_counts() {
     let position = Rc::new(RefCell::new(0_u32));
     let seen = Rc::clone(&position);
     let drops = move |change: PinChange| {
@@ -273,7 +273,7 @@ fn without_watchdog() -> NamedTempFile {
 fn a_weeder_without_a_watchdog_is_named() {
     let restart = |elf: &Path| {
         let (_, mut weeder, mut tester) = boards_with(elf, Wiring::right());
-        let restart = resets::restart(Way::Watchdog, &mut weeder, &mut tester, 1.003, true).expect("both answer");
+        let restart = resets::restart(ResetBy::Watchdog, &mut weeder, &mut tester, 1.003, true).expect("both answer");
         // The check goes on.
         weeder.ask("get").expect("it is reset by its pin, and answers");
         restart
@@ -286,7 +286,7 @@ fn a_weeder_without_a_watchdog_is_named() {
 
 #[test]
 fn a_save_that_tears_is_counted() {
-    // Each reset spoils the half of the EEPROM that has the settings.
+    // Each reset corrupts the half of the EEPROM that has the settings.
     let tear = |eeprom: &mut [u8]| eeprom[..512].iter_mut().for_each(|byte| *byte &= 0xF0);
     let wires = Wiring { eeprom_at_reset: Some(Box::new(tear)), ..Wiring::right() };
     let (mut weeder, mut tester) = boards(wires);
@@ -297,10 +297,10 @@ fn a_save_that_tears_is_counted() {
 
 #[test]
 fn settings_that_a_reset_loses_are_counted() {
-    let spoils = Rc::new(Cell::new(false));
-    let is_to_spoil = Rc::clone(&spoils);
+    let corrupts = Rc::new(Cell::new(false));
+    let is_to_corrupt = Rc::clone(&corrupts);
     let lose = move |eeprom: &mut [u8]| {
-        if is_to_spoil.get() {
+        if is_to_corrupt.get() {
             eeprom.fill(0xFF);
         }
     };
@@ -311,7 +311,7 @@ fn settings_that_a_reset_loses_are_counted() {
     weeder.ask("save").expect("it saves");
     tester.record_for_ms(1000).expect("the tester answers");
     let saved = resets::Kept::read(&mut weeder, &mut tester).expect("both answer");
-    spoils.set(true);
+    corrupts.set(true);
     let after = resets::Kept::read(&mut weeder, &mut tester).expect("both answer");
     assert_eq!((saved.lost(&saved), saved.lost(&after)), (0, 1));
 }

@@ -11,7 +11,7 @@ use trial::bench::{self, encoder, servo, swings};
 use trial::firmware;
 use uno::elf::Size;
 
-/// How the figures are to be printed.
+/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What was measured, without the figures of others that the tables set beside it.
+/// The measured figures. Published figures are only in the tables.
 fn in_json(Figures { classifier, size, rates, jitter, lateness }: &Figures) -> Value {
     let tasks: Vec<Value> = classifier
         .tasks

@@ -39,7 +39,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Classifies, and prints a line an object and, where there are labels, who was taken for whom.
+/// Classifies, and prints a line for each detection. With labels it also prints the confusion matrix.
 ///
 /// # Errors
 /// If the file or its contents are wrong.

@@ -34,10 +34,10 @@ pub struct Arguments {
     replace: Replace,
 }
 
-/// Reads, judges and prints.
+/// Reads, evaluates and prints.
 ///
 /// # Errors
-/// If the table cannot be read or has a plot that cannot be, or the report cannot be written.
+/// If the table cannot be read or has an invalid plot, or the report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.check([REPORT], arguments.replace)).transpose()?;
     let records = evaluation::read_csv(&arguments.file)?;

@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
                 let objects: Vec<Labelled> = taught.iter().filter_map(object).collect();
                 file.write(|to| listing::write_csv(&objects, to))?;
                 if !json {
-                    say!("What the machine was taught is in {}: {} examples", file.path().display(), taught.len())?;
+                    say!("The taught examples are in {}: {} examples", file.path().display(), taught.len())?;
                 }
             }
             printed?;
@@ -127,7 +127,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
                     let list = |examples: &[Taught]| Value::from_iter(examples.iter().filter_map(in_json));
                     say!("{:#}", json!({ "only_in_file": list(&in_file), "only_on_machine": list(&on_machine) }))?;
                 }
-                false if is_same => say!("The machine was taught what is in {}", file.display())?,
+                false if is_same => say!("The machine was taught the examples in {}", file.display())?,
                 false => say!("{}", differences(&in_file, &on_machine))?,
             }
             Ok(if is_same { Finding::Good } else { Finding::Bad })

@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     if differ.is_empty() {
         return Ok(Finding::Good);
     }
-    say!("These figures are not what their commands print; `weeder figures` writes them:")?;
+    say!("These figures differ from their commands' output; `weeder figures` updates them:")?;
     say!("{}", differ.join("\n"))?;
     Ok(Finding::Bad)
 }
@@ -67,14 +67,8 @@ fn renew(page: &str, path: &Path) -> Result<String> {
         renewed += &format!("{line}\n");
         let Some(command) = line.strip_prefix(MARK).and_then(|rest| rest.strip_suffix(" -->")) else { continue };
         let place = |number: usize| format!("{}:{}", path.display(), number + 1);
-        let Some((number, fence)) = lines.next() else {
-            bail!("{}: no figure stands behind its command", path.display())
-        };
-        ensure!(
-            fence == "```text",
-            "{}: a block ```text has to stand right behind the figure's command",
-            place(number)
-        );
+        let Some((number, fence)) = lines.next() else { bail!("{}: no figure follows its command", path.display()) };
+        ensure!(fence == "```text", "{}: a block ```text must follow the figure's command directly", place(number));
         ensure!(lines.by_ref().any(|(_, line)| line == "```"), "{}: the figure's block has no end", place(number));
         let figure = print(command).with_context(|| place(number))?;
         renewed += &format!("{fence}\n{figure}```\n");
@@ -119,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_without_its_block_is_told_with_its_line() {
+    fn a_figure_without_its_block_is_named_with_its_line() {
         for (page, complaint) in [
             ("<!-- figures: weeder hex -->\nno block\n", "page.md:2: a block ```text has to stand"),
             ("\n<!-- figures: weeder hex -->\n```text\n", "page.md:3: the figure's block has no end"),
@@ -132,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_is_told_line_by_line() {
+    fn differences_are_listed_line_by_line() {
         assert_eq!(difference("same\nold\n", "same\nnew\nmore\n"), "- old\n+ new\n+ more\n");
     }
 }

@@ -106,8 +106,7 @@ fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Res
     say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")?;
     if old_bootloader {
         say!(
-            "Behind this bootloader the machine does not come back by itself where its watchdog has had to stop it: the tool \
-             has no signal until power is taken away and given back. Optiboot, which Arduino's IDE can burn, has no such fault."
+            "With this bootloader the machine does not restart after a stop by its watchdog: the tool has no signal until you switch the power off and on. Optiboot, which Arduino's IDE can burn, has no such fault."
         )?;
     }
     Ok(())
@@ -177,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_that_comes_ten_times_is_said_once_and_progress_as_it_comes() {
+    fn a_repeated_message_is_printed_once_and_progress_at_once() {
         let mut words = String::from("avrdude: ser_open(): no modem lines\n\n");
         for attempt in 1..=10 {
             words += &format!("avrdude: stk500_getsync() attempt {attempt} of 10: not in sync: resp=0x{attempt:02x}\n");

@@ -115,7 +115,7 @@ enum Command {
     Design(design::Arguments),
     /// Create a randomised plan of a field trial, as a table to fill in.
     Plan(plan::Arguments),
-    /// Judge a field trial from the counts of its plots.
+    /// Evaluate a field trial from the counts of its plots.
     Evaluate(evaluate::Arguments),
     /// Update or check the manual's figures.
     Figures(figures::Arguments),
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_s_range_is_in_its_help_and_in_what_is_said_of_a_number_below_it() {
+    fn every_number_s_range_is_in_its_help_and_in_its_error() {
         let mut ranges = 0;
         for (name, command) in subcommands(&grammar(), "weeder") {
             for option in command.get_arguments().filter(|option| option.get_action().takes_values()) {
@@ -253,7 +253,7 @@ mod tests {
     const NAMES: &str = "examples.diff examples.pull examples.push flash monitor record serve set-up settings.diff settings.pull \
         settings.push";
 
-    /// Of words that name no file.
+    /// Arguments with words that name no file.
     const NO_FILE: &str = "bounds:chip bounds:function check-board:board check-board:port check-board:tester examples.diff:port examples.pull:port examples.push:port flash:port rows.forget:name rows.name:name \
         rows.name:port set-up:port sim:channel_a sim:channel_b sim:channel_beam";
 
@@ -295,7 +295,7 @@ mod tests {
         commands.iter().flat_map(of_one).collect()
     }
 
-    /// Whether it takes free text or a path, not a number, a list of known words, or a value with its own parser.
+    /// Whether it takes free text or a path, without its own parser or list of values.
     fn is_free(argument: &Arg) -> bool {
         let parser = argument.get_value_parser();
         let found = parser.type_id();
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn of_every_argument_that_could_name_a_file_it_is_decided_what_happens_to_one_that_is_there() {
+    fn every_argument_that_could_name_a_file_has_a_rule_for_an_existing_one() {
         let names = NAMES.split_whitespace().map(|command| format!("{command}:rows_file"));
         let kept: BTreeSet<String> = [READ, CONTINUED, EDITED, NO_FILE]
             .iter()
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn no_command_replaces_a_file_that_is_there_before_it_is_told_to() {
+    fn no_command_replaces_an_existing_file_without_force() {
         let folder = tempfile::tempdir().expect("there is room for a folder");
         let path = |name: &str| folder.path().join(name);
         fs::write(path("small.toml"), "[plot]\nrows = 1\nrow_m = 6\n").unwrap();

@@ -89,16 +89,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let jobs: Vec<&Job> = jobs.iter().map(|(_, job)| job).collect();
         match picture::draw(&jobs) {
             Some(drawn) => svg.write(|to| svg::write(to, &drawn))?,
-            None => tell!("{} is not drawn: nothing in the records has a place", svg.path().display()),
+            None => tell!("{} is not drawn: no event in the records has a position", svg.path().display()),
         }
     }
     if let Some(table) = &table {
         table.write(|to| write_csv(&counted, to))?;
     }
     if counted.iter().all(|(_, summary)| summary.fixes == 0) {
-        tell!(
-            "There is no fix in the records, so that nothing has a place: `weeder record --gps PORT` writes them with a receiver"
-        );
+        tell!("The records have no fix, so no event has a position: `weeder record --gps PORT` records a receiver");
     }
     printed
 }

@@ -59,10 +59,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let Arguments { parts, out, replace, json, brief, result } = arguments;
     let (replace, json, brief, settings) = (*replace, *json, *brief, header.settings);
     let of = |what: &str| format!("these are parts of a {what}");
-    ensure!(!brief || header.command == trial::COMMAND, "{}: --brief is for those of a trial", of(&header.command));
+    ensure!(!brief || header.command == trial::COMMAND, "{}: --brief is for parts of a trial", of(&header.command));
     ensure!(
         result.is_none() || header.command == sweep::COMMAND,
-        "{}: --result is for those of a sweep",
+        "{}: --result is for parts of a sweep",
         of(&header.command)
     );
     match header.command.as_str() {

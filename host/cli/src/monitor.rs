@@ -45,15 +45,15 @@ pub struct Arguments {
 /// The rows that a line addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum To {
-    /// It names no row: the chosen rows.
+    /// The line names no row: the chosen rows.
     Chosen,
-    /// To all of them.
+    /// All rows.
     All,
-    /// To one.
+    /// One row.
     Row(usize),
 }
 
-/// What a typed line says: of several rows, the one that stands before a colon or all, and the command.
+/// Parses a typed line: the row before a colon, or `all`, and the command.
 ///
 /// # Errors
 /// If there is no such row, or the rest is no command; in words.
@@ -80,7 +80,7 @@ fn row(name: &str, names: &[String]) -> Result<To, String> {
     }
 }
 
-/// Watches until the user has seen enough.
+/// Watches until the user quits.
 ///
 /// # Errors
 /// If there is no Uno to begin with, or terminal or log fail.

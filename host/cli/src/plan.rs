@@ -1,4 +1,4 @@
-//! `weeder plan`: draws the plan of a field trial by lot, as the table to be filled in.
+//! `weeder plan`: creates a randomised plan of a field trial, as a table to fill in.
 
 use crate::destination::{FileName, Replace};
 use crate::numbers::{number_within, whole_within};
@@ -41,7 +41,7 @@ pub struct Arguments {
     replace: Replace,
 }
 
-/// Draws the plan and prints or writes it.
+/// Creates the plan and prints or writes it.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -18,7 +18,7 @@ use std::thread;
 /// The file of the rows' names in the user's folder.
 const FILE: &str = "weeder/rows.toml";
 
-/// The file in which the rows' names are.
+/// The option for the file of the rows' names.
 #[derive(Args)]
 pub struct NamesFile {
     /// File with the rows' names. Default: `weeder/rows.toml` in your settings folder.
@@ -45,7 +45,7 @@ impl NamesFile {
     /// The names in it.
     ///
     /// # Errors
-    /// If it cannot be read; one that was named has to be there.
+    /// If it cannot be read. A file named by the user must exist.
     pub fn read(&self) -> Result<Names> {
         let path = self.path()?;
         ensure!(
@@ -97,7 +97,7 @@ impl Port {
     /// The machine there.
     ///
     /// # Errors
-    /// If there is none, or another than a weeder.
+    /// If there is none, or it is no weeder.
     pub fn open(&self) -> Result<Link> {
         Ok(self.board()?.open()?)
     }
@@ -106,7 +106,7 @@ impl Port {
 /// A port, and a row's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// Where one was given.
+    /// The name, if one was given.
     pub name: Option<String>,
     /// The port.
     pub port: String,
@@ -140,7 +140,7 @@ pub struct Chosen {
 }
 
 impl Ports {
-    /// The rows that are meant.
+    /// The chosen rows.
     ///
     /// # Errors
     /// If there is none, two have a name, or the file of the names cannot be read.
@@ -179,7 +179,7 @@ fn board(port: &str, names: Option<&Names>) -> Board {
     known.map_or_else(|| Board::Port(port.to_owned()), |row| row.board.clone())
 }
 
-/// What `--port` means.
+/// The row of a `--port`.
 fn row(machine: &Named, names: Option<&Names>) -> Result<Row> {
     let board = board(&machine.port, names);
     let name = match &machine.name {
@@ -217,7 +217,7 @@ impl Chosen {
         self.rows.iter().map(|row| row.name.clone()).collect()
     }
 
-    /// A way to each.
+    /// A function for each row that opens its link.
     pub fn openers(&self) -> Vec<Opener> {
         let opener = |row: &Row| -> Opener {
             let board = row.board.clone();
@@ -235,10 +235,10 @@ impl Chosen {
         })
     }
 
-    /// What came of a work with each row, told of those with which it went wrong, under their names.
+    /// Prints the failures of the rows' results, with their names.
     ///
     /// # Errors
-    /// If it went wrong with one: the only one's own error, or which rows those were.
+    /// If a row failed: the only row's own error, or the names of the failed rows.
     pub fn check<T>(&self, mut done: Vec<Result<T>>) -> Result<()> {
         if let (false, [_]) = (self.are_several, done.as_slice()) {
             return done.remove(0).map(drop);
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn two_rows_of_one_name_have_to_be_told_apart() {
+    fn two_rows_of_one_name_are_refused() {
         let port = ["a/uno", "b/uno"].map(|text| named(text).unwrap()).to_vec();
         let ports = Ports { port, all: false, names: NamesFile { rows_file: None } };
         let error = ports.choose().err().unwrap().to_string();

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// Time between two tries to open the port again.
 const RETRY: Duration = Duration::from_secs(1);
 
-/// Where beam and tool stand beside the antenna, as the user has measured it.
+/// The measured positions of beam and tool relative to the antenna.
 #[derive(Args)]
 pub struct AntennaArguments {
     /// Distance from the antenna forward to the beam in mm, -20000 to 20000; negative behind it. Default: 0.
@@ -73,10 +73,10 @@ pub struct GpsArguments {
 }
 
 impl GpsArguments {
-    /// The receiver, where there is to be one, and the first lines of the record.
+    /// The receiver, if the user named one, and the first lines of the record.
     ///
     /// # Errors
-    /// If its row is not among those that are recorded, or its port cannot be opened now: later that is no error.
+    /// If its row is not recorded, or its port cannot be opened now. A later loss of the port is no error.
     pub fn open(&self, chosen: &Chosen) -> Result<Option<(Gps, Lines)>> {
         let antenna = self.antenna.over(Antenna::default());
         let Some(Named { name, port }) = &self.gps else {
@@ -90,7 +90,7 @@ impl GpsArguments {
             Some(name) => chosen.find(name)?,
             None if chosen.rows.len() == 1 => 0,
             None => bail!(
-                "of several rows, one has the receiver in its record: say which, as in `--gps {}={port}`",
+                "with several rows, name the row that records the receiver, as in `--gps {}={port}`",
                 chosen.names().join("|")
             ),
         };
@@ -169,12 +169,14 @@ impl Source {
             LinkError::Absent(port) => {
                 anyhow!("there is no port {port} for --gps: plug the receiver in, and name its port")
             }
-            LinkError::Busy(port) => anyhow!("{port} is in use: end what else listens to the receiver, such as gpsd"),
+            LinkError::Busy(port) => {
+                anyhow!("{port} is in use: end the other program that reads the receiver, such as gpsd")
+            }
             other => other.into(),
         })?))
     }
 
-    /// How many bytes have come.
+    /// The number of bytes received.
     fn read(&mut self, bytes: &mut [u8], now: Instant) -> io::Result<usize> {
         match self {
             Self::Port(port) => match port.read(bytes) {

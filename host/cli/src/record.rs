@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(20);
 #[derive(Args)]
 #[command(after_help = "\
 It records plants, swings and alarms, and the status ten times a second, until Ctrl-C.\n\
-It continues after a pulled cable, and goes on with the other rows meanwhile.\n\
+It continues after a pulled cable, and records the other rows meanwhile.\n\
 Opening the port resets most Unos: start before you work.\n\
 With a satellite receiver, `weeder map` draws a map of one row; see docs/map.md.\n\n\
 Examples:\n  \
@@ -93,10 +93,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     logs.end()
 }
 
-/// Opens all rows, and says which of them are there. With several, those that are not are heard of, and waited for.
+/// Opens all rows, and returns which are connected. With several rows, missing ones are reported and tried again.
 ///
 /// # Errors
-/// If none is there.
+/// If no row is connected.
 pub fn open(chosen: &Chosen) -> Result<(Rows, Vec<bool>)> {
     let (rows, missing) = Rows::open(chosen.openers());
     let are_there = missing.iter().map(Option::is_none).collect();
@@ -134,7 +134,7 @@ impl Logs {
     pub fn open(out: &std::path::Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
             let folder = FolderName::from(out.as_os_str().to_owned());
-            // A log that is there is gone on with.
+            // An existing log is continued.
             folder.check([""; 0], Replace::default())?;
             folder.make()?;
         }
@@ -144,10 +144,10 @@ impl Logs {
         Ok(Self { logs: paths.map(log).collect::<Result<_, LogError>>()? })
     }
 
-    /// Writes down what happened to a row. After a log could not be written it is left as it is.
+    /// Writes an event of a row. After a failure its log is not written again.
     ///
     /// # Errors
-    /// If it cannot be written for the first time.
+    /// At the first failure of a log.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
         match self.logs.get_mut(row) {
             Some(log) if log.is_written => log.writer.write(happening).inspect_err(|_| log.is_written = false),
@@ -155,15 +155,15 @@ impl Logs {
         }
     }
 
-    /// The time that a row's line gets which is written now, in milliseconds.
+    /// The time of a row's line written now, in milliseconds.
     fn now_ms(&self, row: usize) -> u64 {
         self.logs.get(row).map_or(0, |log| log.writer.now_ms())
     }
 
-    /// Writes the lines that this gives for the present into a row's log. After a log could not be written it is left as it is.
+    /// Writes the lines that `lines` returns for the present time into a row's log, as [`Logs::write`].
     ///
     /// # Errors
-    /// If it cannot be written for the first time.
+    /// At the first failure of a log.
     fn lines_at(&mut self, row: usize, lines: impl FnOnce(u64) -> Lines) -> Result<(), LogError> {
         let Some(log) = self.logs.get_mut(row) else { return Ok(()) };
         let time_ms = log.writer.now_ms();
@@ -174,10 +174,10 @@ impl Logs {
         log.writer.lines_at(time_ms, &lines).inspect_err(|_| log.is_written = false)
     }
 
-    /// Tells of a log that could not be written: the other rows' logs still are.
+    /// Reports a log that could not be written. The other rows' logs continue.
     ///
     /// # Errors
-    /// If none is written any more.
+    /// If no log is left.
     fn go_on_after(&self, written: Result<(), LogError>, row: usize, chosen: &Chosen) -> Result<()> {
         if let Err(error) = written {
             tell!("error: {}", chosen.under_name(row, &format!("{:#}", anyhow::Error::from(error))));
@@ -197,7 +197,7 @@ impl Logs {
         self.check()
     }
 
-    /// Says whether all of them are whole.
+    /// Checks that all logs are complete.
     ///
     /// # Errors
     /// If one could not be written.

@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 struct Line {
     name: Option<String>,
     board: Board,
-    /// Where it is now.
+    /// Its present port.
     port: Option<String>,
 }
 
@@ -128,7 +128,7 @@ fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<
     rows.chain(others.map(|uno| Line { name: None, port: Some(uno.port.clone()), board: uno.board.clone() })).collect()
 }
 
-/// How a board is known, in words.
+/// A board's identification, in words.
 fn described(board: &Board) -> String {
     match board {
         Board::Only => "the only Uno".to_owned(),

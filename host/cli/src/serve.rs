@@ -57,7 +57,7 @@ pub struct Arguments {
 /// Serves until Ctrl-C.
 ///
 /// # Errors
-/// If there is no page, two machines have a name, or an address cannot be had.
+/// If there is no page, two machines have a name, or an address cannot be bound.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let page = match (&arguments.page, Page::inside()) {
         (Some(folder), _) => Page::read(folder)?,
@@ -101,7 +101,7 @@ fn open_in_browser(address: &str) {
         _ => vec!["xdg-open"],
     };
     words.push(address);
-    // The program may run as long as the browser.
+    // The program may run until the browser ends.
     let opened = Command::new(words[0]).args(&words[1..]).stdin(Stdio::null()).stdout(Stdio::null()).spawn();
     if let Err(error) = opened {
         tell!("No browser can be opened from here ({}: {error}): open the address by hand.", words[0]);

@@ -151,10 +151,10 @@ impl Guide {
                     self.keep()?;
                 }
                 Ended::LeftOut => say!("  Left out.")?,
-                Ended::Stopped => return say!("Stopped. The same command goes on here."),
+                Ended::Stopped => return say!("Stopped. The same command continues here."),
             }
         }
-        say!("\nThe settings are saved on the machine. What was measured is in {}.", self.path.display())
+        say!("\nThe settings are saved on the machine. The measurements are in {}.", self.path.display())
     }
 
     fn keep(&self) -> Result<()> {
@@ -309,7 +309,7 @@ impl Guide {
                 matches!(event, CalibratedBySwitch { .. } | CalibratedByEye {} | NotCalibrated {}).then_some(*event)
             };
             let Some((event, line)) = self.wait_for(SWINGS, calibrated)? else {
-                bail!("the machine does not say how the swings ended: is it in hold?");
+                bail!("the machine has not reported the swings: is it in hold?");
             };
             match event {
                 EventLine::NotCalibrated {} => {
@@ -352,7 +352,7 @@ impl Guide {
         }
     }
 
-    /// Measures the wheel until that was done often enough.
+    /// Measures the wheel until there are enough measurements.
     fn measure_wheel(&mut self, length_mm: u16) -> Result<bool> {
         loop {
             let stretches = self.state.measured.stretches();
@@ -411,7 +411,7 @@ impl Guide {
                         say!("  The margin stays at {} mm.", settings.get(Setting::MarginMm))?;
                         return Ok(true);
                     };
-                    say!("  Roll past plants: both beams tell the slip.")?;
+                    say!("  Roll past plants: both beams measure the slip.")?;
                     if !self.pass_plants()? {
                         return Ok(false);
                     }
@@ -442,7 +442,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_kept_is_taken_up() {
+    fn saved_progress_is_continued() {
         let kept = [
             HEAD,
             "done 2",

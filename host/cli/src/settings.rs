@@ -188,7 +188,7 @@ impl Chosen {
             let wanted = wanted(file)?;
             return Ok(self.rows.iter().map(|row| (row.name.clone(), wanted.clone())).collect());
         }
-        ensure!(self.are_several, "{} is a folder, and a file has to be named", file.display());
+        ensure!(self.are_several, "{} is a folder: name a file", file.display());
         self.rows.iter().map(|row| Ok((row.name.clone(), wanted(&Self::file_in(file, row, "toml"))?))).collect()
     }
 
@@ -229,7 +229,7 @@ fn of_preset(file: &Path) -> Option<Result<Vec<(Setting, u16)>>> {
 fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
     if let Some(wanted) = of_preset(file) {
         let wanted = wanted?;
-        ensure!(!wanted.is_empty(), "the preset {} sets nothing: the factory settings are its own", file.display());
+        ensure!(!wanted.is_empty(), "the preset {} changes nothing: it has the factory settings", file.display());
         return Ok(wanted);
     }
     let wanted = settings_file::read(file)?;

@@ -146,11 +146,11 @@ impl From<ControllerName> for Treatment {
 
 /// How to show a sweep's points.
 pub struct Shown {
-    /// Where they are written.
+    /// The output file.
     pub out: Option<FileName>,
     /// Whether to replace existing files.
     pub replace: Replace,
-    /// Whether for programs.
+    /// Whether to print JSON.
     pub json: bool,
     /// The result to show, if there are two axes.
     pub result: String,
@@ -192,7 +192,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     show(&sweep, &points, &shown, out.as_ref())
 }
 
-/// Prints the result of all points' plots, which were weeded somewhere.
+/// Prints the result of all points' plots, from this or other machines.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -228,7 +228,7 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
         None => format!("{}\n", list(sweep, points)),
     };
     if points.iter().any(|point| point.results.alarms_percent > 0.0) {
-        text += "! an alarm took the tool out in some of the rows: --result alarms says in how many\n";
+        text += "! an alarm took the tool out in some of the rows: --result alarms shows in how many\n";
     }
     text
 }
@@ -290,7 +290,7 @@ fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
         writer.write_record(columns(sweep))?;
         for point in points {
             let values = place(point).chain(point.results.values());
-            // A result that there is not has an empty cell.
+            // A missing result has an empty cell.
             writer
                 .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;
         }
@@ -303,7 +303,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn in_the_help_blanks_stand_between_an_axis_s_name_its_range_and_what_it_is() {
+    fn the_help_separates_an_axis_s_name_range_and_meaning() {
         let help = long_help();
         let (_, list) = help.split_once("What an axis can be:\n").expect("there is a list");
         let mut columns = list.lines().map(|line| line.trim_start().split("  ").filter(|part| !part.is_empty()));

@@ -103,7 +103,7 @@ impl FromStr for Votes {
     }
 }
 
-/// Trains, and prints what came of it.
+/// Trains, and prints the result.
 ///
 /// # Errors
 /// If a file or its contents are wrong, or the table would not fit.
@@ -186,7 +186,7 @@ impl Arguments {
 /// Chooses the examples to teach in addition to the built-in table, and prints the result.
 fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelled], k: Option<u8>) -> Result<Finding> {
     if table.is_some_and(|table| matches!(table.form, Form::Rust)) {
-        bail!("what a machine is taught beside its built-in table is written as CSV (.csv)");
+        bail!("examples to teach beside the built-in table are written as CSV (.csv)");
     }
     let Beside { chosen, before, after } = training::beside(objects, k, usize::from(CAPACITY))?;
     let printed = match arguments.json {
@@ -254,7 +254,7 @@ fn counts_in_json(classified: &Confusion) -> Value {
     json!({ "objects": classified.total(), "plants_taken_for_weeds": classified.plants_taken_for_weeds() })
 }
 
-/// How a table is written.
+/// The format of a written table.
 enum Form {
     Rust,
     Csv,

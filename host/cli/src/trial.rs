@@ -198,11 +198,11 @@ pub struct PlotPart {
 
 /// How to show a trial.
 pub struct Shown {
-    /// Where its report goes.
+    /// The report's folder.
     pub out: Option<FolderName>,
     /// Whether to replace existing files.
     pub replace: Replace,
-    /// Whether for programs.
+    /// Whether to print JSON.
     pub json: bool,
     /// Whether to show only the most important results.
     pub brief: bool,
@@ -274,7 +274,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     show(&study, &outcomes, &shown, folder.as_ref(), || picture_of(&study.experiment, &engine))
 }
 
-/// Prints the result of all plots, which were weeded somewhere.
+/// Prints the result of all plots, from this or other machines.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -309,7 +309,7 @@ fn show(
         say!("{}", by_speed(&totals, Brief))
     } else {
         let [plants, ground] = [Plants, Ground].map(|contents| by_speed(&totals, contents));
-        say!("{plants}\n{ground}\n\n{WHERE_IT_GOES}\n{}\n\n{}", where_it_goes(&totals), summary.join("\n"))
+        say!("{plants}\n{ground}\n\n{LOSS_BUDGET}\n{}\n\n{}", loss_budget(&totals), summary.join("\n"))
     };
     let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.alarms).sum();
     let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.effect.injured()).sum();
@@ -366,7 +366,7 @@ enum Contents {
     Brief,
     /// The results for plants.
     Plants,
-    /// What was weeded.
+    /// The weeded ground.
     Ground,
 }
 
@@ -397,7 +397,7 @@ fn name(controller: Treatment) -> &'static str {
     ["a ", "the "].iter().find_map(|article| title.strip_prefix(article)).unwrap_or(title)
 }
 
-/// A table of a trial, which is at most 110 characters wide.
+/// A table of a trial, at most 110 characters wide.
 fn by_speed(totals: &[Total], contents: Contents) -> Table {
     let columns = || COLUMNS.iter().filter(|(_, _, tables)| tables.contains(&contents));
     let mut table = number_table(columns().map(|(heading, _, _)| heading), 0);
@@ -409,10 +409,10 @@ fn by_speed(totals: &[Total], contents: Contents) -> Table {
 }
 
 /// The heading of the loss budget.
-const WHERE_IT_GOES: &str = "Where the row's ground goes with this firmware, %";
+const LOSS_BUDGET: &str = "Loss budget of the row's ground with this firmware, %";
 
 /// The firmware's loss budget, a line a speed: each adds up to 100 %.
-fn where_it_goes(totals: &[Total]) -> Table {
+fn loss_budget(totals: &[Total]) -> Table {
     let headings = budget::Part::ALL.map(|part| in_two_lines(part.title()));
     let mut table = number_table(std::iter::once("km/h".to_owned()).chain(headings), 0);
     for total in of(totals, Treatment::Firmware) {
@@ -422,7 +422,7 @@ fn where_it_goes(totals: &[Total]) -> Table {
     table
 }
 
-/// The part to which most of the row's ground is lost.
+/// The largest loss of the row's ground.
 fn most_lost(total: &Total) -> String {
     let (part, share) = total.budget.largest_loss();
     format!("{} {:.1}", part.key(), 100.0 * share)
@@ -434,7 +434,7 @@ fn weeded(total: &Total) -> String {
     total.weeded_percent.within.map_or(format!("{mean:.1}"), |within| format!("{mean:.1} ± {within:.1}"))
 }
 
-/// The share of weeds that is gone.
+/// The removed share of the weeds.
 fn gone(weeds: WeedCount) -> String {
     weeds.efficiency_percent().map_or("-".to_owned(), |percent| format!("{percent:.1}"))
 }

@@ -73,7 +73,7 @@ impl Analysis {
     /// Analyses the plots of a trial.
     ///
     /// # Errors
-    /// Where there is no plot, or one that cannot be. What a single measure has no model for is said in its place.
+    /// If there is no plot, or an invalid one. A measure without a model has a [`NoModel`] instead.
     pub fn of(records: Vec<PlotRecord>) -> Result<Self> {
         ensure!(!records.is_empty(), "a trial has at least one plot");
         for (index, record) in records.iter().enumerate() {

@@ -42,7 +42,7 @@ use uno::Pulse;
 pub use table::write_csv;
 pub use total::{Total, compare, totals};
 
-/// What runs the firmware.
+/// How the firmware is run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Engine {
     /// Its code, compiled for the host.
@@ -70,7 +70,7 @@ impl Treatment {
     /// All, the firmware first.
     pub const ALL: [Self; 4] = [Self::Firmware, Self::WithoutLookAhead, Self::Paper, Self::Ideal];
 
-    /// What it is called.
+    /// Its name.
     pub fn title(self) -> &'static str {
         match self {
             Self::Firmware => "this firmware",
@@ -90,9 +90,9 @@ pub struct Experiment {
     pub spacings_cm: Vec<f64>,
     /// How often each speed and spacing is tried.
     pub replications: u32,
-    /// Who weeds.
+    /// The controllers.
     pub controllers: Vec<Treatment>,
-    /// Where.
+    /// The field and the machine.
     pub conditions: Conditions,
     /// Examples that are taught to the firmware.
     #[serde(with = "taught")]
@@ -104,9 +104,9 @@ pub struct Experiment {
 /// One plot, weeded by one controller.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotOutcome {
-    /// Who weeded it.
+    /// The controller.
     pub controller: Treatment,
-    /// What is written down.
+    /// The plot's record.
     pub record: PlotRecord,
     /// Plants and weeds, counted.
     pub effect: Effect,
@@ -317,7 +317,7 @@ impl Experiment {
         }
     }
 
-    /// What every controller does in the same row.
+    /// The inputs that all controllers share in a row.
     fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>> {
         let (stand, drive, trial) = self.grow(plot, row)?;
         let sensors = sensors(&trial);
@@ -356,7 +356,7 @@ impl Experiment {
 
     /// A row that has grown, how it is driven, and both as a trial for the firmware.
     fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial)> {
-        // What grows, how it is driven and what the machine is like have a chance of their own each.
+        // Stand, driving and machine each have their own random numbers.
         let chance = |of: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
             rng.set_stream(plot.index << 34 | u64::from(row) << 2 | of);
@@ -366,7 +366,7 @@ impl Experiment {
         let stand =
             Stand::grow(&self.conditions, spacing_cm * 10.0, &mut chance(0)).map_err(|problem| match problem {
                 Problem::Empty => anyhow!(
-                    "nothing for the beam stands in a row of {} m with plants {spacing_cm} cm apart: \
+                    "the beam would see nothing in a row of {} m with plants {spacing_cm} cm apart: \
                      ask for a longer row or a smaller spacing",
                     self.conditions.plot.row_m
                 ),

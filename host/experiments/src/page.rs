@@ -50,10 +50,10 @@ pub struct Page<'a> {
 }
 
 impl Page<'_> {
-    /// The page as HTML, to be written to a file as it is.
+    /// The page as HTML, a complete file.
     ///
     /// # Errors
-    /// Where a figure of the comparison is not finite, or plotters cannot draw.
+    /// If a figure of the comparison is not finite, or plotters cannot draw.
     pub fn html(&self) -> Result<String> {
         let comparison = self.comparison.map(Headline::of).transpose()?;
         let analysis = self.analysis;
@@ -128,7 +128,7 @@ impl Headline {
 }
 
 impl Comparison {
-    /// Every figure that is shown, with whose it is and at which speed.
+    /// Checks that every figure is finite. The error names controller and speed.
     fn check(&self) -> Result<()> {
         let of_controllers = self.controllers.iter().flat_map(|controller| {
             controller.points.iter().flat_map(|point| {
@@ -187,5 +187,5 @@ fn beside_others(work: &[Work]) -> Table {
 
 fn parameters(parameters: &[(String, String)]) -> Table {
     let rows = parameters.iter().map(|(name, value)| vec![name.clone(), value.clone()]).collect();
-    Table { rows, is_prose: true, ..Table::new("What the trial was made with", ["parameter", "value"]) }
+    Table { rows, is_prose: true, ..Table::new("Parameters of the trial", ["parameter", "value"]) }
 }

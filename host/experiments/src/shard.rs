@@ -30,7 +30,7 @@ const MOST_NAMED: usize = 8;
 pub struct Shard {
     /// Which one, from 1.
     number: u64,
-    /// Of how many.
+    /// The number of shards.
     of: u64,
 }
 
@@ -41,7 +41,7 @@ impl Shard {
     /// The numbers of its plots, points or runs, ascending from 0.
     pub fn numbers(self, all: u64) -> impl ExactSizeIterator<Item = u64> {
         let count = all.saturating_sub(self.number - 1).div_ceil(self.of);
-        // A range of u64 does not know its length.
+        // A range of u64 is no exact-size iterator.
         (0..usize::try_from(count).unwrap_or(usize::MAX)).map(move |turn| self.number - 1 + turn as u64 * self.of)
     }
 
@@ -85,7 +85,7 @@ pub struct Program {
 pub struct Header {
     /// The format version: [`FORM`].
     weeder_part: u32,
-    /// Who computed it.
+    /// The program that computed it.
     pub program: Program,
     /// The command, such as `trial`.
     pub command: String,
@@ -113,7 +113,7 @@ pub struct Part<T> {
 pub struct Numbered<T> {
     /// Which one, from 0.
     pub number: u64,
-    /// What came of it.
+    /// The result.
     pub outcome: T,
 }
 
@@ -151,7 +151,7 @@ pub fn write<T: Serialize>(
 /// Reads the first line of a part, called `name`.
 ///
 /// # Errors
-/// Where it cannot be read, or is something else.
+/// If it cannot be read, or is no part.
 pub fn read_header(name: &str, from: &mut dyn BufRead) -> Result<Header> {
     let no_part = |problem: String| {
         anyhow!("{name} is no part of a study, as `weeder trial --shard 1/4 --out {name}` would write it: {problem}")
@@ -179,16 +179,16 @@ fn unreadable(name: &str) -> String {
     format!("{name} cannot be read")
 }
 
-/// Longest header that is read, in bytes: what is no part may have no end of a line.
+/// Longest header that is read, in bytes: another file may have no line end.
 const MOST_HEADER: u64 = 1 << 24;
 
-/// Reads the outcomes of a part behind its header: all of them, in the order of their numbers.
+/// Reads all outcomes after a part's header, in the order of their numbers.
 ///
 /// # Errors
-/// Where it cannot be read, a line is wrong, or one is missing or too many.
+/// If it cannot be read, a line is wrong, or an outcome is missing or surplus.
 pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut dyn BufRead) -> Result<Part<T>> {
     let shard = header.shard;
-    let spoiled = |line: usize, problem: String| {
+    let damaged = |line: usize, problem: String| {
         anyhow!("{name}, line {line}: {problem}; compute part {shard} again, with --force")
     };
     let mut expected = shard.numbers(header.all);
@@ -197,18 +197,18 @@ pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut
     for (line, text) in (2..).zip(from.lines()) {
         let text = text.with_context(|| unreadable(name))?;
         let outcome: Numbered<T> = serde_json::from_str(&text)
-            .map_err(|_| spoiled(line, "this is not an outcome of this study, or was cut".to_owned()))?;
+            .map_err(|_| damaged(line, "this is not an outcome of this study, or was cut".to_owned()))?;
         match expected.next() {
             Some(number) if number == outcome.number => outcomes.push(outcome),
             Some(number) => {
-                return Err(spoiled(line, format!("this is number {}, but has to be {number}", outcome.number)));
+                return Err(damaged(line, format!("this is number {}, but has to be {number}", outcome.number)));
             }
-            None => return Err(spoiled(line, "this is one more than the part has".to_owned())),
+            None => return Err(damaged(line, "this is one more than the part has".to_owned())),
         }
         last = line;
     }
     match expected.next() {
-        Some(number) => Err(spoiled(last + 1, format!("the part ends before number {number}"))),
+        Some(number) => Err(damaged(last + 1, format!("the part ends before number {number}"))),
         None => Ok(Part { name: name.to_owned(), header, outcomes }),
     }
 }
@@ -216,11 +216,10 @@ pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut
 /// Checks that parts, each with its name, make one whole study that this program computed.
 ///
 /// # Errors
-/// The first thing that is wrong: a part of another program, of another study, one that is there twice, or those that are
-/// missing.
+/// The first problem: a part of another program or another study, a duplicate, or the missing parts.
 pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
     let missing =
-        |which: String| anyhow!("{which} missing: name all parts of the study, or compute what is missing by --shard");
+        |which: String| anyhow!("{which} missing: name all parts of the study, or compute the missing ones by --shard");
     let (other, first) = parts.first().ok_or_else(|| missing("all parts are".to_owned()))?;
     for (name, header) in parts {
         let theirs = &header.program;
@@ -235,7 +234,7 @@ pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
         let ours = ours.into_iter().chain(counts(first));
         let differs = theirs.zip(ours).find_map(|((what, theirs), (_, ours))| difference(what, &theirs, &ours));
         if let Some((what, theirs, ours)) = differs {
-            bail!("{name} is of another study than {other}: its {what} is {theirs}, and there it is {ours}");
+            bail!("{name} belongs to another study than {other}: its {what} is {theirs}, not {ours}");
         }
     }
     let mut holders: Vec<Option<&str>> = vec![None; first.shard.of as usize];

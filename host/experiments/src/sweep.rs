@@ -13,10 +13,10 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Forward speeds that are tried, least and greatest, in km/h.
+/// Valid forward speeds, least and greatest, in km/h.
 pub const SPEEDS_KM_H: (f64, f64) = (0.1, 8.0);
 
-/// Plant spacings that are tried, least and greatest, in cm.
+/// Valid plant spacings, least and greatest, in cm.
 pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
 
 /// Most values of an axis.
@@ -87,7 +87,7 @@ impl Results {
         "alarms",
     ];
 
-    /// All of them.
+    /// All results.
     pub fn values(&self) -> [f64; 7] {
         [
             self.plant_damage_percent,
@@ -104,7 +104,7 @@ impl Results {
         let performance = outcome.record.performance();
         Self {
             plant_damage_percent: performance.plant_damage_percent,
-            // Of all weeds: the scatter of a square metre would hide the effect.
+            // From all weeds: the scatter of a square metre would hide the effect.
             weeding_efficiency_percent: outcome
                 .effect
                 .in_plot
@@ -126,9 +126,9 @@ pub struct Sweep {
     pub x: Axis,
     /// The second axis, if there is one.
     pub y: Option<Axis>,
-    /// Who weeds.
+    /// The controller.
     pub controller: Treatment,
-    /// What does not vary.
+    /// The fixed conditions.
     pub conditions: Conditions,
     /// Speed if no axis has it, km/h.
     pub speed_km_h: f64,
@@ -145,7 +145,7 @@ pub struct Point {
     pub x: f64,
     /// Its value on the second axis.
     pub y: Option<f64>,
-    /// What came of it.
+    /// The result.
     pub results: Results,
 }
 
@@ -160,7 +160,7 @@ impl Sweep {
     /// Weeds a plot at each point. The first axis varies fastest. `progress` gets the completed share, from 0 to 1.
     ///
     /// # Errors
-    /// Before anything is weeded where an axis has a value that cannot be; else the first that a plot meets.
+    /// If an axis has an invalid value, before anything is weeded; else the first error of a plot.
     pub fn run(&self, progress: impl Fn(f64) + Sync) -> Result<Vec<Point>> {
         let outcomes = self.run_shard(Shard::WHOLE, progress)?;
         self.points(&outcomes.into_iter().map(|point| point.outcome).collect::<Vec<_>>())
@@ -190,10 +190,10 @@ impl Sweep {
         mine.par_iter().map(weed).collect::<Result<Vec<_>>>().map(|outcomes| outcomes.concat())
     }
 
-    /// The points, of what came of all their plots.
+    /// The points, from the outcomes of all their plots.
     ///
     /// # Errors
-    /// Where an axis has a value that cannot be.
+    /// If an axis has an invalid value.
     pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>> {
         let point = |(place, outcome): (&Place, &PlotOutcome)| {
             let results = Results::of(outcome, place.experiment.conditions.plot.rows);
@@ -202,7 +202,7 @@ impl Sweep {
         Ok(self.places()?.iter().zip(outcomes).map(point).collect())
     }
 
-    /// Where all points are, the first axis running fastest.
+    /// All points. The first axis varies fastest.
     fn places(&self) -> Result<Vec<Place>> {
         let x = &self.x.parameter;
         ensure!(
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_axis_says_what_would_be_right() {
+    fn an_invalid_axis_is_refused_with_what_would_be_right() {
         let error = |text: &str| text.parse::<Axis>().unwrap_err().to_string();
         for text in ["lead_out_ms", "lead_out_ms=0..300", "=", "speed=a..b:c", "speed=0..inf:1"] {
             assert!(error(text).contains("has to be NAME=FROM..TO:STEP"), "{text}");

@@ -7,7 +7,7 @@ use trial::report::number_table;
 /// A table whose first column names its rows.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// What is in it.
+    /// The caption.
     pub caption: String,
     /// The heading of each column.
     pub columns: Vec<String>,

@@ -38,11 +38,11 @@ pub const DEFAULT_MOST_EXAMPLES: usize = 64;
 pub struct Training {
     /// The values of each feature that map onto 0 and 255.
     pub ranges: [Range; COUNT],
-    /// Squared distance beyond which a detection is like no example.
+    /// Squared distance beyond which no example is near enough.
     pub radius: u32,
     /// Examples that vote.
     pub k: u8,
-    /// Objects that Wilson's rule took out.
+    /// Detections that Wilson's rule removed.
     pub edited_out: usize,
     /// The table: the detections that were chosen as examples.
     pub kept: Vec<Labelled>,
@@ -86,7 +86,7 @@ const ENEMY_DIVISOR: u32 = 4;
 /// - **Examples**: see [`condense`].
 ///
 /// # Errors
-/// Where there is nothing to be learned, with what would help.
+/// If the detections teach nothing; says what would help.
 pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Training> {
     let first = objects.first().context(NO_OBJECTS)?;
     let is_mixed = objects.iter().any(|object| object.kind != first.kind);
@@ -139,7 +139,7 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
 /// Examples to teach in the field, in addition to the built-in ones.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// The objects that were chosen.
+    /// The chosen detections.
     pub chosen: Vec<Labelled>,
     /// All detections, classified by the built-in examples alone.
     pub before: Confusion,
@@ -152,7 +152,7 @@ pub struct Beside {
 /// ([`condense::beside`]).
 ///
 /// # Errors
-/// Where there is no object, or more would be needed.
+/// If there is no detection, or `most` is too few.
 pub fn beside(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Beside> {
     ensure!(!objects.is_empty(), NO_OBJECTS);
     let mut model = Model::built_in();
@@ -165,8 +165,8 @@ pub fn beside(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Beside
     Ok(Beside { chosen: chosen.into_iter().map(|index| objects[index]).collect(), before, after })
 }
 
-/// The radius, from the distances between detections of one class and of both. `edited` has the indices of those that
-/// are no noise.
+/// The radius, from the distances between detections of one class and of both. `edited` has the indices of the
+/// detections that are not noise.
 fn learn_radius(examples: &[Example<COUNT>], edited: &[usize]) -> u32 {
     let distances = |of_one_class: bool| {
         let nearest = |&index: &usize| {

@@ -197,11 +197,11 @@ fn the_page_is_the_same_each_time() {
 }
 
 #[test]
-fn every_plot_is_in_the_table_with_what_follows_from_it() {
+fn every_plot_is_in_the_table_with_its_measures() {
     let xml = closed(&full_page());
     let page = parse(&xml);
     let analysis = trial(true);
-    let rows = cells(&page, "Each plot, counted and measured, and what follows");
+    let rows = cells(&page, "Each plot: counts, measurements and results");
     assert_eq!(rows.len(), 24);
     for ((record, performance), row) in analysis.records.iter().zip(&analysis.performances).zip(rows) {
         let number = |index: usize| row[index].parse::<f64>().unwrap();
@@ -235,7 +235,7 @@ fn every_plot_is_in_the_table_with_what_follows_from_it() {
 }
 
 #[test]
-fn models_stand_beside_what_the_paper_printed() {
+fn models_stand_beside_the_paper_s_figures() {
     let xml = closed(&full_page());
     let page = parse(&xml);
     let analysis = trial(true);
@@ -316,7 +316,7 @@ fn zones_reached_stand_beside_damage_and_the_page_says_how_they_differ() {
 }
 
 #[test]
-fn the_bound_is_named_for_what_is_kept_below_it() {
+fn the_bound_is_named_for_the_kept_margins() {
     let xml = closed(&full_page());
     let page = parse(&xml);
     let name = "most with every zone and margin kept";
@@ -331,7 +331,7 @@ fn the_bound_is_named_for_what_is_kept_below_it() {
 }
 
 #[test]
-fn every_picture_is_said_in_words_too() {
+fn every_picture_has_a_description() {
     let xml = closed(&full_page());
     let page = parse(&xml);
     let pictures = page.descendants().filter(|node| node.tag_name().name() == "svg");
@@ -347,7 +347,7 @@ fn every_picture_is_said_in_words_too() {
 }
 
 #[test]
-fn a_real_trial_is_judged_without_comparison_and_row() {
+fn a_real_trial_is_evaluated_without_comparison_and_row() {
     let html = plain_page("Our field", &[], &trial(true));
     let xml = closed(&html);
     let page = parse(&xml);
@@ -372,7 +372,7 @@ fn a_trial_of_one_plot_has_a_page() {
     let html = plain_page("One plot", &[], &Analysis::of(records).unwrap());
     let xml = closed(&html);
     let page = parse(&xml);
-    assert_eq!(cells(&page, "Each plot, counted and measured, and what follows").len(), 1);
+    assert_eq!(cells(&page, "Each plot: counts, measurements and results").len(), 1);
     assert!(!html.contains("NaN"));
 }
 

@@ -235,7 +235,7 @@ fn as_many_parameters_as_plots_are_refused() {
 }
 
 #[test]
-fn a_factor_that_does_not_vary_is_left_out_and_the_reader_is_told() {
+fn a_constant_factor_is_left_out_with_a_remark() {
     let one_speed = [(1.0, 50.0), (1.0, 50.0), (1.0, 60.0), (1.0, 60.0)];
     let one_spacing = [(1.0, 50.0), (1.0, 50.0), (2.0, 50.0), (2.0, 50.0)];
     for (plots, left, remark) in [(one_speed, "spacing", Remark::OneSpeed), (one_spacing, "speed", Remark::OneSpacing)]
@@ -370,7 +370,7 @@ fn the_checks_of_the_residuals_are_those_of_r() {
 }
 
 #[test]
-fn a_bend_a_plot_far_off_and_uneven_scatter_are_each_said_in_words() {
+fn a_bend_an_outlier_and_uneven_scatter_are_each_described() {
     let said = |value: fn(usize, f64) -> f64| {
         let plots = paper_plots();
         let values: Vec<f64> = (0..24).map(|plot| value(plot, plots[plot].0) + EFFICIENCY[plot % 3] / 20.0).collect();
@@ -379,7 +379,7 @@ fn a_bend_a_plot_far_off_and_uneven_scatter_are_each_said_in_words() {
         Checks::of(&design, &values, &model).sentences("It").join(" ")
     };
     assert!(said(|_, speed| (speed - 1.75).powi(2)).contains("does not follow straight lines"));
-    assert!(said(|plot, speed| speed + if plot == 4 { 3.0 } else { 0.0 }).contains("Plot 5 is farther off"));
+    assert!(said(|plot, speed| speed + if plot == 4 { 3.0 } else { 0.0 }).contains("Plot 5 is farther from the model"));
     let fan = said(|plot, speed| [-1.0, 0.0, 1.0][plot % 3] * (speed - 0.9));
     assert!(fan.contains("scatters more at some speeds"), "{fan}");
 }

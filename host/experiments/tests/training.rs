@@ -34,7 +34,7 @@ fn clear_case() -> Vec<Labelled> {
 }
 
 #[test]
-fn each_object_of_the_simulated_field_is_judged_right_by_all_others() {
+fn each_detection_of_the_simulated_field_is_classified_right_by_all_others() {
     let objects = synthetic::objects(&CROPS[0], 1).unwrap();
     let training = train(&objects, None, DEFAULT_MOST_EXAMPLES).unwrap();
     assert_eq!(training.k, K);
@@ -122,7 +122,7 @@ fn an_object_between_plants_and_weeds_is_unknown() {
 }
 
 #[test]
-fn a_handful_of_objects_does_not_make_weeds_of_what_is_nearer_to_plants() {
+fn a_few_detections_do_not_make_weeds_of_detections_nearer_to_plants() {
     // So few that each is far from its nearest fellow.
     let plants = (0..4).map(|n| labelled(Kind::Plant, 278 + 139 * n, 500, 140));
     let weeds = (0..4).map(|n| labelled(Kind::Weed, 278 + 139 * n, 300, 16));
@@ -252,7 +252,7 @@ fn a_bad_line_is_named_with_what_would_be_right() {
             "694,500,226,250,573,weed\n",
             "line 2: up to here there is no label plant: some objects of either class are needed",
         ),
-        ("", "line 1: nothing stands below the header"),
+        ("", "line 1: no line is below the header"),
     ] {
         let error = read_text(&[&format!("{HEADER}{lines}")]).unwrap_err();
         assert!(error.starts_with(&format!("0.csv, {message}")), "{error}");
@@ -297,7 +297,7 @@ fn a_file_that_does_not_exist_is_named() {
 }
 
 #[test]
-fn what_is_taught_beside_the_built_in_table_spares_the_plants_of_another_field_too() {
+fn taught_examples_spare_the_plants_of_another_field_too() {
     for crop in &CROPS[1..] {
         let chosen = beside(&synthetic::objects(crop, 1).unwrap(), None, 32).unwrap();
         assert!(chosen.chosen.len() <= 32, "{}", crop.name);
@@ -314,7 +314,7 @@ fn what_is_taught_beside_the_built_in_table_spares_the_plants_of_another_field_t
 }
 
 #[test]
-fn what_cannot_be_spared_beside_the_built_in_table_is_refused() {
+fn plants_that_taught_examples_cannot_spare_are_an_error() {
     let error = beside(&synthetic::objects(&CROPS[2], 1).unwrap(), None, 5).unwrap_err();
     assert!(error.to_string().starts_with("too many examples for the flash budget: "), "{error}");
 }

@@ -198,7 +198,7 @@ fn counts_that_carry_no_binomial_model_are_refused_with_a_reason() {
 }
 
 #[test]
-fn plots_that_differ_by_more_than_counting_makes_them_are_said_to() {
+fn overdispersed_plots_get_a_remark() {
     let clumped = paper_plots().into_iter().enumerate().map(|(plot, (place, (_, of)))| {
         let damaged = if plot % 2 == 0 { of / 2 } else { 0 };
         (place, (damaged, of))

@@ -53,7 +53,7 @@ impl Part {
         }
     }
 
-    /// What it is called.
+    /// Its name.
     pub fn title(self) -> &'static str {
         match self {
             Self::Weeded => "weeded",

@@ -28,7 +28,7 @@ impl Conditions {
     /// The conditions of a preset, or of a file. `read` returns the file's text.
     ///
     /// # Errors
-    /// Where it is neither, or something in the file is wrong: with the line.
+    /// If it is neither, or something in the file is wrong: with the line.
     pub fn load(preset_or_file: &str, read: impl FnOnce(&Path) -> io::Result<String>) -> Result<Self, FileError> {
         let path = Path::new(preset_or_file);
         match Self::preset(preset_or_file) {
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_says_what_differs_from_the_default() {
+    fn a_file_has_only_differences_from_the_default() {
         let conditions = parse("[crop]\nspacing_scatter_mm = 12.5\n[plot]\nrows = 2\n[settings]\nk = 5\n").unwrap();
         let mut expected = Conditions::default();
         expected.set("crop.spacing_scatter_mm", 12.5).unwrap();
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn margin_and_leads_are_told_once_as_the_timing() {
+    fn margin_and_leads_are_set_once_as_the_timing() {
         let conditions = parse("[settings]\nlead_out_ms = 200\nmargin_mm = 40\n").unwrap();
         assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Conditions::default().timing() });
         assert!(conditions.firmware_settings().is_empty());

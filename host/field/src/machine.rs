@@ -31,7 +31,7 @@ pub struct Machine {
     pub ticks_per_rev: u32,
     /// Distance from the beam back to the tool: the paper's X.
     pub beam_to_tool_mm: f64,
-    /// Distance from the beam back to a second one; 0 where there is none.
+    /// Distance from the beam back to a second one; 0 if there is none.
     pub second_beam_mm: f64,
     /// Time after which the beam's sensor reports a change. A change that lasts less is not reported.
     pub beam_response_ms: f64,
@@ -163,7 +163,7 @@ impl Machine {
         self.level_before(wiring::BEAM, 0.0, row, motion)
     }
 
-    /// As [`beam_before`](Self::beam_before), of the second beam, where there is one.
+    /// As [`beam_before`](Self::beam_before), of the second beam, if there is one.
     pub fn second_beam_before(&self, row: &Row, motion: &Motion) -> Option<PinChange> {
         self.has_second_beam().then(|| self.level_before(wiring::SECOND_BEAM, self.second_beam_mm, row, motion))
     }
@@ -186,7 +186,7 @@ impl Machine {
         half_covered(leaves_mm, self.beam_mm)
     }
 
-    /// What the encoder and the beam do to their pins while the machine rolls past the row, in order of time.
+    /// The pin changes of encoder and beam while the machine rolls past the row, in order of time.
     ///
     /// The motion begins at `start_cycle`, with the encoder at rest and the beam as [`Machine::beam_before`] says.
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
@@ -233,7 +233,7 @@ impl Machine {
         self.changes(self.beam_before(row, motion), 0.0, row, motion, start_cycle)
     }
 
-    /// As [`beam_changes`](Self::beam_changes), of the second beam; none where there is none.
+    /// As [`beam_changes`](Self::beam_changes), of the second beam; none if there is none.
     pub fn second_beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let before = self.second_beam_before(row, motion);
         before.map_or_else(Vec::new, |before| self.changes(before, self.second_beam_mm, row, motion, start_cycle))
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_dirt_hides_is_missing_from_the_pins_as_from_the_count() {
+    fn hidden_pulses_are_missing_from_the_pins_and_from_the_count() {
         let machine = Machine { dirt: Dirt { share: 0.05, seed: 3 }, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
         let changes = machine.encoder_changes(&motion, START_CYCLE);
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn the_beam_reports_each_thing_at_its_edges_a_millisecond_late() {
+    fn the_beam_reports_each_plant_and_weed_at_its_edges_a_millisecond_late() {
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1200.0);
         let beam = beam(&Machine::default().pin_changes(&row(), &motion, START_CYCLE));
         let levels: Vec<bool> = beam.iter().map(|change| change.high).collect();
@@ -419,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn the_second_beam_sees_what_the_first_saw_as_far_behind_it_as_it_stands() {
+    fn the_second_beam_has_the_first_s_edges_at_the_beams_distance() {
         let machine = Machine { second_beam_mm: 220.0, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1300.0).with_slip(|| 0.2);
         let second = machine.second_beam_changes(&row(), &motion, START_CYCLE);

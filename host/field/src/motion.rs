@@ -137,7 +137,7 @@ impl Motion {
         let duration_s = (place_mm - self.end_mm) / self.end_speed_mm_s;
         assert!(
             duration_s.is_finite() && duration_s >= 0.0,
-            "at {} mm with {} mm/s the machine never comes to {place_mm} mm",
+            "at {} mm with {} mm/s the machine never reaches {place_mm} mm",
             self.end_mm,
             self.end_speed_mm_s
         );
@@ -494,7 +494,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_slips_from_when_it_is_said_on() {
+    fn a_wheel_slips_from_the_given_time_on() {
         let motion = Motion::starting_at(0.0).change_speed(500.0, 1000.0).until(0.25).slipping(0.05);
         let motion = motion.change_speed(500.0, 1000.0).until(3.0);
         let before_mm = 500.0 * 0.25 * 0.25;
@@ -518,7 +518,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_a_motion_rolls_as_the_whole_does() {
+    fn the_rest_of_a_motion_rolls_as_the_whole_does() {
         let whole = to_and_fro();
         for from_s in [0.0, 0.2, 3.3, 7.0] {
             let left = whole.since(from_s);
@@ -535,7 +535,7 @@ mod tests {
     }
 
     #[test]
-    fn who_goes_along_finds_the_wheel_where_a_search_does() {
+    fn a_cursor_finds_the_same_wheel_position_as_a_search() {
         let mut slip = [0.02, 0.1, 0.0].into_iter().cycle();
         let motion = to_and_fro().with_slip(|| slip.next().unwrap_or(0.0));
         let times_s: Vec<f64> =

@@ -1,13 +1,12 @@
-//! The native run: the firmware's own decisions, compiled for the host, weed a row.
+//! The native run: weeds a row with the firmware's own decisions, compiled for the host.
 //!
-//! [`weed`] does what `src/main.rs` does with the same [`control`] code and the same examples: a turn of the loop reads clock
-//! and encoder, takes the beam's edges with the position at which each came, and commands the servo. Turns come every
-//! millisecond, not as fast as a chip can; nothing else is simplified: motion, beam, encoder and servo are those that
-//! the virtual Uno is given. It is some twenty thousand times faster than real time, for studies of many rows.
+//! [`weed`] runs the loop of `src/main.rs` with the same [`control`] code and examples. A turn reads clock and encoder, takes
+//! the beam's edges with their positions, and commands the servo. It takes a millisecond; the chip is faster. Nothing else
+//! is simplified: motion, beam, encoder and servo are the same as for the virtual Uno. It is some twenty thousand times
+//! faster than real time, for studies of many rows. It also returns why the tool was out, for the
+//! [loss budget](crate::budget).
 //!
-//! Beside the pulses it hands over why the tool was kept out, for the [loss budget](crate::budget).
-//!
-//! Console, EEPROM, interrupts and cycles are not in it: for those there is the virtual Uno.
+//! It has no console, EEPROM, interrupts or cycles. The virtual Uno has.
 
 use crate::budget::{Part, Reason, Reasons, part_of};
 use crate::machine::{Machine, PULSE_TICKS, time_at_s};
@@ -37,33 +36,33 @@ type Weeder = Rig<ByExamples>;
 pub const TURN_S: f64 = 0.001;
 const STEPS_A_TURN: u32 = Interval::STEPS_PER_SECOND / 1000;
 
-/// How long the machine stands before it rolls, so that the clock is not at its beginning: 0.1 s.
+/// The machine stands for 0.1 s before it rolls, so that the clock does not start at 0.
 const STILL_STEPS: u32 = Interval::STEPS_PER_SECOND / 10;
 
-/// Turns from one look at the reasons to the next: 3 mm at 2.5 km/h. A zone begins and ends late by as much in the mean, so that its
+/// Turns between two samples of the reasons: 3 mm at 2.5 km/h. A zone's begin and end are late by the same mean, so its
 /// length is right.
 const LOOK_TURNS: u32 = 4;
 
-/// What a command waits for a servo's frame at the longest.
+/// Longest wait of a command for the servo's frame.
 const SERVO_FRAME_S: f64 = 0.020;
 
-/// Cycles in a step of Timer1, behind its prescaler of 8.
+/// Cycles in a step of Timer1, whose prescaler is 8.
 const CYCLES_A_STEP: u64 = 8;
 
-/// The decisions refuse to be set up or started.
+/// The decisions refused a setting or the start.
 #[derive(Debug, Error, PartialEq)]
 #[error("the firmware answers `{command}` with `{answer}`")]
 pub struct Refused {
-    /// The line that was typed.
+    /// The typed line.
     command: String,
-    /// What the console said.
+    /// The console's answer.
     answer: String,
 }
 
-/// What the decisions did.
+/// The result of a native run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weeded {
-    /// The first of the servo's pulses of each width.
+    /// The servo's pulses, the first of each width.
     pub pulses: Vec<Pulse>,
     /// The machine's state at the end.
     pub state: State,
@@ -71,25 +70,25 @@ pub struct Weeded {
     pub reasons: Vec<Reason>,
 }
 
-/// The servo's line: which pulses come of the widths that the loop commands.
+/// The servo's line: the pulses for the widths that the loop commands.
 #[derive(Clone, Debug)]
 pub struct ServoLine {
     width: HalfMicros,
     gap_ms: u8,
-    /// Steps of half a microsecond at which the last pulse of another width began.
+    /// The beginning of the last pulse with a new width, in steps of half a microsecond.
     rise: u64,
     pulses: Vec<Pulse>,
 }
 
 impl ServoLine {
-    /// A line with pulses of a width since time 0, for a servo that needs `gap_ms` between them; with 0, frames are fixed.
+    /// A line with pulses of a width since time 0. The servo needs `gap_ms` between pulses; 0 for fixed frames.
     pub fn new(width: HalfMicros, gap_ms: u8) -> Self {
         let mut line = Self { width, gap_ms, rise: 0, pulses: Vec::new() };
         line.begin(width, 0);
         line
     }
 
-    /// Commands a width, to be called each turn of the loop as the firmware's is (`src/servo.rs`).
+    /// Commands a width. Call it in each turn of the loop, as the firmware does (`src/servo.rs`).
     #[inline]
     pub fn command(&mut self, width: HalfMicros, time_s: f64) {
         if width == self.width {
@@ -104,7 +103,7 @@ impl ServoLine {
         }
     }
 
-    /// Whether no other width is on the line, or comes next.
+    /// Whether the line has this width, now and next.
     pub fn shows(&self, width: HalfMicros) -> bool {
         self.width == width
     }
@@ -136,9 +135,9 @@ pub struct Sensors {
 /// Turns whose counts are calculated together.
 const AT_ONCE: usize = 64;
 
-/// What the sensors say in a turn.
+/// The readings of a turn.
 pub struct Turn<'a> {
-    /// When it is.
+    /// Its time.
     pub time_s: f64,
     /// The encoder's count.
     pub position: i64,
@@ -149,16 +148,16 @@ pub struct Turn<'a> {
 /// An edge of a beam.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// When it comes.
+    /// Its time.
     time_s: f64,
-    /// The encoder's count when it comes.
+    /// The encoder's count at that time.
     pub position: i64,
-    /// Which of the beams are broken from then on.
+    /// The beams that are broken after it.
     pub beams: Beams,
 }
 
 impl Sensors {
-    /// Those of a trial, whose motion begins at time 0, for a loop whose turns begin so far apart.
+    /// The readings of a trial, for a loop with turns of `turn_s`. The motion begins at time 0.
     pub fn new(trial: &Trial, turn_s: f64) -> Self {
         let Trial { machine, motion, row, .. } = trial;
         let mut edges = machine.beam_changes(row, motion, 0);
@@ -182,7 +181,7 @@ impl Sensors {
             }
             let mut wheel_mm = times_s;
             course.roll(&mut wheel_mm);
-            // All of a clean encoder's first: they do not depend on each other, and the computer works on several at once.
+            // First all counts of a clean encoder: they are independent, so the compiler can vectorise them.
             let ticks = wheel_mm.map(|wheel_mm| encoder.clean_ticks(wheel_mm));
             counts.extend(ticks.map(|ticks| encoder.count(ticks) as i32));
             let [.., last_s] = times_s;
@@ -193,14 +192,14 @@ impl Sensors {
         Self { turn_s, counts, edges }
     }
 
-    /// What they say, from the first turn to some behind the end of the motion.
+    /// The turns, from the first to some after the end of the motion.
     #[inline]
     pub fn turns(&self) -> impl Iterator<Item = Turn<'_>> {
         let mut to_come = &self.edges[..];
         self.counts.iter().zip(0..).map(move |(&position, turn)| {
             let time_s = f64::from(turn) * self.turn_s;
             let mut edges = &to_come[..0];
-            // In most turns there is none.
+            // Most turns have no edge.
             if to_come.first().is_some_and(|edge| edge.time_s <= time_s) {
                 (edges, to_come) = to_come.split_at(to_come.partition_point(|edge| edge.time_s <= time_s));
             }
@@ -215,14 +214,14 @@ struct Encoder<'a> {
     machine: &'a Machine,
     start_mm: f64,
     tick_mm: f64,
-    /// The pulse in which a clean encoder is, whether dirt hides it, and the counts that it has hidden before.
+    /// The present pulse of a clean encoder, whether dirt hides it, and the counts hidden before it.
     pulse: i64,
     is_hidden: bool,
     hidden_ticks: i64,
 }
 
 impl<'a> Encoder<'a> {
-    /// That of a machine at the beginning of its motion.
+    /// The encoder of a machine at the beginning of its motion.
     fn of(machine: &'a Machine, motion: &Motion) -> Self {
         Self {
             machine,
@@ -234,13 +233,13 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// What a clean encoder counts until the wheel's rim is at a place.
+    /// The count of a clean encoder when the wheel's rim is at a position.
     #[inline]
     fn clean_ticks(&self, wheel_mm: f64) -> i64 {
         marks(wheel_mm - self.start_mm, self.tick_mm)
     }
 
-    /// The count where a clean encoder's is `ticks`; the nearer to the last one asked for, the sooner.
+    /// The count when a clean encoder has `ticks`. The time grows with the distance from the last call.
     #[inline(always)]
     fn count(&mut self, ticks: i64) -> i64 {
         let pulse = self.machine.pulse(ticks);
@@ -251,12 +250,12 @@ impl<'a> Encoder<'a> {
         ticks - self.hidden_ticks - in_pulse
     }
 
-    /// Counts what dirt hides on the way to a pulse. What is lost on the way there comes back on the way back.
+    /// Rolls to a pulse and counts the hidden ticks. Rolling back restores them.
     #[inline(always)]
     fn roll_to(&mut self, pulse: i64) {
         let step = (pulse - self.pulse).signum();
         while self.pulse != pulse {
-            // The whole pulse is behind, or is ahead again.
+            // The whole pulse was passed, forward or back.
             self.hidden_ticks += if self.is_hidden && step > 0 { PULSE_TICKS } else { 0 };
             self.pulse += step;
             self.is_hidden = self.machine.dirt.hides(self.pulse);
@@ -265,7 +264,7 @@ impl<'a> Encoder<'a> {
     }
 }
 
-/// What the beams see before the motion begins.
+/// The beams' levels before the motion begins.
 pub fn beams_before(trial: &Trial) -> Beams {
     let Trial { machine, motion, row, .. } = trial;
     Beams {
@@ -274,16 +273,16 @@ pub fn beams_before(trial: &Trial) -> Beams {
     }
 }
 
-/// Has the decisions weed the trial's row. The motion begins at time and cycle 0; the sensors are those of its row, machine and
-/// motion in turns of [`TURN_S`].
+/// Weeds the trial's row with the firmware's decisions. The motion begins at time and cycle 0. `sensors` must come from this
+/// trial, with turns of [`TURN_S`].
 ///
 /// # Errors
-/// Where they refuse a setting, or to start.
+/// If they refuse a setting or the start.
 pub fn weed(trial: &Trial, sensors: &Sensors) -> Result<Weeded, Refused> {
     run(trial, sensors, |_| ())
 }
 
-/// The same, and the slip in thousandths as the second beam tells it, plant by plant.
+/// The slip that the second beam measures, in thousandths, plant by plant.
 ///
 /// # Errors
 /// As [`weed`].
@@ -291,7 +290,7 @@ pub fn slips_permille(trial: &Trial, sensors: &Sensors) -> Result<Vec<i16>, Refu
     let (mut slips, mut tells) = (Vec::new(), false);
     run(trial, sensors, |weeder| {
         if !tells {
-            weeder.tell_events(true);
+            weeder.enable_events(true);
             tells = true;
         }
         while let Some(event) = weeder.next_event() {
@@ -303,7 +302,7 @@ pub fn slips_permille(trial: &Trial, sensors: &Sensors) -> Result<Vec<i16>, Refu
     Ok(slips)
 }
 
-/// Weeds the row; `listen` is given the decisions behind each turn.
+/// Weeds the row. Calls `listen` after each turn.
 #[inline(always)]
 fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
     let readings = Readings::new(instant(0), Position::new(0));
@@ -314,7 +313,7 @@ fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) ->
         type_line(&mut weeder, &format!("set {} {value}", setting.text()))?;
     }
     for example in &trial.examples {
-        example.features.into_iter().for_each(|feature| weeder.tell_feature(feature));
+        example.features.into_iter().for_each(|feature| weeder.enter_feature(feature));
         type_line(&mut weeder, if example.label == label::PLANT { "teach plant" } else { "teach weed" })?;
     }
     type_line(&mut weeder, if trial.start == Start::Now { "start now" } else { "start" })?;
@@ -341,11 +340,11 @@ fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) ->
 struct Why<'a> {
     trial: &'a Trial,
     reasons: Reasons,
-    /// A tool that was told to be in the row for longer is there.
+    /// The slowest swing: after this time a commanded tool has arrived.
     slowest_s: f64,
-    /// Since when it is told so.
+    /// The time of the command into the row, if it is commanded in.
     in_since_s: Option<f64>,
-    /// The zone that was kept last, and what it was kept for.
+    /// The last zone, and its part of the budget.
     zone: Option<((Position, Position), Part)>,
     is_guarding: bool,
     /// The middles of the guarded zones that are still ahead of the tool, or at it.
@@ -370,7 +369,7 @@ impl<'a> Why<'a> {
         })
     }
 
-    /// After a turn, by whose orders the tool is to be in the row or not. Not a part of the loop, which is the faster for it.
+    /// Records the present reason after a turn. Not inlined, which makes the loop faster.
     #[inline(never)]
     fn look(&mut self, weeder: &mut Weeder, is_in: bool, time_s: f64) {
         while self.is_guarding
@@ -383,7 +382,7 @@ impl<'a> Why<'a> {
         if !is_in {
             self.in_since_s = None;
         } else if time_s - *self.in_since_s.get_or_insert(time_s) > self.slowest_s {
-            // It weeds: there is nothing to explain, which saves asking.
+            // It weeds: no reason to look up, which saves time.
             return self.reasons.turn_to(Part::Swings, time_s);
         }
         let part = self.part(weeder, time_s);
@@ -412,7 +411,7 @@ impl<'a> Why<'a> {
         }
     }
 
-    /// What a zone is kept for.
+    /// The part of the budget that a zone belongs to.
     fn kept_for(&mut self, tool: Position, begin: Position, end: Position, time_s: f64) -> Part {
         self.guarded.retain(|middle| !begin.is_ahead_of(*middle));
         if self.guarded.iter().any(|middle| !middle.is_ahead_of(end)) {
@@ -470,7 +469,7 @@ mod tests {
             let dirt = Dirt { share: rng.random_range(0.0..0.1), seed };
             let machine = Machine { second_beam_mm: 150.0, dirt, ..Machine::default() };
             let speed_mm_s = rng.random_range(300.0..900.0);
-            // Farther back than it began, too, where counts are negative.
+            // It also rolls back behind its start, to negative counts.
             let motion = Motion::starting_at(0.0)
                 .change_speed(speed_mm_s, 900.0)
                 .stop_at(1000.0, 900.0)

@@ -141,7 +141,7 @@ impl Planting {
     }
 }
 
-/// A row without an end, sown ahead of the machine. Its parameters may change on the way.
+/// A row without an end, sown ahead of the machine. Its parameters may change as it rolls.
 #[derive(Clone, Debug)]
 pub struct Sowing {
     /// Spacing, canopies and their scatter. Its numbers of plants and weeds are not used.

@@ -73,7 +73,7 @@ impl Rolling {
         }
     }
 
-    /// Rolls on until a cycle, and returns the pin changes on the way. The cycle must not be before that of the last
+    /// Rolls on until a cycle, and returns the pin changes until then. The cycle must not be before that of the last
     /// call.
     pub fn roll_until(&mut self, cycle: u64) -> Vec<PinChange> {
         let during_s = self.now_s()..time_at_s(self.start_cycle, cycle);
@@ -221,14 +221,14 @@ mod tests {
 
     const START_CYCLE: u64 = 1_000_000;
 
-    /// The changes on the way: from a time on, a speed and a slip.
+    /// The changes during the motion: from a time on, a speed and a slip.
     fn way() -> impl Strategy<Value = Vec<(f64, f64, f64)>> {
         prop::collection::vec((0.05..1.5, -500.0..1200.0, -0.05..0.2), 1..6)
     }
 
     proptest! {
         #[test]
-        fn rolling_piece_by_piece_gives_what_the_whole_motion_gives(way in way(), slice_cycles in 1_000_u64..400_000) {
+        fn rolling_piece_by_piece_equals_the_whole_motion(way in way(), slice_cycles in 1_000_u64..400_000) {
             let row = vec![Thing::plant(300.0, 150.0), Thing::weed(500.0, 14.0), Thing::plant(800.0, 120.0)];
             let machine = Machine { second_beam_mm: 220.0, beam_mm: 6.0, ..Machine::default() };
             let mut rolling = Rolling::new(machine, row.clone(), 0.0, START_CYCLE);
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn the_servo_hears_what_changes_and_what_is_over_is_forgotten() {
+    fn the_servo_takes_changes_and_past_motion_is_dropped() {
         let mut rolling = Rolling::new(Machine::default(), Vec::new(), 0.0, 0);
         rolling.roll_at(500.0);
         for frame in 0..200_u64 {

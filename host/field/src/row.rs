@@ -2,7 +2,7 @@
 //! its width at the beam's height.
 //!
 //! A [`Row`] comes from a list, from a CSV file of measured plants, or from a seed
-//! ([`Planting`](crate::planting::Planting)). Things in a row do not overlap: canopies that touch are one detection of
+//! ([`Planting`](crate::planting::Planting)). Plants and weeds in a row do not overlap: canopies that touch are one detection of
 //! the beam, and one thing of the row. Weeds below the beam are not in the row: they are part of the ground that the
 //! tool works. Dust, clods and insects that break the beam may be added ([`Row::with_dust`]).
 //!
@@ -20,19 +20,19 @@ use thiserror::Error;
 
 pub use files::FileError;
 
-/// The widest thing in a row: wider than any crop plant with intra-row weeding.
+/// The greatest width: wider than any crop plant with intra-row weeding.
 pub const MAX_WIDTH_MM: f64 = 1000.0;
 
-/// The widest canopy of a single plant. A thing that is longer along the row is no wider than this across it.
+/// The widest canopy of a single plant, and the greatest width across the row.
 const MAX_CANOPY_MM: f64 = 400.0;
 
-/// Farthest from the origin that a thing stands, 10 km: farther than any row goes.
+/// The greatest distance from the origin, 10 km: longer than any row.
 pub const MAX_POSITION_MM: f64 = 1e7;
 
 /// The longest row, 6 km. A simulation stores every edge of the encoder.
 pub const MAX_LENGTH_MM: f64 = 6e6;
 
-/// What a thing in the row is.
+/// The kinds of thing in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -73,7 +73,7 @@ pub struct Thing {
     pub width_mm: f64,
     /// Its width across the row. For joined canopies it is that of the widest.
     pub across_mm: f64,
-    /// What it is.
+    /// Plant or weed.
     pub kind: Kind,
     /// The parts of its width where leaves break the beam, as positions along the row in ascending order. Empty for a
     /// thing without gaps.
@@ -91,7 +91,7 @@ impl Thing {
         Self::new(position_mm, width_mm, Kind::Weed)
     }
 
-    /// A thing without gaps, as wide across the row as along it, as far as a canopy may be.
+    /// A plant or weed without gaps. It is as wide across the row as along it, but at most as wide as a canopy.
     pub fn new(position_mm: f64, width_mm: f64, kind: Kind) -> Self {
         Self { position_mm, width_mm, across_mm: width_mm.min(MAX_CANOPY_MM), kind, leaves: Vec::new() }
     }
@@ -107,7 +107,7 @@ impl Thing {
     }
 
     fn check(&self) -> Result<(), Problem> {
-        // A position that is no number is in no range.
+        // Rejects NaN too.
         if !(-MAX_POSITION_MM..=MAX_POSITION_MM).contains(&self.position_mm) {
             return Err(Problem::Position(self.position_mm));
         }
@@ -138,7 +138,7 @@ impl Thing {
     }
 }
 
-/// What is wrong with a thing or a row, and what would be right.
+/// The problem of a thing or a row, and what would be right.
 #[derive(Debug, Error, PartialEq)]
 pub enum Problem {
     /// The position is not a number, or out of range.
@@ -150,23 +150,23 @@ pub enum Problem {
     /// Two things overlap.
     #[error(
         "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
-         each has to end before the next begins (what has grown together is one line)"
+         each has to end before the next begins (plants that have grown together are one line)"
     )]
     Overlap {
         /// The later thing.
         kind: Kind,
-        /// The later thing's place.
+        /// The later thing's position.
         position_mm: f64,
         /// The earlier thing.
         other: Kind,
-        /// The earlier thing's place.
+        /// The earlier thing's position.
         other_mm: f64,
     },
     /// The row is too long.
     #[error("the row is {} m long: it has to be at most {} m", (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0)]
     Length(f64),
     /// The row is empty.
-    #[error("nothing stands in the row: it has to have at least one plant or weed")]
+    #[error("the row is empty: it needs at least one plant or weed")]
     Empty,
 }
 
@@ -232,7 +232,7 @@ impl Row {
         })
     }
 
-    /// Everything that stands in the row, in ascending order of place.
+    /// Everything that stands in the row, by position.
     pub fn things(&self) -> &[Thing] {
         &self.things
     }
@@ -242,12 +242,12 @@ impl Row {
         &self.dust_mm
     }
 
-    /// The crop plants, in ascending order of place.
+    /// The crop plants, by position.
     pub fn plants(&self) -> impl Iterator<Item = &Thing> {
         self.things.iter().filter(|thing| thing.kind == Kind::Plant)
     }
 
-    /// The tall weeds, in ascending order of place.
+    /// The tall weeds, by position.
     pub fn weeds(&self) -> impl Iterator<Item = &Thing> {
         self.things.iter().filter(|thing| thing.kind == Kind::Weed)
     }
@@ -314,7 +314,7 @@ impl Row {
     }
 }
 
-/// The spacing that a plant without neighbours is given, for the figures that are counted per length of row.
+/// The assumed spacing of a plant without neighbours, for figures per length of row.
 const LONE_PLANT_SPACING_MM: f64 = 500.0;
 
 #[cfg(test)]
@@ -323,7 +323,7 @@ mod tests {
     use crate::planting::Planting;
     use files::csv_table;
 
-    /// What reading this text says.
+    /// Parses a text. Returns the error's message otherwise.
     fn read(text: &str) -> Result<Row, String> {
         Row::parse_csv(Path::new("row.csv"), text.into()).map_err(|error| error.to_string())
     }
@@ -368,7 +368,7 @@ mod tests {
                 "750,150,plant\n250,150,plant\n700,20,weed\n",
                 "row.csv, line 2: the plant at 750 mm and the weed at 700 mm overlap",
             ),
-            ("", "row.csv, line 1: nothing stands below the header"),
+            ("", "row.csv, line 1: no line is below the header"),
         ] {
             for end in ["\n", "\r\n"] {
                 let said = read(&format!("{header}{text}").replace('\n', end)).unwrap_err();

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_canopy_is_widest_half_way_up_and_unseen_above_its_top() {
+    fn a_canopy_is_widest_half_way_up_and_invisible_above_its_top() {
         assert_eq!(width_at(150.0, 300.0, 160.0), Some(160.0));
         assert_eq!(width_at(150.0, 150.0, 160.0), None);
         let low = width_at(150.0, 187.5, 160.0).unwrap();

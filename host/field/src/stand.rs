@@ -50,7 +50,7 @@ pub struct Stand {
     pub stems: Vec<Stem>,
     /// The crop plants of the next row on the side to which the tool swings.
     pub neighbours: Vec<Stem>,
-    /// The weeds, those that are tall included.
+    /// The weeds, including tall ones.
     pub weeds: Vec<Weed>,
     /// The ground, across the whole width, on which weeds are counted: the row's part of the plot's square metres.
     pub counted_mm: Range<f64>,
@@ -342,14 +342,14 @@ mod tests {
         }
         let high = grow(&conditions, 2);
         let seen = high.row.weeds().count();
-        // Half of the weeds in the row's 100 mm: 60 a square metre on 50 m2, less those that canopies hide.
+        // Half of the weeds in the row's 100 mm: 60 a square metre on 50 m2, without those hidden by canopies.
         assert!((800..1500).contains(&seen), "{seen}");
         assert!(high.row.weeds().filter(|weed| weed.width_mm > 60.0).count() > 20);
         assert_eq!(low.weeds, high.weeds);
     }
 
     #[test]
-    fn stems_stand_off_the_middle_of_their_canopies_as_far_as_they_are_told() {
+    fn stems_stand_off_the_middle_of_their_canopies_by_the_given_distance() {
         let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
         conditions.set("crop.stem_off_mm", 20.0).unwrap();
         let stand = grow(&conditions, 4);
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_touches_is_one_thing_and_a_plant_if_any_of_it_is() {
+    fn touching_canopies_are_one_and_a_plant_if_any_of_them_is() {
         let things = vec![Thing::weed(100.0, 20.0), Thing::plant(150.0, 100.0), Thing::weed(300.0, 20.0)];
         let together = grown_together(things);
         assert_eq!(together, [Thing { across_mm: 100.0, ..Thing::plant(145.0, 110.0) }, Thing::weed(300.0, 20.0)]);

@@ -28,7 +28,7 @@ use uno::Pulse;
 const TOUCH_MM: f64 = 1e-6;
 
 /// Time between two checks of the tool in a protected zone: at 2.5 km/h the machine moves about a millimetre.
-const LOOK_S: f64 = 0.000_5;
+const SAMPLE_S: f64 = 0.000_5;
 
 /// Counts of weeds. `u64`, because there are about ten a plant, and many plants in a study.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -190,7 +190,7 @@ impl Tools<'_> {
             covered.start < across_mm + half_chord_mm && across_mm - half_chord_mm < covered.end
         };
         self.motion.times_within_s(&(zone.start + x_mm..zone.end + x_mm)).into_iter().any(|times| {
-            let looks = ((times.end - times.start) / LOOK_S).ceil() as u32;
+            let samples = ((times.end - times.start) / SAMPLE_S).ceil() as u32;
             // Between two ends of the servo's turning, the tool stays between its positions at them. Often that is
             // clear of the zone.
             self.between_turns_s(&times).any(|stretch| {
@@ -198,11 +198,11 @@ impl Tools<'_> {
                 let near_mm = protected_mm + self.steering.within_mm();
                 let comes_near =
                     from.start.min(to.start) < across_mm + near_mm && across_mm - near_mm < from.end.max(to.end);
-                let look_at = |time_s: f64| (time_s - times.start) / LOOK_S;
+                let sample = |time_s: f64| (time_s - times.start) / SAMPLE_S;
                 // Not at the very ends: there the zone is a point.
-                let first = (look_at(stretch.start).floor() as u32).max(1);
-                let behind = (look_at(stretch.end).ceil() as u32 + 1).min(looks);
-                comes_near && (first..behind).any(|look| enters(times.start + f64::from(look) * LOOK_S))
+                let first = (sample(stretch.start).floor() as u32).max(1);
+                let behind = (sample(stretch.end).ceil() as u32 + 1).min(samples);
+                comes_near && (first..behind).any(|sample| enters(times.start + f64::from(sample) * SAMPLE_S))
             })
         })
     }
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn weeding_efficiency_is_the_share_that_is_gone() {
+    fn weeding_efficiency_is_the_removed_share() {
         assert_eq!(WeedCount { before: 8, after: 2 }.efficiency_percent(), Some(75.0));
         assert_eq!(WeedCount::default().efficiency_percent(), None);
     }

@@ -26,7 +26,7 @@ pub enum Start {
 /// The inputs of a trial.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// What stands in the row.
+    /// The row's plants and weeds.
     pub row: Row,
     /// The machine.
     pub machine: Machine,
@@ -36,7 +36,7 @@ pub struct Trial {
     pub timing: Timing,
     /// How the firmware is put to work.
     pub start: Start,
-    /// Further settings, applied after those that follow from machine and timing.
+    /// Further settings, applied after the settings of machine and timing.
     pub settings: Vec<(Setting, u16)>,
     /// Examples that are taught in addition to the built-in ones.
     pub examples: Vec<Example<{ features::COUNT }>>,
@@ -74,12 +74,12 @@ impl Trial {
             speed_mm_s,
             span.end + machine.beam_to_tool_mm + RUN_OUT_MM,
         );
-        // A real machine does not stop at once. The firmware would take that for a failed encoder.
+        // A real machine does not stop at once. To the firmware that would be a failed encoder.
         let motion = motion.change_speed(0.0, BRAKING_MM_S2);
         Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new(), examples: Vec::new() }
     }
 
-    /// The firmware's settings, in an order without contradictions on the way.
+    /// The firmware's settings, in an order without intermediate contradictions.
     pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
         let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
         let Timing { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;

@@ -85,12 +85,12 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// What happened to a plant.
+/// The result for a plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantOutcome {
     /// The plant.
     pub plant: Thing,
-    /// What the tool had to keep off: its canopy, or the zone round its stem.
+    /// The protected stretch: its canopy, or the zone round its stem.
     pub kept_mm: Range<f64>,
     /// Distance from the position where the tool was fully out to the leading end of `kept_mm`; negative inside it.
     /// `None` if the tool was out from the beginning.
@@ -121,7 +121,7 @@ impl PlantOutcome {
     }
 }
 
-/// What happened to a tall weed.
+/// The result for a tall weed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeedOutcome {
     /// The weed.
@@ -130,7 +130,7 @@ pub struct WeedOutcome {
     pub cut: bool,
 }
 
-/// What happened to the row.
+/// The result for the row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
     /// Every plant, in the order of the row.
@@ -419,7 +419,7 @@ mod tests {
         pulses
     }
 
-    /// Places of the machine at which the swings of [`row`] should be commanded, with these leads.
+    /// Positions of the machine at which the swings of [`row`] should be commanded, with these leads.
     fn ideal_mm(timing: Timing) -> Vec<f64> {
         let lead_mm = |lead_ms: u32| mm_s(2.5) * f64::from(lead_ms) / 1000.0;
         let mut places = vec![200.0];
@@ -519,7 +519,7 @@ mod tests {
     }
 
     #[test]
-    fn rolling_back_with_the_tool_in_damages_a_plant_that_was_kept_on_the_way_there() {
+    fn rolling_back_with_the_tool_in_damages_a_plant_that_was_kept_before() {
         let places = ideal_mm(Timing::default());
         let there = motion();
         let pulses = pulses(&there, &places);

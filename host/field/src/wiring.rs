@@ -52,9 +52,9 @@ pub struct Connection {
     pub contact: Contact,
     /// The other side.
     pub goes_to: &'static str,
-    /// What keeps the line high when nothing pulls it low.
+    /// The resistor that keeps the line high when nothing pulls it low.
     pub pull_up: PullUp,
-    /// What to know of it.
+    /// A note for the builder.
     pub note: &'static str,
 }
 
@@ -68,7 +68,7 @@ pub enum Contact {
 }
 
 impl Contact {
-    /// What is printed beside it on the board.
+    /// Its label on the board.
     pub fn label(self) -> String {
         match self {
             Contact::Serial => "D0, D1".to_owned(),

@@ -71,7 +71,7 @@ fn weed(preset: &str, number: u64, spacing_mm: f64, speed_km_h: f64) -> (Option<
     (alarm.map(|(alarm, _)| alarm), plants)
 }
 
-/// At most one row in so many may end in the alarm.
+/// At most one row in this number may end in the alarm.
 #[track_caller]
 fn assert_rare(preset: &str, rows_an_alarm: u64) {
     let ends = |&row: &u64| {

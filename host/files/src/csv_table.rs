@@ -57,10 +57,7 @@ impl CsvTable {
         }
         let is_twice = |column: &&&str| header.iter().filter(|name| name == *column).count() > 1;
         if let Some(twice) = columns.iter().find(is_twice) {
-            return Err(at(
-                header_line,
-                format!("the column `{twice}` stands there twice: each has a name of its own"),
-            ));
+            return Err(at(header_line, format!("the column `{twice}` occurs twice: each column needs its own name")));
         }
         let mut lines = Vec::new();
         let mut before = header_line;
@@ -80,7 +77,7 @@ impl CsvTable {
             before = line;
         }
         if lines.is_empty() {
-            return Err(at(header_line, "nothing stands below the header: at least one line has to".to_owned()));
+            return Err(at(header_line, "no line is below the header: add at least one".to_owned()));
         }
         Ok(Self { path: path.into(), header, lines })
     }
@@ -102,7 +99,7 @@ fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
     goes_on.then(|| behind.find(|(_, line)| is_odd(line)).map_or(before + 1, |(number, _)| number))
 }
 
-/// What stands in a file.
+/// The content of a file.
 ///
 /// # Errors
 /// If it cannot be read.
@@ -182,13 +179,13 @@ mod tests {
 
     #[test]
     fn a_column_that_stands_there_twice_is_refused() {
-        let wrong = "table.csv, line 1: the column `place_mm` stands there twice: each has a name of its own";
+        let wrong = "table.csv, line 1: the column `place_mm` occurs twice: each column needs its own name";
         assert_eq!(read("place_mm,width_mm,place_mm\n7,1,8\n"), Err(wrong.to_owned()));
         assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
     }
 
     #[test]
-    fn a_quotation_mark_that_is_not_closed_is_told_with_its_own_line() {
+    fn an_open_quotation_mark_is_named_with_its_own_line() {
         for text in
             ["place_mm,width_mm\n7,1\n# 5\" pot\n8,\"1\n9,1\n", "place_mm,width_mm\n7,1\n\n8,\"1\n9,1\n10,1\n\"11,1"]
         {
@@ -214,11 +211,11 @@ mod tests {
             }
         }
         assert!(read("place_mm,width_mm\nok\n7,1\n").unwrap_err().starts_with("table.csv, line 2: fields: 1"));
-        assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: nothing stands below"));
+        assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: no line is below"));
     }
 
     #[test]
-    fn what_the_system_says_of_a_missing_file_is_said_once() {
+    fn the_system_s_error_for_a_missing_file_is_printed_once() {
         let error = CsvTable::read(Path::new("no/such/table.csv"), &[]).err().unwrap();
         assert_eq!(error.to_string(), "no/such/table.csv cannot be read");
         assert!(error.source().is_some());

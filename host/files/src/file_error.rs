@@ -16,9 +16,9 @@ pub enum FileError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong, behind its name.
+        /// The problem, after the name.
         problem: String,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// A line of it.
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_quoted_stays_in_its_line_and_gives_a_terminal_no_orders() {
+    fn quoted_text_stays_in_its_line_and_cannot_control_a_terminal() {
         let quoted = in_a_line("`left\nright\u{1b}[2J` is no name, `grün` is one");
         assert_eq!(quoted, r"`left\nright\u{1b}[2J` is no name, `grün` is one");
     }

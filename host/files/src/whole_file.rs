@@ -95,7 +95,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_file_that_fails_half_way_leaves_what_was_there() {
+    fn a_file_that_fails_half_way_leaves_the_old_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("report.html");
         write(&path, |to| to.write_all(b"whole")).unwrap();
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_known_before_and_nothing_is_left_behind() {
+    fn an_unwritable_file_is_known_before_and_nothing_is_left_behind() {
         let folder = tempfile::tempdir().unwrap();
         assert!(check(&folder.path().join("report.html")).is_ok());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -139,7 +139,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_stays_one_and_a_device_stays_what_it_is() {
+    fn a_link_stays_a_link_and_a_device_stays_a_device() {
         let folder = tempfile::tempdir().unwrap();
         let (file, link) = (folder.path().join("table.csv"), folder.path().join("newest.csv"));
         fs::write(&file, "old").unwrap();

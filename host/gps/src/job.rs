@@ -28,7 +28,7 @@ use std::ops::Range;
 const STANDING_MS: f64 = 1000.0;
 
 /// The longest distance between two statuses in ticks, some hundred metres.
-pub(crate) const LONGEST_WAY: u32 = 1_000_000;
+pub(crate) const LONGEST_DISTANCE: u32 = 1_000_000;
 
 /// The parameters of reading a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +45,7 @@ impl Default for Wanted {
     }
 }
 
-/// What something is.
+/// The kinds of a position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// A detection that the beam has seen.
@@ -87,7 +87,7 @@ impl What {
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Thing {
-    /// What.
+    /// Its kind.
     pub what: What,
     /// The log's line.
     pub line: u64,
@@ -96,7 +96,7 @@ pub struct Thing {
     /// Its time, by the log's clock.
     pub time_ms: u64,
     /// Distance by the wheel since the stretch began, in metres.
-    pub way_m: f64,
+    pub distance_m: f64,
     /// Its width along the row in mm; 0 if it has none.
     pub width_mm: f64,
     /// Where it is.
@@ -120,7 +120,7 @@ pub struct Ground {
     /// The work.
     pub did: Did,
     /// Distances by the wheel since the stretch began, in metres.
-    pub way_m: Range<f64>,
+    pub distance_m: Range<f64>,
     /// When, by the record's clock.
     pub time_ms: Range<u64>,
     /// The tool's path, a line for each part that has positions. Empty if the machine was not at work.
@@ -295,8 +295,8 @@ impl Job {
         // When a shorter delay is found, a later fix may get an earlier time.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
         let track = Track::through(&fixes, self.antenna.error_m(), wanted.longest_outage_m);
-        let find = |way_m: f64, recorded_ms: u64, offset: Offset| match &track {
-            Some(track) => track.find(way_m, recorded_ms as f64, offset),
+        let find = |distance_m: f64, recorded_ms: u64, offset: Offset| match &track {
+            Some(track) => track.find(distance_m, recorded_ms as f64, offset),
             None => Err(Missing::NoFixBefore),
         };
         let beam_to_tool_mm = read.settings.as_ref().map_or(0.0, |to| f64::from(to.get(Setting::BeamToToolMm)));
@@ -307,15 +307,17 @@ impl Job {
                 What::Object { .. } | What::Guarded | What::Label(_) => beam,
                 What::SwingOut | What::SwingIn | What::Alarm => tool,
             };
-            thing.found = find(thing.way_m, thing.time_ms, offset);
+            thing.found = find(thing.distance_m, thing.time_ms, offset);
         }
         let passed = |passed: Passed| {
-            let way_m = metres(passed.ticks.start as f64)..metres(passed.ticks.end as f64);
+            let distance_m = metres(passed.ticks.start as f64)..metres(passed.ticks.end as f64);
             let lines = match passed.did {
                 Did::Rolled => Vec::new(),
-                Did::Weeded | Did::Spared => lines(&way_m, |way_m| find(way_m, passed.time_ms.end, tool)),
+                Did::Weeded | Did::Spared => {
+                    lines(&distance_m, |distance_m| find(distance_m, passed.time_ms.end, tool))
+                }
             };
-            Ground { did: passed.did, way_m, time_ms: passed.time_ms, lines }
+            Ground { did: passed.did, distance_m, time_ms: passed.time_ms, lines }
         };
         let ground = read.ground.into_iter().map(passed).collect();
         self.stretches.push(Stretch { things, ground, time_ms: read.time_ms.unwrap_or_default() });
@@ -331,12 +333,12 @@ impl Job {
 const LINE_STEP_M: f64 = 0.5;
 
 /// The lines along this distance, where positions are known.
-fn lines(way_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Vec<Vec<Place>> {
+fn lines(distance_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) -> Vec<Vec<Place>> {
     let mut lines: Vec<Vec<Place>> = vec![Vec::new()];
-    let steps = ((way_m.end - way_m.start) / LINE_STEP_M).ceil().max(1.0);
+    let steps = ((distance_m.end - distance_m.start) / LINE_STEP_M).ceil().max(1.0);
     for step in 0..=steps as u64 {
         let share = step as f64 / steps;
-        match (find(way_m.start + share * (way_m.end - way_m.start)), lines.last_mut()) {
+        match (find(distance_m.start + share * (distance_m.end - distance_m.start)), lines.last_mut()) {
             (Ok(found), Some(line)) => line.push(found.place),
             (Err(_), Some(line)) if !line.is_empty() => lines.push(Vec::new()),
             _ => {}
@@ -376,7 +378,7 @@ impl Reading {
 
     /// Whether the distance since the last status is impossible: the log has a gap.
     fn is_far(&self, status: &Status) -> bool {
-        self.last_position.is_some_and(|last| status.position.wrapping_sub(last).unsigned_abs() > LONGEST_WAY)
+        self.last_position.is_some_and(|last| status.position.wrapping_sub(last).unsigned_abs() > LONGEST_DISTANCE)
     }
 
     /// The wheel's ticks at a time. `None` outside of the stretch.
@@ -465,7 +467,7 @@ impl Reading {
             line: entry.number,
             text: entry.text.clone(),
             time_ms: entry.time_ms,
-            way_m: (ticks as f64 * self.tick_mm() + behind_mm) / 1000.0,
+            distance_m: (ticks as f64 * self.tick_mm() + behind_mm) / 1000.0,
             width_mm,
             found: Err(Missing::NoFixBefore),
         });

@@ -54,7 +54,7 @@ fn thing(job: &Job, thing: &Thing) -> Feature {
     let time = found.zip(job.midnight_ms).and_then(|(found, midnight)| utc(midnight + found.utc_ms));
     feature.set_property("time", time.map_or(JsonValue::Null, JsonValue::from));
     feature.set_property("record_s", rounded(thing.time_ms as f64 / 1000.0, 3));
-    feature.set_property("distance_m", rounded(thing.way_m, 3));
+    feature.set_property("distance_m", rounded(thing.distance_m, 3));
     feature.set_property("line", thing.line);
     match thing.found {
         Ok(found) => {
@@ -86,7 +86,7 @@ fn ground(ground: &Ground) -> Option<Feature> {
         Did::Spared => "not_weeded",
         Did::Rolled => return None,
     };
-    let length_m = ground.way_m.end - ground.way_m.start;
+    let length_m = ground.distance_m.end - ground.distance_m.start;
     let parts: Vec<Vec<Position>> = ground.lines.iter().flat_map(|line| cut(line)).collect();
     let geometry = match parts.len() {
         0 => None,
@@ -95,7 +95,7 @@ fn ground(ground: &Ground) -> Option<Feature> {
     };
     let mut feature = feature(kind, geometry);
     feature.set_property("record_s", rounded(ground.time_ms.start as f64 / 1000.0, 3));
-    feature.set_property("distance_m", rounded(ground.way_m.start, 3));
+    feature.set_property("distance_m", rounded(ground.distance_m.start, 3));
     feature.set_property("length_m", rounded(length_m, 3));
     (length_m > 0.0).then_some(feature)
 }

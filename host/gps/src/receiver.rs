@@ -18,7 +18,7 @@ use crate::plane::Place;
 use crate::sentence::{DAY_MS, Line, Quality, Report};
 use std::fmt;
 
-/// Fixes that have jumped are believed once they have agreed with each other for so long, in ms.
+/// After a jump, fixes are accepted again once they have agreed for this time, in ms.
 pub const AGREEING_MS: f64 = 10_000.0;
 
 /// And the number of fixes that must agree.
@@ -105,7 +105,7 @@ pub struct Heard {
 pub struct Counts {
     /// Fixes that are used.
     pub fixes: u64,
-    /// Times at which there was no fix any more.
+    /// How often the fix was lost.
     pub losses: u64,
     /// Fixes that have jumped.
     pub jumps: u64,

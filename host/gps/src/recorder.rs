@@ -6,7 +6,7 @@
 //! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
-use crate::job::{LONGEST_WAY, tick_mm};
+use crate::job::{LONGEST_DISTANCE, tick_mm};
 use crate::receiver::{Heard, Receiver};
 use crate::sentence::Line;
 use link::LineReader;
@@ -58,7 +58,7 @@ impl Recorder {
             Happening::Lost(_) => self.wheel_lost(),
             Happening::Status(status, _) => {
                 let step = |last: i32| status.position.wrapping_sub(last);
-                if self.wheel.is_some_and(|(last, _)| step(last).unsigned_abs() > LONGEST_WAY) {
+                if self.wheel.is_some_and(|(last, _)| step(last).unsigned_abs() > LONGEST_DISTANCE) {
                     self.wheel_lost();
                 }
                 let ticks = self.wheel.map_or(0, |(last, ticks)| ticks + i64::from(step(last)));
@@ -112,12 +112,12 @@ impl Recorder {
             lines.push((kind, line));
             lines.extend(marks(&heard));
             if self.damaged == DAMAGED_IN_A_ROW {
-                let why = "nothing that comes is NMEA 0183: see that --gps-baud is the receiver's, and to its cable";
+                let why = "no received line is NMEA 0183: check --gps-baud and the cable";
                 lines.push((Kind::GpsMark, why.to_owned()));
             }
         }
         if self.heard_ms.is_some_and(|heard_ms| time_ms.saturating_sub(heard_ms) > SILENCE_MS) {
-            lines.extend(self.lost("the receiver says nothing"));
+            lines.extend(self.lost("the receiver is silent"));
         }
         lines
     }
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_alone_as_with_another_baud_rate_is_told_once() {
+    fn noise_alone_as_with_another_baud_rate_is_reported_once() {
         let (mut recorder, _) = Recorder::new(&Antenna::default());
         recorder.found(0, "a port");
         let lines: Lines = (0..200).flat_map(|_| recorder.take(10, &[0x80, b'x', 0xFF, b'\n'])).collect();
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_record_says_of_the_antenna_is_read_again() {
+    fn the_antenna_s_line_in_a_record_is_read_again() {
         for antenna in [
             Antenna::default(),
             Antenna { beam_ahead_mm: -250.5, beam_right_mm: 30.0, delay_ms: 80.0, ..Antenna::default() },

@@ -67,7 +67,7 @@ pub struct Report {
     pub quality: Option<Quality>,
 }
 
-/// What a line is.
+/// The kinds of line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Line {
     /// A sentence with a position or time.

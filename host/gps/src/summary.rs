@@ -1,6 +1,6 @@
 //! A job in numbers: the stand, the ground, the time, and how many positions there are.
 //!
-//! A spacing is the distance between two neighbouring plants if the machine was at work all the way between. So a
+//! A spacing is the distance between two neighbouring plants if the machine was at work all the time between. So a
 //! headland is no gap in the stand: the work switch marks the row end. If a spacing is longer than one and a half of
 //! the usual one, plants are missing in it. Unknown detections count as plants.
 
@@ -25,7 +25,7 @@ pub struct Stand {
 pub struct Summary {
     /// Plants, including unknown detections.
     pub plants: u64,
-    /// Of them unknown.
+    /// Unknown detections among them.
     pub unknown: u64,
     /// Mean distance between neighbouring plants without a missing one between, in mm.
     pub spacing_mean_mm: Option<f64>,
@@ -43,7 +43,7 @@ pub struct Summary {
     pub labels: u64,
     /// Ground of the row over which the machine was at work, in metres.
     pub worked_m: f64,
-    /// Of it weeded.
+    /// The weeded part of it.
     pub weeded_m: f64,
     /// The same as a share.
     pub weeded_percent: Option<f64>,
@@ -61,13 +61,13 @@ pub struct Summary {
     pub without_place: u64,
     /// Fixes that are used.
     pub fixes: u64,
-    /// Times at which there was no fix any more.
+    /// How often the fix was lost.
     pub fix_losses: u64,
     /// Fixes that have jumped.
     pub jumps: u64,
     /// Lines of the receiver that came damaged.
     pub damaged_lines: u64,
-    /// Times at which the receiver was gone or silent.
+    /// How often the receiver was lost or silent.
     pub receiver_losses: u64,
 }
 
@@ -104,7 +104,7 @@ impl Summary {
         for stretch in &job.stretches {
             record_ms += stretch.time_ms.end - stretch.time_ms.start;
             for ground in stretch.ground.iter().filter(|ground| ground.did != Did::Rolled) {
-                let length_m = ground.way_m.end - ground.way_m.start;
+                let length_m = ground.distance_m.end - ground.distance_m.start;
                 summary.worked_m += length_m;
                 summary.weeded_m += if ground.did == Did::Weeded { length_m } else { 0.0 };
                 work_ms += ground.time_ms.end - ground.time_ms.start;
@@ -150,14 +150,14 @@ fn spacings_mm(job: &Job) -> Vec<f64> {
     let mut spacings = Vec::new();
     for stretch in &job.stretches {
         let is_plant = |thing: &&Thing| matches!(thing.what, What::Object { class: Class::Plant | Class::Unknown, .. });
-        let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.way_m).collect();
+        let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.distance_m).collect();
         // Both are known by the wheel's distance.
         let rests: Vec<_> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
         for pair in plants.windows(2) {
-            let is_between = |way_m: f64| (pair[0]..pair[1]).contains(&way_m);
+            let is_between = |distance_m: f64| (pair[0]..pair[1]).contains(&distance_m);
             let rested = rests.iter().any(|rest| {
-                let contains_both = rest.way_m.start <= pair[0] && pair[1] <= rest.way_m.end;
-                contains_both || is_between(rest.way_m.start) || is_between(rest.way_m.end)
+                let contains_both = rest.distance_m.start <= pair[0] && pair[1] <= rest.distance_m.end;
+                contains_both || is_between(rest.distance_m.start) || is_between(rest.distance_m.end)
             });
             if !rested && pair[1] > pair[0] {
                 spacings.push(1000.0 * (pair[1] - pair[0]));

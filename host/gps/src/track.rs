@@ -79,7 +79,7 @@ impl Missing {
             Self::NoFixBehind => "no fix behind it",
             Self::OutageTooLong => "the outage is too long",
             Self::Jumped => "the fixes have jumped there",
-            Self::NoHeading => "the fixes do not tell the heading",
+            Self::NoHeading => "the fixes do not show the heading",
         }
     }
 }
@@ -102,7 +102,7 @@ pub struct Found {
 struct Station {
     time_ms: f64,
     utc_ms: i64,
-    way_m: f64,
+    distance_m: f64,
     at: Metres,
     error_m: f64,
     track: u32,
@@ -128,13 +128,13 @@ impl Track {
         let plane = Plane::around(fixes.first()?.1.place);
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
         let mut intervals = Vec::new();
-        for &(way_m, fix) in fixes {
+        for &(distance_m, fix) in fixes {
             let at = plane.metres(fix.place);
             let error_m = error_m.unwrap_or_else(|| fix.quality.usual_error_m());
             let station = Station {
                 time_ms: fix.time_ms,
                 utc_ms: fix.utc_ms,
-                way_m,
+                distance_m,
                 at,
                 error_m,
                 track: fix.track,
@@ -146,7 +146,7 @@ impl Track {
                 continue;
             };
             intervals.push(fix.time_ms - last.until_ms);
-            if last.track == fix.track && (way_m - last.way_m).abs() < STANDING_M {
+            if last.track == fix.track && (distance_m - last.distance_m).abs() < STANDING_M {
                 last.fixes += 1.0;
                 last.at = last.at.plus(at.minus(last.at).times(1.0 / last.fixes));
                 last.error_m = last.error_m.max(error_m);
@@ -165,23 +165,23 @@ impl Track {
     ///
     /// # Errors
     /// Why it has no position.
-    pub fn find(&self, way_m: f64, recorded_ms: f64, offset: Offset) -> Result<Found, Missing> {
-        let first = self.passed(way_m, recorded_ms)?;
+    pub fn find(&self, distance_m: f64, recorded_ms: f64, offset: Offset) -> Result<Found, Missing> {
+        let first = self.passed(distance_m, recorded_ms)?;
         let (from, to) = (&self.stations[first], &self.stations[first + 1]);
         if from.track != to.track {
             return Err(Missing::Jumped);
         }
         let basis = if self.follow(from, to) { Basis::Measured } else { Basis::Interpolated };
-        if basis == Basis::Interpolated && (to.way_m - from.way_m).abs() > self.longest_outage_m {
+        if basis == Basis::Interpolated && (to.distance_m - from.distance_m).abs() > self.longest_outage_m {
             return Err(Missing::OutageTooLong);
         }
-        let share = (way_m - from.way_m) / (to.way_m - from.way_m);
+        let share = (distance_m - from.distance_m) / (to.distance_m - from.distance_m);
         let antenna = from.at.plus(to.at.minus(from.at).times(share));
         let mut error_m = from.error_m.max(to.error_m);
         let mut at = antenna;
         let beside_m = offset.ahead_m.hypot(offset.right_m);
         if beside_m > 0.0 {
-            let (forward, heading_error) = self.heading(first, way_m).ok_or(Missing::NoHeading)?;
+            let (forward, heading_error) = self.heading(first, distance_m).ok_or(Missing::NoHeading)?;
             at = at.plus(forward.times(offset.ahead_m)).plus(forward.turned_right().times(offset.right_m));
             error_m = error_m.hypot(beside_m * heading_error);
         }
@@ -193,24 +193,25 @@ impl Track {
 
     /// The first of the two fixes between which the wheel passed this distance for the last time before the object was
     /// recorded.
-    fn passed(&self, way_m: f64, recorded_ms: f64) -> Result<usize, Missing> {
+    fn passed(&self, distance_m: f64, recorded_ms: f64) -> Result<usize, Missing> {
         let before = self.stations.partition_point(|station| station.time_ms <= recorded_ms + RECORDED_EARLY_MS);
         for first in (0..before).rev() {
-            let from_m = self.stations[first].way_m;
+            let from_m = self.stations[first].distance_m;
             let Some(to) = self.stations.get(first + 1) else { continue };
-            let (low, high) = (from_m.min(to.way_m), from_m.max(to.way_m));
+            let (low, high) = (from_m.min(to.distance_m), from_m.max(to.distance_m));
             // The fixes of a standstill are one station, which lies where the first of them does: the track ends a little beyond.
             let beyond = if first + 2 == self.stations.len() { STANDING_M } else { 0.0 };
-            if (low - beyond..=high + beyond).contains(&way_m) && high > low {
+            if (low - beyond..=high + beyond).contains(&distance_m) && high > low {
                 return Ok(first);
             }
-            if high < way_m - ROLLED_BACK_M.max(self.longest_outage_m) {
+            if high < distance_m - ROLLED_BACK_M.max(self.longest_outage_m) {
                 break;
             }
         }
         // It was recorded before the next fix, or before all fixes.
-        let farthest = self.stations[..before].iter().map(|station| station.way_m).fold(f64::NEG_INFINITY, f64::max);
-        Err(if way_m > farthest && before > 0 { Missing::NoFixBehind } else { Missing::NoFixBefore })
+        let farthest =
+            self.stations[..before].iter().map(|station| station.distance_m).fold(f64::NEG_INFINITY, f64::max);
+        Err(if distance_m > farthest && before > 0 { Missing::NoFixBehind } else { Missing::NoFixBefore })
     }
 
     /// Whether two fixes are successive, without an outage.
@@ -219,11 +220,12 @@ impl Track {
     }
 
     /// The machine's heading between a fix and the next, as a metre forward, and its standard deviation in radians.
-    fn heading(&self, first: usize, way_m: f64) -> Option<(Metres, f64)> {
+    fn heading(&self, first: usize, distance_m: f64) -> Option<(Metres, f64)> {
         let stations = &self.stations;
         let track = stations[first].track;
-        let is_in =
-            |station: &Station| station.track == track && (station.way_m - way_m).abs() <= LONGEST_CHORD_M / 2.0;
+        let is_in = |station: &Station| {
+            station.track == track && (station.distance_m - distance_m).abs() <= LONGEST_CHORD_M / 2.0
+        };
         let (mut begin, mut end) = (first, first + 2);
         loop {
             let (heading, error) = fitted(&stations[begin..end]);
@@ -246,15 +248,15 @@ fn fitted(stations: &[Station]) -> (Metres, f64) {
     let count = stations.len() as f64;
     let (mut mean_m, mut middle, mut error_m) = (0.0, Metres::default(), 0.0_f64);
     for station in stations {
-        mean_m += station.way_m / count;
+        mean_m += station.distance_m / count;
         middle = middle.plus(station.at.times(1.0 / count));
         error_m = error_m.max(station.error_m);
     }
     let (mut spread, mut slope) = (0.0, Metres::default());
     for station in stations {
-        let way_m = station.way_m - mean_m;
-        spread += way_m * way_m;
-        slope = slope.plus(station.at.minus(middle).times(way_m));
+        let distance_m = station.distance_m - mean_m;
+        spread += distance_m * distance_m;
+        slope = slope.plus(station.at.minus(middle).times(distance_m));
     }
     (slope, error_m / spread.sqrt())
 }
@@ -268,14 +270,14 @@ mod tests {
     const FIELD: Place = Place { latitude: -33.4, longitude: -179.999_99 };
 
     /// Fixes once a second, at half a metre a second. `at` returns the antenna's position after a distance in metres.
-    fn driven(ways_m: impl IntoIterator<Item = f64>, at: impl Fn(f64) -> Metres) -> Vec<(f64, Fix)> {
+    fn driven(distances_m: impl IntoIterator<Item = f64>, at: impl Fn(f64) -> Metres) -> Vec<(f64, Fix)> {
         let plane = Plane::around(FIELD);
-        let fix = |(second, way_m): (usize, f64)| {
+        let fix = |(second, distance_m): (usize, f64)| {
             let (time_ms, utc_ms) = (1000.0 * second as f64, 1000 * second as i64);
-            let fix = Fix { time_ms, utc_ms, place: plane.place(at(way_m)), quality: Quality::Rtk, track: 0 };
-            (way_m, fix)
+            let fix = Fix { time_ms, utc_ms, place: plane.place(at(distance_m)), quality: Quality::Rtk, track: 0 };
+            (distance_m, fix)
         };
-        ways_m.into_iter().enumerate().map(fix).collect()
+        distances_m.into_iter().enumerate().map(fix).collect()
     }
 
     fn every_half_metre(count: u32) -> impl Iterator<Item = f64> {
@@ -290,11 +292,15 @@ mod tests {
     #[test]
     fn the_track_reaches_to_where_the_machine_stands_at_its_end() {
         // The fixes of the standstill are one station, at the first of them.
-        let ways_m = every_half_metre(10).chain([4.998, 5.0, 5.0]);
-        let track = Track::through(&driven(ways_m, |way_m| Metres { east: way_m, north: 0.0 }), None, 20.0)
-            .expect("it has fixes");
-        for way_m in [4.998, 5.0, 5.002] {
-            assert!(off_m(track.find(way_m, 12_000.0, Offset::default()), Metres { east: way_m, north: 0.0 }) < 0.005);
+        let distances_m = every_half_metre(10).chain([4.998, 5.0, 5.0]);
+        let track =
+            Track::through(&driven(distances_m, |distance_m| Metres { east: distance_m, north: 0.0 }), None, 20.0)
+                .expect("it has fixes");
+        for distance_m in [4.998, 5.0, 5.002] {
+            assert!(
+                off_m(track.find(distance_m, 12_000.0, Offset::default()), Metres { east: distance_m, north: 0.0 })
+                    < 0.005
+            );
         }
         assert_eq!(track.find(5.01, 12_000.0, Offset::default()), Err(Missing::NoFixBehind));
     }
@@ -302,29 +308,29 @@ mod tests {
     proptest! {
         #[test]
         fn on_a_straight_row_positions_are_right_for_every_direction_and_offset(
-            direction in 0.0..std::f64::consts::TAU, way_m in 0.1..29.4_f64, ahead_m in -3.0..3.0_f64, right_m in -3.0..3.0_f64,
+            direction in 0.0..std::f64::consts::TAU, distance_m in 0.1..29.4_f64, ahead_m in -3.0..3.0_f64, right_m in -3.0..3.0_f64,
         ) {
             let forward = Metres { east: direction.sin(), north: direction.cos() };
-            let fixes = driven(every_half_metre(60), |way_m| forward.times(way_m));
+            let fixes = driven(every_half_metre(60), |distance_m| forward.times(distance_m));
             let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
-            let found = track.find(way_m, 2000.0 * way_m, Offset { ahead_m, right_m });
-            let expected = forward.times(way_m + ahead_m).plus(forward.turned_right().times(right_m));
+            let found = track.find(distance_m, 2000.0 * distance_m, Offset { ahead_m, right_m });
+            let expected = forward.times(distance_m + ahead_m).plus(forward.turned_right().times(right_m));
             prop_assert!(off_m(found, expected) < 1e-4);
-            prop_assert_eq!(found.expect("it has a place").utc_ms, (2000.0 * way_m).round() as i64);
+            prop_assert_eq!(found.expect("it has a place").utc_ms, (2000.0 * distance_m).round() as i64);
         }
 
         #[test]
-        fn what_happened_in_an_outage_is_between_the_fixes_on_both_sides_where_the_way_may_be_so_long(
-            lost in 2..50_u32, length in 1..40_u32, way_m in 0.0..29.0_f64,
+        fn events_in_an_outage_are_between_the_fixes_on_both_sides_if_the_distance_allows(
+            lost in 2..50_u32, length in 1..40_u32, distance_m in 0.0..29.0_f64,
         ) {
-            let fixes = driven(every_half_metre(60), |way_m| Metres { east: way_m, north: 0.0 });
+            let fixes = driven(every_half_metre(60), |distance_m| Metres { east: distance_m, north: 0.0 });
             let kept: Vec<_> =
                 fixes.iter().enumerate().filter(|(at, _)| !(lost..lost + length).contains(&(*at as u32))).map(|(_, it)| *it).collect();
             let track = Track::through(&kept, None, 10.0).expect("there are fixes");
-            let found = track.find(way_m, 2000.0 * way_m, Offset::default());
+            let found = track.find(distance_m, 2000.0 * distance_m, Offset::default());
             let outage = 0.5 * f64::from(lost - 1)..0.5 * f64::from(lost + length);
-            let expected = Metres { east: way_m, north: 0.0 };
-            if !outage.contains(&way_m) {
+            let expected = Metres { east: distance_m, north: 0.0 };
+            if !outage.contains(&distance_m) {
                 prop_assert_eq!(found.map(|found| found.basis), Ok(Basis::Measured));
                 prop_assert!(off_m(found, expected) < 1e-4);
             } else if outage.end > 29.5 {
@@ -340,7 +346,7 @@ mod tests {
 
     #[test]
     fn before_the_first_fix_and_behind_the_last_there_is_no_place() {
-        let fixes = driven(every_half_metre(10), |way_m| Metres { east: way_m, north: 0.0 });
+        let fixes = driven(every_half_metre(10), |distance_m| Metres { east: distance_m, north: 0.0 });
         let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
         assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
         assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
@@ -352,10 +358,10 @@ mod tests {
     fn a_machine_that_rolls_back_keeps_its_heading_and_the_last_pass_counts() {
         // Four metres forward, two back on the same line, and forward on another line, a metre to the north.
         let ways = (0..=8).chain((4..8).rev()).chain(5..=12).map(|step| 0.5 * f64::from(step));
-        let mut fixes = driven(ways, |way_m| Metres { east: way_m, north: 0.0 });
+        let mut fixes = driven(ways, |distance_m| Metres { east: distance_m, north: 0.0 });
         let plane = Plane::around(FIELD);
-        for (way_m, fix) in &mut fixes[13..] {
-            fix.place = plane.place(Metres { east: *way_m, north: 1.0 });
+        for (distance_m, fix) in &mut fixes[13..] {
+            fix.place = plane.place(Metres { east: *distance_m, north: 1.0 });
         }
         let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
         let ahead = Offset { ahead_m: 1.0, right_m: 0.0 };
@@ -367,7 +373,7 @@ mod tests {
 
     #[test]
     fn where_the_fixes_have_jumped_for_good_nothing_is_interpolated() {
-        let mut fixes = driven(every_half_metre(20), |way_m| Metres { east: way_m, north: 0.0 });
+        let mut fixes = driven(every_half_metre(20), |distance_m| Metres { east: distance_m, north: 0.0 });
         fixes[10..].iter_mut().for_each(|(_, fix)| fix.track = 1);
         let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
         assert_eq!(track.find(4.75, 9500.0, Offset::default()), Err(Missing::Jumped));
@@ -375,8 +381,8 @@ mod tests {
     }
 
     #[test]
-    fn a_standing_machine_is_at_the_mean_of_its_fixes_and_two_alone_tell_no_heading_through_noise() {
-        let mut fixes = driven([0.0, 0.0, 0.0, 0.5], |way_m| Metres { east: way_m, north: 0.0 });
+    fn a_standing_machine_is_at_the_mean_of_its_fixes_and_two_noisy_fixes_give_no_heading() {
+        let mut fixes = driven([0.0, 0.0, 0.0, 0.5], |distance_m| Metres { east: distance_m, north: 0.0 });
         let plane = Plane::around(FIELD);
         for (at, north) in [(0, 0.3), (1, -0.3), (2, 0.6)] {
             fixes[at].1.place = plane.place(Metres { east: 0.0, north });

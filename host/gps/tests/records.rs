@@ -44,22 +44,22 @@ fn record(change: impl Fn(u64, String) -> Vec<(Kind, String)>) -> Vec<Entry> {
         (0, Kind::Setting, "beam_to_tool_mm=400".to_owned()),
     ];
     for tenth in 0..=600_u64 {
-        let (time_ms, way_mm) = (100 * tenth, SPEED * tenth as f64 / 10.0);
-        let is_at_work = (5000.0..25_000.0).contains(&way_mm);
+        let (time_ms, distance_mm) = (100 * tenth, SPEED * tenth as f64 / 10.0);
+        let is_at_work = (5000.0..25_000.0).contains(&distance_mm);
         // The tool is out over the first 200 of each 500 mm.
-        let is_out = !is_at_work || way_mm % 500.0 < 200.0;
+        let is_out = !is_at_work || distance_mm % 500.0 < 200.0;
         let (mode, tool) = (if is_at_work { "work" } else { "hold" }, if is_out { "out" } else { "in" });
         if tenth.is_multiple_of(10) && tenth >= 20 {
-            let place = plane.place(Metres { east: way_mm / 1000.0, north: 0.0 });
+            let place = plane.place(Metres { east: distance_mm / 1000.0, north: 0.0 });
             lines.extend(change(tenth / 10, gga(time_ms, place)).into_iter().map(|(kind, line)| (time_ms, kind, line)));
         }
-        let position = (TICKS_A_MM * way_mm) as i64;
-        if is_at_work && (way_mm % 500.0 == 200.0 || way_mm % 500.0 == 0.0) {
+        let position = (TICKS_A_MM * distance_mm) as i64;
+        if is_at_work && (distance_mm % 500.0 == 200.0 || distance_mm % 500.0 == 0.0) {
             lines.push((time_ms, Kind::Event, format!("swing tool={tool} pos={position}")));
         }
         let status = format!("state={mode} tool={tool} pos={position} speed_mm_s=500 windows=0 unseen_mm=0");
         lines.push((time_ms, Kind::Status, status));
-        if is_at_work && way_mm % 500.0 == 250.0 {
+        if is_at_work && distance_mm % 500.0 == 250.0 {
             // The canopy is 100 mm wide, and ended here. The hold includes both margins.
             let leading = position - 200;
             let plant = format!("plant pos={leading} votes=3 spacing=1000 delay=600 hold=400 actuation=1000");
@@ -100,10 +100,10 @@ fn a_plant_is_the_middle_of_its_canopy_and_stands_where_the_beam_was() {
     for (number, plant) in plants.iter().enumerate() {
         // The leading edge was 100 mm before, the middle is 50 mm behind that, and the beam is a metre ahead of the
         // antenna.
-        let way_m = 5.2 + 0.5 * number as f64;
-        assert!((plant.way_m - way_m).abs() < 1e-9 && plant.width_mm == 100.0, "{plant:?}");
+        let distance_m = 5.2 + 0.5 * number as f64;
+        assert!((plant.distance_m - distance_m).abs() < 1e-9 && plant.width_mm == 100.0, "{plant:?}");
         let at = plane.metres(plant.found.expect("it has a place").place);
-        assert!((at.east - way_m - 1.0).abs() < 1e-3 && at.north.abs() < 1e-3, "{at:?}");
+        assert!((at.east - distance_m - 1.0).abs() < 1e-3 && at.north.abs() < 1e-3, "{at:?}");
     }
 }
 
@@ -211,7 +211,7 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
     assert_eq!(job.things().count(), PLANTS + SWINGS + 1, "nothing told is left out");
     let [one, other] = job.stretches.as_slice() else { panic!("{}", job.stretches.len()) };
     let spacing_m = |things: &[Thing]| {
-        let plants: Vec<f64> = things.iter().filter(is_object).map(|plant| plant.way_m).collect();
+        let plants: Vec<f64> = things.iter().filter(is_object).map(|plant| plant.distance_m).collect();
         plants[2] - plants[1]
     };
     assert!((spacing_m(&one.things) - 0.5).abs() < 1e-9 && (spacing_m(&other.things) - 1.0).abs() < 1e-9);
@@ -219,17 +219,17 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
 
 #[test]
 fn ground_that_is_rolled_over_again_counts_once() {
-    let status = |time_ms, way_mm: i64| {
-        let text = format!("state=work tool=in pos={} speed_mm_s=0 windows=0 unseen_mm=0", 2 * way_mm);
+    let status = |time_ms, distance_mm: i64| {
+        let text = format!("state=work tool=in pos={} speed_mm_s=0 windows=0 unseen_mm=0", 2 * distance_mm);
         Entry { number: 1, time_ms, kind: Kind::Status, text }
     };
     let entry = |kind, text: &str| Entry { number: 1, time_ms: 0, kind, text: text.to_owned() };
     let mut log = vec![entry(Kind::Connected, "0.2.0"), entry(Kind::Setting, "ticks_per_m=2000")];
-    let ways_mm = [0, 500, 1000, 500, 200, 700, 1200];
-    log.extend(ways_mm.into_iter().enumerate().map(|(at, way_mm)| status(100 * at as u64, way_mm)));
+    let distances_mm = [0, 500, 1000, 500, 200, 700, 1200];
+    log.extend(distances_mm.into_iter().enumerate().map(|(at, distance_mm)| status(100 * at as u64, distance_mm)));
     let job = Job::read(&log, &Wanted::default());
     let weeded = job.stretches[0].ground.iter().filter(|ground| ground.did == Did::Weeded);
-    let length_m: f64 = weeded.map(|ground| ground.way_m.end - ground.way_m.start).sum();
+    let length_m: f64 = weeded.map(|ground| ground.distance_m.end - ground.distance_m.start).sum();
     assert!((length_m - 1.2).abs() < 1e-9, "{length_m}");
 }
 
@@ -248,7 +248,7 @@ fn a_label_lies_where_the_last_object_does_and_a_refused_one_is_none() {
     let at = things.iter().position(|thing| matches!(thing.what, What::Label(_))).expect("a label");
     assert_eq!(things[at].what, What::Label(Class::Weed));
     let object = things[..at].iter().rev().find(|thing| is_object(thing)).expect("an object");
-    assert_eq!((object.found, object.way_m), (things[at].found, things[at].way_m));
+    assert_eq!((object.found, object.distance_m), (things[at].found, things[at].distance_m));
     assert_eq!(things.iter().filter(|thing| matches!(thing.what, What::Label(_))).count(), 1);
 }
 
@@ -280,7 +280,7 @@ proptest! {
             let Ok(found) = thing.found else { continue };
             let ahead_m = if is_object(&thing) { 1.0 } else { 0.6 };
             let at = plane.metres(found.place);
-            prop_assert!((at.east - thing.way_m - ahead_m).abs() < 2e-3 && at.north.abs() < 2e-3, "{:?}", thing);
+            prop_assert!((at.east - thing.distance_m - ahead_m).abs() < 2e-3 && at.north.abs() < 2e-3, "{:?}", thing);
         }
         prop_assert!(map::features(&[("a record", &job)]).features.len() >= PLANTS + SWINGS);
     }

@@ -30,7 +30,7 @@ pub fn alarm(alarm: Alarm) -> &'static str {
     }
 }
 
-/// What to do about a warning.
+/// What to do after a warning.
 pub fn warning(warning: Warning) -> &'static str {
     match warning {
         Warning::LateCommand => "drive evenly, look at the plant, or raise `lead_out_ms`",
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_alarm_and_what_to_do_fit_on_a_line_of_80_characters() {
+    fn an_alarm_and_its_advice_fit_on_a_line_of_80_characters() {
         for alarm in (0..).map_while(Alarm::from_index) {
             let line = format!("alarm {}: {}", name(alarm), super::alarm(alarm));
             assert!(line.len() <= 80, "{line}");

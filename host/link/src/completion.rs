@@ -58,14 +58,14 @@ mod tests {
     }
 
     #[test]
-    fn what_no_command_begins_with_has_no_completion() {
+    fn an_unknown_beginning_has_no_completion() {
         for line in ["xyz", "set nothing ", "hold ", "start now ", "set wheel_mm 4oo"] {
             assert!(complete(line).is_empty(), "{line:?}");
         }
     }
 
     #[test]
-    fn what_several_completions_share_is_found() {
+    fn the_common_part_of_completions_is_found() {
         assert_eq!(common(&complete("set lead")), "set lead_");
         assert_eq!(common(&complete("xyz")), "");
     }

@@ -54,7 +54,7 @@ pub enum LinkError {
     NotOpened {
         /// Its name.
         port: String,
-        /// What the system says.
+        /// The system's error.
         source: serialport::Error,
     },
     /// The port went away.
@@ -62,7 +62,7 @@ pub enum LinkError {
     Gone(#[source] io::Error),
     /// The firmware did not finish its answer.
     #[error(
-        "nothing finishes the answer to `{command}`: press the Uno's reset, and see that the weeder's firmware is on it \
+        "the answer to `{command}` has no end: press the Uno's reset, and check that the weeder's firmware is on it \
          (`weeder flash`); it sent {received:?}"
     )]
     Silent {
@@ -72,9 +72,7 @@ pub enum LinkError {
         received: String,
     },
     /// The received bytes are not text.
-    #[error(
-        "what comes from the port is no text: see that nothing else is wired to D0 and D1, and flash the Uno again"
-    )]
+    #[error("the port sends no text: check that nothing else is wired to D0 and D1, and flash the Uno again")]
     Noise,
     /// Something else answers.
     #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]

@@ -27,8 +27,7 @@ pub enum ExamplesError {
     Link(#[from] LinkError),
     /// The firmware has other built-in examples than this program.
     #[error(
-        "the firmware has other built-in examples than this program, so what it was taught cannot be given in millimetres: use the \
-         `weeder` that was built with it, or put this one's on the board by `weeder flash`"
+        "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder`, or flash this one's firmware by `weeder flash`"
     )]
     OtherTable,
     /// An example has features that no object in whole millimetres has.
@@ -40,12 +39,11 @@ pub enum ExamplesError {
         number: u16,
     },
     /// The machine is at work: teaching needs HOLD.
-    #[error("the machine is at work, where it is not taught: hold it first, by its switch or `hold`; nothing was sent")]
+    #[error("the machine is at work and takes no examples: hold it first, by its switch or `hold`; nothing was sent")]
     AtWork,
     /// They do not find room.
     #[error(
-        "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or have it forget those \
-         that the file does not have, by --replace; nothing was sent"
+        "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or use --replace to forget all that are not in the file; nothing was sent"
     )]
     NoRoom {
         /// Examples that would be taught.
@@ -228,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn an_object_is_told_within_what_a_byte_leaves_open() {
+    fn features_are_recovered_within_a_byte_s_resolution() {
         for (spacing_mm, width_mm) in [(60, 12), (500, 100), (600, 150), (700, 180)] {
             let features = Features::describe(417, spacing_mm, width_mm);
             let told = features_of(&example_of(&features, label::PLANT)).expect("it is an object's");

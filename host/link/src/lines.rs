@@ -11,7 +11,7 @@ pub(super) const STRANGE: char = '\u{FFFD}';
 /// The longest line in characters. The firmware's own lines are shorter than 128.
 const LIMIT: usize = 256;
 
-/// Lines that wait to be taken; when more come the oldest go.
+/// Most lines that wait to be taken. A further line drops the oldest.
 const WAITING: usize = 1024;
 
 /// Collects bytes to lines.
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_without_an_end_is_cut_and_what_is_kept_is_bounded() {
+    fn a_line_without_an_end_is_cut_and_the_buffer_is_bounded() {
         let mut reader = LineReader::new();
         for _ in 0..10_000 {
             reader.take(&[b'x'; 1000]);

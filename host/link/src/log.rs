@@ -1,7 +1,7 @@
 //! The log of a session: one line for each input and output, as a CSV file for any program and for the replay.
 //!
 //! The columns are `time_ms` since the log was opened, `kind` and `line`. `line` is the firmware's own text. The log
-//! also holds the machine's version, settings and examples at each connection, so that it can be replayed by itself. It
+//! also holds the machine's version, settings and examples at each connection, so that it can be replayed alone. It
 //! holds the output of a satellite receiver as lines whose kind begins with `gps`. Each line is written before the next
 //! is read. So a power failure damages at most the last line.
 
@@ -17,7 +17,7 @@ use thiserror::Error;
 /// The kind of a line in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The Uno is there; the version.
+    /// The Uno is connected; the version.
     Connected,
     /// The Uno is gone; why.
     Lost,
@@ -29,13 +29,13 @@ pub enum Kind {
     Status,
     /// An event.
     Event,
-    /// What was typed.
+    /// A typed command.
     Command,
-    /// What it answered.
+    /// A line of its answer.
     Answer,
     /// Positions of beam and tool relative to a satellite receiver's antenna.
     Antenna,
-    /// The receiver's port is there; which.
+    /// The receiver's port was opened; its name.
     GpsFound,
     /// The receiver's port is gone, or silent; why.
     GpsLost,
@@ -106,7 +106,7 @@ pub enum LogError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The file is no log.
@@ -119,13 +119,13 @@ pub struct LogWriter {
     path: PathBuf,
     file: csv::Writer<File>,
     began: Instant,
-    /// Lines below the header that were there, and that were added.
+    /// Lines below the header: those found at opening, and those added since.
     found: u64,
     added: u64,
 }
 
 impl LogWriter {
-    /// Opens a log; one that is there is gone on with.
+    /// Opens a log. An existing one is continued.
     ///
     /// # Errors
     /// If the file cannot be written, or is something else.
@@ -150,12 +150,12 @@ impl LogWriter {
         Ok(log)
     }
 
-    /// The time that a line gets which is written now, in milliseconds.
+    /// The time of a line written now, in milliseconds.
     pub fn now_ms(&self) -> u64 {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// Writes down what happened.
+    /// Writes an event of the session.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -163,7 +163,7 @@ impl LogWriter {
         self.write_at(self.now_ms(), happening)
     }
 
-    /// Writes down what happened at a time that another clock tells.
+    /// Writes an event of the session, with a time from another clock.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -187,7 +187,7 @@ impl LogWriter {
         }
     }
 
-    /// Writes lines of some kinds at a time, of what is no [`Happening`].
+    /// Writes lines that do not come from a session, with this time.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -224,9 +224,9 @@ pub struct Entry {
     pub number: u64,
     /// The PC's time since the log was opened.
     pub time_ms: u64,
-    /// What kind of line it is.
+    /// Its kind.
     pub kind: Kind,
-    /// What stands there.
+    /// Its text.
     pub text: String,
 }
 
@@ -314,13 +314,13 @@ impl Pieces {
         let (mut above, mut any) = (self.lines, false);
         for line in text.split_inclusive('\n') {
             self.lines += 1;
-            let is_told = line != "\n" && !line.starts_with('#');
+            let is_text = line != "\n" && !line.starts_with('#');
             // A comment replaces each skipped line, so that line numbers stay right.
             if !self.has_header {
-                self.head.push_str(if is_told { line } else { "#\n" });
-                self.has_header = is_told;
+                self.head.push_str(if is_text { line } else { "#\n" });
+                self.has_header = is_text;
                 above = self.lines;
-            } else if is_told && is_wanted(line) {
+            } else if is_text && is_wanted(line) {
                 below.push_str(line);
                 any = true;
             } else {
@@ -347,7 +347,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_log_is_read_as_it_was_written_and_gone_on_with_behind_a_line_cut_off() {
+    fn a_log_is_read_back_and_continued_after_a_cut_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let answer = "speed_mm_s,spacing_mm \"quoted\"";

@@ -17,7 +17,7 @@ const READ_MS: u64 = 20;
 /// Longest wait of a write for room, and of a read.
 const PATIENCE: Duration = Duration::from_millis(READ_MS);
 
-/// USB vendors and products of the Uno, and of the converters on boards that are built like it.
+/// USB vendors and products of the Uno, and of the converters on compatible boards.
 const UNOS: [(u16, u16); 10] = [
     (0x2341, 0x0001),
     (0x2341, 0x0043),
@@ -97,7 +97,7 @@ pub fn open_other(name: &str) -> Result<Box<dyn crate::Port>, LinkError> {
     open(name).map(|(port, _)| Box::new(port) as Box<dyn crate::Port>)
 }
 
-/// Opens the port of something that only talks, such as a satellite receiver, at so many bits in a second.
+/// Opens the port of a device that only sends, such as a satellite receiver, at `baud` bits a second.
 ///
 /// # Errors
 /// If it is absent, in use, forbidden, or no serial port.
@@ -147,14 +147,14 @@ mod tests {
     }
 
     #[test]
-    fn two_unos_have_to_be_told_apart() {
+    fn two_unos_are_an_error() {
         let ports = [port("ttyACM0", Some((0x2341, 0x0043))), port("ttyUSB0", Some((0x1A86, 0x7523)))];
         let error = only_uno(&ports).unwrap_err().to_string();
         assert!(error.ends_with("choose one by --port, of ttyACM0, ttyUSB0"), "{error}");
     }
 
     #[test]
-    fn no_uno_is_said_with_what_there_is_instead() {
+    fn no_uno_is_an_error_with_the_other_ports() {
         let error = only_uno(&[port("ttyS0", None)]).unwrap_err().to_string();
         assert!(error.contains("(there is ttyS0): plug it in"), "{error}");
         let error = only_uno(&[]).unwrap_err().to_string();
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_port_that_is_absent_and_a_file_that_is_no_port_are_told_apart() {
+    fn an_absent_port_and_a_file_that_is_no_port_have_different_errors() {
         let error = try_port("/dev/no-such-port").unwrap_err().to_string();
         assert!(error.starts_with("there is no port /dev/no-such-port: plug the Uno in"), "{error}");
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn who_may_not_open_a_port_is_told_of_its_group() {
+    fn a_forbidden_port_is_an_error_with_its_group() {
         let denied = serialport::Error::new(ErrorKind::Io(io::ErrorKind::PermissionDenied), "Permission denied");
         let error = explain("/dev/ttyACM0", denied).to_string();
         assert!(error.contains("`sudo usermod -aG dialout $USER`) and log in again"), "{error}");

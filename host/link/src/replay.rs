@@ -97,7 +97,7 @@ struct Played {
     replayed: Vec<Heard>,
     /// Notes on skipped parts, with the reasons.
     notes: Vec<String>,
-    /// The last place.
+    /// The last position.
     end: i32,
 }
 
@@ -108,16 +108,14 @@ fn replay_stretch(
     progress: &mut Progress<impl FnMut(f64)>,
 ) -> Result<(), ReplayError> {
     if stretch.settings.get(Setting::SecondBeamMm) > 0 {
-        replayed
-            .notes
-            .push("a machine with a second beam is not replayed: the log does not hold what that saw".to_owned());
+        replayed.notes.push("a machine with a second beam is not replayed: the log lacks its edges".to_owned());
         return Ok(());
     }
-    let judged_from = stretch.judged_from();
-    if judged_from > i32::MIN {
-        replayed
-            .notes
-            .push(format!("the log begins with ground already seen: swings before pos={judged_from} are not judged"));
+    let compared_from = stretch.compared_from();
+    if compared_from > i32::MIN {
+        replayed.notes.push(format!(
+            "the log begins with ground already seen: swings before pos={compared_from} are not compared"
+        ));
     }
 
     let mut played = Vec::new();
@@ -127,7 +125,7 @@ fn replay_stretch(
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // The logged values are the same at every pace.
     let Played { logged, notes, end, .. } = &played[0];
-    let bounds = Bounds { first: stretch.first.position, judged_from, end: *end };
+    let bounds = Bounds { first: stretch.first.position, compared_from, end: *end };
     compare(logged, &heard, &bounds, replayed);
     replayed.notes.extend_from_slice(notes);
     Ok(())
@@ -139,21 +137,21 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
     let mut logged: Vec<Heard> = Vec::new();
     let mut last = (stretch.first.clone(), stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms));
     let mut notes = Vec::new();
-    // Whether the start that is carried out next takes unseen ground for bare.
+    // Whether the next start treats unseen ground as bare.
     let mut starts_now = false;
     for (place, (entry, happened)) in stretch.happened.iter().enumerate() {
         progress.advance();
         match happened {
             Happened::Status(status) => {
                 player.roll(&last.0, status, entry.time_ms.saturating_sub(last.1)).map_err(|()| {
-                    let problem = "the machine cannot have come so far since the status before".to_owned();
+                    let problem = "the machine cannot have rolled so far since the status before".to_owned();
                     ReplayError::Line { line: entry.number, problem }
                 })?;
                 last = (status.clone(), entry.time_ms);
             }
             Happened::Event(event) => {
                 let mut is_given = false;
-                if let Some(at) = stretch.place_of_change(place) {
+                if let Some(at) = stretch.position_of_change(place) {
                     player.roll_to(at, &last.0, stretch.next_status(place));
                     last.0.position = player.position();
                     last.0.speed_mm_s = player.speed_mm_s;
@@ -169,11 +167,11 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
             Happened::Command { is_refused: true, .. } => {}
             Happened::Command { line, .. } => {
                 // The status that shows the new state must come nearer to the command.
-                if stretch.is_told_by_state(place) {
+                if stretch.is_reported_by_event(place) {
                     starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
                     continue;
                 }
-                if let Some(at) = stretch.place_of_command(entry.time_ms, &last, place) {
+                if let Some(at) = stretch.position_of_command(entry.time_ms, &last, place) {
                     player.roll_to(at, &last.0, stretch.next_status(place));
                     last.0.position = player.position();
                     last.0.speed_mm_s = player.speed_mm_s;
@@ -235,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_typed_is_told_without_what_a_terminal_obeys() {
+    fn typed_text_is_shown_without_control_characters() {
         let typed = |status| if status == 2 { vec![(Kind::Command, "test \u{1b}[2J")] } else { Vec::new() };
         assert_eq!(replay(&log(20, typed)).unwrap().notes, [r"line 6: not replayed from `test \u{1b}[2J` on"]);
     }

@@ -64,7 +64,7 @@ pub struct Plugged {
     pub board: Board,
 }
 
-/// Why the rows' names cannot be had.
+/// Why the rows' names cannot be read or changed.
 #[derive(Debug, Error)]
 pub enum NamesError {
     /// An error of the file, or of a line in it.
@@ -94,7 +94,7 @@ pub enum NamesError {
 }
 
 impl Board {
-    /// The board at a port: whether it has a serial number of its own, the system's list tells.
+    /// The board at a port. The system's list shows whether it has its own serial number.
     ///
     /// # Errors
     /// If there is no such port.
@@ -106,7 +106,7 @@ impl Board {
         let listed = ports.iter().find(|listed| listed.port_name == port || listed.port_name == now);
         match listed {
             Some(listed) if serial_number(listed).is_some() => Ok(of(listed, &ports, Path::new(BY_PLACE))),
-            // A link of the user's own is meant to lead elsewhere some day.
+            // A user's own link may lead to another port some day.
             Some(listed) if listed.port_name == port => Ok(of(listed, &ports, Path::new(BY_PLACE))),
             None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
             // An absolute path is valid in any folder.
@@ -123,10 +123,10 @@ impl Board {
         Link::over(port, resets)
     }
 
-    /// The port at which it is now.
+    /// Its present port.
     ///
     /// # Errors
-    /// If it is not plugged in, or cannot be told from another.
+    /// If it is not plugged in, or matches several boards.
     pub fn port(&self) -> Result<String, LinkError> {
         match self {
             Self::Only => find_uno(),
@@ -203,7 +203,7 @@ pub fn wrong_with(name: &str) -> Option<String> {
 #[derive(Clone, Debug)]
 pub struct Names {
     path: PathBuf,
-    /// What a new file begins with.
+    /// The head of a new file.
     head: &'static str,
     document: DocumentMut,
     rows: Vec<Row>,
@@ -239,7 +239,7 @@ impl Names {
         self.rows.iter().find(|row| row.name == name)
     }
 
-    /// Calls a board so. Another name that it had is dropped, and so is another board that had the name; the row keeps its place.
+    /// Names a board. Drops its previous name, and the board that had this name. The row keeps its number.
     ///
     /// # Errors
     /// If it cannot be a row's name.
@@ -248,7 +248,7 @@ impl Names {
         if let Some(problem) = wrong_with(name) {
             return Err(refused(problem));
         }
-        // Some systems' files are the same then.
+        // Some file systems ignore case.
         let twin = self.rows.iter().find(|row| row.name != name && row.name.to_lowercase() == name.to_lowercase());
         if let Some(twin) = twin {
             return Err(refused(format!("there is a row {} already", twin.name)));
@@ -274,7 +274,7 @@ impl Names {
     /// Forgets a row.
     ///
     /// # Errors
-    /// If there is none of this name.
+    /// If no row has this name.
     pub fn forget(&mut self, name: &str) -> Result<(), NamesError> {
         if self.document.remove(name).is_none() {
             let known: Vec<&str> = self.rows.iter().map(|row| row.name.as_str()).collect();
@@ -285,7 +285,7 @@ impl Names {
         Ok(())
     }
 
-    /// Writes the file, and makes its folder where there is none.
+    /// Writes the file, and makes its folder if necessary.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_in_a_file_is_said_with_its_line() {
+    fn an_error_in_a_file_has_its_line() {
         let path = Path::new("rows.toml");
         for (text, problem) in [
             ("\nleft = 3\n", "rows.toml, line 2: left is `3`: it has to be { serial_number"),

@@ -18,18 +18,18 @@ use std::time::{Duration, Instant};
 /// Opens a link. Called again each time that the link is lost.
 pub type Opener = Box<dyn FnMut() -> Result<Link, LinkError> + Send>;
 
-/// What one row says.
+/// An event of one row.
 #[derive(Debug)]
 pub struct Heard {
     /// The row's number, in the order of opening.
     pub row: usize,
-    /// When.
+    /// When it came.
     pub at: Instant,
-    /// What.
+    /// The event.
     pub what: What,
 }
 
-/// Something of one row.
+/// The kinds of a row's events.
 #[derive(Debug)]
 pub enum What {
     /// An event of its session.
@@ -41,7 +41,7 @@ pub enum What {
         /// The line that begins with `error:`, if the firmware refused.
         refusal: Option<String>,
     },
-    /// A command of ours is not typed, and why.
+    /// A command that was not typed, and why.
     NotTyped {
         /// The command.
         command: String,
@@ -92,7 +92,7 @@ impl Rows {
         (Self { orders, heard }, missing)
     }
 
-    /// How many there are.
+    /// The number of rows.
     pub fn count(&self) -> usize {
         self.orders.len()
     }
@@ -157,7 +157,7 @@ impl Talk {
                     Ok(Order::Type(command)) => {
                         // In the order of arrival: a `hold` does not drop commands that came after it.
                         self.hold_where_owed(&mut session);
-                        self.type_or_tell(&mut session, command);
+                        self.type_or_report(&mut session, command);
                     }
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
@@ -183,7 +183,7 @@ impl Talk {
         }
     }
 
-    fn type_or_tell(&mut self, session: &mut Session, command: String) {
+    fn type_or_report(&mut self, session: &mut Session, command: String) {
         if !session.is_connected() {
             self.tell(What::NotTyped { command, why: "the row is not there".to_owned() });
         } else if !session.command(&command) {

@@ -1,10 +1,9 @@
-//! A session: a link that is watched for as long as it lasts, and opened again where it broke.
+//! A session: polls the machine over a link, and opens the link again if it is lost.
 //!
-//! [`Session::turn`] is called over and over. It types what was asked of it, one command at a time, asks for the status when
-//! nothing else is under way, and tells what happened. It waits no longer than a read does, except for the Uno to start where
-//! a port is opened. After every start of the Uno it asks for the settings and the examples and turns the events on. Behind a
-//! command that changes either, it asks for them again. [`Session::hold`] does not wait. Where the Uno is lost, so is every
-//! command that was not answered.
+//! The caller calls [`Session::turn`] in a loop. It types one command at a time, polls the status when no command waits,
+//! and returns what happened. It waits for one read at most; only opening a port also waits for the Uno to start. After
+//! every start it asks for settings and examples, and turns the events on. After a command that changes either, it asks
+//! for them again. [`Session::hold`] does not wait. If the Uno is lost, unanswered commands are lost too.
 
 use super::settings::{self, Settings, SettingsError};
 use super::{ConsoleLine, EventLine, Link, LinkError, Status, is_greeting};
@@ -12,10 +11,10 @@ use control::say::command::{Command, parse};
 use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
-/// Time between two questions for the status.
+/// Time between two polls of the status.
 const POLL: Duration = Duration::from_millis(100);
 
-/// Time after which an answer is given up.
+/// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Time between two tries to open the port again.
@@ -24,16 +23,16 @@ const RETRY: Duration = Duration::from_secs(1);
 /// The command that takes the tool out.
 pub const HOLD: &str = "hold";
 
-/// What the session asks for itself.
+/// The command that the session polls with.
 const STATUS: &str = "status";
 const SETTINGS: &str = "get";
 const EXAMPLES: &str = "examples";
 const EVENTS: &str = "events on";
 
-/// Most lines that are told of in one turn, so that a machine that says much cannot keep it from turning.
+/// Most lines that one turn reads, so that a machine that sends without pause cannot block it.
 const LINES: usize = 64;
 
-/// Commands that wait at the most.
+/// Most commands that may wait.
 const WAITING: usize = 256;
 
 /// Something that happened in a session.
@@ -54,74 +53,74 @@ pub enum Happening {
     Lost(String),
     /// The machine's status.
     Status(Status, String),
-    /// The machine told something by itself.
+    /// The machine sent an event line.
     Event(EventLine, String),
     /// A command was typed.
     Command(String),
     /// A line of the answer to it. The last one is `ok` or begins with `error:`.
     Answer(String),
-    /// The settings behind a command that has changed or saved some, and the lines that show them.
+    /// The settings after a command has changed or saved some, and the lines that show them.
     Settings(Settings, Vec<String>),
-    /// The examples behind a command that has changed some, a line each.
+    /// The examples after a command has changed some, a line each.
     Examples(Vec<String>),
 }
 
-/// A line that was typed, and when.
+/// A typed line, and when it was typed.
 struct Asked {
     line: String,
-    /// Whether the session asks for itself; the lines that have come, then.
+    /// The received lines, if the session itself asked; `None` for the caller's commands.
     own: Option<Vec<String>>,
     since: Instant,
 }
 
-/// A way to a link.
+/// Opens a link.
 type Opener = Box<dyn FnMut() -> Result<Link, LinkError>>;
 
-/// A link that is opened again where it broke.
+/// A link that is opened again after a loss.
 pub struct Session {
     open: Opener,
     link: Option<Link>,
-    /// What is not answered yet, in the order of the answers: one question, and every `hold` that came behind it.
+    /// Lines without an answer, in the order of the answers: one command, and each `hold` typed after it.
     asked: VecDeque<Asked>,
     waiting: VecDeque<String>,
-    /// Whether the machine is to hold before anything else is typed.
+    /// Whether to type `hold` before anything else.
     is_to_hold: bool,
-    /// What the session asks for itself when nothing else waits. `hold` does not drop it.
+    /// The session's own questions, typed when no command waits. `hold` does not drop them.
     own: BTreeSet<String>,
     poll_at: Option<Instant>,
     retry_at: Option<Instant>,
     /// Whether the reason for the missing Uno was not reported yet.
-    is_lost_untold: bool,
+    is_loss_unreported: bool,
     happened: VecDeque<Happening>,
 }
 
 impl Session {
-    /// Opens a link by `open`, which is called again each time that the link is lost.
+    /// Opens a link by `open`. The session calls `open` again after each loss.
     ///
     /// # Errors
-    /// Where the first link fails.
+    /// If the first link fails.
     pub fn open(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, SettingsError> {
         let mut session = Self::waiting_for(open);
         session.try_now(Instant::now())?;
         Ok(session)
     }
 
-    /// Opens the link now, where there is none. Why it fails is said here, and not told again; the turns try on.
+    /// Opens a missing link now. The turns then try again, without reporting this error a second time.
     ///
     /// # Errors
-    /// Where the link fails.
+    /// If the link fails.
     pub fn try_now(&mut self, now: Instant) -> Result<(), SettingsError> {
         if self.link.is_some() {
             return Ok(());
         }
         let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
         if opened.is_err() {
-            (self.retry_at, self.is_lost_untold) = (Some(now + RETRY), false);
+            (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
         }
         opened
     }
 
-    /// A session without a link: `open` is called by the turns, over and over until there is an Uno. Why there is none at first is told.
+    /// A session without a link: the turns call `open` until it returns one. The first failure is reported.
     pub fn waiting_for(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Self {
         Self {
             open: Box::new(open),
@@ -132,12 +131,12 @@ impl Session {
             own: BTreeSet::new(),
             poll_at: None,
             retry_at: None,
-            is_lost_untold: true,
+            is_loss_unreported: true,
             happened: VecDeque::new(),
         }
     }
 
-    /// Types a command as soon as those before it have been answered; whether it can be one and found a place to wait.
+    /// Types a command after the commands before it have been answered. False if it is no command or too many wait.
     pub fn command(&mut self, command: &str) -> bool {
         let fits = super::is_command(command) && self.waiting.len() < WAITING;
         if fits {
@@ -146,15 +145,15 @@ impl Session {
         fits
     }
 
-    /// Has the machine hold in the next turn, before all that waits, which is dropped: how many commands that were, the last ones.
-    /// What is being answered is answered to its end, and then the `hold`; one that is last of that already counts for this one too.
+    /// Types `hold` in the next turn and drops all waiting commands. Returns how many were dropped. Answers in progress
+    /// still come, before that of `hold`. A `hold` that is already typed and is the last line counts for this one too.
     pub fn hold(&mut self) -> usize {
-        // The chip has room for few characters: one that is under way already is not typed again.
+        // The chip's receive queue is short, so a `hold` in progress is not typed again.
         self.is_to_hold |= self.asked.back().is_none_or(|asked| asked.line != HOLD);
         self.waiting.drain(..).count()
     }
 
-    /// Turns the events on, behind all that waits.
+    /// Turns the events on, after all waiting commands.
     pub fn turn_events_on(&mut self) {
         self.own.insert(EVENTS.to_owned());
     }
@@ -164,12 +163,12 @@ impl Session {
         self.waiting.is_empty() && !self.is_to_hold && self.asked.iter().all(|asked| asked.own.is_some())
     }
 
-    /// Whether the Uno is there.
+    /// Whether the link is open.
     pub fn is_connected(&self) -> bool {
         self.link.is_some()
     }
 
-    /// Goes on for a moment, and returns what happened since the last turn.
+    /// Types, reads, and returns what happened since the last turn.
     pub fn turn(&mut self, now: Instant) -> Vec<Happening> {
         let result = match self.link.take() {
             Some(link) => self.listen(link, now),
@@ -177,7 +176,7 @@ impl Session {
                 self.retry_at = Some(now + RETRY);
                 let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
                 // The reason was reported when it was lost.
-                if self.is_lost_untold { opened } else { Ok(()) }
+                if self.is_loss_unreported { opened } else { Ok(()) }
             }
             None => {
                 std::thread::sleep(Duration::from_millis(20));
@@ -196,7 +195,7 @@ impl Session {
         self.asked.clear();
         self.waiting.clear();
         self.own.clear();
-        (self.is_to_hold, self.is_lost_untold) = (false, false);
+        (self.is_to_hold, self.is_loss_unreported) = (false, false);
         self.happened.push_back(Happening::Lost(why));
     }
 
@@ -207,10 +206,10 @@ impl Session {
         let examples = link.ask(EXAMPLES)?;
         link.ask(EVENTS)?;
         self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, shown, examples });
-        // Before anything is typed: how the machine was when all began.
-        self.happened.extend(told(STATUS, link.ask(STATUS)?)?);
+        // Before the first command, so that a log begins with the machine's state.
+        self.happened.extend(parse_answer(STATUS, link.ask(STATUS)?)?);
         self.link = Some(link);
-        (self.poll_at, self.is_lost_untold) = (None, false);
+        (self.poll_at, self.is_loss_unreported) = (None, false);
         Ok(())
     }
 
@@ -250,7 +249,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a line, and knows whose it is.
+    /// Takes a received line: an event, or a line of an answer.
     fn take(&mut self, line: String) {
         let said = ConsoleLine::parse(&line);
         if let ConsoleLine::Event(event) = said {
@@ -265,9 +264,9 @@ impl Session {
         // The end of an abandoned answer is ignored.
         let Some(asked) = self.asked.front_mut() else { return };
         match &mut asked.own {
-            Some(lines) if is_end => match told(&asked.line, std::mem::take(lines)) {
+            Some(lines) if is_end => match parse_answer(&asked.line, std::mem::take(lines)) {
                 Ok(happening) if is_done => self.happened.extend(happening),
-                // Noise has spoiled a line: once more.
+                // Noise has damaged a line: ask again.
                 _ => drop(self.own.insert(asked.line.clone())),
             },
             // At once, not at the answer's end: a log and a map take the machine's position from it.
@@ -288,8 +287,8 @@ impl Session {
     }
 }
 
-/// What the answer to a question of the session's own tells.
-fn told(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
+/// Parses the answer to one of the session's own questions.
+fn parse_answer(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
     Ok(match question {
         STATUS => answer.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line))),
         SETTINGS => Some(Happening::Settings(settings::shown_by(&answer)?, answer)),
@@ -298,7 +297,7 @@ fn told(question: &str, answer: Vec<String>) -> Result<Option<Happening>, Settin
     })
 }
 
-/// What has to be asked for again behind a command that is answered by `ok`.
+/// The question to ask again after this command was answered by `ok`; `None` if it changes nothing.
 fn changed_by(command: &str) -> Option<String> {
     Some(
         match parse(command.as_bytes()).ok()? {

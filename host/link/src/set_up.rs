@@ -111,7 +111,7 @@ impl fmt::Display for Step {
                 write!(f, "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {STRETCHES} done)")
             }
             Self::PassPlants(done) => {
-                write!(f, "have the beams tell the slip: roll past {PLANTS} plants ({done} done)")
+                write!(f, "measure the slip with both beams: roll past {PLANTS} plants ({done} done)")
             }
             Self::SetMargin(margin) => {
                 let word = if margin.least_mm() < margin.in_use_mm { "lower" } else { "raise" };
@@ -133,7 +133,7 @@ impl fmt::Display for Margin {
 /// The servo, timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Timing {
-    /// The leads in milliseconds, out and in. `None` if the operator judges them by eye.
+    /// The leads in milliseconds, out and in. `None` if the operator sets them by eye.
     leads: Option<(u16, u16)>,
     /// The pulse widths of the stroke.
     pulses: (u16, u16),
@@ -334,9 +334,8 @@ impl SetUp {
         let in_use_mm = settings.get(Setting::MarginMm);
         let safe_mm = Setting::MarginMm.description().default;
         match self.margin(settings) {
-            Ok(margin) => (in_use_mm < margin.least_mm()).then(|| {
-                format!("margin_mm {in_use_mm} is too small: what was measured asks for {}", margin.least_mm())
-            }),
+            Ok(margin) => (in_use_mm < margin.least_mm())
+                .then(|| format!("margin_mm {in_use_mm} is too small: the measurements need {}", margin.least_mm())),
             Err(missing) => (in_use_mm < safe_mm).then(|| {
                 let missing: Vec<&str> = missing.iter().map(Step::name).collect();
                 format!("margin_mm {in_use_mm} is not measured: {} first; {safe_mm} is safe", missing.join(" and "))
@@ -430,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_second_beam_plants_tell_what_is_left_of_the_slip() {
+    fn with_a_second_beam_plants_show_the_remaining_slip() {
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::SecondBeamMm, 200)];
         let mut lines = [&TIMED[..], &MEASURED, &MEASURED].concat();
         assert_eq!(
@@ -499,7 +498,7 @@ mod tests {
     }
 
     #[test]
-    fn a_margin_below_what_was_measured_is_warned_of() {
+    fn a_margin_below_the_measured_one_gives_a_warning() {
         let ready = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::TicksPerM, 1920)];
         let with_margin = |margin_mm| settings(&[&ready[..], &[(Setting::MarginMm, margin_mm)]].concat());
         let third = ["> calibrate 10000", "ticks_per_m=1920"];
@@ -507,7 +506,7 @@ mod tests {
         let measured = SetUp::of_lines([&TIMED[..], &MEASURED, &third, &typed].concat());
         assert_eq!(measured.warning(&with_margin(30)), None);
         let warning = measured.warning(&with_margin(29)).expect("it is too small");
-        assert_eq!(warning, "margin_mm 29 is too small: what was measured asks for 30");
+        assert_eq!(warning, "margin_mm 29 is too small: the measurements need 30");
         let in_part = SetUp::of_lines([&TIMED[..], &typed].concat());
         let warning = in_part.warning(&with_margin(49)).expect("the wheel was not measured");
         assert_eq!(warning, "margin_mm 49 is not measured: measure the wheel first; 50 is safe");
@@ -519,7 +518,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_measured_is_the_same_behind_its_lines() {
+    fn measurements_are_the_same_after_writing_and_reading() {
         let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
         let heard = [&["servo_out_us=1795"][..], &TIMED, &MEASURED, &[by_eye, "slip permille=-4"]].concat();
         let (set_up, settings) = (SetUp::of_lines(heard), settings(&[(Setting::ServoOutUs, 1795)]));

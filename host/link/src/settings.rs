@@ -1,4 +1,4 @@
-//! The machine's settings: reads all, and changes them without a contradiction on the way.
+//! The machine's settings: reads all, and changes them without an intermediate contradiction.
 //!
 //! Names, ranges and defaults are those of the firmware's own table ([`control::settings`]). The firmware refuses a
 //! value that contradicts the others. So the order of changes matters, and [`steps`] finds one.
@@ -15,7 +15,7 @@ pub enum SettingsError {
     Link(#[from] LinkError),
     /// The firmware lacks a setting that this program has, or gives an impossible value.
     #[error(
-        "the firmware gives no good value for {setting}: it is of another version, put this one on it by `weeder flash`"
+        "the firmware gives no valid value for {setting}: it has another version; flash this one by `weeder flash`"
     )]
     Unknown {
         /// The setting's name.
@@ -32,9 +32,9 @@ pub enum SettingsError {
     NotTaken {
         /// The setting's name.
         setting: String,
-        /// What was sent.
+        /// The value sent.
         wanted: u16,
-        /// What the firmware has.
+        /// The firmware's value.
         found: u16,
     },
 }
@@ -78,8 +78,7 @@ pub fn explain(contradiction: Contradiction) -> String {
                 .to_owned()
         }
         Contradiction::EncoderTooCoarse => {
-            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and what ticks_per_rev \
-             and wheel_mm give, are to be that many; take an encoder with more counts"
+            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; take an encoder with more counts"
                 .to_owned()
         }
         Contradiction::BeamTooNear { needed_mm } => format!(
@@ -243,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_room_goes_before_what_takes_it() {
+    fn changes_that_widen_a_range_come_first() {
         let near = settings(&[(Setting::TopSpeedMmS, 100), (Setting::BeamToToolMm, 100), (Setting::MarginMm, 10)]);
         let far = settings(&[(Setting::BeamToToolMm, 2000), (Setting::MarginMm, 200), (Setting::LeadOutMs, 500)]);
         assert_leads(&near, &far);
@@ -251,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_wheel_is_told_after_the_wheel() {
+    fn a_measured_wheel_is_set_after_the_wheel() {
         let one = settings(&[(Setting::WheelMm, 400), (Setting::TicksPerM, 1950)]);
         let other = settings(&[(Setting::WheelMm, 410), (Setting::TicksPerM, 1950)]);
         assert_leads(&one, &other);

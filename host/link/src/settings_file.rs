@@ -13,7 +13,7 @@ use toml_edit::{Decor, Document, DocumentMut, Item, Key, TomlError, Value};
 /// The head of a new file.
 const HEAD: &str = "\
 # Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.
-# What is not named here is left as it is.
+# Settings that are not named here are not changed.
 ";
 
 /// How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder.
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_in_a_file_is_said_with_its_line_and_what_would_be_right() {
+    fn an_error_in_a_file_has_its_line_and_what_would_be_right() {
         for (text, wrong) in [
             (
                 "k = 3\nwheel = 400\n",

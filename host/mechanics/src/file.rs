@@ -11,7 +11,7 @@ use std::path::Path;
 /// Reads a machine and checks it.
 ///
 /// # Errors
-/// If the file cannot be read, is no TOML, has unknown keys or units, or makes no machine that could be calculated.
+/// If the file cannot be read, is no TOML, has unknown keys or units, or makes no calculable machine.
 pub fn read(path: &Path) -> Result<Machine, FileError> {
     parse(path, &fs::read_to_string(path).map_err(|source| FileError::unread(path, source))?)
 }
@@ -28,7 +28,7 @@ fn parse(path: &Path, text: &str) -> Result<Machine, FileError> {
     Ok(machine)
 }
 
-/// What the TOML reader found wrong at a byte, with the key there and what the paper's machine has there.
+/// The TOML reader's error at a byte, with the key there and the paper's value.
 fn explain(text: &str, byte: usize, message: &str) -> String {
     let message = message.trim().replace('\n', ", ");
     let Some(entry) = toml_entry::around(text, byte) else { return message };
@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_as_on_the_papers_machine() {
+    fn omitted_values_are_the_papers() {
         let parse = |text| parse(Path::new("my.toml"), text).unwrap();
         assert_eq!(parse(""), Machine::default());
         let mut larger = Machine::default();
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mistake_between_the_keys_of_another_section_is_found() {
+    fn an_error_between_the_keys_of_another_section_is_found() {
         let scattered = "wheel.width = \"35 mm\"\nsoil.depth = \"2 kg\"\nwheel.diameter = \"400 mm\"";
         assert_refused(scattered, 2, "soil.depth: \"2 kg\" is not a length");
     }
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_toml_is_refused_with_its_line() {
+    fn invalid_toml_is_refused_with_its_line() {
         assert_refused("[wheel]\ndiameter = 400 mm", 2, "");
         assert_refused("wheel = 5", 1, "expected a section");
     }

@@ -21,7 +21,7 @@ pub struct Input {
     pub section: &'static str,
     /// Key within it.
     pub key: &'static str,
-    /// What it is.
+    /// Its meaning.
     pub about: &'static str,
     /// Its value in `unit`.
     pub value: f64,
@@ -254,7 +254,7 @@ sections! {
         /// Pulse with the tool in the row, in microseconds.
         pulse_in: f64 = 1500.0, FACTOR, 500.0 to 2500.0;
     }
-    /// The steel of the shanks, and what they are to bear.
+    /// The steel of the shanks, and their load.
     shank: Shank {
         /// Bending stress that the steel may see; 56 MPa is the paper's for mild steel.
         allowed_stress: Pressure = 56.0, MPA, 1.0 to 2000.0;
@@ -263,7 +263,7 @@ sections! {
         /// Times the steady draft that a stone or root hits with.
         impact_factor: f64 = 2.0, FACTOR, 1.0 to 10.0;
     }
-    /// The engine, and the way to the wheels.
+    /// The engine, and its drive to the wheels.
     engine: Engine {
         /// Rated power (Table 1, no. 3).
         power: Power = 2.5, HP, 0.01 to 200.0;
@@ -297,7 +297,7 @@ sections! {
         rim_thickness: Length = 3.0, MM, 0.1 to 100.0;
         /// Width (Table 1, no. 7).
         width: Length = 35.0, MM, 5.0 to 1000.0;
-        /// Shear stress that the rim's steel bears at most.
+        /// Allowable shear stress of the rim's steel.
         shear_strength: Pressure = 80.0, MPA, 1.0 to 2000.0;
     }
     /// The handle.
@@ -344,7 +344,7 @@ impl Machine {
     pub fn to_toml(&self) -> String {
         let mut file = String::from(
             "# A machine for `weeder design --machine FILE.toml`.\n\
-             # What is left out is as on the paper's machine. Units may be changed with their values:\n\
+             # Omitted values are those of the paper's machine. Units may be changed with their values:\n\
              # \"0.4 m\" is \"400 mm\".\n",
         );
         let inputs = self.inputs();

@@ -18,7 +18,7 @@ const GOOD_TEETH: RangeInclusive<u32> = 9..=120;
 /// Allowed relative deviation of the speed, before a warning.
 const SPEED_TOLERANCE: f64 = 0.05;
 
-/// Times the needed power from which an engine is too large.
+/// An engine with more than this multiple of the needed power is too large.
 const ENGINE_EXCESS: f64 = 2.0;
 
 /// The greatest wheel numerics of soft and of tilled soil. Above them it is firm.
@@ -200,7 +200,7 @@ impl Design {
                 "Eq. 11",
                 self.failure_zone,
                 MM,
-                fine(format!("what the protection zones leave of {rows} between rows")),
+                fine(format!("{rows} between rows, less the protection zones")),
             ),
             figure("sweep_width", "widest sweep", "Eq. 12", self.sweep_width, MM, sweep_sense),
             figure("apex_angle", "bluntest apex angle", "Eq. 13", self.apex_angle, DEGREE, apex_sense),
@@ -224,9 +224,11 @@ impl Design {
             let (given, stress) = (written(diameter, MM), written(design.stress, MPA));
             let ratio = f64::from(design.stress / shank.allowed_stress);
             if ratio > 1.0 {
-                concern(format!("the shank's {given} would bear {stress}, {ratio:.1} times what is allowed: it bends"))
+                concern(format!(
+                    "the shank's {given} would bear {stress}, {ratio:.1} times the allowed stress: it bends"
+                ))
             } else {
-                fine(format!("the shank's {given} bear {stress}, {} of what is allowed", percent(ratio.into())))
+                fine(format!("the shank's {given} bear {stress}, {} of the allowed stress", percent(ratio.into())))
             }
         };
         let (inter, intra) = (&self.inter_row_shank, &self.intra_row_shank);

@@ -70,9 +70,9 @@ pub enum NoSwing {
     /// The servo stalls.
     #[error("the soil takes {needed_kg_cm:.1} of the servo's {stall_kg_cm:.1} kg cm: it stalls; take a stronger one")]
     Stalls {
-        /// What the soil takes.
+        /// The soil's torque.
         needed_kg_cm: f64,
-        /// What the servo has.
+        /// The servo's torque.
         stall_kg_cm: f64,
     },
 }

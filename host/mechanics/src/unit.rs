@@ -164,7 +164,7 @@ impl Written for f64 {
     const UNITS: &'static [Unit<Self>] = &[FACTOR];
 }
 
-/// A number of things.
+/// A count.
 pub const COUNT: Unit<u32> = Unit { name: "", of: |value| value as u32, value: f64::from };
 
 impl Written for u32 {
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_refused() {
+    fn text_that_is_no_number_is_refused() {
         for text in ["", "mm", "nan mm", "inf mm", "4oo mm", "1,5 mm"] {
             assert!(parse::<Length>(text).is_err(), "{text}");
         }

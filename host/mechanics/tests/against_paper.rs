@@ -48,7 +48,7 @@ fn the_acceleration_force_is_right() {
 }
 
 #[test]
-fn the_tractive_force_is_twice_what_it_should_be() {
+fn the_tractive_force_is_twice_the_right_value() {
     assert_row(("tractive force", "N"), 1082.4, "1082.5", "536.6", Verdict::Follows);
 }
 
@@ -141,7 +141,7 @@ fn the_handle_is_right() {
 }
 
 #[test]
-fn the_field_capacity_is_less_than_half_of_what_speed_and_width_give() {
+fn the_field_capacity_is_less_than_half_of_speed_times_width() {
     let theoretical = HECTARE_PER_HOUR.value(capacity::theoretical(KM_H.of(2.5), M.of(0.4)));
     assert_relative_eq!(theoretical, 0.1, epsilon = 1e-9);
     assert_row(("field capacity at 86.25 %", "ha/h"), 0.041, "0.08625", "0.08625", Verdict::Wrong);

@@ -35,7 +35,7 @@ fn a_servo_is_too_weak_or_strong_enough() {
 }
 
 #[test]
-fn a_blade_as_high_as_the_weeding_is_deep_is_told_of() {
+fn a_blade_as_high_as_the_weeding_depth_gives_a_remark() {
     let force = |mm: f64| figure_with("soil_force", |machine| machine.soil.depth = MM.of(mm));
     assert_sense(&force(25.0), true, "98.47 kg cm: too much for the servo");
     assert_sense(&force(15.0), false, "the servo bears that too");
@@ -56,8 +56,8 @@ fn a_wheel_is_safe_or_fails() {
 fn a_shank_bends_or_bears_its_load() {
     let shank =
         |mm: f64| figure_with("inter_row_shank_diameter", |machine| machine.inter_row.shank_diameter = MM.of(mm));
-    assert_sense(&shank(16.0), true, "427 MPa, 7.6 times what is allowed: it bends");
-    assert_sense(&shank(32.0), false, "95 % of what is allowed");
+    assert_sense(&shank(16.0), true, "427 MPa, 7.6 times the allowed stress: it bends");
+    assert_sense(&shank(32.0), false, "95 % of the allowed stress");
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn wheels_sink_in_on_soft_soil() {
 }
 
 #[test]
-fn a_tractive_force_beyond_a_tyres_grip_is_told_of() {
+fn a_tractive_force_beyond_a_tyres_grip_gives_a_remark() {
     let pull = |mm: f64| figure_with("tractive_force", |machine| machine.soil.depth = MM.of(mm));
     assert_sense(&pull(25.0), true, "84 % of the weight");
     assert_sense(&pull(15.0), false, "wheels can pull that");

@@ -110,7 +110,7 @@ pub struct Decisions {
 
 fn init(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, beginning: &Beginning, world: &World, cause: Cause) -> Weeder {
     let [for_settings, for_examples] = eeprom.halves();
-    let nearest = Nearest::asleep(&EXAMPLES[..], for_examples);
+    let nearest = Nearest::uninit(&EXAMPLES[..], for_examples);
     let classifier = Observed { nearest, by: beginning.classification, weed: Rc::clone(weed) };
     let (readings, beams) = shown(beginning.steps, world);
     Rig::wake_at(classifier, for_settings, readings, beams, cause)

@@ -16,7 +16,7 @@ use control::units::{Instant, Interval, Position};
 use control::weeder::{Controller, Orders};
 use std::ops::{Deref, DerefMut};
 
-/// The classifier of the firmware, with examples and a memory for those from the field.
+/// The firmware's classifier, with built-in examples and a memory for field examples.
 pub type ByExamples<M = Volatile> = Nearest<&'static [knn::Example<{ features::COUNT }>], M>;
 
 /// Which of the beams are broken.
@@ -24,7 +24,7 @@ pub type ByExamples<M = Volatile> = Nearest<&'static [knn::Example<{ features::C
 pub struct Beams {
     /// The first.
     pub broken: bool,
-    /// The second; false where there is none.
+    /// The second beam; false if there is none.
     pub second_broken: bool,
 }
 
@@ -39,7 +39,7 @@ impl Beams {
 #[derive(Clone, Debug)]
 pub struct Rig<C, M = Volatile> {
     controller: Controller<C, M>,
-    /// What the next turn reads.
+    /// The readings for the next turn.
     pub readings: Readings,
     beams: Beams,
     line: LineBuffer,
@@ -73,7 +73,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         self
     }
 
-    /// What the beams show.
+    /// The beams' levels.
     pub fn beams(&self) -> Beams {
         self.beams
     }
@@ -104,7 +104,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         self.turn_with(self.readings)
     }
 
-    /// The sensors show this, and the loop turns: faster than [`turn`](Self::turn), as nothing is read back.
+    /// Sets the readings and runs a turn. Faster than [`turn`](Self::turn): it reads nothing back.
     #[inline(always)]
     pub fn turn_with(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
@@ -113,13 +113,13 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         orders
     }
 
-    /// A turn of the loop, so many microseconds later.
+    /// A turn of the loop after `microseconds`.
     pub fn turn_after(&mut self, microseconds: u32) -> Orders {
         self.readings.now = self.readings.now + Interval::from_steps(microseconds / 4);
         self.turn()
     }
 
-    /// Stands for so many milliseconds, with a turn in each.
+    /// Stands for some milliseconds, with a turn in each.
     pub fn stand(&mut self, milliseconds: u32) -> Orders {
         (0..milliseconds).map(|_| self.turn_after(1000)).last().unwrap_or_else(|| self.orders())
     }
@@ -149,7 +149,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         said
     }
 
-    /// Takes the events that wait to be told.
+    /// Takes the waiting events.
     pub fn events(&mut self) -> Vec<Event> {
         std::iter::from_fn(|| self.next_event()).collect()
     }

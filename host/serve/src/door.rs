@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_paired_and_names_the_address_comes_in() {
+    fn a_paired_client_that_names_the_address_comes_in() {
         assert_eq!(lan().admit(&LOOK), Ok(()));
         assert_eq!(lan().admit(&POST), Ok(()));
     }
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn another_origin_stays_out_everywhere_and_so_does_who_does_something_and_hides_his() {
+    fn another_origin_stays_out_everywhere_and_so_does_a_post_without_an_origin() {
         let origins: [&[&[u8]]; 7] = [
             &[b"null"],
             &[b"http://weeder.example:8866"],
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_another_page_puts_into_itself_stays_out_and_a_link_to_the_front_is_followed() {
+    fn embedding_in_another_page_stays_out_and_a_link_to_the_front_is_followed() {
         for (site, comes_in) in [("same-origin", true), ("none", true), ("same-site", false), ("cross-site", false)] {
             let knock = Knock { sites: &[site.as_bytes()], ..LOOK };
             assert_eq!(lan().admit(&knock).is_ok(), comes_in, "{site}");
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_not_paired_finds_the_form_and_nothing_else() {
+    fn an_unpaired_client_finds_the_form_and_nothing_else() {
         for path in ["/", "/pair", "/pair.css", "/pair.js"] {
             assert_eq!(lan().admit(&Knock { path, is_paired: false, ..LOOK }), Ok(()), "{path}");
             assert_eq!(lan().admit(&Knock { path, is_paired: false, ..POST }), Ok(()), "{path}");

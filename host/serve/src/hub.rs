@@ -1,7 +1,7 @@
-//! What all pages are told: how each machine is now, and what each of them says.
+//! Sends each machine's state and output to all pages.
 //!
-//! Machines write and pages read, and no page makes a machine wait: a page that is too slow misses what it did not read, and is told
-//! so. What is kept does not grow with the number of pages.
+//! Machines write and pages read. No page makes a machine wait: a page that is too slow misses messages, and gets a notice.
+//! The memory does not grow with the number of pages.
 
 use link::settings::{Setting, help, name};
 use serde_json::{Value, json};
@@ -9,15 +9,15 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::broadcast::{self, Receiver};
 
-/// Messages of a machine that a page may be behind by: some ten seconds of it at work.
+/// Most messages of a machine that a page may be behind: some ten seconds of work.
 const BEHIND: usize = 128;
 
 /// A message to the pages, as JSON.
 pub type Message = Arc<str>;
 
-/// The place where machines and pages meet.
+/// Connects machines and pages.
 pub struct Hub {
-    /// How each machine is: the message that says so to a page that begins.
+    /// Each machine's state, as the first message to a new page.
     machines: Mutex<Vec<Value>>,
     pages: broadcast::Sender<Message>,
 }
@@ -31,7 +31,7 @@ impl Hub {
         }
     }
 
-    /// The machine is there: the firmware's version, and the lines that show its settings and examples.
+    /// The machine is connected: the firmware's version, and the lines that show its settings and examples.
     pub fn there(&self, machine: usize, version: &str, settings: &[String], examples: &[String]) {
         let help: BTreeMap<_, _> = Setting::all().map(|setting| (name(setting), help(setting))).collect();
         self.change(
@@ -47,12 +47,12 @@ impl Hub {
         );
     }
 
-    /// The machine is not there.
+    /// The machine is lost.
     pub fn lost(&self, machine: usize, why: &str) {
         self.change(machine, lost(machine, why));
     }
 
-    /// The machine has given its status, a line, or has other settings or examples, their lines.
+    /// The machine has sent its status as a line, or has new settings or examples, as lines.
     pub fn know(&self, machine: usize, what: &str, said: Value) {
         let mut machines = self.machines();
         self.send(&json!({ "machine": machine, "is": what, "said": said }));
@@ -61,13 +61,13 @@ impl Hub {
         }
     }
 
-    /// The machine has told an event line.
+    /// The machine has sent an event line.
     pub fn event(&self, machine: usize, line: &str) {
         let _machines = self.machines();
         self.send(&json!({ "machine": machine, "is": "event", "said": line }));
     }
 
-    /// Why a machine is not there; nothing where it is.
+    /// Why a machine is lost; `None` if it is connected.
     pub fn why_lost(&self, machine: usize) -> Option<String> {
         match self.machines().get(machine) {
             Some(known) => known["why"].as_str().map(str::to_owned),
@@ -75,7 +75,7 @@ impl Hub {
         }
     }
 
-    /// How all machines are now, and where to hear what comes after that.
+    /// The present state of all machines, and the receiver of later messages.
     pub fn listen(&self) -> (Vec<Message>, Receiver<Message>) {
         let machines = self.machines();
         (machines.iter().map(|known| known.to_string().into()).collect(), self.pages.subscribe())
@@ -115,12 +115,12 @@ mod tests {
     }
 
     #[test]
-    fn a_page_begins_with_how_all_machines_are_and_hears_what_comes_after() {
+    fn a_new_page_gets_the_state_of_all_machines_and_then_the_changes() {
         let hub = Hub::new(2);
         hub.there(0, "0.2.0", &["k=5".to_owned()], &["field 0".to_owned()]);
         hub.know(0, "status", "state=hold".into());
         hub.know(0, "settings", json!(["k=3"]));
-        // It is not there to be known of.
+        // A lost machine has no status.
         hub.know(1, "status", "state=work".into());
         let (now, mut later) = hub.listen();
         let mut now: Vec<Value> = now.iter().map(|message| serde_json::from_str(message).unwrap()).collect();

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_counted_however_it_is_written_and_cut() {
+    fn a_line_is_counted_with_any_header_and_any_split() {
         let head =
             b"POST / HTTP/1.1\r\nCONTENT-Length: 4\nX: content-length:\r\ncontent-length2: 4\r\n content-length: 4\r\n\
             content-content-length: 1\r\ncontent-length:4\r\n\r\n";

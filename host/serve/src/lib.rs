@@ -69,7 +69,7 @@ const BACKLOG: u32 = 1024;
 /// Time between two checks whether to stop.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What to serve, and where.
+/// The machines and the addresses to serve.
 pub struct Setup {
     /// The machines: a name, and a function that opens its link.
     pub machines: Vec<(String, Opener)>,
@@ -96,22 +96,20 @@ pub enum ServeError {
         .0[0], .0.iter().map(Ipv4Addr::to_string).collect::<Vec<_>>().join(", "))]
     SeveralNetworks(Vec<Ipv4Addr>),
     /// An address that means all networks, or only this computer.
-    #[error(
-        "{0} is no address for a phone to open: name this computer's own in the phone's network, or say --lan alone"
-    )]
+    #[error("{0} cannot be opened by a phone: name this computer's address in the phone's network, or use --lan alone")]
     NoAddress(Ipv4Addr),
     /// Another program uses the port.
-    #[error("port {} of {} is in use: end what has it, or choose another by --http-port", .0.port(), .0.ip())]
+    #[error("port {} of {} is in use: end the other program, or choose another port by --http-port", .0.port(), .0.ip())]
     InUse(SocketAddr),
     /// The address is another computer's.
-    #[error("{0} is none of this computer's addresses: say --lan alone, or name one that it has")]
+    #[error("{0} is no address of this computer: use --lan alone, or name one of its addresses")]
     NotMine(Ipv4Addr),
     /// The address cannot be had.
     #[error("no connection can be taken at {address}")]
     NotBound {
         /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The system lacks something.
@@ -299,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn several_networks_have_to_be_told_apart_and_none_is_said_with_the_way_out() {
+    fn several_networks_and_no_network_are_errors_with_a_remedy() {
         let error = found(&[[192, 168, 4, 1], [172, 17, 0, 1]]).unwrap_err();
         assert!(error.ends_with("as in `--lan 192.168.4.1`, of 192.168.4.1, 172.17.0.1"), "{error}");
         let error = found(&[[127, 0, 0, 1]]).unwrap_err();
@@ -307,17 +305,17 @@ mod tests {
     }
 
     #[test]
-    fn an_address_that_cannot_be_had_is_said_with_what_to_do() {
+    fn an_address_that_cannot_be_bound_is_an_error_with_advice() {
         let runtime = runtime::Builder::new_current_thread().enable_io().build().unwrap();
         let _inside = runtime.enter();
         let error = |lan: [u8; 4], port| listen(Some(lan.into()), port, false).err().unwrap().to_string();
-        assert!(error([0, 0, 0, 0], 0).contains("no address for a phone to open"));
-        assert!(error([127, 0, 0, 1], 0).contains("no address for a phone to open"));
-        assert!(error([192, 0, 2, 1], 0).contains("192.0.2.1 is none of this computer's addresses"));
+        assert!(error([0, 0, 0, 0], 0).contains("cannot be opened by a phone"));
+        assert!(error([127, 0, 0, 1], 0).contains("cannot be opened by a phone"));
+        assert!(error([192, 0, 2, 1], 0).contains("192.0.2.1 is no address of this computer"));
         let taken = listen(None, 0, false).unwrap();
         assert!(
             error([127, 0, 0, 2], taken.here.port())
-                .contains("is in use: end what has it, or choose another by --http-port")
+                .contains("is in use: end the other program, or choose another port by --http-port")
         );
     }
 }

@@ -1,5 +1,5 @@
-//! A machine at a serial port, in a thread of its own: it types what it is asked to, one line after the other for all clients, gives the
-//! answers back, and has the hub tell all else. It decides nothing: what may be typed is decided before.
+//! A machine at a serial port, in its own thread. It types the clients' lines one by one and returns the answers. The hub
+//! gets all other output. It makes no decisions: [`rules`](super::rules) decides which lines may be typed.
 
 use super::hub::Hub;
 use control::say::command::{Command, parse};
@@ -13,16 +13,16 @@ use std::time::Instant;
 use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
 
-/// Says something to the operator at this computer.
+/// Shows a message to the operator at this computer.
 pub type Tell = Arc<dyn Fn(&str) + Send + Sync>;
 
-/// Commands that wait to be typed at the most, and as many that wait to hold.
+/// Most commands that wait to be typed, and most that wait to hold.
 const WAITING: usize = 64;
 
-/// Lines of an answer that are kept: the longest one has not a tenth of them.
+/// Most stored lines of an answer. The longest answer has less than a tenth.
 const LINES: usize = 1000;
 
-/// What came of a line that was to be typed.
+/// The result of a line to type.
 #[derive(Clone, Debug)]
 pub enum Typed {
     /// The machine's answer; its last line is `ok`, or begins with `error:`.
@@ -31,20 +31,20 @@ pub enum Typed {
     Dropped,
     /// The machine was lost before it had answered.
     Lost(String),
-    /// Too much waits already.
+    /// Too many commands wait.
     Busy,
 }
 
-/// A line to type, those who ask for it, and its answer.
+/// A line to type, the clients that wait for it, and its answer.
 struct Asked {
     line: String,
     askers: Vec<oneshot::Sender<Typed>>,
     answer: Vec<String>,
 }
 
-/// A machine, for those who want something of it.
+/// A machine, as its clients see it.
 pub struct Machine {
-    /// What the operator calls it.
+    /// The operator's name for it.
     pub name: String,
     commands: mpsc::Sender<Asked>,
     holds: mpsc::Sender<Asked>,
@@ -63,12 +63,12 @@ impl Machine {
         Self { name, commands, holds }
     }
 
-    /// Types a command when those before it are answered.
+    /// Types a command after the commands before it have been answered.
     pub async fn command(&self, line: String) -> Typed {
         ask(&self.commands, line).await
     }
 
-    /// Has it hold, before all that waits.
+    /// Types `hold` before all waiting commands.
     pub async fn hold(&self) -> Typed {
         ask(&self.holds, HOLD.to_owned()).await
     }
@@ -85,7 +85,7 @@ async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Typed {
 impl Asked {
     fn end(self, typed: &Typed) {
         for asker in self.askers {
-            // One that has gone does not want to know.
+            // The client may have gone.
             let _ = asker.send(typed.clone());
         }
     }
@@ -96,14 +96,14 @@ struct Talk {
     name: String,
     hub: Arc<Hub>,
     tell: Tell,
-    /// What the session has and is not answered yet, in its order.
+    /// The session's lines without an answer, in its order.
     asked: VecDeque<Asked>,
 }
 
 impl Talk {
     fn run(mut self, mut session: Session, mut commands: mpsc::Receiver<Asked>, mut holds: mpsc::Receiver<Asked>) {
         loop {
-            // Read before the commands: so all commands that were sent before a hold are here, and are dropped by it.
+            // Holds are read before commands. So all commands sent before a hold are dropped by it.
             let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
             loop {
                 match commands.try_recv() {
@@ -122,7 +122,7 @@ impl Talk {
     }
 
     fn order(&mut self, session: &mut Session, asked: Asked) {
-        // What is typed to a machine that is not there must not wait until it is.
+        // A command to a lost machine must not wait for it.
         if !session.is_connected() {
             let why = self.hub.why_lost(self.number);
             asked.end(&Typed::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned())));
@@ -133,7 +133,7 @@ impl Talk {
                 }
             }
             match self.asked.back_mut() {
-                // One that is under way counts for this one too, as it does for the session.
+                // A hold in progress counts for this one too, as in the session.
                 Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
                 _ => self.asked.push_back(asked),
             }
@@ -167,7 +167,7 @@ impl Talk {
                 }
                 if is_end && let Some(mut asked) = self.asked.pop_front() {
                     let answer = std::mem::take(&mut asked.answer);
-                    // The pages live on them.
+                    // The pages need the events.
                     if parse(asked.line.as_bytes()) == Ok(Command::Events(false)) {
                         session.turn_events_on();
                     }
@@ -194,8 +194,7 @@ mod tests {
     use tokio::runtime;
     use tokio::time::{sleep, timeout};
 
-    /// The lines typed to a firmware, whether its events are on, whether it answers `dump` by now, and whether its cable is
-    /// plugged in.
+    /// The typed lines, and three switches: events on, `dump` answered, cable plugged in.
     #[derive(Clone, Default)]
     struct Desk {
         typed: Arc<Mutex<Vec<String>>>,
@@ -279,7 +278,7 @@ mod tests {
         }
     }
 
-    /// A machine that is there.
+    /// A connected machine.
     fn machine() -> (Machine, Arc<Hub>, Desk) {
         let desk = Desk::default();
         desk.is_there.store(true, Ordering::Relaxed);
@@ -295,7 +294,7 @@ mod tests {
         (machine, hub, desk)
     }
 
-    /// Waits until this is so.
+    /// Waits until the condition holds.
     async fn until(is_so: impl Fn() -> bool) {
         let look = async {
             while !is_so() {
@@ -310,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn hold_drops_what_others_have_waiting_and_is_typed_once_for_all_who_ask() {
+    fn hold_drops_waiting_commands_and_is_typed_once_for_all_clients() {
         run(async {
             let (machine, hub, desk) = machine();
             until(|| hub.why_lost(0).is_none()).await;
@@ -323,7 +322,7 @@ mod tests {
                     assert!(matches!(&held, Typed::Answered(lines) if *lines == ["ok"]), "{held:?}");
                 }
             };
-            // It does not wait for the answer that is under way.
+            // It does not wait for the answer in progress.
             let answered_later = async {
                 until(|| desk.typed() == ["dump", "hold"]).await;
                 desk.answers_dump.store(true, Ordering::Relaxed);
@@ -335,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_gets_all_at_once_when_it_connects_and_then_what_others_change() {
+    fn a_page_gets_everything_when_it_connects_and_then_the_changes() {
         run(async {
             let (machine, hub, _) = machine();
             let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();
@@ -367,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_typed_to_a_machine_that_is_lost_is_not_typed_when_it_is_back() {
+    fn commands_to_a_lost_machine_are_not_typed_when_it_is_back() {
         run(async {
             let (machine, hub, desk) = machine();
             until(|| hub.why_lost(0).is_none()).await;

@@ -7,7 +7,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// A file as it is served.
+/// A served file.
 pub struct File {
     /// Its media type.
     pub media: &'static str,
@@ -17,15 +17,15 @@ pub struct File {
 
 /// The page.
 pub struct Page {
-    /// What is shown.
+    /// The content.
     pub html: File,
-    /// How it looks.
+    /// The style.
     pub css: File,
-    /// What it does.
+    /// The script.
     pub js: File,
 }
 
-/// The files that are in this program, if any are.
+/// The files in this program, if it is a release.
 const INSIDE: Option<[&[u8]; 3]> = include!(concat!(env!("OUT_DIR"), "/inside.rs"));
 
 /// Why there is no page.
@@ -70,11 +70,11 @@ impl Page {
 
 /// The form for the code.
 pub mod form {
-    /// What is shown.
+    /// The content.
     pub const HTML: &str = include_str!("pair/pair.html");
-    /// How it looks.
+    /// The style.
     pub const CSS: &str = include_str!("pair/pair.css");
-    /// What it does.
+    /// The script.
     pub const JS: &str = include_str!("pair/pair.js");
 }
 
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_without_a_page_is_said_with_the_way_to_one() {
+    fn a_folder_without_a_page_is_an_error_with_a_remedy() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
         let error = Page::read(folder).err().expect("there is no page there").to_string();
         assert!(error.contains("index.html of the page cannot be read"), "{error}");

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_code_is_right_however_it_is_typed() {
+    fn a_code_is_right_in_any_spelling() {
         let code = pairing().code;
         assert_eq!((code.text().as_str(), code.spelled().as_str()), ("K7PM2F9X", "K7PM-2F9X"));
         for typed in ["K7PM2F9X", "k7pm-2f9x", " K7PM 2F9X "] {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn of_too_many_phones_the_first_has_to_pair_again() {
+    fn with_too_many_phones_the_first_has_to_pair_again() {
         let mut pairing = pairing();
         for number in 0..=PHONES {
             pairing.pair([number as u8; TOKEN_LENGTH]);

@@ -14,14 +14,14 @@ use tokio::sync::oneshot::{self, Receiver, Sender};
 /// Connections in a stage. A browser opens six.
 const PLACES: usize = 32;
 
-/// What a connection does.
+/// The state of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// It has not sent a whole request of a known client: it is new, half open, or not paired.
     Opening,
     /// It waits for an answer, reads it, or stays open for the next request.
     Asking,
-    /// It hears the events.
+    /// It receives the events.
     Listening,
     /// It has requested HOLD.
     Holding,
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn of_as_many_addresses_as_there_are_places_the_oldest_goes_and_the_newest_stays() {
+    fn if_each_place_has_another_address_the_oldest_goes_and_the_newest_stays() {
         let places = Places::default();
         let mut connections: Vec<_> = (0..=PLACES as u8).map(|last| take(&places, last)).collect();
         assert_eq!(open(&mut connections), (1..=PLACES).collect::<Vec<_>>());

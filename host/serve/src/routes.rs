@@ -64,13 +64,13 @@ const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; 
 /// All ports of an address share cookies.
 const COOKIE_NAME: &str = "weeder";
 
-/// What all requests share.
+/// The state that all requests share.
 pub struct Served {
     /// The page.
     pub page: Page,
     /// The machines, in the order of their numbers.
     pub machines: Vec<Machine>,
-    /// What they say.
+    /// Their output.
     pub hub: Arc<Hub>,
     /// Who is paired.
     pub pairing: Mutex<Pairing>,
@@ -232,18 +232,18 @@ async fn pair(
         }
         Try::Wrong { left: 0 } => {
             (served.tell)(&format!(
-                "{address} has sent a wrong code, the last of five: no code is taken for a minute, the right one included."
+                "{address} has sent the fifth wrong code: no code is accepted for a minute, not even the right one."
             ));
-            (StatusCode::FORBIDDEN, "That is not the code. No code is taken for a minute now.\n").into_response()
+            (StatusCode::FORBIDDEN, "That is not the code. No code is accepted for a minute now.\n").into_response()
         }
         Try::Wrong { left } => {
             (served.tell)(&format!("{address} has sent a wrong code. Tries left: {left}."));
-            let said = format!("That is not the code. It stands on the computer's screen. Tries left: {left}.\n");
+            let said = format!("That is not the code. The computer's screen shows it. Tries left: {left}.\n");
             (StatusCode::FORBIDDEN, said).into_response()
         }
         Try::Locked(wait) => {
             let seconds = wait.as_secs() + 1;
-            let said = format!("There were too many wrong codes: none is taken for {seconds} s.\n");
+            let said = format!("Too many wrong codes: no code is accepted for {seconds} s.\n");
             (StatusCode::TOO_MANY_REQUESTS, [(RETRY_AFTER, seconds.to_string())], said).into_response()
         }
     }

@@ -37,7 +37,7 @@ pub enum Forbidden {
     #[error("that is no command: it has to be one line of 1 to {} printable ASCII characters", link::COMMAND_LENGTH)]
     NoLine,
     /// The command is unknown.
-    #[error("`weeder serve` does not know that command, and passes on only those that it knows: `help` lists them")]
+    #[error("`weeder serve` does not know that command, and passes on only known commands: `help` lists them")]
     Unknown,
     /// The operator has not allowed it.
     #[error("this is not allowed from here: go to the machine, or have `weeder serve` started with --allow-start")]
@@ -57,7 +57,7 @@ pub enum Forbidden {
     ChangesMachine,
     /// It changes the output for all other clients.
     #[error(
-        "this changes what everybody hears, and is never allowed over the network: go to the computer that has the port"
+        "this changes the events for all clients, and is never allowed over the network: type it at the computer with the port"
     )]
     ChangesWire,
 }
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_looks_is_for_everybody() {
+    fn questions_are_allowed_to_all_clients() {
         for line in HARMLESS {
             for reach in [Reach::Here, WATCHING, STARTING] {
                 assert_eq!(allow(line, reach), Ok(Order::Type), "{line:?} from {reach:?}");
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_the_tool_by_hand_or_changes_the_machine_is_never_typed_over_the_network() {
+    fn manual_moves_and_changes_of_the_machine_are_never_typed_over_the_network() {
         for (line, why) in NEVER {
             for reach in [WATCHING, STARTING] {
                 assert_eq!(allow(line, reach), Err(why), "{line:?} from {reach:?}");
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_of_the_manual_says_of_every_command_what_becomes_of_it() {
+    fn the_table_of_the_manual_has_the_rule_of_every_command() {
         let manual = include_str!("../../../docs/serve.md");
         let words = |cell: &'static str| cell.split('`').skip(1).step_by(2);
         let rows: Vec<Vec<&'static str>> = manual
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_here_is_not_passed_on_over_the_network() {
+    fn unknown_commands_are_not_passed_on_over_the_network() {
         for line in ["START", "starts", "start later", "start now now", "set k", "launch", "help me", "servo", "\u{1}"]
         {
             assert!(allow(line, STARTING).is_err(), "{line:?}");
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_none_or_two_is_never_passed_on() {
+    fn an_empty_or_double_line_is_never_passed_on() {
         let long = "x".repeat(link::COMMAND_LENGTH + 1);
         for line in
             ["", "   ", "status\nstart", "status\rstart", "hold\u{8}\u{8}\u{8}\u{8}start", "\tstart", "grün", &long]

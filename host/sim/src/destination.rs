@@ -73,12 +73,12 @@ impl Replace {
 }
 
 impl FileName {
-    /// Whether it could be written, and nothing is lost by it.
+    /// Checks that it can be written without losing a file.
     ///
     /// # Errors
     /// If it could not, and why.
     pub fn check(&self, replace: Replace) -> Result<OutFile<'_>> {
-        ensure!(!self.0.is_dir(), "{} is a folder, and a file has to be named", self.0.display());
+        ensure!(!self.0.is_dir(), "{} is a folder: name a file", self.0.display());
         replace.check(&self.0)?;
         whole_file::check(&self.0).with_context(|| cannot_be_written(&self.0))?;
         Ok(OutFile(&self.0))
@@ -122,7 +122,7 @@ impl OutFile<'_> {
 }
 
 impl FolderName {
-    /// Whether files could be written there, and nothing is lost by those of these names.
+    /// Checks that files of these names can be written there without losing a file.
     ///
     /// # Errors
     /// If they could not, and why.
@@ -132,10 +132,10 @@ impl FolderName {
         replace: Replace,
     ) -> Result<OutFolder<'_>> {
         let folder = &self.0;
-        ensure!(!folder.exists() || folder.is_dir(), "{} is a file, and a folder has to be named", folder.display());
+        ensure!(!folder.exists() || folder.is_dir(), "{} is a file: name a folder", folder.display());
         let ending = folder.extension().and_then(|ending| ending.to_str());
         if !folder.exists() && ending.is_some_and(|ending| FILE_ENDINGS.contains(&ending)) {
-            bail!("{} is named like a file, and a folder has to be named: several files go there", folder.display());
+            bail!("{} is named like a file: name a folder, for several files", folder.display());
         }
         let there = folder.ancestors().find(|part| part.exists()).unwrap_or(Path::new("."));
         whole_file::check_folder(there).with_context(|| cannot_be_written(folder))?;
@@ -152,7 +152,7 @@ impl FolderName {
         &self.0
     }
 
-    /// Makes it where there is none.
+    /// Makes the folder if necessary.
     ///
     /// # Errors
     /// If it cannot be made.
@@ -162,7 +162,7 @@ impl FolderName {
 }
 
 impl OutFolder<'_> {
-    /// Writes a file there whole, or leaves what was there; makes the folder where there is none.
+    /// Writes a whole file there, or leaves the old file. Makes the folder if necessary.
     ///
     /// # Errors
     /// If folder or file cannot be written, or this name was not checked.

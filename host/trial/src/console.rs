@@ -30,7 +30,7 @@ pub enum ConsoleError {
     Silent {
         /// The command.
         command: String,
-        /// What came.
+        /// The received text.
         received: String,
     },
     /// A status line lacks a figure.

@@ -106,7 +106,7 @@ impl Program {
         let status = cargo.wait().context(START)?;
         ensure!(
             status.success(),
-            "`cargo {}` failed ({status}): its own messages stand above; where a tool is missing, run ./setup.sh",
+            "`cargo {}` failed ({status}): see its messages above; if a tool is missing, run ./setup.sh",
             self.alias
         );
         elf.with_context(|| {

@@ -197,9 +197,9 @@ impl Receiver {
         Ok(Self { simulated: SimulatedReceiver::new(setup), pty, unread: VecDeque::new() })
     }
 
-    /// Passes on what it has said by now.
+    /// Passes on its output so far.
     fn serve(&mut self, time_s: f64, way: &Way) -> Result<()> {
-        // It talks whether or not anybody listens, and takes no commands.
+        // It sends without a request, and takes no commands.
         if self.pty.was_opened()? {
             self.unread.clear();
         }
@@ -209,7 +209,7 @@ impl Receiver {
     }
 }
 
-/// Gives a program what waits for it, as far as it has room, and forgets what is too much.
+/// Writes the waiting bytes to a program, as far as it has room. Drops the oldest surplus bytes.
 fn give(pty: &mut Pty, unread: &mut VecDeque<u8>) -> Result<()> {
     let written = pty.write(unread.make_contiguous())?;
     unread.drain(..written);
@@ -301,7 +301,7 @@ impl LiveUno {
     /// Powers it up. Its clock stands until it runs.
     ///
     /// # Errors
-    /// Where there is nothing to run or it does not fit, no terminal is to be had, or a file is wrong.
+    /// If there is no program or it does not fit, no terminal can be opened, or a file is wrong.
     pub fn start(setup: Setup) -> Result<LiveUno> {
         let eeprom = setup.eeprom.map(EepromFile::open).transpose()?;
         let content = eeprom.as_ref().map_or(&[][..], |file| &file.content);
@@ -344,7 +344,7 @@ impl LiveUno {
     /// Runs until `stop` is set.
     ///
     /// # Errors
-    /// Where the firmware crashes or halts, or the terminal or the EEPROM's file fails.
+    /// If the firmware crashes or halts, or the terminal or the EEPROM's file fails.
     pub fn run(&mut self, stop: &AtomicBool) -> Result<()> {
         let mut pace = (!self.fast).then(Pace::new);
         while !stop.load(Ordering::Relaxed) {
@@ -375,7 +375,7 @@ impl LiveUno {
         if self.slices.is_multiple_of(EEPROM_SLICES) { self.keep_eeprom() } else { Ok(()) }
     }
 
-    /// Passes on what is left.
+    /// Passes on the remaining output.
     fn end(&mut self) -> Result<()> {
         self.serve_terminal()?;
         self.serve_receiver()?;
@@ -415,7 +415,7 @@ impl LiveUno {
         }
 
         let mut buffer = [0; MOST_BYTES_ON_THEIR_WAY];
-        let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(self.uno.bytes_on_their_way());
+        let room = MOST_BYTES_ON_THEIR_WAY.saturating_sub(self.uno.bytes_pending());
         let count = pty.read(&mut buffer[..room])?;
         self.uno.send(&buffer[..count]);
 
@@ -423,7 +423,7 @@ impl LiveUno {
         give(pty, &mut self.unread)
     }
 
-    /// Has the satellite receiver say what it has to say by now.
+    /// Passes on the satellite receiver's output so far.
     fn serve_receiver(&mut self) -> Result<()> {
         match &mut self.receiver {
             Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),

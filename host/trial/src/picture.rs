@@ -123,15 +123,15 @@ fn parts_within(path: &[(f64, f64)], ground: &Range<f64>) -> Vec<Vec<(f64, f64)>
 
 /// The part of a straight piece over this ground.
 fn piece_within(from: (f64, f64), to: (f64, f64), ground: &Range<f64>) -> Option<((f64, f64), (f64, f64))> {
-    let (way_mm, turn) = (to.0 - from.0, to.1 - from.1);
-    if way_mm == 0.0 {
+    let (rolled_mm, turn) = (to.0 - from.0, to.1 - from.1);
+    if rolled_mm == 0.0 {
         // The tool swung while the machine stood.
         return ground.contains(&from.0).then_some((from, to));
     }
-    let share_at = |place_mm: f64| (place_mm - from.0) / way_mm;
+    let share_at = |place_mm: f64| (place_mm - from.0) / rolled_mm;
     let (a, b) = (share_at(ground.start), share_at(ground.end));
     let (first, last) = (a.min(b), a.max(b));
-    let at = |share: f64| (from.0 + share * way_mm, from.1 + share * turn);
+    let at = |share: f64| (from.0 + share * rolled_mm, from.1 + share * turn);
     let begin = if first > 0.0 { at(first) } else { from };
     let end = if last < 1.0 { at(last) } else { to };
     (first < 1.0 && last > 0.0).then_some((begin, end))
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_holds_the_curve_over_its_ground_alone() {
+    fn a_lane_has_the_curve_over_its_own_ground() {
         let path = [(-1000.0, 45.0), (500.0, 45.0), (1500.0, 0.0), (9000.0, 0.0)];
         assert_eq!(parts_within(&path, &(0.0..1000.0)), [[(0.0, 45.0), (500.0, 45.0), (1000.0, 22.5)]]);
         assert_eq!(parts_within(&path, &(1000.0..3000.0)), [[(1000.0, 22.5), (1500.0, 0.0), (3000.0, 0.0)]]);

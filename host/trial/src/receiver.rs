@@ -45,9 +45,9 @@ pub struct Trouble {
     pub every_s: f64,
     /// When there is no fix, in seconds of that.
     pub outage_s: Range<f64>,
-    /// When the fixes are somewhere else.
+    /// The time during which fixes are displaced.
     pub jump_s: Range<f64>,
-    /// How far that is, in metres to the north.
+    /// The displacement, in metres to the north.
     pub jump_m: f64,
     /// The share of lines with a changed byte.
     pub damaged: f64,
@@ -96,20 +96,20 @@ impl SimulatedReceiver {
         Self { setup, plane, noise, fixes: 0 }
     }
 
-    /// The position of an object when the machine has travelled `way_m`. `beside` is its offset from the beam.
-    pub fn place(&self, way_m: f64, beside: Offset) -> Place {
-        self.plane.place(self.metres(way_m, beside))
+    /// The position of an object when the machine has travelled `distance_m`. `beside` is its offset from the beam.
+    pub fn place(&self, distance_m: f64, beside: Offset) -> Place {
+        self.plane.place(self.metres(distance_m, beside))
     }
 
-    fn metres(&self, way_m: f64, beside: Offset) -> Metres {
+    fn metres(&self, distance_m: f64, beside: Offset) -> Metres {
         let (east, north) = self.setup.direction_degrees.to_radians().sin_cos();
         let forward = Metres { east, north };
-        forward.times(way_m + beside.ahead_m).plus(forward.turned_right().times(beside.right_m))
+        forward.times(distance_m + beside.ahead_m).plus(forward.turned_right().times(beside.right_m))
     }
 
-    /// The bytes up to this time, in seconds since the Uno was powered up. `way_m` returns the distance travelled at a
+    /// The bytes up to this time, in seconds since the Uno was powered up. `distance_m` returns the distance travelled at a
     /// time.
-    pub fn bytes_until(&mut self, time_s: f64, way_m: impl Fn(f64) -> f64) -> Vec<u8> {
+    pub fn bytes_until(&mut self, time_s: f64, distance_m: impl Fn(f64) -> f64) -> Vec<u8> {
         let mut bytes = Vec::new();
         loop {
             let moment_s = self.fixes as f64 / self.setup.rate_hz;
@@ -117,15 +117,15 @@ impl SimulatedReceiver {
                 return bytes;
             }
             self.fixes += 1;
-            for line in self.sentences(moment_s, way_m(moment_s)) {
+            for line in self.sentences(moment_s, distance_m(moment_s)) {
                 bytes.extend(self.sent(line));
             }
         }
     }
 
-    fn sentences(&mut self, moment_s: f64, way_m: f64) -> [String; 2] {
+    fn sentences(&mut self, moment_s: f64, distance_m: f64) -> [String; 2] {
         let Offset { ahead_m, right_m } = self.setup.beam;
-        let mut at = self.metres(way_m, Offset { ahead_m: -ahead_m, right_m: -right_m });
+        let mut at = self.metres(distance_m, Offset { ahead_m: -ahead_m, right_m: -right_m });
         let error_m = self.setup.error_mm / 1000.0;
         at = at.plus(Metres { east: self.normal(), north: self.normal() }.times(error_m));
         let mut has_fix = true;

@@ -28,7 +28,7 @@ pub struct Counted {
 /// A replay's result.
 #[derive(Clone, Debug)]
 pub struct Replay {
-    /// What the firmware counted.
+    /// The firmware's count.
     pub counted: Counted,
     /// Encoder edges in the recording.
     pub edges: usize,
@@ -42,7 +42,7 @@ const PAUSE_MS: u64 = 1;
 /// Simulated time between two reports of progress.
 const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
-/// Plays the recording to the firmware at `elf`. `progress` is told the share done, from 0 to 1.
+/// Plays the recording to the firmware at `elf`. `progress` gets the share done, from 0 to 1.
 ///
 /// # Errors
 /// If the firmware cannot be run or does not answer.

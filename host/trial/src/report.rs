@@ -265,7 +265,7 @@ fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::
     Ok(())
 }
 
-/// What is about to be tried, in a line.
+/// The trial, in a line.
 pub fn introduction(row: &row::Row, machine: &Machine, motion: &Motion) -> String {
     let span = row.span_mm();
     format!(
@@ -308,7 +308,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_totals_tell_what_happened_in_plain_words() {
+    fn the_totals_are_in_plain_words() {
         let (trial, outcome) = ruined_row();
         let totals = totals(&trial, &outcome);
         for words in [
@@ -325,7 +325,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn one_thing_is_told_from_several() {
+    fn singular_and_plural_differ() {
         let (trial, mut outcome) = ruined_row();
         (outcome.stray_pulses, outcome.judgement.idle_swings, outcome.status.lost_ticks) = (1, 1, 1);
         let words = totals(&trial, &outcome);

@@ -29,7 +29,7 @@ pub enum TrialError {
     #[error(transparent)]
     Console(#[from] ConsoleError),
     /// The firmware restarted during the trial.
-    #[error("the firmware restarted {} during the trial, so that its position means nothing", counted(.0, "time"))]
+    #[error("the firmware restarted {} during the trial, so its position is invalid", counted(.0, "time"))]
     Restarted(usize),
 }
 
@@ -90,7 +90,7 @@ pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
     Ok(uno)
 }
 
-/// Has the firmware at `elf` weed a trial's row. `progress` is told the share of the motion done, from 0 to 1.
+/// Weeds a trial's row with the firmware at `elf`. `progress` gets the share of the motion done, from 0 to 1.
 ///
 /// # Errors
 /// If the firmware cannot be run or does not answer.
@@ -146,10 +146,10 @@ pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<O
     })
 }
 
-/// Tells the firmware what it has to know of machine and timing, by its settings, and of the crop, by examples.
+/// Sets the firmware's settings for machine and timing, and teaches the crop's examples.
 ///
 /// # Errors
-/// If it refuses something, or does not answer.
+/// If it refuses a setting or an example, or does not answer.
 pub fn set_up(trial: &Trial, uno: &mut Uno) -> Result<(), ConsoleError> {
     for (setting, value) in trial.firmware_settings() {
         ask(uno, &format!("set {} {value}", name(setting)))?;

@@ -293,7 +293,7 @@ impl Uno {
         while let Some(change) = self.to_drive.pop_front_if(|change| change.cycle <= self.core.cycle()) {
             self.set(change.pin, change.high);
         }
-        self.terminal.send_what_is_due(&mut self.core);
+        self.terminal.send_due(&mut self.core);
         let next_level = self.to_drive.front().map(|change| change.cycle);
         let until = [next_level, self.terminal.next_byte_ends()].into_iter().flatten().fold(until, u64::min);
         self.core.step(until).map_err(|stop| {
@@ -317,8 +317,8 @@ impl Uno {
     }
 
     /// Sent bytes that have not reached the receiver yet.
-    pub fn bytes_on_their_way(&self) -> usize {
-        self.terminal.bytes_on_their_way()
+    pub fn bytes_pending(&self) -> usize {
+        self.terminal.bytes_pending()
     }
 
     /// Pushes up to 63 bytes into the receiver at once, faster than any line could. simavr buffers them and passes them

@@ -44,7 +44,7 @@ impl Capture {
     ///
     /// # Errors
     ///
-    /// Where the file is no VCD, has no such channels, or leaves their levels open.
+    /// If the file is no VCD, has no such channels, or leaves their levels open.
     pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, FileError> {
         let file = File::open(path).map_err(|source| FileError::unread(path, source))?;
         Capture::parse(path, BufReader::new(file), channels)
@@ -96,7 +96,7 @@ impl Capture {
                         let cycle = to_cycles(time, timescale);
                         if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
                             return Err(wrong(format!(
-                                "goes on beyond {MOST_HOURS} h at line {}: cut the recording, or look at its $timescale",
+                                "is longer than {MOST_HOURS} h at line {}: cut the recording, or check its $timescale",
                                 parser.line()
                             )));
                         }
@@ -138,16 +138,12 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
                 _ => {}
             }
             if scopes > MOST_SCOPES {
-                return wrong(format!("more than {MOST_SCOPES} scopes stand within each other"));
+                return wrong(format!("more than {MOST_SCOPES} scopes are nested"));
             }
         }
     }
     // The reader reports an error in a shorter head.
-    if rest.limit() == 0 {
-        wrong("no $enddefinitions stands in its first MiB".to_owned())
-    } else {
-        Ok(io::Cursor::new(head))
-    }
+    if rest.limit() == 0 { wrong("its first MiB has no $enddefinitions".to_owned()) } else { Ok(io::Cursor::new(head)) }
 }
 
 /// The nearest cycle to a time of the file.
@@ -228,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_choice_of_channels_is_told_what_there_is() {
+    fn a_wrong_choice_of_channels_is_an_error_with_the_available_ones() {
         let file = recording("1 us", "#0 0! 0\"");
         let error = |channels: &[(Pin, &str)]| parse(&file, channels).unwrap_err();
         let with_b = |b| [CHANNELS[0], (Pin::D3, b)];
@@ -267,12 +263,12 @@ mod tests {
     #[test]
     fn a_recording_that_would_never_end_or_is_nested_without_end_is_refused() {
         let endless = parse(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
-        assert!(endless.contains("pins.vcd goes on beyond 24 h at line 9"), "{endless}");
+        assert!(endless.contains("pins.vcd is longer than 24 h at line 9"), "{endless}");
         let nested = "$timescale 1 us $end\n".to_owned() + &"$scope module a $end\n".repeat(100_000);
         let error = Capture::parse(Path::new("pins.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("more than 50 scopes"), "{error}");
         let error = Capture::parse(Path::new("pins.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
-        assert!(std::error::Error::source(&error).unwrap().to_string().contains("no $enddefinitions"), "{error}");
+        assert!(std::error::Error::source(&error).unwrap().to_string().contains("has no $enddefinitions"), "{error}");
     }
 
     #[test]

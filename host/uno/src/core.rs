@@ -73,7 +73,7 @@ const fn request(name: &[u8; 4]) -> u32 {
     u32::from_be_bytes(*name)
 }
 
-/// What stopped a chip.
+/// Why a chip stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stop {
     /// It met an invalid instruction, or ran past the end of its flash.
@@ -266,7 +266,7 @@ impl Core {
         unsafe { (*self.chip.as_ptr()).interrupts.running_ptr > 0 }
     }
 
-    /// Where the program stands.
+    /// The program's address and stack pointer.
     pub(super) fn place(&self) -> Place {
         match self.next_instruction() {
             _ if self.is_in_handler() => Place::InHandler,

@@ -14,7 +14,7 @@ pub enum UnoError {
     NoRoom {
         /// The firmware's size.
         bytes: usize,
-        /// What there is.
+        /// The available flash in bytes.
         available: usize,
     },
     /// The EEPROM content does not fit.
@@ -25,7 +25,7 @@ pub enum UnoError {
     Crashed {
         /// When.
         cycle: u64,
-        /// Where, in bytes.
+        /// The address in bytes.
         program_counter: u32,
     },
     /// The firmware sleeps with interrupts off, so that nothing but a reset can wake it.
@@ -35,7 +35,7 @@ pub enum UnoError {
     Halted {
         /// When.
         cycle: u64,
-        /// Where, in bytes.
+        /// The address in bytes.
         program_counter: u32,
     },
     /// The ELF has no such symbol, or the bytes do not fit into it.
@@ -51,14 +51,14 @@ pub enum UnoError {
     NotInSram {
         /// Address of the first byte.
         address: u16,
-        /// How many there were.
+        /// Their number.
         length: usize,
     },
     /// The ELF has no such function.
     #[error("the firmware has no function `{0}`: give its path from the crate on")]
     NoFunction(String),
     /// The firmware did not reach a function.
-    #[error("the firmware did not come to `{symbol}` within {timeout_cycles} cycles")]
+    #[error("the firmware did not reach `{symbol}` within {timeout_cycles} cycles")]
     NotReached {
         /// The function.
         symbol: String,
@@ -68,9 +68,9 @@ pub enum UnoError {
     /// A text that was waited for did not come.
     #[error("the firmware did not send {text:?} within {timeout_cycles} cycles; it sent {received:?}")]
     NoAnswer {
-        /// What was waited for.
+        /// The awaited text.
         text: String,
-        /// How long.
+        /// The time limit.
         timeout_cycles: u64,
         /// The received text; [`Uno::received`](crate::Uno::received) still returns it.
         received: String,

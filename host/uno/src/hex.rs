@@ -35,7 +35,7 @@ impl Bootloader {
     /// Reads a bootloader's Intel HEX file.
     ///
     /// # Errors
-    /// Where it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
+    /// If it cannot be read, is not Intel HEX, or does not lie in the chip's boot section.
     pub fn read(path: &Path) -> Result<Bootloader, FileError> {
         let wrong = |problem: String| FileError::new(path, problem);
         let right = "take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex";
@@ -61,7 +61,7 @@ impl Bootloader {
     /// Compiles Optiboot, the Uno's own bootloader. The file of it that Debian has ready is longer than its boot section.
     ///
     /// # Errors
-    /// Where avr-gcc or the source is missing.
+    /// If avr-gcc or the source is missing.
     pub fn optiboot() -> Result<Bootloader, FileError> {
         let not_compiled = |reason: &dyn Display| {
             let needs = "it takes avr-gcc and the source, which Debian has as gcc-avr and arduino-core-avr";
@@ -92,7 +92,7 @@ impl Bootloader {
     /// All that goes into flash: the firmware, then erased flash, then the bootloader.
     ///
     /// # Errors
-    /// Where the firmware reaches into the bootloader.
+    /// If the firmware reaches into the bootloader.
     pub fn behind(&self, firmware: &[u8]) -> Result<Vec<u8>, UnoError> {
         check_room(firmware.len(), self.start.into())?;
         let mut flash = firmware.to_vec();
@@ -102,15 +102,15 @@ impl Bootloader {
     }
 }
 
-/// Checks that a firmware of so many bytes fits into the flash that a bootloader leaves.
+/// Checks that a firmware of `bytes` fits into the flash beside a bootloader.
 ///
 /// # Errors
-/// Where it does not.
+/// If it does not.
 pub fn check_room(bytes: usize, available: usize) -> Result<(), UnoError> {
     if bytes <= available { Ok(()) } else { Err(UnoError::NoRoom { bytes, available }) }
 }
 
-/// What goes into flash from address 0 on as Intel HEX.
+/// Flash contents from address 0 as Intel HEX.
 ///
 /// # Panics
 /// If `flash` is longer than the ATmega328P's.
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_named_with_what_is_wrong() {
+    fn other_files_are_refused_with_the_reason() {
         let path = tempfile::NamedTempFile::new().unwrap();
         let error = Bootloader::read(path.path()).unwrap_err().to_string();
         assert!(error.contains("is empty"), "{error}");
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_reads_back() {
+    fn written_flash_reads_back() {
         let flash: Vec<u8> = (0..=255).cycle().take(1000).collect();
         let mut read = Vec::new();
         for (address, bytes) in pieces(&text(&flash)).unwrap() {

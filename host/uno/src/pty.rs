@@ -28,8 +28,7 @@ const BAUD: u32 = 115_200;
 /// The system's folder for the programs' sides.
 const TERMINALS: &str = "/dev/pts";
 
-/// The device's side of a pseudo terminal. Dropped, it is gone for those who have the other side open, as an Uno whose cable is
-/// pulled.
+/// The device's side of a pseudo terminal. Dropping it looks like a pulled cable to programs at the other side.
 #[derive(Debug)]
 pub struct Pty {
     device: File,
@@ -48,7 +47,7 @@ impl Pty {
     /// Opens one.
     ///
     /// # Errors
-    /// Where the system has none to give.
+    /// If the system has none to give.
     pub fn open() -> Result<Pty, FileError> {
         let open = || -> io::Result<Pty> {
             let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
@@ -111,7 +110,7 @@ impl Pty {
     /// that is gone.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn was_opened(&mut self) -> Result<bool, FileError> {
         let mut opened = false;
         let mut buffer = [MaybeUninit::uninit(); 1024];
@@ -141,7 +140,7 @@ impl Pty {
     /// Takes what programs have written, up to `buffer`'s length; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, FileError> {
         self.count(|mut device| device.read(buffer))
     }
@@ -149,7 +148,7 @@ impl Pty {
     /// Hands over bytes to the program that reads, as many as it has room for; without waiting. Returns the number of bytes.
     ///
     /// # Errors
-    /// Where it has failed.
+    /// If it has failed.
     pub fn write(&mut self, bytes: &[u8]) -> Result<usize, FileError> {
         self.count(|mut device| device.write(bytes))
     }
@@ -206,7 +205,7 @@ mod tests {
     use std::fs::OpenOptions;
 
     #[test]
-    fn bytes_pass_both_ways_as_they_are() {
+    fn bytes_pass_both_ways_unchanged() {
         let mut pty = Pty::open().unwrap();
         let mut program = open(&pty);
         let bytes = [0, 3, 4, b'\r', b'\n', 17, 19, 127, 255];

@@ -38,7 +38,7 @@ impl Terminal {
     }
 
     /// Gives the chip every byte that has ended by now.
-    pub(crate) fn send_what_is_due(&mut self, to: &mut Core) {
+    pub(crate) fn send_due(&mut self, to: &mut Core) {
         while !self.to_send.is_empty() && self.next_byte_ends <= to.cycle() {
             if let Some(byte) = self.to_send.pop_front()
                 && !to.receive(byte)
@@ -55,7 +55,7 @@ impl Terminal {
     }
 
     /// The number of unsent bytes.
-    pub(crate) fn bytes_on_their_way(&self) -> usize {
+    pub(crate) fn bytes_pending(&self) -> usize {
         self.to_send.len()
     }
 

@@ -121,7 +121,7 @@ fn on_simavr(elf: &Path) -> String {
 }
 
 #[test]
-fn the_virtual_uno_does_what_the_data_sheet_says_and_simavr_alone_does_not() {
+fn the_virtual_uno_follows_the_data_sheet_and_simavr_alone_does_not() {
     for Correction { name, simavr, .. } in CORRECTIONS {
         let elf = compile(name);
         assert_eq!(on_the_virtual_uno(&elf), format!("{}\n", expected(name)), "{name} on the virtual Uno");

@@ -111,7 +111,7 @@ fn results(uno: &mut Uno) -> Vec<u16> {
 }
 
 #[test]
-fn the_adc_tells_each_pin_its_voltage_in_1024ths_of_the_reference() {
+fn the_adc_converts_each_pin_s_voltage_to_1024ths_of_the_reference() {
     let mut uno = boot("adc");
     uno.set(Pin::D2, true);
     let voltages = [0, 5, 2500, 3300, 4999, 5000];

@@ -118,7 +118,7 @@ fn entering_an_interrupt_takes_four_cycles() {
 }
 
 #[test]
-fn waking_up_takes_four_cycles_more() {
+fn leaving_sleep_takes_four_cycles_more() {
     let mut uno = boot("entry");
     uno.set(Pin::D4, false);
     assert_eq!(responses(&mut uno), [11; 20]);
@@ -333,7 +333,7 @@ fn a_crash_and_a_halt_are_errors_that_say_where() {
 }
 
 #[test]
-fn a_missing_answer_is_an_error_that_shows_what_came_instead() {
+fn a_missing_answer_is_an_error_that_shows_the_received_text() {
     let mut uno = boot("echo");
     let error = uno.run_until_serial("steady", 5 * MILLISECOND).unwrap_err().to_string();
     assert!(error.contains("\"steady\"") && error.contains("\"ready\\n\""), "{error}");
@@ -374,7 +374,7 @@ fn an_elf_that_is_none_is_refused_by_name() {
 }
 
 #[test]
-fn the_size_is_what_the_sections_add_up_to() {
+fn the_size_is_the_sum_of_the_sections() {
     let mut uno = boot("memory");
     // .noinit has `kept`. .data has `started`, whose initial value also takes flash.
     assert_eq!(uno.size().sram, 3);

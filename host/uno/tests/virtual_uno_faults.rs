@@ -53,7 +53,7 @@ fn power_that_comes_back_to_noise_leaves_the_same_noise_for_the_same_seed() {
 }
 
 #[test]
-fn a_byte_written_from_outside_is_what_the_program_goes_on_with() {
+fn a_byte_written_from_outside_is_used_by_the_program() {
     let mut uno = running();
     uno.write("turns", &0x7000_u16.to_le_bytes()).unwrap();
     uno.run_for_ms(1).unwrap();
@@ -63,7 +63,7 @@ fn a_byte_written_from_outside_is_what_the_program_goes_on_with() {
 }
 
 #[test]
-fn what_cannot_be_written_is_refused_by_name() {
+fn an_unwritable_variable_is_refused_by_name() {
     let mut uno = running();
     let refused = uno.write("no such variable", &[1]).unwrap_err().to_string();
     assert!(refused.contains("no variable `no such variable`"), "{refused}");

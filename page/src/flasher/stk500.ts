@@ -184,7 +184,7 @@ export class Bootloader {
         const answer = await this.#take(answerBytes + 2, ANSWER_MS);
         if (answer?.[0] === INSYNC && answer.at(-1) === OK) return answer.slice(1, -1);
         throw new FlashError(
-            "the bootloader fell silent on the way: flash it again; nothing is lost by that. Where it stays so, try another cable, " +
+            "the bootloader fell silent: flash it again, which loses nothing. If it stays silent, try another cable, " +
                 "and pull D0 and D1 free of other devices",
         );
     }

@@ -1,5 +1,5 @@
 // The log of a session, for `weeder replay`: a CSV file of `time_ms,kind,line`, with the firmware's own lines. It has
-// the machine's settings and examples at each connection, so that it can be replayed by itself.
+// the machine's settings and examples at each connection, so that it can be replayed alone.
 
 import type { Happening } from "./session.ts";
 

@@ -1,33 +1,33 @@
-// The machines at another computer's ports, by `weeder serve`. That computer has a session with each of them: what it knows comes as
-// server-sent events, and a command is a request that gives back its answer.
+// The machines at another computer's ports, by `weeder serve`. That computer has a session with each machine. It sends
+// their state as server-sent events, and answers a request for each command.
 //
-// What may be typed from here is decided there. A computer that falls silent is reported as lost machines, and asked again
-// until it answers.
+// The computer decides which commands this page may type. If it falls silent, its machines are reported as lost, and the
+// page asks again until it answers.
 
 import { english } from "../words/words.ts";
 import { isEvent, read, settingsOf } from "./grammar.ts";
 import { type Happening, type Link, NoMachine, Refused } from "./session.ts";
 
-/** Time without a word from the computer after which it is taken for gone: it says something twice a second, however still the machines are. */
+/** Silence after which the computer counts as lost: it sends a message twice a second. */
 const SILENCE_MS = 3000;
-/** Time between two tries to hear it again. */
+/** Time between two tries to reach it. */
 const RETRY_MS = 2000;
 
 const SILENT = english("servedSilent");
 
-/** What may be typed from here beside `hold` and questions. */
+/** Commands that this page may type, besides `hold` and questions. */
 export interface Allowed {
     /** `start` and `clear`. */
     readonly mayStart: boolean;
-    /** What changes the machine, or moves its tool by hand. */
+    /** Commands that change the machine or move its tool. */
     readonly mayChange: boolean;
 }
 
-/** What came of a HOLD to all machines. */
+/** The result of a HOLD to all machines. */
 export interface HeldAll {
     /** Each machine, and why it has not obeyed. */
     readonly machines: readonly { readonly name: string; readonly error: string | null }[];
-    /** Time until the last of those that have had obeyed, as the computer there took it. */
+    /** Time until the last machine had obeyed, measured by the computer. `null` if none has. */
     readonly lastMs: number | null;
 }
 
@@ -36,7 +36,7 @@ export function isServed(): boolean {
     return new URLSearchParams(location.search).has("served");
 }
 
-/** What is told of a machine. Settings and examples are the lines that show them, help is by a setting's name. */
+/** News of a machine. Settings and examples are the lines that show them. Help texts are by the setting's name. */
 type About =
     | {
           is: "there";
@@ -58,7 +58,7 @@ export class Served {
     #events: EventSource | undefined;
     #heardMs = 0;
 
-    /** Asks which machines there are. */
+    /** Asks the computer for its machines. */
     static async open(): Promise<Served> {
         const answer = await fetch("/machines");
         if (!answer.ok) throw new Error(await answer.text());
@@ -71,7 +71,7 @@ export class Served {
         this.allowed = allowed;
     }
 
-    /** Hears the machines from now on. */
+    /** Starts to receive the events. */
     listen(): void {
         this.#heardMs = performance.now();
         const events = new EventSource("/events");
@@ -83,7 +83,7 @@ export class Served {
         events.addEventListener("error", () => this.#lose(SILENT));
     }
 
-    /** Has all machines hold, before all that waits. */
+    /** Holds all machines, before all waiting commands. */
     async holdAll(): Promise<HeldAll> {
         const answer = await fetch("/machines/hold", { method: "POST" }).catch(() => {
             throw new Error(SILENT);
@@ -92,7 +92,7 @@ export class Served {
         return (await answer.json()) as HeldAll;
     }
 
-    /** Looks whether the computer is still there. */
+    /** Checks whether the computer has fallen silent. */
     watch(): void {
         if (this.#events && performance.now() - this.#heardMs > SILENCE_MS) this.#lose(SILENT);
     }
@@ -112,7 +112,7 @@ export class Served {
 
     async #again(): Promise<void> {
         const answer = await fetch("/machines").catch(() => undefined);
-        // Another start of `weeder serve` has another code, and gives the form for it; and maybe other machines.
+        // A new start of `weeder serve` has another code, so it answers with the form. It may have other machines.
         if (answer?.status === 401 || (answer?.ok && !this.#isSame(await answer.text()))) location.reload();
         else if (answer?.ok) this.listen();
         else setTimeout(() => void this.#again(), RETRY_MS);
@@ -129,16 +129,16 @@ export class Served {
     }
 }
 
-/** A machine at another computer's port. The session with it is there: what that tells comes by `tell`, and a command is a request. */
+/** A machine at another computer's port. The computer's session reports by `tell`, and each command is a request. */
 export class ServedMachine implements Link {
     onHappening: (happening: Happening) => void = () => {};
-    /** It was not there before, and is not now: why. */
+    /** Gets the reason if the machine was absent and still is. */
     onAbsent: (why: string) => void = () => {};
     readonly name: string;
     readonly #number: number;
-    /** While it is there: ends the requests under way, with the reason. */
+    /** While it is connected: ends pending requests, with the reason. */
     #there: AbortController | undefined;
-    /** Done when what was asked before is answered: a browser has few connections to a computer, and HOLD needs one at once. */
+    /** Resolves when earlier commands are answered. A browser has few connections, and HOLD needs one at once. */
     #answered: Promise<unknown> = Promise.resolve();
     #holds = 0;
 
@@ -161,7 +161,7 @@ export class ServedMachine implements Link {
         await this.#type("hold");
     }
 
-    /** Takes what that computer tells of it. */
+    /** Takes the computer's news of it. */
     tell(message: About): void {
         switch (message.is) {
             case "there":

@@ -1,78 +1,78 @@
-// A session with a machine at the other end of a wire: types commands one at a time, knows whose answer comes, asks for
-// the status in between, and tells what happened.
+// A session with a machine over a wire: types one command at a time, matches the answers, polls the status, and reports
+// what happened.
 //
-// It has no clock of its own: `turn` is called over and over with the wire's time, which for the page's own Uno is the
-// chip's. After every start of the Uno it asks who is there, for settings and examples, and turns the events on. `hold` does
-// not wait. A wire that ended ends its session.
+// It has no clock: the caller calls `turn` in a loop with the wire's time. For the page's own Uno this is the chip's time.
+// After every start of the Uno it asks for version, settings and examples, and turns the events on. `hold` does not wait. A
+// session ends with its wire.
 
 import type { EventLine, Setting, Status } from "./console_line.ts";
 import { isEvent, read, settingsOf } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
-/** Types a command, and gives back its answer without the `ok`. Throws what the machine refuses by. */
+/** Types a command, and returns its answer without the `ok`. Throws `Refused` if the machine refuses it. */
 export type Ask = (command: string) => Promise<string[]>;
 
 /** A serial line to a machine. */
 export interface Wire {
-    /** Hears what comes. */
+    /** Gets the received text. */
     onText: (text: string) => void;
-    /** The line is gone, and why; never called after `close`. */
+    /** Gets the reason when the line is lost. Never called after `close`. */
     onEnd: (why: string) => void;
     send(text: string): void;
     close(): Promise<void>;
 }
 
-/** Time between two questions for the status. */
+/** Time between two polls of the status. */
 const POLL_MS = 100;
-/** Time after which an answer is given up: the longest, all examples, takes less than a second. */
+/** Longest wait for an answer: the longest answer, all examples, takes less than a second. */
 const PATIENCE_MS = 2000;
-/** The longest that counts between two turns. A page that was busy, or asleep, has not waited: the answer may lie there unread. */
+/** Longest time that counts as waiting between two turns. A busy or suspended page may have an unread answer. */
 const LONGEST_TURN_MS = 200;
-/** Time in which the greeting comes after a reset, behind a bootloader: the old ones wait for two seconds. */
+/** Longest time from a reset to the greeting: old bootloaders wait for two seconds. */
 const BOOT_MS = 3000;
-/** How often a machine whose answers do not come, or come garbled, is asked again from the beginning. */
+/** Further tries from the beginning, after missing or damaged answers. */
 const TRIES = 2;
 
 /** Something that happened. */
 export type Happening =
-    /** The firmware has started, and says why. */
+    /** The firmware has started; its greeting has the reason. */
     | { is: "started"; line: string }
-    /** The machine is there, and has shown its settings and examples. */
+    /** The machine is connected, and has shown its settings and examples. */
     | { is: "connected"; version: string; settings: readonly Setting[]; examples: readonly string[] }
-    /** The machine is gone: for good, by the operator's wish or not, or until it has restarted. */
+    /** The machine is lost: for good, as the operator wanted or not, or until it has restarted. */
     | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
     | { is: "status"; status: Status; line: string }
-    /** The machine told something by itself. */
+    /** The machine sent an event line. */
     | { is: "event"; event: EventLine; line: string }
     | { is: "command"; line: string }
     | { is: "answer"; line: string }
     | { is: "settings"; settings: readonly Setting[] }
     | { is: "examples"; examples: readonly string[] }
-    /** What the settings are, by their names. */
+    /** The help texts of the settings, by name. */
     | { is: "help"; help: Map<string, string> };
 
-/** The machine refused a command: what was wrong, and what would be right. */
+/** The machine refused a command: the problem, and what would be right. */
 export class Refused extends Error {}
 
-/** There is no machine that answers, and what to do. */
+/** No machine answers, and what to do. */
 export class NoMachine extends Error {}
 
 /** A machine to talk to: by a session here, or by the session of another computer (served.ts). */
 export interface Link {
     onHappening: (happening: Happening) => void;
-    /** Types a command for the operator when those before it are answered, and gives back its answer without the `ok`. */
+    /** Types an operator's command after the commands before it. Returns its answer without the `ok`. */
     ask: Ask;
-    /** Has the machine hold, before what the operator typed and is not sent yet: that is dropped. Done when it has obeyed. */
+    /** Holds the machine at once, and drops the operator's unsent commands. Resolves when the machine has obeyed. */
     hold(): Promise<void>;
-    /** Goes on, at a time, if it has a clock. */
+    /** Runs a turn at this time. A link without it needs no turns. */
     turn?(now: number): void;
-    /** Lets go of the machine, if it holds it. */
+    /** Closes the wire, if this link has one. */
     close?(): Promise<void>;
 }
 
 interface Question {
     readonly command: string;
-    /** Whether the operator asked it. */
+    /** Whether the operator typed it. */
     readonly isTyped: boolean;
     readonly since: number;
     readonly answer: string[];
@@ -82,24 +82,24 @@ interface Question {
 
 export class Session implements Link {
     onHappening: (happening: Happening) => void = () => {};
-    /** Whether the machine is there and has said what it is. */
+    /** Whether the machine has answered with version, settings and examples. */
     #isReady = false;
     readonly #wire: Wire;
     readonly #lines = new LineReader();
-    /** What was typed and is not answered yet, in the order of the answers. */
+    /** Typed commands without an answer, in the order of the answers. */
     #asked: Question[] = [];
     #waiting: Question[] = [];
-    /** Time that was spent waiting, by the wire's clock. */
+    /** The waiting time so far, by the wire's clock. */
     #now: number;
     /** The wire's time at the last turn. */
     #turnedAt: number;
     #pollAt = Number.POSITIVE_INFINITY;
     #ended = false;
-    /** Until when a greeting is waited for. */
+    /** End of the wait for a greeting. */
     #greetingBy: number;
-    /** How often what was asked has been dropped to ask again from the beginning. */
+    /** How often the session has begun again. */
     #beginnings = 0;
-    /** Something that has come and is no weeder's. */
+    /** Received text that does not come from the weeder. */
     #strange = "";
 
     /** `resets` says whether opening the wire resets the Uno. */
@@ -115,7 +115,7 @@ export class Session implements Link {
         return this.#ask(command, true);
     }
 
-    /** What the page asks itself is not dropped. */
+    /** Keeps the page's own questions. */
     async hold(): Promise<void> {
         const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
         this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
@@ -147,7 +147,7 @@ export class Session implements Link {
         await this.#wire.close();
     }
 
-    /** `take` sends the question, or has it wait. */
+    /** `take` sends the question or queues it. */
     #ask(
         command: string,
         isTyped: boolean,
@@ -165,7 +165,7 @@ export class Session implements Link {
         this.#wire.send(`${question.command}\n`);
     }
 
-    /** Asks who is there, again where an answer is lost: a computer that is busy, or noise on the wire, takes one now and then. */
+    /** Asks for version, settings and examples. Tries again if an answer is lost, to a busy computer or noise on the wire. */
     async #begin(): Promise<void> {
         this.#isReady = false;
         this.#pollAt = Number.POSITIVE_INFINITY;
@@ -204,13 +204,13 @@ export class Session implements Link {
     }
 
     async #version(): Promise<string> {
-        // What was typed before ends here, and its answer belongs to no question.
+        // Ends an earlier half line. Its answer belongs to no question.
         this.#wire.send("\n");
         for (const line of await this.#ask("version", false)) {
             const said = read(line);
             if (said.is === "version") return said.version;
         }
-        throw new NoMachine(this.#whoIsThere());
+        throw new NoMachine(this.#whyNoAnswer());
     }
 
     async #settings(): Promise<Setting[]> {
@@ -220,9 +220,9 @@ export class Session implements Link {
         return settings;
     }
 
-    /** An answer does not come: a machine that was there is asked for all again. */
+    /** An answer is missing: a connected machine is asked for everything again. */
     #giveUp(question: Question): void {
-        const error = new NoMachine(this.#whoIsThere());
+        const error = new NoMachine(this.#whyNoAnswer());
         if (this.#isReady) this.#beginAgain(error, error.message);
         else {
             this.#asked.shift();
@@ -230,14 +230,14 @@ export class Session implements Link {
         }
     }
 
-    /** Why no good answer came, and what to do. */
-    #whoIsThere(): string {
+    /** Why no valid answer came, and what to do. */
+    #whyNoAnswer(): string {
         const strange = [...this.#strange];
         const unreadable = strange.filter((character) => character === "\u{fffd}").length;
         if (strange.length === 0)
-            return "nothing answers at this port: choose another, or press the Uno's reset; a new board is to be flashed first";
+            return "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first";
         if (unreadable * 4 > strange.length)
-            return "what comes from this port is no text: choose another; on an Uno see that D0 and D1 are free, and flash it again";
+            return "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again";
         return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
     }
 
@@ -274,13 +274,13 @@ export class Session implements Link {
         }
     }
 
-    /** The Uno has started: nothing that was typed will be answered. */
+    /** The Uno has started: pending commands will not be answered. */
     #restart(greeting: string): void {
         this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
         this.onHappening({ is: "started", line: greeting });
     }
 
-    /** Drops what was asked, and asks who is there. */
+    /** Drops all questions, and asks for version, settings and examples. */
     #beginAgain(error: Error, why: string): void {
         const dropped = [...this.#asked.splice(0), ...this.#waiting.splice(0)];
         this.#beginnings++;
@@ -296,7 +296,7 @@ export class Session implements Link {
             this.onHappening({ is: "settings", settings: await this.#settings() });
         if (/^\s*(label|teach|forget)\b/.test(command))
             this.onHappening({ is: "examples", examples: await this.#ask("examples", false) });
-        // The page lives on them.
+        // The page needs the events.
         if (/^\s*events\b/.test(command)) await this.#ask("events on", false);
     }
 

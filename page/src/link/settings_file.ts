@@ -20,7 +20,7 @@ export function range({ isSwitched, least, greatest, unit, default: usual }: Set
 export function write(settings: readonly Setting[], help: ReadonlyMap<string, string>): string {
     const head =
         "# Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.\n" +
-        "# What is not named here is left as it is.\n";
+        "# Settings that are not named here are not changed.\n";
     const entries = settings.map((setting) => {
         const value = setting.isSwitched ? setting.value === 1 : setting.value;
         return `\n# ${help.get(setting.name) ?? ""}\n# ${range(setting)}\n${setting.name} = ${value}\n`;

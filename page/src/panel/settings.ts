@@ -140,7 +140,7 @@ export class SettingsForm {
     }
 
     /**
-     * Sends the changed values, in an order without contradictions on the way, and saves them. Nothing is sent if the
+     * Sends the changed values, in an order without intermediate contradictions, and saves them. Nothing is sent if the
      * result contradicts itself. Refusals are shown in the machine's words. Returns whether it is saved.
      */
     async #send(): Promise<boolean> {

@@ -47,7 +47,7 @@ export interface Dimensions {
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
 export type Verdict = "kept" | "margin cut" | "damaged";
 
-/** A change on the way. */
+/** A pin change within a turn. */
 export type Change =
     /** The new speed; negative backwards. */
     | { speedKmH: number }
@@ -122,7 +122,7 @@ export class Machine {
     runUntil(cycle: number): void {
         const { uno } = this;
         this.#rust.roll(cycle);
-        // A copy: the servo's pulses on the way change its memory.
+        // A copy: the servo's pulses call the core, which changes its memory.
         const changes = this.#rust.trialTable(TABLE.changes).slice();
         for (let at = 0; at < changes.length; at += 3) {
             uno.runUntil(changes[at] ?? 0);

@@ -1,6 +1,6 @@
 // The virtual Uno for another program, in lock step: a command for node, not a part of the page.
 //
-// Each line of standard input is a turn: the cycle until which the clock runs, and the inputs on the way. Each line of
+// Each line of standard input is a turn: the cycle until which the clock runs, and the inputs until then. Each line of
 // standard output has the Uno's outputs in that turn. The first line has the firmware. `weeder check-board
 // --second-simulator` uses it instead of the weeder (host/check/src/second.rs is the other end).
 

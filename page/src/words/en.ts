@@ -71,10 +71,10 @@ export const en = {
         left: "Left: {parts}.",
         leftSwings: "{count} where the tool swung",
         leftPlants: "{count} beside a plant",
-        leftWeeds: "{count} taken for a plant",
+        leftWeeds: "{count} classified as a plant",
         leftClosed: "{count} while the tool was held out",
         notKept: "Why plants were not kept: {parts}.",
-        notKeptUnseen: "{count} without a keep-out zone: not seen, or taken for a weed",
+        notKeptUnseen: "{count} without a keep-out zone: not seen, or classified as a weed",
         notKeptOff: "{count} with the zone elsewhere: the wheel slips",
         notKeptLate: "{count} the swing was late or early for this speed",
 
@@ -95,7 +95,7 @@ export const en = {
         hadSettings: "This Uno had other settings before it was flashed.",
         putThemBack: "Put them back",
         dropThem: "Drop them",
-        notAllPutBack: "Not all of them could be put back: look at Settings.",
+        notAllPutBack: "Not all of them could be restored: check Settings.",
         areBack: "The settings of before are saved.",
         hasNoSuch: "This firmware has no {names}.",
 
@@ -192,7 +192,7 @@ export const en = {
         refused: "{count} of {all} were refused, and nothing is saved: see there.",
         savedForGood: "Saved: they are there after a reset, and without power.",
         notSavedWhy: "Not saved: {why}",
-        fileSame: "{file} says what the machine has already.",
+        fileSame: "{file} has the machine's present settings.",
         fileDiffers:
             "{file}: {count} differs from the machine's. Look at it, then send it.|{file}: {count} differ from the machine's. Look at them, then send them.",
 
@@ -209,7 +209,7 @@ export const en = {
         wheelRoll: "Roll forward to the other mark:",
         notBegun: "not begun",
         rolled: "{distance} by the present setting",
-        wheelMeasured: "What you have measured, in mm",
+        wheelMeasured: "Measured distance, in mm",
         countIt: "Count it",
         takeIt: "Take it all the same",
         keepIt: "Keep it for good.",
@@ -231,14 +231,13 @@ export const en = {
         pulseIn: "{pulse} us is the tool in the row now. Not saved yet.",
         pulseOut: "{pulse} us is the tool out now. Not saved yet.",
         servoTime:
-            "Time it with the tool in the soil. Without an end switch, film it: the lamp is lit while the tool is told to be out.",
+            "Time it with the tool in the soil. Without an end switch, film it: the lamp is lit while the tool is commanded out.",
         swingThree: "Swing three times",
         swingsThree: "The tool swings in and out three times. Keep clear of it.",
         timedSet: "The end switch has timed it, and both leads are set. Not saved yet.",
         timedNotSet:
             "The end switch has timed it, but these leads need the beam farther ahead, or a lower top speed: nothing is set.",
-        timedByEye:
-            "It has swung three times. Put in what you saw, the longest way out and the shortest wait before it came in.",
+        timedByEye: "It has swung three times. Enter the longest swing out, and the shortest wait before the swing in.",
         notTimed: "The end switch did not follow: see to it, or set end_switch off and go by eye.",
         leadOut: "Longest way out, and some more: lead_out_ms",
         leadIn: "Shortest wait before it comes in: lead_in_ms",
@@ -247,7 +246,7 @@ export const en = {
 
         // Examples.
         teachLead:
-            "Roll past a plant or a tall weed in hold, and say what it was by the two buttons. It counts from the next object on, and is kept at once.",
+            "Roll past a plant or a tall weed in hold, and label it with the two buttons. The label counts from the next detection on, and is saved at once.",
         places: "{count} of {all} places are taken.",
         forgetAll: "Forget all",
         forget: "Forget",
@@ -270,7 +269,7 @@ export const en = {
         phaseVerifying: "Reading it back: {share}",
         flashed: "Done: {count} bytes were written and read back in {time}.",
         oldBootloader:
-            "Behind this bootloader the machine does not come back by itself where its watchdog has had to stop it: the tool has no signal until power is taken away and given back. Optiboot, which Arduino's IDE can burn, has no such fault.",
+            "With this bootloader the machine does not restart after a stop by its watchdog: the tool has no signal until you switch the power off and on. Optiboot, which Arduino's IDE can burn, has no such fault.",
         notFlashed: "Not flashed: {why}",
         withoutSerial: "Without Web Serial",
         withoutSerialHow: "Save the HEX as a file. avrdude, which the Arduino IDE brings along, writes it:",
@@ -301,7 +300,7 @@ export const en = {
         noAlarmNext: "There is no alarm behind this place.",
         atPlace: "At {distance}, after {time}: {speed}",
         replayIt: "Replay it",
-        replayLead: "What the firmware of this page would have decided.",
+        replayLead: "The decisions of this page's firmware.",
         replaySame: "On {objects} detections, {alarms} alarms and {swings} swings both agree.",
         replayWhole: "The decisions are those of this version.",
         replayDiffers: "Then they differ: {difference}.",
@@ -347,13 +346,13 @@ export const en = {
         resetWhileAsked: "the Uno was reset while it was asked",
         noSettings: "the firmware shows no settings: flash this page's, and try again",
         nothingAnswers:
-            "nothing answers at this port: choose another, or press the Uno's reset; a new board is to be flashed first",
-        noText: "what comes from this port is no text: choose another; on an Uno see that D0 and D1 are free, and flash it again",
+            "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first",
+        noText: "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again",
         otherDevice:
             "it is not the weeder's firmware that answers, but \u201c{text}\u201d: choose another port, or flash this one",
         servedSilent:
             "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there",
-        servedDropped: "this page could not keep up with what the machines say: it connects again",
+        servedDropped: "this page could not keep up with the machines' output: it connects again",
         servedGone: "the port is gone: plug the Uno in again",
         servedNoAnswer: "the machine does not answer",
         servedNotThere: "the machine is not there",
@@ -365,7 +364,7 @@ export const en = {
         fileForm: "it has to be a setting's name, =, and its value",
         fileOldGap: "{name} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm",
         fileUnknown: "there is no setting {name}: there are {names}",
-        fileTwice: "{name} stands there twice",
+        fileTwice: "{name} occurs twice",
         fileSwitched: "{name} is {value}: it has to be {range}",
         fileNumber: "{name} is {value}: it has to be a whole number, {range}",
         fileEmpty: "the file names no setting: is it one that `weeder settings pull` has written?",
@@ -419,7 +418,7 @@ export const en = {
         contradictSecondBeam:
             "a second beam stands 72 mm or more behind the first and ahead of the tool, and beam_to_tool_mm is 1000 at most: change second_beam_mm or beam_to_tool_mm",
         contradictEncoder:
-            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and what ticks_per_rev and wheel_mm give, are to be that many; take an encoder with more counts",
+            "a wheel has to give 900 ticks a metre or more, or a failing encoder is found too late: ticks_per_m, and the value from ticks_per_rev and wheel_mm, must reach that; take an encoder with more counts",
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
 
@@ -427,11 +426,11 @@ export const en = {
         timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
         takeWorst: "take the worst time: `set {name} {worst}`",
         measureWheel: "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)",
-        passPlants: "have the beams tell the slip: roll past {all} plants ({done} done)",
+        passPlants: "measure the slip with both beams: roll past {all} plants ({done} done)",
         lowerMargin: "lower the margin: `set margin_mm {margin}`: {sum}",
         raiseMargin: "raise the margin: `set margin_mm {margin}`: {sum}",
         marginReady: "the margin pays for {sum}: `save`",
-        marginTooSmall: "margin_mm {now} is too small: what was measured asks for {least}",
+        marginTooSmall: "margin_mm {now} is too small: the measurements need {least}",
         marginNotMeasured: "margin_mm {now} is not measured: {missing} first; {safe} is safe",
     },
 } as const;

@@ -73,7 +73,7 @@ pub enum Command {
         /// The steps.
         steps: Vec<Step, STEPS>,
     },
-    /// Play the pattern with interrupts off, first with longer delays and then as it is. No measurement runs meanwhile, and the
+    /// Play the pattern with interrupts off, first with longer delays and then unchanged. No measurement runs meanwhile, and the
     /// clock loses time.
     Burst {
         /// Steps of the pattern, 1 to 128.

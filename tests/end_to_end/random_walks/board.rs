@@ -169,18 +169,18 @@ impl Board {
                 if setting.is_of_the_wheel() {
                     let _ = self.settings.set(Setting::TicksPerM, 0);
                 }
-                self.rest_anew();
+                self.begin_rest();
             }
             Command::Defaults | Command::Revert => self.in_doubt = true,
             Command::GetAll => {
                 self.in_doubt = false;
-                self.rest_anew();
+                self.begin_rest();
             }
             Command::CalibrateServo => self.times_the_servo = true,
             Command::Hold | Command::Start { .. } | Command::Servo(_) | Command::ServoIn | Command::ServoOut => {
                 self.in_doubt |= std::mem::take(&mut self.times_the_servo);
-                // What was moved by hand has yet to come back.
-                self.rest_anew();
+                // The tool has yet to come back from a manual move.
+                self.begin_rest();
             }
             Command::TestRow { .. } => self.in_doubt |= std::mem::take(&mut self.times_the_servo),
             _ => {}
@@ -188,7 +188,7 @@ impl Board {
     }
 
     /// The servo's pulse gets some time again until it must be right.
-    fn rest_anew(&mut self) {
+    fn begin_rest(&mut self) {
         self.rests_since = self.rests_since.map(|_| self.uno.cycle());
     }
 
@@ -207,7 +207,7 @@ impl Board {
     }
 
     /// The number of taught examples that the firmware reports.
-    fn told_examples(&mut self) -> Result<usize, Failure> {
+    fn listed_examples(&mut self) -> Result<usize, Failure> {
         let lines = ask(&mut self.uno, "examples").map_err(unanswered)?;
         Ok(lines.iter().filter(|line| line.starts_with("field ")).count())
     }
@@ -308,8 +308,8 @@ impl Machine for Board {
             self.rests_since = None;
         }
         if stack_is_low && !self.stack_was_low {
-            let spoiled = self.uno.first_stack_address() + LOW_STACK;
-            self.uno.write_sram(spoiled, &[0]).map_err(stopped)?;
+            let corrupted = self.uno.first_stack_address() + LOW_STACK;
+            self.uno.write_sram(corrupted, &[0]).map_err(stopped)?;
             self.stack_was_low = true;
         }
         self.drive(cycles);
@@ -379,7 +379,7 @@ impl Machine for Board {
             match self.current.as_deref().and_then(|line| line.split([' ', '\t']).next()) {
                 Some("start" | "servo" | "calibrate" | "test") => self.rests_since = None,
                 // The pulse for out may change, now or soon.
-                Some("set" | "defaults" | "revert") => self.rest_anew(),
+                Some("set" | "defaults" | "revert") => self.begin_rest(),
                 _ => {}
             }
         }
@@ -402,7 +402,7 @@ impl Machine for Board {
     }
 
     fn is_done(&self) -> bool {
-        let is_said = self.uno.bytes_on_their_way() == 0 && self.typed.is_empty();
+        let is_said = self.uno.bytes_pending() == 0 && self.typed.is_empty();
         is_said && self.current.is_none() && !self.heard.contains('\n')
     }
 
@@ -416,7 +416,7 @@ impl Machine for Board {
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
         // A line on its way would otherwise reach the restarted machine.
-        while self.uno.bytes_on_their_way() > 0 {
+        while self.uno.bytes_pending() > 0 {
             self.uno.run_for_ms(1).map_err(stopped)?;
         }
         match cause {
@@ -443,7 +443,7 @@ impl Machine for Board {
             self.hear(&line)?;
         }
         self.in_doubt = false;
-        let (told, kept) = (self.told_examples()?, self.examples().len());
+        let (told, kept) = (self.listed_examples()?, self.examples().len());
         if told != kept {
             return Err(Failure::fail(format!("it tells {told} examples, and {kept} are kept")));
         }

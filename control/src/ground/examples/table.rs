@@ -15,7 +15,7 @@ pub const RANGES: [Range; FEATURES] = [
     Range { lowest: 340, highest: 716 },
 ];
 
-/// Squared distance beyond which a detection is like no example.
+/// Squared distance beyond which no example is near enough.
 pub const RADIUS: u32 = 172;
 
 /// Examples that vote.

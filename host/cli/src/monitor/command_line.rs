@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn up_and_down_go_through_what_was_entered() {
+    fn up_and_down_recall_entered_lines() {
         let mut line = CommandLine::default();
         for text in ["status", "get k", "get k"] {
             typed(&mut line, text);
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn tab_completes_as_far_as_there_is_one_way_and_shows_the_ways_from_there() {
+    fn tab_completes_the_common_part_and_shows_the_choices() {
         let mut line = CommandLine::default();
         typed(&mut line, "set lea");
         line.key(KeyCode::Tab.into());
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_firmware_would_not_take_is_not_typed() {
+    fn invalid_lines_are_not_typed() {
         let mut line = CommandLine::default();
         typed(&mut line, "h\u{e4}ld\u{1b}");
         assert_eq!(line.text(), "hld");

@@ -91,7 +91,7 @@ pub struct Model {
     pub hold: Option<Hold>,
     /// Typed lines, answers and events, the newest last.
     pub lines: VecDeque<String>,
-    /// What is being typed.
+    /// The line being typed.
     pub line: CommandLine,
     /// Whether to ring the bell.
     rings: bool,

@@ -77,8 +77,8 @@ impl Talk<'_> {
                 }
             }
             // Two statuses after a command, all its events have come.
-            let has_told = |row: &Standing| !row.is_there || row.statuses >= 2;
-            if ended && self.is_idle() && self.standing.iter().all(has_told) {
+            let has_reported = |row: &Standing| !row.is_there || row.statuses >= 2;
+            if ended && self.is_idle() && self.standing.iter().all(has_reported) {
                 return self.end();
             }
             let Some(heard) = self.rows.next(LOOK) else { continue };
@@ -129,7 +129,7 @@ impl Talk<'_> {
                 _ => self.rows.command(row, command),
             }
         }
-        self.tell_of_hold(output)
+        self.report_hold(output)
     }
 
     fn take(&mut self, heard: &Heard, ended: bool, output: &mut impl Write) -> Result<()> {
@@ -177,11 +177,11 @@ impl Talk<'_> {
         if let Some(hold) = &mut self.hold {
             hold.take(heard);
         }
-        self.tell_of_hold(output)
+        self.report_hold(output)
     }
 
     /// Prints the result of a `hold` to all rows, once no row is left to answer.
-    fn tell_of_hold(&mut self, output: &mut impl Write) -> Result<()> {
+    fn report_hold(&mut self, output: &mut impl Write) -> Result<()> {
         if let Some(hold) = self.hold.take_if(|hold| hold.is_over()) {
             writeln!(output, "{}", hold.summary(&self.chosen.names()))?;
         }

@@ -69,7 +69,7 @@ fn a_soak_of_nothing_is_refused() {
 }
 
 #[test]
-fn no_cause_is_told_twice() {
+fn no_cause_is_printed_twice() {
     for arguments in [
         &["virtual-uno", "--bootloader", "no-such.hex"][..],
         &["virtual-uno", "--stand", "--bootloader", "optiboot", "--eeprom", "no-such/uno.eeprom"],
@@ -109,7 +109,7 @@ fn no_message_in_the_source_repeats_its_cause() {
 }
 
 #[test]
-fn what_a_file_says_gives_the_terminal_no_orders() {
+fn a_file_s_text_cannot_control_the_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let wires = "$timescale 1 us $end\n$var wire 1 ! A\u{1b}[2J $end\n$enddefinitions $end\n#0 0!\n";
     let log = "time_ms,kind,line\n0,connected,0.2.0\n0,setting,k\u{1b}[2J=3\n";

@@ -36,7 +36,7 @@ fn bash_completes_commands_and_their_options() {
 }
 
 #[test]
-fn bash_completes_presets_crops_and_what_an_axis_can_be() {
+fn bash_completes_presets_crops_and_axes() {
     assert_eq!(offered_by_bash(&["weeder", "trial", "--field", "so"]), ["soft-ground"]);
     assert_eq!(offered_by_bash(&["weeder", "sweep", "--field", "dire"]), ["direct-sown"]);
     assert_eq!(offered_by_bash(&["weeder", "sweep", "--x", "lead_"]), ["lead_out_ms=", "lead_in_ms="]);
@@ -47,7 +47,7 @@ fn bash_completes_presets_crops_and_what_an_axis_can_be() {
 }
 
 #[test]
-fn other_shells_are_told_of_every_command() {
+fn other_shells_complete_every_command() {
     for shell in ["elvish", "fish", "powershell", "zsh"] {
         let script = completions(shell);
         for command in ["virtual-uno", "monitor", "old-bootloader"] {

@@ -162,7 +162,7 @@ fn the_swing_comes_as_settings_for_the_firmware() {
 }
 
 #[test]
-fn a_tool_that_cannot_swing_as_it_has_to_is_told_why() {
+fn an_impossible_swing_is_explained() {
     let words = printed("[intra_row]\nshank_length = \"120 mm\"\n", &[]);
     assert!(words.contains("an arm of 120 mm cannot bring the tool 130 mm aside"), "{words}");
     let words = printed("[intra_row]\nservo_torque = \"20 kg cm\"\n", &[]);

@@ -35,7 +35,7 @@ enum Kind {
 }
 
 #[test]
-fn what_cannot_be_written_is_said_before_the_work_and_without_a_temporary_name() {
+fn an_unwritable_file_is_named_before_the_work_without_a_temporary_name() {
     for (arguments, kind) in WRITERS {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("file"), "mine").unwrap();
@@ -59,13 +59,13 @@ fn a_folder_is_no_file_and_a_file_is_no_folder() {
         let (name, wrong) = match kind {
             Kind::Folder => {
                 fs::write(folder.path().join("report"), "mine").unwrap();
-                ("report", "report is a file, and a folder has to be named")
+                ("report", "report is a file: name a folder")
             }
             // An existing log is continued, and has its own error.
             Kind::File("log.csv") => continue,
             Kind::File(name) => {
                 fs::create_dir(folder.path().join(name)).unwrap();
-                (name, " is a folder, and a file has to be named")
+                (name, " is a folder: name a file")
             }
         };
         let output = weeder(folder.path(), &[arguments, &[name]].concat());
@@ -111,7 +111,7 @@ fn the_table_is_printed_even_if_the_file_cannot_be_written() {
 }
 
 #[test]
-fn what_is_written_to_a_device_goes_there() {
+fn output_to_a_device_goes_there() {
     let folder = tempfile::tempdir().unwrap();
     let output = weeder(folder.path(), &["sweep", "--field", "small.toml", "--x", "k=1..3:2", "--out", "/dev/null"]);
     assert!(output.status.success());

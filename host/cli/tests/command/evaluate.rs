@@ -28,7 +28,7 @@ fn assert_not_judged(folder: &TempDir, message: &str) {
 }
 
 #[test]
-fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
+fn the_manual_s_example_is_evaluated_in_plain_words_and_tables() {
     let said = said(Path::new("."), &["evaluate", EXAMPLE]);
     for line in [
         "24 plots of 8 treatments (1, 1.5, 2 and 2.5 km/h; 50 and 60 cm), 3 of each treatment.",
@@ -48,7 +48,7 @@ fn the_manual_s_example_is_judged_in_plain_words_and_tables() {
 /// factor(speed_km_h) * factor(spacing_cm), d))`, `g <- glm(cbind(damaged, plants - damaged) ~ speed_km_h + spacing_cm, d, family =
 /// binomial, control = glm.control(epsilon = 1e-300, maxit = 30))`, `summary(g)$coefficients`.
 #[test]
-fn the_json_has_what_r_makes_of_the_same_table() {
+fn the_json_agrees_with_r_for_the_same_table() {
     let json: Value = serde_json::from_str(&said(Path::new("."), &["evaluate", EXAMPLE, "--json"])).unwrap();
     assert_eq!(json["plots"].as_array().unwrap().len(), 24);
     assert_eq!(json["treatments"].as_array().unwrap().len(), 8);
@@ -87,7 +87,7 @@ fn the_report_is_one_page_in_a_folder_of_its_own() {
 }
 
 #[test]
-fn a_trial_without_damage_and_without_replications_is_judged_as_far_as_it_goes() {
+fn a_trial_without_damage_or_replications_is_evaluated_partly() {
     let folder = folder_with(
         "1,1,50,100,12,60,0,12,127,0.4,2.5\n1,1,60,100,10,50,0,12,126,0.4,2.5\n\
          1,2,50,100,18,60,0,12,65,0.4,2.5\n1,2,60,100,17,50,0,12,64,0.4,2.5\n",
@@ -105,7 +105,7 @@ fn a_trial_without_damage_and_without_replications_is_judged_as_far_as_it_goes()
 }
 
 #[test]
-fn a_single_plot_has_its_measures_and_is_told_that_it_carries_no_model() {
+fn a_single_plot_has_its_measures_and_no_model() {
     let folder = folder_with("1,1.5,50,200,30,50,1,24,180,0.4,2.5\n");
     let said = said(folder.path(), &["evaluate", "trial.csv"]);
     assert!(said.contains("159.94") && said.contains("Weeding efficiency has no model"), "{said}");
@@ -131,7 +131,7 @@ fn a_wrong_line_is_named_and_nothing_is_written() {
         ("2,1.5,50,200,30,50,1,a lot,180,0.4,2.5", "trial.csv, line 3: area_m2 is `a lot`: it has to be a number"),
         (
             "1,1.5,50,200,30,50,1,24,180,0.4,2.5",
-            "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm stands in line 2",
+            "trial.csv, line 3: replication 1 of 1.5 km/h and 50 cm is already in line 2",
         ),
     ] {
         assert_not_judged(&folder_with(&format!("{good}{wrong}\n")), message);
@@ -157,6 +157,6 @@ fn a_file_that_does_not_exist_is_named() {
 fn a_report_that_cannot_be_written_is_an_error() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("report"), "a file, no folder").unwrap();
-    let file = "report is a file, and a folder has to be named";
+    let file = "report is a file: name a folder";
     assert_refused(folder.path(), &["evaluate", EXAMPLE, "--out", "report"], file);
 }

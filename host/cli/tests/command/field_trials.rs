@@ -23,11 +23,11 @@ fn assert_writes_nothing(arguments: &[&str], words: &str) {
 }
 
 #[test]
-fn a_trial_says_who_damaged_what_and_writes_its_report() {
+fn a_trial_prints_each_controller_s_damage_and_writes_its_report() {
     let folder = folder();
     let words = said(folder.path(), &["trial", "--field", "small.toml", "--out", "report"]);
     assert!(words.contains("Plants damaged by this firmware: none of "), "{words}");
-    assert!(words.contains("Where the row's ground goes") && !words.contains("contradict"), "{words}");
+    assert!(words.contains("Loss budget of the row's ground") && !words.contains("contradict"), "{words}");
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(
         page.contains("weeder trial --field small.toml --out report") && page.contains("a queue without look-ahead")
@@ -40,7 +40,7 @@ fn a_trial_says_who_damaged_what_and_writes_its_report() {
 }
 
 #[test]
-fn a_trial_s_table_can_be_judged_like_a_real_one() {
+fn a_trial_s_table_can_be_evaluated_like_a_real_one() {
     let folder = folder();
     said(folder.path(), &["trial", "--field", "small.toml", "--out", "."]);
     let words = said(folder.path(), &["evaluate", "trial.csv"]);
@@ -75,7 +75,7 @@ fn a_trial_gives_programs_its_plots() {
 }
 
 #[test]
-fn what_is_wrong_with_a_trial_is_named_and_nothing_is_written() {
+fn an_error_in_a_trial_is_named_and_nothing_is_written() {
     assert_writes_nothing(&["trial", "--field", "wet"], "wet is none of the presets (transplanted, even-stand");
     assert_writes_nothing(&["trial", "--speeds", "1,fast", "--out", "r"], "it has to be a number from 0.1 to 8");
     assert_writes_nothing(&["trial", "--spacings", "1", "--out", "r"], "it has to be a number from 5 to 500");
@@ -89,14 +89,14 @@ fn what_is_wrong_with_a_trial_is_named_and_nothing_is_written() {
 }
 
 #[test]
-fn a_machine_that_outruns_its_beam_is_told_and_is_no_success() {
+fn a_machine_that_outruns_its_beam_is_reported_and_is_no_success() {
     let folder = folder();
     let output = weeder(folder.path(), &["trial", "--field", "small.toml", "--speeds", "7", "--replications", "1"]);
     let words = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(1), "{words}");
     assert!(words.contains("an alarm took the firmware's tool out"), "{words}");
     let words = said(folder.path(), &["sweep", "--field", "small.toml", "--x", "speed=2..7:5"]);
-    assert!(words.contains(" ! ") && words.contains("--result alarms says in how many"), "{words}");
+    assert!(words.contains(" ! ") && words.contains("--result alarms shows in how many"), "{words}");
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn a_firmware_whose_leads_are_set_to_nothing_is_no_success() {
 }
 
 #[test]
-fn a_reader_who_has_seen_enough_ends_it_well() {
+fn a_reader_that_closes_the_pipe_ends_it_well() {
     let folder = folder();
     let line = format!("'{}' sweep --field small.toml --x k=1..9:1 | head -n 1", env!("CARGO_BIN_EXE_weeder"));
     let output =
@@ -162,7 +162,7 @@ fn a_sweep_shows_each_result_along_one_axis_and_one_result_along_two() {
 }
 
 #[test]
-fn the_help_of_a_sweep_lists_what_an_axis_can_be_with_its_range() {
+fn the_help_of_a_sweep_lists_the_axes_with_their_ranges() {
     let help = said(Path::new("."), &["sweep", "--help"]);
     for (name, range) in [
         ("speed", "0.1 to 8"),
@@ -177,7 +177,7 @@ fn the_help_of_a_sweep_lists_what_an_axis_can_be_with_its_range() {
 }
 
 #[test]
-fn what_is_wrong_with_a_field_is_said_in_a_line_with_what_would_be_right() {
+fn an_error_in_a_field_is_one_line_with_what_would_be_right() {
     for (text, wrong) in [
         (
             "[plot]\nrows = \"many\"\n",
@@ -198,7 +198,7 @@ fn what_is_wrong_with_a_field_is_said_in_a_line_with_what_would_be_right() {
 }
 
 #[test]
-fn what_is_wrong_with_a_sweep_is_named_and_nothing_is_written() {
+fn an_error_in_a_sweep_is_named_and_nothing_is_written() {
     assert_writes_nothing(&["sweep", "--x", "lead_out_ms", "--out", "s.csv"], "NAME=FROM..TO:STEP");
     assert_writes_nothing(
         &["sweep", "--x", "lead=1..2:1", "--out", "s.csv"],

@@ -236,7 +236,7 @@ fn an_elf_with_unproved_bounds_is_flashed_only_with_unproved() {
 }
 
 #[test]
-fn what_is_given_to_others_has_the_firmware_from_a_command_that_proves_it() {
+fn released_firmware_comes_from_a_command_that_proves_it() {
     for (file, command) in [("release.sh", "weeder\" hex "), ("page/build.mjs", "\"hex\"")] {
         let text = fs::read_to_string(firmware::workspace_root().join(file)).unwrap();
         assert!(text.contains(command) && !text.contains("objcopy"), "{file}");
@@ -273,7 +273,7 @@ fn a_firmware_that_reaches_into_optiboot_is_refused() {
 }
 
 #[test]
-fn a_port_that_is_in_use_is_said_to_be() {
+fn a_busy_port_is_named() {
     let pty = Pty::open().unwrap();
     let path = pty.path().to_string_lossy();
     let _claim = serialport::new(path.clone(), 115_200).open().unwrap();
@@ -362,7 +362,7 @@ fn a_link_does_not_take_a_file_s_place() {
 }
 
 #[test]
-fn the_hex_file_holds_what_the_elf_does() {
+fn the_hex_file_has_the_content_of_the_elf() {
     let folder = tempfile::tempdir().unwrap();
     let elf = firmware::build().expect("the firmware builds");
     let out = folder.path().join("weeder.hex");

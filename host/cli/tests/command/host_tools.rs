@@ -174,7 +174,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
 }
 
 #[test]
-fn what_is_pushed_is_kept_over_a_reset_unless_it_is_not_to_be() {
+fn pushed_settings_survive_a_reset_unless_no_save_is_given() {
     let uno = uno();
     let folder = tempfile::tempdir().expect("there is room for a file");
     let file = folder.path().join("machine.toml");
@@ -241,7 +241,7 @@ fn a_second_virtual_uno_leaves_the_link_of_a_living_one_alone() {
 }
 
 #[test]
-fn a_virtual_uno_says_what_to_type_next() {
+fn a_virtual_uno_prints_the_next_command() {
     let folder = tempfile::tempdir().expect("there is room for a link");
     let elf = firmware::build().expect("the firmware builds");
     let elf = elf.to_str().expect("it is text");
@@ -261,7 +261,7 @@ fn a_virtual_uno_says_what_to_type_next() {
 }
 
 #[test]
-fn a_file_with_a_mistake_is_refused_before_the_port_is_opened() {
+fn a_wrong_file_is_refused_before_the_port_is_opened() {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let file = folder.path().join("machine.toml");
     fs::write(&file, "k = 3\nwheel_mm = 4000\n").expect("it can be written");
@@ -271,7 +271,7 @@ fn a_file_with_a_mistake_is_refused_before_the_port_is_opened() {
 }
 
 #[test]
-fn the_plain_monitor_answers_line_by_line_and_tells_of_refusals_by_its_status() {
+fn the_plain_monitor_answers_line_by_line_and_its_status_shows_errors() {
     let uno = uno();
     let answers = printed(&weeder(&["monitor", "--plain"], uno.path(), "version\nget k\n"), 0);
     assert!(answers.starts_with("weeder 0.2.0\nok\nk=3 "), "{answers}");
@@ -314,7 +314,7 @@ fn ports_logs_and_recordings_that_do_not_exist_are_named() {
 }
 
 #[test]
-fn a_virtual_uno_that_is_told_to_end_takes_its_link_with_it() {
+fn a_terminated_virtual_uno_removes_its_link() {
     let folder = tempfile::tempdir().expect("there is room for a link");
     let link = folder.path().join("uno");
     for signal in ["-INT", "-TERM", "-HUP"] {

@@ -249,7 +249,7 @@ fn every_page_of_the_manual_is_in_its_summary_once() {
 }
 
 #[test]
-fn a_long_sentence_a_banned_word_and_a_paragraph_are_told() {
+fn a_long_sentence_a_banned_word_and_a_paragraph_are_found() {
     let long = format!("Short. {} end.", "word ".repeat(SENTENCE));
     assert_eq!(long_sentences(&long).len(), 1);
     assert!(long_sentences(&format!("Short. {}end.", "word ".repeat(SENTENCE - 1))).is_empty());

@@ -184,7 +184,7 @@ fn the_readme_s_first_screen_has_both_ways_in_to_be_copied_as_a_whole_and_the_ga
 }
 
 #[test]
-fn commands_in_the_manual_that_need_no_uno_do_what_they_say() {
+fn commands_in_the_manual_that_need_no_uno_work() {
     let folder = TempDir::new().expect("a folder");
     fs::create_dir_all(folder.path().join("control/src/ground/examples")).expect("a folder in it");
     fs::write(folder.path().join("field.csv"), OBJECTS).expect("a file in it");
@@ -253,7 +253,7 @@ fn the_manual_s_page_of_the_console_names_every_command() {
 }
 
 #[test]
-fn every_console_line_in_the_manual_is_answered_by_ok_and_by_what_stands_there() {
+fn every_console_line_in_the_manual_gets_ok_and_the_printed_answer() {
     let elf = firmware::build().expect("the firmware builds");
     let mut typed = 0;
     for page in pages() {
@@ -325,7 +325,7 @@ impl Drop for Running {
 }
 
 #[test]
-fn the_way_to_a_weeder_without_an_uno_is_followed_to_its_end() {
+fn the_start_without_an_uno_works_to_its_end() {
     firmware::build().expect("the firmware builds");
     let folder = TempDir::new().expect("a folder");
     let link = folder.path().join("uno");
@@ -360,7 +360,7 @@ fn the_way_to_a_weeder_without_an_uno_is_followed_to_its_end() {
 }
 
 #[test]
-fn every_link_in_the_manual_leads_somewhere() {
+fn every_link_in_the_manual_has_a_target() {
     for page in pages() {
         let folder = page.path.parent().expect("a page has a folder");
         for link in page.text.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(link, _)| link) {

@@ -23,7 +23,7 @@ fn filled_in(table: &str) -> String {
 }
 
 #[test]
-fn a_plan_that_is_filled_in_by_hand_is_judged() {
+fn a_plan_filled_in_by_hand_is_evaluated() {
     let folder = TempDir::new().unwrap();
     let words = said(folder.path(), &["plan", "--width", "0.4", "--power", "2.5", "--out", "trial.csv"]);
     assert_eq!(words, "Written: trial.csv, 24 plots in 3 blocks\n");

@@ -60,7 +60,7 @@ fn a_full_disk_is_an_error_with_its_cause() {
 }
 
 #[test]
-fn words_beside_the_result_that_cannot_be_told_do_no_harm() {
+fn lost_messages_beside_the_result_do_no_harm() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
     let full = File::options().write(true).open("/dev/full").unwrap();
     let status = command.args(["design", "--machine", "no-such.toml"]).stderr(full).status().unwrap();
@@ -177,7 +177,7 @@ fn a_row_of_few_plants_has_the_weeds_that_there_is_room_for() {
 }
 
 #[test]
-fn the_bound_that_is_printed_is_said_to_be_that_of_kept_margins() {
+fn the_printed_bound_is_named_for_kept_margins() {
     let output = weeder(&["sim", "--plants", "3", "--paper", "--speed", "2"], Stdio::piped());
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(said.contains("with every canopy and its margin kept, this servo allows "), "{said}");

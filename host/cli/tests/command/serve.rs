@@ -121,14 +121,14 @@ fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
 
 impl Served {
     /// Whether the output for the operator contains these words.
-    fn has_told(&self, words: &str) -> bool {
+    fn has_reported(&self, words: &str) -> bool {
         self.told.lock().expect("no thread has panicked").contains(words)
     }
 
     #[track_caller]
     fn wait_until_told(&self, words: &str) {
         for _ in 0..PATIENCE.as_millis() / LOOK.as_millis() {
-            if self.has_told(words) {
+            if self.has_reported(words) {
                 return;
             }
             thread::sleep(LOOK);
@@ -312,8 +312,8 @@ fn of_a_hundred_wrong_codes_five_are_looked_at_and_the_operator_knows() {
     let looked_at = statuses.iter().filter(|&&status| status == 403).count();
     assert!(looked_at % 5 == 0 && looked_at < 20 && statuses[5] == 429, "{statuses:?}");
     let (status, said, cookie) = served.try_code(&served.code);
-    assert!(status == 429 && said.contains("too many wrong codes") && cookie.is_none(), "{status} {said}");
-    served.wait_until_told("127.0.0.1 has sent a wrong code, the last of five: no code is taken for a minute");
+    assert!(status == 429 && said.contains("Too many wrong codes") && cookie.is_none(), "{status} {said}");
+    served.wait_until_told("127.0.0.1 has sent the fifth wrong code: no code is accepted for a minute");
     // A phone that was paired before is not locked out.
     assert_eq!(served.get(&served.lan, "/machines", &phone).0, 200);
 }
@@ -476,7 +476,7 @@ fn clients_that_never_read_are_let_go_of_and_hold_up_neither_the_machine_nor_the
 }
 
 #[test]
-fn a_port_that_is_pulled_is_told_and_opened_again_and_the_machine_beside_it_works_on() {
+fn a_pulled_port_is_reported_and_opened_again_and_the_other_machine_works_on() {
     let folder = folder();
     let (left, left_port) = uno(&folder, "left", &["--stand"]);
     let (_right, right_port) = uno(&folder, "right", &["--stand"]);
@@ -566,7 +566,7 @@ fn it_opens_its_page_in_the_browser_where_that_is_asked_for() {
 }
 
 #[test]
-fn what_keeps_it_from_serving_is_said_with_the_way_out() {
+fn a_failure_to_serve_is_explained_with_a_remedy() {
     let folder = folder();
     let page = folder.path().join("page");
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("there is a free port");
@@ -579,8 +579,8 @@ fn what_keeps_it_from_serving_is_said_with_the_way_out() {
             "index.html of the page cannot be read: name a release's folder `page` by --page",
         ),
         (&page, &["--http-port", "0", "--allow-start"], "--lan"),
-        (&page, &["--http-port", "0", "--lan", "192.0.2.1"], "192.0.2.1 is none of this computer's addresses"),
-        (&page, &["--http-port", &taken], "is in use: end what has it, or choose another by --http-port"),
+        (&page, &["--http-port", "0", "--lan", "192.0.2.1"], "192.0.2.1 is no address of this computer"),
+        (&page, &["--http-port", &taken], "is in use: end the other program, or choose another port by --http-port"),
         (&page, &["--port", "a/uno", "--port", "b/uno"], "two machines are called uno: name them"),
     ] {
         let output = weeder().arg("serve").arg("--page").arg(page).args(words).output().expect("cargo has built it");

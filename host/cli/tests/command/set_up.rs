@@ -201,7 +201,7 @@ fn the_terminal_leads_through_the_steps_is_stopped_and_goes_on() {
     }
     let half = answers.len() / 2;
     let first = weeder(&["set-up"], &[answers[..half].concat(), "q\n".to_owned()].concat());
-    assert!(first.ends_with("Stopped. The same command goes on here.\n"), "{first}");
+    assert!(first.ends_with("Stopped. The same command continues here.\n"), "{first}");
     let second = weeder(&["set-up"], &answers[half..].concat());
     assert!(second.contains(&format!("Step {half} of {}", answers.len())) && second.contains(": done\n"), "{second}");
     assert!(second.contains("The measurements ask for ") && !second.contains("Warning"), "{second}");

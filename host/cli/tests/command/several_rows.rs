@@ -152,10 +152,7 @@ fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
         record.arg(&logs).spawn().expect("it is built")
     };
     for (gps, right) in [
-        (
-            sentences.clone(),
-            "of several rows, one has the receiver in its record: say which, as in `--gps left|middle=",
-        ),
+        (sentences.clone(), "with several rows, name the row that records the receiver, as in `--gps left|middle="),
         (format!("right={sentences}"), "there is no row right: there are left, middle"),
     ] {
         let error = printed(&record(&gps).wait_with_output().expect("it ends"), 2);
@@ -174,7 +171,7 @@ fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
 }
 
 #[test]
-fn the_plain_monitor_types_to_one_row_or_to_all_and_tells_of_each_answer() {
+fn the_plain_monitor_types_to_one_row_or_all_and_prints_each_answer() {
     let folder = TempDir::new().expect("there is room for a folder");
     let _rows = rows(&folder, 2);
     let [left, right] = [0, 1].map(|number| port(&folder, number).display().to_string());
@@ -195,7 +192,7 @@ fn the_plain_monitor_types_to_one_row_or_to_all_and_tells_of_each_answer() {
 }
 
 #[test]
-fn of_several_rows_each_has_a_log_and_one_that_is_unplugged_and_back_is_told_in_its_own_alone() {
+fn each_row_has_its_own_log_and_a_replugged_row_is_only_in_its_own() {
     let folder = TempDir::new().expect("there is room for a folder");
     let machine = rows(&folder, 3);
     let file = named(&folder, 3);

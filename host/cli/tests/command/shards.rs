@@ -103,11 +103,11 @@ fn parts_that_are_no_whole_study_are_refused_by_name() {
     );
     let other = ["trial", "--field", "small.toml", "--seed", "8", "--shard", "2/3", "--out", "other.part"];
     said(path, &other);
-    let seed = "other.part is of another study than 1.part: its experiment.seed is 8, and there it is 7";
+    let seed = "other.part belongs to another study than 1.part: its experiment.seed is 8, not 7";
     assert_reports_nothing(path, &merge(&["1.part", "other.part", "3.part"]), seed);
     let sweep = ["sweep", "--field", "small.toml", "--x", "k=1..9:1", "--shard", "2/3", "--out", "sweep.part"];
     said(path, &sweep);
-    let command = "sweep.part is of another study than 1.part: its command is \"sweep\", and there it is \"trial\"";
+    let command = "sweep.part belongs to another study than 1.part: its command is \"sweep\", not \"trial\"";
     assert_reports_nothing(path, &merge(&["1.part", "sweep.part", "3.part"]), command);
 
     let text = fs::read_to_string(path.join("2.part")).unwrap();
@@ -131,7 +131,7 @@ fn parts_that_are_no_whole_study_are_refused_by_name() {
 }
 
 #[test]
-fn what_does_not_go_with_parts_is_refused() {
+fn options_that_contradict_parts_are_refused() {
     let folder = folder();
     let path = folder.path();
     for shard in ["0/4", "5/4", "2", "x/y"] {
@@ -146,8 +146,8 @@ fn what_does_not_go_with_parts_is_refused() {
     let soak = ["soak", "--hours", "1", "--uno-minutes", "0", "--shard", "1/1", "--out", "soak.part"];
     said(path, &soak);
     assert_reports_nothing(path, &["merge", "soak.part", "--out", "report"], "a soak, which writes no file");
-    assert_reports_nothing(path, &["merge", "soak.part", "--brief"], "--brief is for those of a trial");
-    assert_reports_nothing(path, &["merge", "soak.part", "--result", "alarms"], "--result is for those of a sweep");
+    assert_reports_nothing(path, &["merge", "soak.part", "--brief"], "--brief is for parts of a trial");
+    assert_reports_nothing(path, &["merge", "soak.part", "--result", "alarms"], "--result is for parts of a sweep");
     let nowhere = [&TRIAL[..], &["--shard", "1/4", "--out", "no/such/folder/p"]].concat();
     assert_reports_nothing(path, &nowhere, "no/such/folder/p cannot be written");
 }

@@ -145,7 +145,7 @@ fn the_settings_to_set_first_have_the_defaults_that_the_manual_gives() {
 }
 
 #[test]
-fn the_faults_page_says_what_the_monitor_says_to_do() {
+fn the_faults_page_has_the_monitor_s_advice() {
     let page = expect_file!["../../../../docs/faults.md"].data();
     let alarms = (0..)
         .map_while(Alarm::from_index)
@@ -181,7 +181,7 @@ fn cycles(figures: &str) -> String {
 }
 
 #[test]
-fn the_page_of_the_blinking_led_has_every_code_with_what_to_do() {
+fn the_page_of_the_blinking_led_has_every_code_with_advice() {
     let page = expect_file!["../../../../docs/blinking-led.md"].data();
     let rows: Vec<&str> =
         page.lines().filter(|line| line.starts_with("| ") && line[2..].starts_with(char::is_numeric)).collect();

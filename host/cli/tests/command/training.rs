@@ -24,7 +24,7 @@ fn assert_not_taken(lines: &str, arguments: &[&str], words: &str) {
 }
 
 #[test]
-fn the_built_in_table_is_what_the_command_writes() {
+fn the_built_in_table_is_the_command_s_output() {
     let folder = TempDir::new().unwrap();
     let said = said(folder.path(), &["train", "--synthetic", "--out", "table.rs", "--picture", "regions.svg"]);
     let written = fs::read_to_string(folder.path().join("table.rs")).unwrap();
@@ -94,7 +94,7 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
     };
     let chessboard: String = (0..400).map(square).collect();
     for most in ["64".to_owned(), MOST_EXAMPLES.to_string()] {
-        let room = format!("and there is room for {most}: take out objects with a wrong label");
+        let room = format!("and there is room for {most}: remove detections with a wrong label");
         assert_not_taken(
             &chessboard,
             &["train", "objects.csv", "--max", &most],
@@ -107,7 +107,7 @@ fn objects_that_take_more_examples_than_the_flash_has_room_for_are_refused_by_na
 #[test]
 fn a_table_that_teaches_nothing_is_refused_with_file_and_line() {
     let train = ["train", "objects.csv"];
-    assert_not_taken("", &train, "objects.csv, line 1: nothing stands below the header");
+    assert_not_taken("", &train, "objects.csv, line 1: no line is below the header");
     assert_not_taken("694,500,226,250,573,plant\n", &train, "objects.csv, line 2: up to here there is no label weed");
     assert_not_taken("694,500,NaN,250,573,plant\n", &train, "objects.csv, line 2: delay_mm is `NaN`");
 }

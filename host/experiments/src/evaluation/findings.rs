@@ -138,7 +138,7 @@ impl ResponseAnalysis {
     }
 }
 
-/// What a slope says.
+/// A slope in words.
 fn effect(term: &Term, response: Response, name: &str, unit: &str) -> String {
     let significance = match term.p {
         Some(p) if p >= SIGNIFICANCE => return format!("shows no effect of {name} ({})", probability(p)),
@@ -160,7 +160,7 @@ pub fn probability(p: f64) -> String {
     if p < 0.0001 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") }
 }
 
-/// A number of things.
+/// A count with its noun.
 fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }

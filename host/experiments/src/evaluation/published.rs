@@ -33,11 +33,11 @@ pub struct PublishedMachine {
     pub weeds_gone_percent: &'static str,
     /// Crop plants that were damaged.
     pub damaged_percent: &'static str,
-    /// Where it is published.
+    /// The publication.
     pub source: &'static str,
 }
 
-/// Where nothing is said.
+/// The text of a missing figure.
 const NOT_SAID: &str = "\u{2013}";
 
 /// Published machines, those with a beam first.
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_index_needs_what_the_docs_say() {
+    fn the_printed_index_needs_the_documented_capacity_and_power() {
         assert_eq!(index(0.041, 200, 1500, POWER_HP).round(), 137.0);
         assert_eq!(index(0.041, 0, 0, POWER_HP).round(), 164.0);
         // The best and the worst treatment: 89.49 % and no damage, 80.11 % and 3.92 %.
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_equations_reach_what_the_contradictions_say() {
+    fn the_printed_equations_give_the_stated_contradictions() {
         let all = |response| {
             let of_speed = |speed| [50.0, 60.0].map(|spacing| Published::of(response).equation.at(speed, spacing));
             [1.0, 1.5, 2.0, 2.5].into_iter().flat_map(of_speed).collect::<Option<Vec<f64>>>()

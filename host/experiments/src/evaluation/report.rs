@@ -7,7 +7,7 @@ use crate::statistics::{AnalysisOfVariance, BinomialModel};
 use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use std::fmt::{self, Display, Formatter};
 
-/// What the probabilities and the index mean.
+/// The meaning of p-values and index.
 const LEGEND: &str = "\
 p is how probable it is that chance alone makes an effect as large: below 0.05 it is taken for one.
 Capacities are by Eq. 25 and 26 of the paper, field efficiency by Eq. 24. The performance index (Eq. 27) is
@@ -100,7 +100,7 @@ impl Analysis {
         table
     }
 
-    /// Each plot, as it was written down and what follows from it.
+    /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
         let written_down = [
             "plot",
@@ -117,7 +117,7 @@ impl Analysis {
             "power, hp",
         ];
         let mut table =
-            Table::new("Each plot, counted and measured, and what follows", written_down.into_iter().chain(MEASURES));
+            Table::new("Each plot: counts, measurements and results", written_down.into_iter().chain(MEASURES));
         for (index, (record, performance)) in self.records.iter().zip(&self.performances).enumerate() {
             let cells = [(index + 1).to_string()].into_iter().chain(counted(record)).chain(measures(performance));
             table.rows.push(cells.collect());
@@ -143,7 +143,7 @@ fn counted(record: &PlotRecord) -> [String; 11] {
 }
 
 impl ResponseAnalysis {
-    /// The coefficients with what chance may have done to them, beside the paper's.
+    /// The coefficients with their errors, beside the paper's.
     pub(crate) fn terms(&self) -> Table {
         let Published { equation, text, equation_number, .. } = self.published;
         let mut table = Table::new(
@@ -208,7 +208,7 @@ impl ResponseAnalysis {
         table
     }
 
-    /// What has to be known of the models, and what the residuals say; each sentence once.
+    /// Remarks on the models and the residuals, each sentence once.
     pub(crate) fn remarks(&self) -> Vec<String> {
         let of_model = self.model.iter().flat_map(|model| &model.remarks);
         let of_counts = self.binomial.iter().flatten().flat_map(|model| &model.remarks);
@@ -225,7 +225,7 @@ impl ResponseAnalysis {
     }
 }
 
-/// What speed and spacing do to the odds of what was counted.
+/// The effects of speed and spacing on the odds.
 pub(crate) fn odds(model: &BinomialModel) -> Table {
     let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
     let mut table = Table::new("Binomial model of the counts", columns);
@@ -248,7 +248,7 @@ pub(crate) fn odds(model: &BinomialModel) -> Table {
     table
 }
 
-/// How much of the variation goes with each factor.
+/// The part of the variation of each factor.
 pub(crate) fn sources(variance: &AnalysisOfVariance) -> Table {
     let mut table =
         Table::new("Analysis of variance", ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"]);

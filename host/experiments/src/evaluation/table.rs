@@ -49,7 +49,7 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
         };
         if let Some((first, _)) = plots.iter().find(|(_, other)| same(other)) {
             return Err(line.error(format!(
-                "replication {} of {} km/h and {} cm stands in line {first} already: each plot has a replication of its own",
+                "replication {} of {} km/h and {} cm is already in line {first}: each plot needs its own replication",
                 plot.replication, plot.speed_km_h, plot.spacing_cm
             )));
         }
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read_again() {
+    fn a_written_table_is_read_again() {
         let plots = read(&format!("{HEADER}{LINE}2,2.25,60,10,0,7,7,1.5,0.1,0.055,0.5\n")).unwrap();
         let mut text = Vec::new();
         write_csv(&plots, &mut text).unwrap();
@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn a_replication_that_stands_there_twice_is_named_with_both_lines() {
         let said = read(&format!("{HEADER}{LINE}\n{LINE}")).unwrap_err();
-        let right = "trial.csv, line 4: replication 1 of 1.5 km/h and 50 cm stands in line 2 already: ";
+        let right = "trial.csv, line 4: replication 1 of 1.5 km/h and 50 cm is already in line 2: ";
         assert!(said.starts_with(right), "{said}");
     }
 

@@ -18,7 +18,7 @@ const PLOT: PlotRecord = PlotRecord {
 };
 
 #[test]
-fn a_plot_is_judged_by_the_paper_s_equations() {
+fn a_plot_is_evaluated_by_the_paper_s_equations() {
     let plot = PLOT.performance();
     let close = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-9, "{value} is not {expected}");
     close(plot.plant_damage_percent, 2.0);

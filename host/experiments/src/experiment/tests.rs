@@ -101,7 +101,7 @@ fn the_loss_budget_of_every_row_of_every_preset_adds_up_to_the_whole_row() {
 }
 
 #[test]
-fn the_loss_budget_is_what_a_hand_calculation_says() {
+fn the_loss_budget_agrees_with_a_hand_calculation() {
     // Whole canopies of 150 mm, or of each the stem zone of 120 mm.
     for (stem_zone_mm, kept_mm) in [(0.0, 150.0), (120.0, 120.0)] {
         let mut experiment = experiment(&[2.5], "even-stand");
@@ -137,7 +137,7 @@ fn is_the_loss_budget_of(budget: Budget, kept_mm: f64) {
 }
 
 #[test]
-fn each_part_of_the_loss_budget_is_found_where_it_is_to_be_expected() {
+fn each_part_of_the_loss_budget_has_its_expected_ground() {
     let budget = |preset: &str, speed_km_h: f64, changes: &[(&str, f64)]| {
         let mut experiment = Experiment { spacings_cm: vec![50.0], ..experiment(&[speed_km_h], preset) };
         changes.iter().for_each(|&(name, value)| experiment.conditions.set(name, value).unwrap());
@@ -200,7 +200,7 @@ fn a_machine_steered_by_hand_spares_its_plants_once_it_is_set_up_for_that() {
 }
 
 #[test]
-fn a_shorter_stroke_that_the_firmware_is_told_weeds_more_and_reaches_no_canopy() {
+fn a_configured_shorter_stroke_weeds_more_and_reaches_no_canopy() {
     let mut shorter = experiment(&[2.5], "transplanted");
     let paper = totals(&run(&shorter))[0];
     for (setting, value) in [("servo_out_us", 1750.0), ("lead_out_ms", 150.0)] {
@@ -229,7 +229,7 @@ fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
 }
 
 #[test]
-fn a_firmware_that_is_told_wrong_leads_damages_what_could_have_been_kept() {
+fn a_firmware_with_wrong_leads_damages_avoidable_plants() {
     let mut experiment = experiment(&[3.5], "transplanted");
     for lead in ["lead_out_ms", "lead_in_ms"] {
         experiment.conditions.set(lead, 0.0).unwrap();
@@ -262,7 +262,7 @@ fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
                 ),
                 Err(error) => {
                     let place = format!("{} = {end}", parameter.name);
-                    let told = ["nothing for the beam stands in a row of", "grow together to more than"];
+                    let told = ["the beam would see nothing in a row of", "grow together to more than"];
                     let is_told = told.iter().any(|words| error.to_string().contains(words));
                     assert!(is_told, "{place}: {error}");
                 }
@@ -272,7 +272,7 @@ fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
 }
 
 #[test]
-fn every_plot_can_be_judged_like_a_real_one() {
+fn every_plot_can_be_evaluated_like_a_real_one() {
     let outcomes = run(&experiment(&[1.0, 2.5], "weedy"));
     let analysis = Analysis::of(records(&outcomes, Treatment::Firmware)).unwrap();
     assert_eq!(analysis.records.len(), 4);

@@ -30,7 +30,7 @@ const LOOKS: [Look; 4] = [
     Look { colour: RGBColor(0xB5, 0x56, 0x8A), marker: Some(Marker::UpturnedTriangle) },
 ];
 
-/// How a series looks.
+/// Colour and marker of a series.
 #[derive(Clone, Copy)]
 pub struct Look {
     colour: RGBColor,
@@ -59,9 +59,9 @@ impl Look {
     }
 }
 
-/// Some points that belong together.
+/// Points with one look.
 pub struct Series {
-    /// How they look.
+    /// Their look.
     pub look: Look,
     /// Joined by a line, with large markers.
     pub line: Vec<(f64, f64)>,
@@ -73,9 +73,9 @@ pub struct Series {
 pub struct Chart<'a> {
     /// The label of the x axis, with its unit.
     pub x_label: &'a str,
-    /// The part of the plane.
+    /// The range of the x axis.
     pub x: Range<f64>,
-    /// The same upwards.
+    /// The range of the y axis.
     pub y: Range<f64>,
     /// The series, the last one on top.
     pub series: &'a [Series],
@@ -87,7 +87,7 @@ impl Chart<'_> {
     /// Draws it.
     ///
     /// # Errors
-    /// Where plotters cannot draw it, as for a range without extent.
+    /// If plotters cannot draw it, as for a range without extent.
     pub fn svg(&self) -> Result<String> {
         svg(CHART_SIZE, |area| {
             let mut chart = ChartBuilder::on(area)
@@ -134,7 +134,7 @@ impl Chart<'_> {
 /// Draws the mark of a series in a legend, on a piece of its line where it has one.
 ///
 /// # Errors
-/// Where plotters cannot draw it.
+/// If plotters cannot draw it.
 pub fn key(look: Look, has_line: bool) -> Result<String> {
     let (width, height) = (KEY_SIZE.0 as i32, KEY_SIZE.1 as i32);
     svg(KEY_SIZE, |area| {

@@ -9,7 +9,7 @@ use anyhow::Result;
 
 /// A chart with its texts.
 pub struct Figure {
-    /// What it shows.
+    /// The title.
     pub title: String,
     /// The unit of the y axis, or the total of its share.
     pub unit: String,
@@ -27,7 +27,7 @@ pub struct Figure {
 pub struct Key {
     /// Line and marker.
     pub svg: String,
-    /// Whose they are.
+    /// Their series.
     pub meaning: String,
 }
 
@@ -39,22 +39,21 @@ pub const BOUND: &str = "most with every zone and margin kept";
 /// Plant damage of each controller against speed.
 pub fn damage(comparison: &Comparison) -> Result<Figure> {
     let title = ("Plant damage", "% of the plants");
-    let caption = "Plants in whose zone round the stem the tool was, of all in the rows. Lower is better.";
+    let caption = "Share of the plants whose stem zone the tool entered. Lower is better.";
     curves(comparison, title, caption, |point| point.plant_damage_percent, &[])
 }
 
 /// Weeding in the row of each controller against speed.
 pub fn weeding(comparison: &Comparison) -> Result<Figure> {
     let title = ("In-row weeding", "% of the row's ground");
-    let caption = "Ground of the row that the tool worked. Higher is better, but what is above the line is paid for with \
-                   margins or zones.";
+    let caption = "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.";
     curves(comparison, title, caption, |point| point.in_row_weeding_percent, &comparison.bound)
 }
 
 /// Plants whose zone each controller's tool reached against speed.
 pub fn zones(comparison: &Comparison) -> Result<Figure> {
     let title = ("Zones reached", "% of the plants' zones");
-    let caption = "Zones over which the tool was not fully out, of all in the rows: what the firmware keeps of a plant, less the margin. Lower is better.";
+    let caption = "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.";
     curves(comparison, title, caption, |point| point.zones_reached_percent, &[])
 }
 
@@ -97,7 +96,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
     let treatments = analysis.treatments();
     let spacings = spacings_cm(analysis);
     let x = range_of(analysis.records.iter().map(|record| record.speed_km_h), false);
-    // So that plots of different spacings with the same value are both to be seen.
+    // An offset, so that equal values of different spacings stay visible.
     let step = (x.end - x.start) * 0.02;
     let aside = |index: usize| (index as f64 - (spacings.len() - 1) as f64 / 2.0) * step;
     let mut series = Vec::new();
@@ -137,7 +136,7 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
     })
 }
 
-/// What a model leaves of each plot, against what it says of it.
+/// A model's residuals against its fitted values.
 pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel) -> Result<Figure> {
     let x = range_of(model.fitted.iter().copied(), false);
     let mut series = vec![Series { look: Look::LIMIT, line: vec![(x.start, 0.0), (x.end, 0.0)], cloud: Vec::new() }];
@@ -159,12 +158,11 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel
         svg: chart.svg()?,
         legend,
         words: format!(
-            "Residuals of the {} plots against what the model says of them; the farthest is {} {unit} off.",
+            "Residuals of the {} plots against the model's values; the largest is {} {unit}.",
             model.residuals.len(),
             fixed(farthest, 2),
         ),
-        caption: "What the model leaves of each plot. A curve or a funnel in it says that a straight line is wrong."
-            .into(),
+        caption: "The residual of each plot. A curve or a funnel shows that a straight line is wrong.".into(),
     })
 }
 

@@ -38,7 +38,7 @@ impl Chapter {
     /// The chapter on a measure.
     ///
     /// # Errors
-    /// Where plotters cannot draw the residuals.
+    /// If plotters cannot draw the residuals.
     pub fn of(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Self> {
         let (model, variance) = (of.model.as_ref(), of.variance.as_ref());
         let name = of.response.title().to_lowercase();

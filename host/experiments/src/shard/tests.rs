@@ -76,7 +76,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_no_shard_says_what_would_be_right() {
+fn an_invalid_shard_is_refused_with_what_would_be_right() {
     for text in ["", "1", "0/4", "5/4", "1/0", "a/b", "1/2/3", "-1/4", "1/100001"] {
         assert!(text.parse::<Shard>().unwrap_err().to_string().contains("has to be I/N"), "{text}");
     }
@@ -88,7 +88,7 @@ fn what_is_no_shard_says_what_would_be_right() {
 fn parts_that_are_missing_are_named() {
     assert_eq!(
         refusal(&[header("1/3", 5), header("3/3", 5)]),
-        "part 2/3 is missing: name all parts of the study, or compute what is missing by --shard"
+        "part 2/3 is missing: name all parts of the study, or compute the missing ones by --shard"
     );
     assert!(refusal(&[header("2/4", 5)]).starts_with("parts 1/4, 3/4 and 4/4 are missing"));
     let many = refusal(&[header("1/12", 5)]);
@@ -103,22 +103,22 @@ fn a_part_that_is_there_twice_is_named_with_its_double() {
 }
 
 #[test]
-fn a_part_of_another_study_is_named_with_what_differs() {
+fn a_part_of_another_study_is_named_with_the_difference() {
     let other = |change: &dyn Fn(&mut Header)| {
         let mut changed = header("2/2", 5);
         change(&mut changed);
         refusal(&[header("1/2", 5), changed])
     };
     let seed = other(&|header| header.settings["experiment"]["seed"] = 7.into());
-    assert_eq!(seed, "b is of another study than a: its experiment.seed is 7, and there it is 18446744073709551615");
+    assert_eq!(seed, "b belongs to another study than a: its experiment.seed is 7, not 18446744073709551615");
     let speeds = other(&|header| header.settings["experiment"]["speeds"] = json!([1.0]));
-    assert!(speeds.ends_with("its experiment.speeds is [1.0], and there it is [1.0,2.5]"), "{speeds}");
+    assert!(speeds.ends_with("its experiment.speeds is [1.0], not [1.0,2.5]"), "{speeds}");
     let command = other(&|header| header.command = "sweep".to_owned());
-    assert!(command.ends_with("its command is \"sweep\", and there it is \"trial\""), "{command}");
+    assert!(command.ends_with("its command is \"sweep\", not \"trial\""), "{command}");
     let of = refusal(&[header("1/2", 5), header("2/3", 5)]);
-    assert!(of.ends_with("its number of parts is 3, and there it is 2"), "{of}");
+    assert!(of.ends_with("its number of parts is 3, not 2"), "{of}");
     let size = other(&|header| header.all = 6);
-    assert!(size.ends_with("its size is 6, and there it is 5"), "{size}");
+    assert!(size.ends_with("its size is 6, not 5"), "{size}");
 }
 
 #[test]

@@ -57,13 +57,13 @@ impl Checks {
         }
         if let Some(p) = self.unequal_scatter_p.filter(is_found) {
             said.push(format!(
-                "{name} scatters more at some speeds or spacings than at others ({}): its p are too sure.",
+                "{name} scatters more at some speeds or spacings than at others ({}): its p-values are too small.",
                 probability(p)
             ));
         }
         if let Some((plot, p)) = self.farthest.filter(|(_, p)| is_found(p)) {
             said.push(format!(
-                "Plot {plot} is farther off than chance puts one of so many ({}): look what happened there.",
+                "Plot {plot} is farther from the model than chance explains ({}): check what happened there.",
                 probability(p)
             ));
         }

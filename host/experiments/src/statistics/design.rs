@@ -68,7 +68,7 @@ pub(super) type Column = (&'static str, Vec<f64>);
 #[serde(rename_all = "snake_case")]
 pub enum NoModel {
     /// The response does not vary.
-    #[error("it is {value} in every plot: there is nothing that speed or spacing could explain")]
+    #[error("it is {value} in every plot: speed and spacing explain nothing")]
     Constant {
         /// Its value everywhere.
         value: f64,
@@ -85,7 +85,7 @@ pub enum NoModel {
         parameters: usize,
     },
     /// Speed and spacing go together.
-    #[error("speed and spacing change together, so that their effects cannot be told apart")]
+    #[error("speed and spacing change together, so their effects cannot be separated")]
     Inseparable,
     /// A binomial model's slope diverges.
     #[error(
@@ -106,7 +106,7 @@ pub enum Remark {
     OneSpacing,
     /// The interaction would use up all plots.
     #[error(
-        "no treatment was repeated, so that the interaction cannot be told from chance: it is part of the residual"
+        "no treatment was repeated, so the interaction cannot be separated from chance: it is part of the residual"
     )]
     NoReplication,
     /// The treatments differ in their number of plots.
@@ -115,7 +115,7 @@ pub enum Remark {
     )]
     Unbalanced,
     /// Too few plots for blocks.
-    #[error("the replications are no blocks here: with them no plot would be left to tell an effect from chance")]
+    #[error("the replications are not used as blocks: too few plots would remain to separate effects from chance")]
     NoBlocks,
     /// Plots differ by more than the scatter of counting.
     #[error(

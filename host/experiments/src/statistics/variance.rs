@@ -44,10 +44,10 @@ struct Fit {
 }
 
 impl AnalysisOfVariance {
-    /// Takes a response apart that has a finite value for each plot.
+    /// Analyses a response with a finite value for each plot.
     ///
     /// # Errors
-    /// If the plots carry no such analysis.
+    /// If the plots do not allow this analysis.
     ///
     /// # Panics
     /// If there are more or fewer values than plots.
@@ -181,7 +181,7 @@ impl Levels {
 fn additive_fit(factors: &[&Levels], values: &[f64]) -> Fit {
     /// Singular values below this share of the largest are rounding.
     const TOLERANCE: f64 = 1e-9;
-    // Of a single factor the means do, and are exact.
+    // For a single factor the means suffice, and are exact.
     if let [only] = factors {
         return levels_fit(only, values);
     }

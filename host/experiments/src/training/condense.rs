@@ -21,12 +21,11 @@ use control::ground::{
 use knn::{Example, Kind, classify, squared_distance};
 use std::collections::HashSet;
 
-/// Checks that so many examples are not more than there is room for.
+/// Checks that there is room for this number of examples.
 fn check_room(needed: usize, most: usize) -> Result<()> {
     ensure!(
         needed <= most,
-        "too many examples for the flash budget: these objects cannot be told apart with fewer than {needed} examples, \
-         and there is room for {most}: take out objects with a wrong label, or objects that are like no other"
+        "too many examples for the flash budget: these detections need {needed} examples, and there is room for {most}: remove detections with a wrong label, or unlike all others"
     );
     Ok(())
 }
@@ -47,7 +46,7 @@ pub fn edit(examples: &[Example<COUNT>]) -> Vec<usize> {
 /// indices, in the order of choice.
 ///
 /// # Errors
-/// Where more are needed.
+/// If more are needed.
 pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u32, most: usize) -> Result<Vec<usize>> {
     let half = radius / 2;
     let is_mistreated = |index: usize, kept: &[Example<COUNT>]| {
@@ -76,7 +75,7 @@ pub fn condense(examples: &[Example<COUNT>], edited: &[usize], k: u8, radius: u3
 /// examples are equal.
 ///
 /// # Errors
-/// Where that many leave a plant that is taken for a weed.
+/// If `most` examples still classify a plant as a weed.
 pub fn beside(
     given: &[Example<COUNT>],
     examples: &[Example<COUNT>],

@@ -6,9 +6,9 @@ use field::row::Kind;
 /// A detection with a known kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Labelled {
-    /// What the machine measured.
+    /// The measured features.
     pub features: Features,
-    /// What it was.
+    /// Its true kind.
     pub kind: Kind,
 }
 

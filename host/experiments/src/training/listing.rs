@@ -29,7 +29,7 @@ pub fn rust(training: &Training, how: &str) -> String {
     for range in ranges {
         let _ = writeln!(text, "    Range {{ lowest: {}, highest: {} }},", range.lowest, range.highest);
     }
-    let _ = writeln!(text, "];\n\n/// Squared distance beyond which a detection is like no example.");
+    let _ = writeln!(text, "];\n\n/// Squared distance beyond which no example is near enough.");
     let _ = writeln!(text, "pub const RADIUS: u32 = {radius};");
     let _ = writeln!(text, "\n/// Examples that vote.\npub const K: u8 = {k};");
     let _ = writeln!(text, "\n/// Speed, spacing, delay, hold and actuation of each example, and its label.");

@@ -25,7 +25,7 @@ pub const fn class_of<const CLASSES: usize>(answer: &Answer<CLASSES>) -> Class {
 pub struct Model {
     /// From features to bytes.
     pub scale: Scale<COUNT>,
-    /// Squared distance beyond which a detection is like no example.
+    /// Squared distance beyond which no example is near enough.
     pub radius: u32,
     /// Examples that vote.
     pub k: u8,
@@ -52,7 +52,7 @@ impl Model {
         self.answer(features).map_or(Class::Unknown, |answer| class_of(&answer))
     }
 
-    /// A line an object: what it was, what it is taken for, and what speaks for it.
+    /// A line for each detection: its true kind, its class, and the votes.
     ///
     /// # Errors
     /// If k does not suit the number of examples.

@@ -1,15 +1,12 @@
-//! Objects from simulated rows, as the firmware's own code sees them.
+//! Labelled detections from simulated rows, made by the firmware's own code.
 //!
-//! The machine rolls past rows of a [`Crop`] at its speeds and two spacings, and the levels that its encoder and its
-//! beam give go through the firmware's decisions; no feature is made up. What varies: speed within
-//! a tenth of its class, spacing and canopy, plants that are missing, tall weeds wherever there is ground, closed and
-//! ragged canopies, and the slip of the wheel.
+//! The machine rolls past rows of a [`Crop`] at its speeds and two spacings. The firmware's decisions calculate all
+//! features from the levels of encoder and beam. These vary: speed within a tenth of its class, spacing, canopy, missing
+//! plants, tall weeds on bare ground, closed and ragged canopies, and the wheel's slip. The firmware starts on bare
+//! ground while the machine already rolls. So weeds stand at every distance from the start of counting.
 //!
-//! Each pass begins with the firmware waking up on bare ground while the machine rolls already, so that weeds are met at
-//! every distance from where counting begins.
-//!
-//! The classifier here only takes notes. It is told the truth about each object, in the order in which they stand, so
-//! that the spacing of the next one is counted from a plant.
+//! The classifier here records features. It answers with each detection's true class, in the order of the row, so that
+//! spacing is counted from plants.
 
 use super::labelled::Labelled;
 use anyhow::{Result, ensure};
@@ -33,12 +30,12 @@ use rig::Rig;
 use std::cell::RefCell;
 use std::ops::RangeInclusive;
 
-/// How a crop stands, and which weeds outgrow the beam beside it.
+/// A crop's stand, and the weeds that reach the beam.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crop {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// The speed classes at which it is weeded, in mm/s.
+    /// The speed classes of weeding, in mm/s.
     pub speeds_mm_s: &'static [i16],
     /// Its plant spacings.
     pub spacings_mm: [f64; 2],
@@ -48,10 +45,10 @@ pub struct Crop {
     pub canopy_mm: f64,
     /// A canopy's width is within this of its mean.
     pub canopy_scatter_mm: f64,
-    /// Whether there are canopies through which the beam passes.
+    /// Whether some canopies have gaps for the beam.
     pub is_ragged: bool,
-    /// Bare ground between the places where the firmware wakes up and the first plant's place, in turn: where no plant was before, spacing
-    /// is counted from there.
+    /// Bare ground from the firmware's start to the first plant's position, used in turn. Before the first plant, spacing is
+    /// counted from the start.
     pub headlands_mm: &'static [f64],
     /// Passes over a row at each speed and spacing.
     pub passes: usize,
@@ -59,7 +56,7 @@ pub struct Crop {
     pub weed_widths_mm: RangeInclusive<f64>,
 }
 
-/// The crops that there are, the paper's first. All but its spacings is assumed.
+/// The crops, the paper's first. Only the paper's spacings are measured; all else is assumed.
 pub const CROPS: [Crop; 3] = [
     Crop {
         name: "chilli",
@@ -86,7 +83,7 @@ pub const CROPS: [Crop; 3] = [
         passes: 12,
         weed_widths_mm: 12.0..=30.0,
     },
-    // Stalks below their leaves, and grasses, which are the narrower ones. Above 1.25 km/h so narrow a spacing leaves the tool no time.
+    // Stalks below their leaves, and narrower grasses. Above 1.25 km/h so narrow a spacing leaves the tool no time.
     Crop {
         name: "maize",
         speeds_mm_s: &[SPEED_CLASSES_MM_S[0]],
@@ -101,33 +98,33 @@ pub const CROPS: [Crop; 3] = [
     },
 ];
 
-/// Plants in a row before any go missing.
+/// Plants in a row, including missing ones.
 const PLANTS: usize = 20;
 
 /// Share of the plants that did not come up; never two neighbours.
 const MISSING: f64 = 0.05;
 
-/// Tall weeds: how many grow on a metre of bare ground, and how far they stand from everything else, so
-/// that the beam sees each as an object of its own.
+/// Tall weeds on a metre of bare ground, and their least distance from everything else: the beam then sees each as its
+/// own detection.
 const WEEDS_PER_METRE: f64 = 3.0;
 const WEED_MARGIN_MM: f64 = 25.0;
 
-/// Ground behind the last thing, over which the machine sees that it was the last.
+/// Ground after the last plant or weed, so that its detection ends.
 const RUN_OUT_MM: f64 = 100.0;
 
 /// The speed of a pass, as a share of its class.
 const PACE: RangeInclusive<f64> = 0.9..=1.1;
 
-/// How much farther than its circumference the wheel goes in a turn; negative where it drags.
+/// Relative error of the distance that the wheel rolls in a turn; negative if it drags.
 const SLIP: RangeInclusive<f64> = -0.03..=0.03;
 
-/// The machine rolls from the beginning: it has its speed within a fraction of a millisecond.
+/// The machine rolls from the beginning: it reaches its speed within a fraction of a millisecond.
 const ACCELERATION_MM_S2: f64 = 1e6;
 
-/// All objects of the crop's field that grows from a seed, in the order in which the machine meets them.
+/// All detections in the crop's field of a seed, in the order of the row.
 ///
 /// # Errors
-/// Where rows cannot grow or be seen as they should.
+/// If a row cannot be made, or the firmware's detections do not match it.
 pub fn objects(crop: &Crop, seed: u64) -> Result<Vec<Labelled>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut objects = Vec::new();
@@ -184,7 +181,7 @@ fn grow(crop: &Crop, spacing_mm: f64, headland_mm: f64, ragged: bool, rng: &mut 
     Ok(Row::new(things)?)
 }
 
-/// Takes notes of what the controller asks, and answers with the truth.
+/// Records the features that the controller asks about, and answers with the true class.
 struct Recorder<'a> {
     row: &'a Row,
     seen: RefCell<Vec<Labelled>>,
@@ -195,7 +192,7 @@ impl Classifier for &Recorder<'_> {
 
     fn classify(&self, features: &Features, _k: u8) -> Vote {
         let mut seen = self.seen.borrow_mut();
-        // More objects than things are found out at the end.
+        // Surplus detections are an error at the end.
         let kind = self.row.things().get(seen.len()).map_or(Kind::Plant, |thing| thing.kind);
         seen.push(Labelled { features: *features, kind });
         let class = match kind {
@@ -205,7 +202,7 @@ impl Classifier for &Recorder<'_> {
         Vote { class, votes: 0 }
     }
 
-    // It knows the truth already: there is nothing to teach it, and nothing to forget.
+    // It knows the true classes, so it can be taught nothing.
 
     fn built_in_class(&mut self, _: &Features) -> Class {
         Class::Unknown
@@ -236,10 +233,10 @@ impl Classifier for &Recorder<'_> {
     }
 }
 
-/// What the controller sees of a row.
+/// The controller's detections in a row.
 fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<Vec<Labelled>> {
     let standard = Machine::default();
-    // The firmware knows the wheel; the wheel that slips goes farther in a turn than it knows.
+    // The firmware knows only the wheel's size. A slipping wheel is a wheel of another size.
     let machine = Machine { wheel_mm: standard.wheel_mm * (1.0 + slip), ..standard };
     let motion = Motion::steady(-headland_mm, ACCELERATION_MM_S2, speed_mm_s, row.span_mm().end + RUN_OUT_MM);
     let trial = Trial { motion, ..Trial::at_speed(row.clone(), machine, Timing::default(), speed_mm_s) };

@@ -43,7 +43,7 @@ fn names() -> impl Iterator<Item = String> {
         .chain(Setting::all().map(|setting| setting.text().to_string()))
 }
 
-/// What the TOML reader found wrong at a byte, in a line; where it is the value of a parameter or setting, what that has to be.
+/// The TOML reader's error at a byte, in one line. For a value of a parameter or setting: the valid values.
 pub(super) fn explain(text: &str, byte: usize, error: &toml::de::Error) -> String {
     let entry = toml_entry::around(text, byte).filter(|entry| entry.value.contains(&byte));
     let wrong = entry.and_then(|Entry { name, value, .. }| {

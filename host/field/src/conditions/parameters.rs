@@ -6,14 +6,14 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A parameter, as the table has it.
+/// A parameter in the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Table and key, joined by a point.
     pub name: &'static str,
-    /// What it is, in the unit that its name carries.
+    /// Its meaning. Its name carries its unit.
     pub meaning: &'static str,
-    /// Where its default comes from.
+    /// The source of its default.
     pub source: &'static str,
     /// Least value.
     pub least: f64,
@@ -21,7 +21,7 @@ pub struct Parameter {
     pub greatest: f64,
 }
 
-/// The one table from which everything else about the parameters is made.
+/// The one table of parameters, from which all other code is made.
 macro_rules! parameters {
     ($($(#[doc = $about:literal])* $table:ident: $Table:ident {
         $($key:ident: $kind:ty = $default:literal, $least:literal to $greatest:literal, $meaning:literal, $source:literal;)*
@@ -76,7 +76,7 @@ parameters! {
     }
     /// The crop.
     crop: Crop {
-        spacing_scatter_mm: f64 = 30.0, 0 to 200, "a plant stands within this of its place along the row, evenly spread", "assumed";
+        spacing_scatter_mm: f64 = 30.0, 0 to 200, "a plant stands within this of its position along the row, evenly spread", "assumed";
         spacing_sd_mm: f64 = 0.0, 0 to 300, "standard deviation of the distance from a plant's place to the next, normally spread, beside that scatter", "none: transplanted by hand or machine";
         across_scatter_mm: f64 = 5.0, 0 to 50, "a plant stands within this of the row's line, evenly spread", "assumed";
         canopy_mm: f64 = 150.0, 20 to 350, "mean width of a canopy where it is widest, half way up", "assumed, for chilli some weeks after transplanting";
@@ -106,9 +106,9 @@ parameters! {
     /// The driving.
     driving: Driving {
         speed_scatter_percent: f64 = 8.0, 0 to 50, "speed wanders within this of its mean, evenly spread", "assumed, for a person who walks behind";
-        stops_per_100_m: f64 = 1.0, 0 to 50, "stops on the way", "assumed";
+        stops_per_100_m: f64 = 1.0, 0 to 50, "stops in the row", "assumed";
         stop_s: f64 = 5.0, 0 to 600, "mean length of a stop", "assumed";
-        turn_m: f64 = 2.8, 0 to 100, "way of a turn at a row's end, at the working speed", "fitted: with this, turn_s and the stops the field efficiency is the paper's Eq. 31";
+        turn_m: f64 = 2.8, 0 to 100, "distance of a turn at a row's end, at the working speed", "fitted: with this, turn_s and the stops the field efficiency is the paper's Eq. 31";
         turn_s: f64 = 1.0, 0 to 600, "mean time that a turn takes beside its way", "fitted, as turn_m";
         steering_mm: f64 = 0.0, 0 to 150, "the machine strays within this of the row's line, evenly spread, gradually over a metre or two", "none: by hand it is some 10 to 25 mm";
     }

@@ -7,14 +7,14 @@ use control::say::names;
 /// Longer than any detection's hold: 5 m at the default wheel.
 const FAR_TICKS: i32 = 10_000;
 
-/// Something that was told.
+/// An event of the log or of its replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Heard {
     /// The log's line; 0 for the replay.
     pub(super) line: u64,
     /// Steps of the replay until this event; 0 for the log.
     pub(super) steps: u64,
-    /// What.
+    /// The event.
     pub(super) event: EventLine,
     /// The machine's speed then, in ticks a second.
     pub(super) speed: i32,
@@ -24,11 +24,11 @@ pub(super) struct Heard {
 
 /// The limits of a replayed stretch.
 pub(super) struct Bounds {
-    /// The first place.
+    /// The first position.
     pub(super) first: i32,
     /// Swings before this position are not compared.
-    pub(super) judged_from: i32,
-    /// The last place.
+    pub(super) compared_from: i32,
+    /// The last position.
     pub(super) end: i32,
 }
 
@@ -43,11 +43,10 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
     let is_judged = |heard: &&Heard| match heard.event {
         // The replay cuts a detection that was in the beam at the start of the log.
         EventLine::Detection { position, .. } => position.wrapping_sub(bounds.first) >= 0,
-        EventLine::Swing { position, .. } => position >= bounds.judged_from,
+        EventLine::Swing { position, .. } => position >= bounds.compared_from,
         _ => !heard.is_given,
     };
-    // At the very end an event may be in the log and not in the replay, or the other way round. A detection is reported
-    // some distance behind it.
+    // At the very end an event may be in only one of log and replay: a detection is reported some distance behind it.
     let is_at_end = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
             bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard)
@@ -57,12 +56,11 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
         }
         _ => false,
     };
-    // At the very beginning an event may be compared in the log and lie before the limit in the replay, or the other
-    // way round.
+    // At the very beginning an event may lie within the limit in only one of log and replay.
     let is_at_beginning = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
-            bounds.judged_from > i32::MIN
-                && position.wrapping_sub(bounds.judged_from).saturating_abs() <= swing_ticks(heard, heard)
+            bounds.compared_from > i32::MIN
+                && position.wrapping_sub(bounds.compared_from).saturating_abs() <= swing_ticks(heard, heard)
         }
         // Both have it, but only one of them within the compared range.
         EventLine::Detection { position, .. } => {

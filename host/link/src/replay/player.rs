@@ -23,46 +23,46 @@ const REST_MS: u32 = 5;
 /// Longest rest that is replayed: nothing that it changes takes longer.
 const LONGEST_REST_MS: u64 = 2_000;
 
-/// The speed at which a machine comes to a stop without surprise.
+/// A machine may stop from this speed without an encoder alarm.
 const SLOWLY_MM_S: i32 = 20;
 
-/// A speed that the machine keeps for long enough to be believed between two lines of a log.
+/// From this speed on, the time between two lines of a log follows from the speeds, not from the PC's clock.
 const SURE_MM_S: f64 = 50.0;
 
-/// How fast it rolls at the most where neither its speed nor the host's clock says how fast.
+/// Highest assumed speed where neither the speeds nor the PC's clock give one.
 const MOST_MM_S: f64 = 200.0;
 
-/// How far from the even speed to the slower or the faster of two a machine is taken to have been all the time between two lines: one
-/// that gained its speed right behind the first is nearly there, and none came to rest before it told so.
+/// How far the slow and the fast pace go from the even speed to the slower or faster of two logged speeds. A machine may
+/// accelerate directly after the first line, so it is near 1. It is below 1, as no machine stops before the log says so.
 const EXTREME: f64 = 7.0 / 8.0;
 
-/// By what share the machine's own measure of a steady speed may be off.
+/// Relative error of the machine's own measurement of a steady speed.
 const UNSURE: f64 = 0.02;
 
-/// Longest way between two lines of a log. A machine at 10 km/h rolls it in some minutes.
-const LONGEST_WAY: i32 = 1_000_000;
+/// Longest distance between two lines of a log. A machine at 10 km/h rolls it in some minutes.
+const LONGEST_DISTANCE: i32 = 1_000_000;
 
 /// Faster than any machine, and as far as [`control::units::Wheel::ticks`] goes with every encoder.
 const FASTEST_MM_S: u16 = 3_800;
 
-/// How fast the machine is taken to be between two lines of a log, which tell its speed there alone, and in whole mm/s.
+/// The assumed speed between two lines of a log. The log has only the speeds at the lines, in whole mm/s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pace {
-    /// As fast as it is with an even acceleration.
+    /// Constant acceleration.
     Even,
-    /// As slow as it may have been: nearly the slower of the two speeds, and a little less.
+    /// As slow as possible: nearly the slower of the two speeds, and a little less.
     Slow,
-    /// As fast as it may have been: nearly the faster of the two, and a little more.
+    /// As fast as possible: nearly the faster of the two, and a little more.
     Fast,
 }
 
 impl Pace {
-    /// All of them, the likeliest first.
+    /// All paces, the most likely first.
     pub(super) const ALL: [Self; 3] = [Self::Even, Self::Slow, Self::Fast];
 
-    /// The speed where a share of the way between two lines is rolled, in mm/s; never negative.
+    /// The speed after a share of the distance between two lines, in mm/s; never negative.
     fn speed(self, from: f64, to: f64, share: f64) -> f64 {
-        // The square of the speed goes evenly with the way.
+        // At constant acceleration the square of the speed is linear in the distance.
         let even = (from * from + share * (to * to - from * from)).max(0.0).sqrt();
         let (one, other) = (from.abs(), to.abs());
         match self {
@@ -80,27 +80,27 @@ pub(super) struct Player<'a> {
     witness: Rc<Witness>,
     /// The ground over which the beam was broken.
     canopies: Canopies,
-    /// Steps until here, which are the same at every pace.
+    /// Steps so far, the same at every pace.
     steps: u64,
     /// The machine's speed over the ground.
     pub(super) speed_mm_s: i32,
-    /// What the decisions told.
+    /// The events of the decisions.
     pub(super) heard: Vec<Heard>,
-    /// Whether the next alarm told is one that was given.
+    /// Whether the next alarm was raised by the replay itself.
     swallows_alarm: bool,
 }
 
 impl<'a> Player<'a> {
-    /// A machine as it was when the stretch began. It has rolled there from where watching began, as far as the log tells where
-    /// that was.
+    /// A machine in the state at the stretch's beginning. It has rolled there from the position where watching began, if
+    /// the log shows it.
     pub(super) fn new(stretch: &'a Stretch<'a>, pace: Pace) -> Self {
         let canopies = Canopies::of(stretch);
-        // A little before, so that what stands at that place is seen in full and the log says what it was taken for.
+        // It starts a little earlier, so that it sees a detection at that position in full.
         let began = stretch.began();
         let has_rolled = began != stretch.first.position;
         let position = if has_rolled { began.wrapping_sub(DETECTION_TICKS + 1) } else { began };
         let broken = canopies.over(position).is_some();
-        // A log has no other sensor than these: add another here only where a log tells its level, else refuse the log in `replay_stretch`.
+        // The log's sensors. Add another only if the log has its level; else refuse such a log in `replay_stretch`.
         let readings = Readings {
             now: Instant::ZERO,
             position: Position::new(position),
@@ -116,7 +116,7 @@ impl<'a> Player<'a> {
         let mut rig = Rig::wake_at(classifier, Volatile::new(), readings, beams, Cause::Unknown);
         rig.clear();
         for (setting, value) in steps(rig.settings(), &stretch.settings) {
-            // In an order that the firmware takes, and every value is in its range.
+            // In an order that the firmware accepts, and every value is in its range.
             let _ = rig.set(setting, value);
         }
         let mut player = Self {
@@ -133,22 +133,22 @@ impl<'a> Player<'a> {
         if stretch.first.mode == Mode::Work {
             let _ = player.rig.start(stretch.first.unseen_mm <= 0);
         }
-        player.rig.tell_events(true);
+        player.rig.enable_events(true);
         player
     }
 
-    /// Rolls from where watching began to where the log begins, at the speed that the machine has there; so slowly where it stands
-    /// there that an encoder which falls silent then is no wonder.
+    /// Rolls from the position where watching began to the log's first position, at the log's first speed. If the machine
+    /// stands there, it rolls so slowly that its stop raises no encoder alarm.
     fn roll_in(&mut self, first: &Status) {
-        let way = first.position.wrapping_sub(self.position());
+        let distance = first.position.wrapping_sub(self.position());
         let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { SLOWLY_MM_S };
-        let way_mm = i64::from(self.rig.settings().wheel().millimetres(Ticks(way)));
-        let time_ms = (way_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
-        self.roll_by(way, speed_mm_s, speed_mm_s, time_ms);
+        let distance_mm = i64::from(self.rig.settings().wheel().millimetres(Ticks(distance)));
+        let time_ms = (distance_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
+        self.roll_by(distance, speed_mm_s, speed_mm_s, time_ms);
         self.speed_mm_s = first.speed_mm_s;
     }
 
-    /// Where the machine is.
+    /// The machine's position.
     pub(super) fn position(&self) -> i32 {
         self.rig.readings.position.count()
     }
@@ -160,52 +160,52 @@ impl<'a> Player<'a> {
         TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
     }
 
-    /// Rolls from one status to the next, `host_ms` later by the host's clock, gaining or losing speed evenly.
+    /// Rolls from one status to the next, `host_ms` later by the PC's clock.
     pub(super) fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
-        let way = to.position.wrapping_sub(self.position());
-        if way.saturating_abs() > LONGEST_WAY {
+        let distance = to.position.wrapping_sub(self.position());
+        if distance.saturating_abs() > LONGEST_DISTANCE {
             return Err(());
         }
-        if way == 0 {
+        if distance == 0 {
             self.speed_mm_s = to.speed_mm_s;
-            // It may have rolled here on account of a line between the two.
+            // A line between the two may have moved it here already.
             if f64::from(to.speed_mm_s.saturating_abs()) < SURE_MM_S {
                 self.rest(host_ms.min(LONGEST_REST_MS));
             }
             return Ok(());
         }
-        self.roll_by(way, from.speed_mm_s, to.speed_mm_s, host_ms);
+        self.roll_by(distance, from.speed_mm_s, to.speed_mm_s, host_ms);
         Ok(())
     }
 
-    /// Rolls to a place on the way to the next status, if it lies there.
+    /// Rolls to a position, if it lies before the next status.
     pub(super) fn roll_to(&mut self, place: i32, from: &Status, next: Option<&Status>) {
-        let way = place.wrapping_sub(self.position());
+        let distance = place.wrapping_sub(self.position());
         let Some(next) = next else { return };
         let whole = next.position.wrapping_sub(self.position());
-        if way == 0 || way.signum() != whole.signum() || way.unsigned_abs() > whole.unsigned_abs() {
+        if distance == 0 || distance.signum() != whole.signum() || distance.unsigned_abs() > whole.unsigned_abs() {
             return;
         }
-        if way.unsigned_abs() > LONGEST_WAY as u32 {
+        if distance.unsigned_abs() > LONGEST_DISTANCE as u32 {
             return;
         }
-        let share = f64::from(way) / f64::from(whole);
+        let share = f64::from(distance) / f64::from(whole);
         let speed = self.pace.speed(from.speed_mm_s.into(), next.speed_mm_s.into(), share);
-        self.roll_by(way, from.speed_mm_s, way.signum() * speed.round() as i32, 0);
+        self.roll_by(distance, from.speed_mm_s, distance.signum() * speed.round() as i32, 0);
     }
 
-    /// Rolls a way, tick by tick. The speeds say how long it takes. Where they are next to nothing, the host's clock does: a host that
-    /// was busy reads late, and two lines that came far apart at once.
-    fn roll_by(&mut self, way: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
+    /// Rolls a distance, tick by tick. The time follows from the speeds, because a busy PC reads lines late and together.
+    /// Near standstill it follows from the PC's clock.
+    fn roll_by(&mut self, distance: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
         let tick_mm = 100.0 / f64::from(self.rig.settings().wheel().ticks(100).0.max(1));
-        let way_mm = f64::from(way) * tick_mm;
+        let distance_mm = f64::from(distance) * tick_mm;
         let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
         let mean = (from + to) / 2.0;
-        let by_speed_s = way_mm / mean;
+        let by_speed_s = distance_mm / mean;
         self.witness.speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
-        let host_s = (host_ms as f64 / 1000.0).max(way_mm.abs() / MOST_MM_S);
+        let host_s = (host_ms as f64 / 1000.0).max(distance_mm.abs() / MOST_MM_S);
         let is_known = by_speed_s > 0.0 && (by_speed_s < 3.0 * host_s.max(0.1) || mean.abs() > SURE_MM_S);
-        let steps = way.unsigned_abs();
+        let steps = distance.unsigned_abs();
         let start = self.position();
         let mut speed = from.abs();
         for step in 1..=steps {
@@ -214,7 +214,7 @@ impl<'a> Player<'a> {
             let interval_s = if is_known { 2.0 * tick_mm / (before + speed) } else { host_s / f64::from(steps) };
             self.speed_mm_s = (from_mm_s.signum() | to_mm_s.signum()) * speed.round() as i32;
             self.wait(Interval::from_steps((interval_s * f64::from(Interval::STEPS_PER_SECOND)) as u32));
-            self.rig.at(start.wrapping_add(way.signum() * step as i32));
+            self.rig.at(start.wrapping_add(distance.signum() * step as i32));
             self.step();
         }
         self.speed_mm_s = to_mm_s;
@@ -231,7 +231,7 @@ impl<'a> Player<'a> {
         self.rig.readings.now = self.rig.readings.now + interval;
     }
 
-    /// Has the decisions take the place where the machine now is.
+    /// Runs a turn of the decisions at the present position.
     fn step(&mut self) {
         self.steps += 1;
         let response = self.speed().distance_in_ms(self.rig.settings().get(Setting::BeamResponseMs));
@@ -239,13 +239,13 @@ impl<'a> Player<'a> {
         let canopy = self.canopies.over(ground);
         let before = self.rig.beams();
         self.rig.see(Beams { broken: canopy.is_some(), second_broken: false });
-        // The edge may have ended the detection before, which is classified by now.
+        // The edge may have ended the previous detection, which is classified by now.
         if let Some(canopy) = canopy
             && !before.broken
         {
             self.witness.seen.set(canopy.seen);
         }
-        // An end switch that does as it is told.
+        // An end switch without a fault.
         self.rig.readings.end_switch_on = self.rig.tool_out();
         self.rig.turn();
         self.listen();
@@ -260,13 +260,13 @@ impl<'a> Player<'a> {
                     let event = EventLine::from(&event);
                     self.heard.push(Heard { line: 0, steps: self.steps, event, speed, is_given: false });
                 }
-                // They rest on time, which the log has only roughly; or follow from the others.
+                // They depend on time, which the log has only roughly, or follow from other events.
                 _ => {}
             }
         }
     }
 
-    /// Goes to a state, unless it is there already; to work `now`, over ground that was not seen too.
+    /// Enters a state, unless it is there already. With `now` it works over unseen ground too, as `start now`.
     pub(super) fn enter(&mut self, mode: Mode, now: bool) {
         match (mode, self.rig.state()) {
             (Mode::Work, State::Hold) => {
@@ -281,13 +281,13 @@ impl<'a> Player<'a> {
         self.step();
     }
 
-    /// Raises an alarm that the log has; whether the replay did not have it by itself.
+    /// Raises a logged alarm. Returns whether the replay had not raised it itself.
     pub(super) fn raise(&mut self) -> bool {
         let is_given = !matches!(self.rig.state(), State::Alarm(_));
         if is_given {
-            // All alarms do the same; this one can be given from outside.
+            // All alarms have the same effect, and the caller can raise this one.
             self.swallows_alarm = true;
-            // A detection in the beam begins here, give or take the tolerance of its place.
+            // A detection in the beam begins here, within the tolerance of its position.
             let broken =
                 (0..=DETECTION_TICKS).any(|ahead| self.canopies.over(self.position().wrapping_add(ahead)).is_some());
             self.rig.lose_edges(Beams { broken, second_broken: false });
@@ -296,7 +296,7 @@ impl<'a> Player<'a> {
         is_given
     }
 
-    /// Carries out what was typed; false where that cannot be replayed.
+    /// Executes a typed line. False if it cannot be replayed.
     pub(super) fn command(&mut self, line: &str) -> bool {
         match command::parse(line.as_bytes()) {
             Ok(Command::Start { now }) => {
@@ -304,16 +304,16 @@ impl<'a> Player<'a> {
             }
             Ok(Command::Hold) => self.rig.hold(),
             Ok(Command::Clear) => self.rig.clear(),
-            // What it sees is not in the log.
+            // The log lacks the second beam's edges.
             Ok(Command::Set(Setting::SecondBeamMm, 1..)) => return false,
             Ok(Command::Set(setting, value)) => {
-                // Where the answer was lost, it is refused here as there.
+                // If the log lacks the answer: the firmware refused what the replay refuses.
                 let _ = self.rig.set(setting, value);
             }
             Ok(Command::Label { label, force }) => {
                 let _ = self.rig.label(label, force);
             }
-            Ok(Command::Feature(feature)) => self.rig.tell_feature(feature),
+            Ok(Command::Feature(feature)) => self.rig.enter_feature(feature),
             Ok(Command::Teach(label)) => {
                 let _ = self.rig.teach(label);
             }
@@ -332,7 +332,7 @@ impl<'a> Player<'a> {
 struct Canopy {
     from: i32,
     to: i32,
-    /// What the log tells of it, where it was classified.
+    /// The log's values, if it was classified.
     seen: Option<Seen>,
 }
 
@@ -342,7 +342,7 @@ impl Canopy {
     }
 }
 
-/// The ground over which the beam was broken, as far as the log tells.
+/// The ground over which the beam was broken, as far as the log shows it.
 fn canopies(stretch: &Stretch) -> Vec<Canopy> {
     let mut settings = stretch.settings.clone();
     let mut canopies = Vec::new();
@@ -359,13 +359,13 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
                 };
                 canopies.push(Canopy { from: *position, to: position.wrapping_add(width), seen: Some(seen) });
             }
-            // It is latched as soon as the detection is wider than it may be.
+            // It is latched when the detection exceeds the greatest width.
             Happened::Event(EventLine::Alarm { alarm: Alarm::BeamBlocked, position }) => {
                 let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
                 canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
             }
             Happened::Command { line, is_refused: false } => {
-                // The holds behind it have the new margin.
+                // Later holds have the new margin.
                 if let Ok(Command::Set(setting, value)) = command::parse(line.as_bytes()) {
                     let _ = settings.set(setting, value);
                 }
@@ -376,14 +376,14 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
     canopies
 }
 
-/// The ground over which the beam was broken, in the log's order, and how to find it: a day has 200 000 plants.
+/// The ground over which the beam was broken, in the log's order, with an index: a day has 200 000 plants.
 struct Canopies {
     canopies: Vec<Canopy>,
-    /// Where a stretch began: ground is compared as ticks from here, as a position wraps.
+    /// The stretch's beginning. Ground is compared as ticks from here, because a position wraps.
     first: i32,
     /// Their numbers, by where they begin.
     by_from: Vec<usize>,
-    /// The farthest end of each of these and all that begin before it, in ticks from `first`.
+    /// For each of these, the farthest end of it and all before it, in ticks from `first`.
     farthest: Vec<i32>,
 }
 

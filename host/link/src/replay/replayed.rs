@@ -35,9 +35,9 @@ pub enum ReplayError {
 pub struct Difference {
     /// The log's line, if it has one.
     pub line: Option<u64>,
-    /// What the log says.
+    /// The log's value.
     pub logged: String,
-    /// What the replay says.
+    /// The replay's value.
     pub replayed: String,
 }
 

@@ -112,7 +112,7 @@ impl<'a> Stretch<'a> {
 
     /// The first position from which the log has all inputs of the tool's swings. A machine that has just started has
     /// no zones, and the ground that it has seen was bare.
-    pub(super) fn judged_from(&self) -> i32 {
+    pub(super) fn compared_from(&self) -> i32 {
         if self.first.unseen_mm > 0 && self.first.zones == 0 {
             return i32::MIN;
         }
@@ -124,7 +124,7 @@ impl<'a> Stretch<'a> {
 
     /// The machine's position at a typed command that changes no state: between two statuses, by the PC's clock. `start
     /// now` at work lets the tool into the row at its next swing in.
-    pub(super) fn place_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
+    pub(super) fn position_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
         if let Happened::Command { line, .. } = self.happened[place].1
             && matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }))
             && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
@@ -137,13 +137,13 @@ impl<'a> Stretch<'a> {
         })?;
         let whole_ms = entry.time_ms.checked_sub(last.1).filter(|&time_ms| time_ms > 0)?;
         let share = time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
-        let way = f64::from(next.position.wrapping_sub(last.0.position)) * share;
-        Some(last.0.position.wrapping_add(way as i32))
+        let distance = f64::from(next.position.wrapping_sub(last.0.position)) * share;
+        Some(last.0.position.wrapping_add(distance as i32))
     }
 
     /// The position of a state change that an event reports. An alarm has its own position. Else the next swing has it.
     /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows.
-    pub(super) fn place_of_change(&self, place: usize) -> Option<i32> {
+    pub(super) fn position_of_change(&self, place: usize) -> Option<i32> {
         let mode = match &self.happened[place].1 {
             Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
             Happened::Event(EventLine::State { mode }) => mode,
@@ -160,7 +160,7 @@ impl<'a> Stretch<'a> {
 
     /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
     /// requested status between them.
-    pub(super) fn is_told_by_state(&self, place: usize) -> bool {
+    pub(super) fn is_reported_by_event(&self, place: usize) -> bool {
         let Happened::Command { line, .. } = self.happened[place].1 else { return false };
         let brings = match command::parse(line.as_bytes()) {
             Ok(Command::Start { .. }) => Mode::Work,

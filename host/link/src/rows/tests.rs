@@ -105,7 +105,7 @@ fn open(desks: &[Desk]) -> (Rows, Vec<Option<SettingsError>>) {
 }
 
 #[test]
-fn rows_that_are_not_there_are_told_and_the_others_are_talked_to() {
+fn missing_rows_are_reported_and_the_others_work() {
     let desks = [Desk::plugged_in(), Desk::default(), Desk::plugged_in()];
     let (rows, missing) = open(&desks);
     let missing: Vec<Option<String>> = missing.into_iter().map(|why| why.map(|why| why.to_string())).collect();
@@ -124,7 +124,7 @@ fn rows_that_are_not_there_are_told_and_the_others_are_talked_to() {
 }
 
 #[test]
-fn a_row_that_is_silent_or_lost_keeps_no_other_from_holding() {
+fn a_silent_or_lost_row_delays_no_other_row_s_hold() {
     let desks = [Desk::plugged_in(), Desk::plugged_in(), Desk::plugged_in()];
     let (rows, _) = open(&desks);
     desks[0].is_silent.store(true, Ordering::Relaxed);
@@ -171,7 +171,7 @@ fn a_row_that_was_lost_with_a_hold_unanswered_holds_first_when_it_is_back_and_ty
 }
 
 #[test]
-fn a_hold_to_all_is_told_with_the_time_of_the_last_row_and_who_has_not_obeyed() {
+fn a_hold_to_all_has_the_time_of_the_last_row_and_the_rows_that_have_not_obeyed() {
     let names = ["1", "2", "3"].map(str::to_owned);
     let since = Instant::now();
     let obeyed = |row, ms| Heard {

@@ -235,7 +235,7 @@ fn an_answer_that_does_not_come_is_given_up() {
 }
 
 #[test]
-fn hold_is_typed_at_once_and_what_waits_is_dropped() {
+fn hold_is_typed_at_once_and_waiting_commands_are_dropped() {
     let (mut session, _, says) = session();
     let now = Instant::now();
     second(&mut session, now);
@@ -257,7 +257,7 @@ fn hold_is_typed_at_once_and_what_waits_is_dropped() {
 }
 
 #[test]
-fn what_was_typed_before_a_reset_is_not_carried_out_after_it() {
+fn commands_typed_before_a_reset_are_not_executed_after_it() {
     let (mut session, _, says) = session();
     let now = Instant::now();
     second(&mut session, now);

@@ -12,7 +12,7 @@ const PAGE: &str = include_str!("../../../../docs/set-up.md");
 pub struct ManualStep {
     /// Its number, from 1.
     pub number: usize,
-    /// What it is called.
+    /// Its name.
     pub title: &'static str,
     /// The parts to fit and the values to set or measure. Empty if there is nothing to type.
     pub tasks: Vec<Task>,
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_task_is_not_taken_for_one() {
+    fn text_that_is_no_task_is_not_a_task() {
         for code in ["calibrate", "calibrate much", "servo_out_us", "no_such_setting = 3", "servo_out_us = 99999", ""] {
             assert_eq!(Task::parse(code), None, "{code}");
         }

@@ -17,7 +17,7 @@ const EDGE_CYCLES: u64 = 2;
 /// Longest time of the bench: ten times its usual time.
 const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
 
-/// What to do if the ELF is not the bench's.
+/// The advice for a wrong ELF.
 const RIGHT_ELF: &str = "run the ELF that `cargo bench-firmware` makes";
 
 /// Simulated time between two reports of progress.
@@ -42,7 +42,7 @@ impl Cycles {
     }
 }
 
-/// What the classifier costs.
+/// The classifier's costs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassifierCosts {
     /// The cycles of each task.
@@ -51,10 +51,10 @@ pub struct ClassifierCosts {
     pub stack: u16,
 }
 
-/// Runs the bench at `elf`. `progress` is told the share of the calls done, from 0 to 1.
+/// Runs the bench at `elf`. `progress` gets the share of the calls done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run or is not the bench, and where its search answers otherwise than the plain one.
+/// If the ELF cannot be run or is not the bench, or its search differs from the plain one.
 pub fn classifier(elf: &Path, mut progress: impl FnMut(f64)) -> Result<ClassifierCosts> {
     let mut uno = Uno::boot(elf)?;
     variable(&uno, "DIFFERENT_ANSWERS")?;

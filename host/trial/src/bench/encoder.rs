@@ -40,7 +40,7 @@ const SILENT_SHARE: f64 = 0.1;
 /// Relative distance, at the end of the search, between a rate that passed and one that failed.
 pub const RESOLUTION: f64 = 0.01;
 
-/// What else the firmware does.
+/// The firmware's other work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Load {
@@ -50,22 +50,22 @@ pub enum Load {
     Telemetry,
 }
 
-/// Which way the encoder turns.
+/// The encoder's direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
     /// AB = 00, 10, 11, 01.
     Forward,
-    /// The other way.
+    /// Backward.
     Backward,
 }
 
-/// How the encoder turns, and beside what.
+/// The encoder's motion, and the firmware's other work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Turning {
     /// The other load.
     pub load: Load,
-    /// Which way.
+    /// The direction.
     pub direction: Direction,
     /// Each edge comes early or late by up to this share of the time between two, evenly distributed; from 0 to 0.5.
     pub jitter: f64,
@@ -74,7 +74,7 @@ pub struct Turning {
 /// The jitter of an encoder whose disc is worn or off its centre.
 pub const JITTER: f64 = 0.3;
 
-/// What a trial showed.
+/// The result of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counted {
     /// The other load.
@@ -105,7 +105,7 @@ const SETTLE_MS: u64 = 100;
 /// Turns the encoder of the firmware at `elf` for half a second and by 40,000 counts at least.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
@@ -126,7 +126,7 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> 
     counted(&mut uno, turning, counts.into(), line_share)
 }
 
-/// Asks for what the firmware has counted of `counts` edges, once it has come to rest.
+/// Asks the firmware for its position after `counts` edges, when the encoder stands.
 fn counted(uno: &mut Uno, turning: Turning, counts: i64, line_share: f64) -> Result<Counted> {
     uno.run_for_ms(SETTLE_MS)?;
     let status = match Status::ask(uno) {
@@ -162,7 +162,7 @@ const SECTIONS_PASSED: u32 = 40;
 /// longest themselves, and are never closer together than `counts_per_s` and the jitter have them.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> {
     let mut uno = run::boot(elf, &[])?;
     ask(&mut uno, "events on")?;
@@ -223,8 +223,8 @@ impl World {
         Self { load, telemetry: Telemetry::default(), beam: true, beam_after: begin, byte_after: line }
     }
 
-    /// Runs until a handler begins or, where nothing comes from outside, until the loop is about to turn interrupts off. Returns
-    /// the cycle of the handler's entry. Something comes from outside once the loop has passed so many critical sections.
+    /// Runs until a handler begins or the loop is about to turn interrupts off. Returns the cycle of the handler's entry.
+    /// After `sections` critical sections it causes another interrupt.
     fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64> {
         loop {
             let cycle = uno.cycle();
@@ -313,10 +313,10 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
     Ok(Some(Rate { turning, counts_per_s, line_share }))
 }
 
-/// Searches the highest rate of the firmware at `elf`. `progress` is told the share of the search done, from 0 to 1.
+/// Searches the highest rate of the firmware at `elf`. `progress` gets the share of the search done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate> {
     let mut passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
     let mut failed = HIGHEST_PER_S;

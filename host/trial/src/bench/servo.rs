@@ -17,9 +17,9 @@ pub const COUNTS_PER_S: u64 = 20_000;
 /// The greatest less the least of [`PULSES`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Jitter {
-    /// Of the pulses' widths, in cycles.
+    /// Jitter of the pulses' widths, in cycles.
     pub width_cycles: u64,
-    /// Of the frames, from rise to rise, in cycles.
+    /// Jitter of the frames, from rise to rise, in cycles.
     pub frame_cycles: u64,
     /// Pulses that were compared.
     pub pulses: usize,
@@ -34,10 +34,10 @@ const ENCODER_VECTORS: [u8; 2] = [1, 2];
 const FRAME_CYCLES: u64 = CYCLES_PER_SECOND / 50;
 
 /// Measures the pulses of the firmware at `elf` in HOLD, while the encoder turns, the status streams and the beam flickers.
-/// `progress` is told the share of the time that has passed, from 0 to 1.
+/// `progress` gets the share of the time that has passed, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter> {
     let mut uno = run::boot(elf, &[])?;
     uno.send(b"events on\n");

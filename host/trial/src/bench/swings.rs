@@ -104,10 +104,10 @@ fn planting(seed: u64, rows: &Rows) -> Planting {
 /// Bare ground that a tall weed of any width and its margins need.
 const ROOM_FOR_WEED_MM: f64 = 2.0 * WEED_MARGIN_MM + 30.0;
 
-/// Has the firmware at `elf` weed the rows. `progress` is told the share of the rows done, from 0 to 1.
+/// Weeds the rows with the firmware at `elf`. `progress` gets the share of the rows done, from 0 to 1.
 ///
 /// # Errors
-/// Where the ELF cannot be run.
+/// If the ELF cannot be run.
 pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Result<Lateness> {
     let count = rows.seeds.end.saturating_sub(rows.seeds.start) as f64;
     let done = AtomicUsize::new(0);

@@ -8,11 +8,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
-/// What can run in a thread.
+/// A task for a thread.
 pub trait Live: Sized + Send + 'static {
     /// The parts that other code needs while it runs.
     type Outside;
-    /// What can end it.
+    /// Its error.
     type Failure: Send;
 
     /// Returns the parts that other code needs while it runs.
@@ -48,7 +48,7 @@ impl<L: Live> Background<L> {
     /// Stops it, and gives it back.
     ///
     /// # Errors
-    /// What has ended it before.
+    /// The error that has ended it.
     ///
     /// # Panics
     /// If its thread did.

@@ -52,12 +52,12 @@ pub struct Ran {
     pub took: Duration,
     /// Total working time of all cores.
     pub cores: Duration,
-    /// In so many threads.
+    /// The number of threads.
     pub threads: usize,
 }
 
 impl Ran {
-    /// How much of their own time passed in a second of the host's.
+    /// Simulated seconds in a second of the host.
     pub fn times_real_time(&self) -> f64 {
         self.simulated.as_secs_f64() / self.took.as_secs_f64().max(f64::EPSILON)
     }
@@ -88,7 +88,7 @@ impl LiveRows {
     /// Runs until `stop` is set, or for this time of the Unos' clock.
     ///
     /// # Errors
-    /// What has ended one of them, and which, once the others have ended as well.
+    /// The first error, and its row, after all have ended.
     pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, Error)> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let threads = cores.min(self.unos.len() / ROWS_OF_A_THREAD).max(1);
@@ -185,7 +185,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// One has stopped: to those at its port it is as if its cable were pulled.
+    /// An Uno has stopped. At its port this looks like a pulled cable.
     fn stop(&mut self, place: usize, error: Error) {
         let (uno, runs) = &mut self.unos[place];
         uno.unplug();
@@ -225,7 +225,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Ends them, and says what has stopped one before.
+    /// Ends them. Returns the error that has stopped one.
     fn end(mut self) -> Option<(usize, Error)> {
         for place in 0..self.unos.len() {
             let (uno, runs) = &mut self.unos[place];

@@ -119,7 +119,7 @@ impl HostPort {
         Ok(())
     }
 
-    fn look_at_clock(&mut self) {
+    fn sample_clock(&mut self) {
         self.ms.store(self.port.uno().cycle() * 1000 / CYCLES_PER_SECOND, Ordering::Relaxed);
     }
 }
@@ -128,14 +128,14 @@ impl Read for HostPort {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.pause(20)?;
         let read = self.port.read(buffer);
-        self.look_at_clock();
+        self.sample_clock();
         read
     }
 }
 
 impl Write for HostPort {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.look_at_clock();
+        self.sample_clock();
         self.pause(10)?;
         self.port.write(bytes)
     }
@@ -253,7 +253,7 @@ fn start_now_over_unseen_ground_is_known_from_start() {
 }
 
 #[test]
-fn an_alarm_of_the_beam_is_raised_again_and_what_is_left_of_the_object_is_cut() {
+fn an_alarm_of_the_beam_is_raised_again_and_the_rest_of_the_detection_is_cut() {
     let things = vec![Thing::plant(600.0, 150.0), Thing::plant(1500.0, 700.0), Thing::plant(2300.0, 150.0)];
     let row = Row::new(things).expect("plants are a row");
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);

@@ -78,7 +78,7 @@ fn recorded(
     let mut uno = trial::boot(&elf, &[machine.beam_before(row, motion)]).expect("the firmware wakes up");
     let sets_off = uno.cycle() + SETS_OFF;
     uno.drive(machine.pin_changes(row, motion, sets_off));
-    let way_m = |time_s: f64| {
+    let distance_m = |time_s: f64| {
         let since_s = (time_s - sets_off as f64 / CYCLES_PER_SECOND as f64).clamp(0.0, motion.duration_s());
         (motion.position_mm(since_s) - motion.start_mm()) / 1000.0
     };
@@ -118,7 +118,7 @@ fn recorded(
                 assert!(session.command("label weed force"));
             }
         }
-        let bytes = simulated.bytes_until(time_s(), way_m);
+        let bytes = simulated.bytes_until(time_s(), distance_m);
         let lines = match (is_plugged, !unplugged_s.contains(&since_s)) {
             (true, false) => recorder.lost("unplugged"),
             (false, true) => recorder.found(time_ms, "simulated"),
@@ -196,7 +196,8 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
 
     // The time is the receiver's, and the label has the detection's position.
     let label = job.things().find(|thing| thing.what == What::Label(Class::Weed)).expect("it was labelled");
-    let weed = job.things().find(|thing| (thing.way_m - label.way_m).abs() < 1e-9).expect("it is an object's");
+    let weed =
+        job.things().find(|thing| (thing.distance_m - label.distance_m).abs() < 1e-9).expect("it is an object's");
     assert_eq!((weed.found, label.time_ms > weed.time_ms), (label.found, true));
     let utc_ms = job.midnight_ms.expect("RMC has a date") + label.found.expect("it has a place").utc_ms;
     assert!((30_000..60_000).contains(&(utc_ms - setup.began_ms)), "{utc_ms}");
@@ -222,9 +223,9 @@ fn without_a_machine_s_trouble_the_ground_weeded_is_where_the_tool_was_in_the_ro
     let truth = SimulatedReceiver::new(setup);
     let weeded = job.stretches.iter().flat_map(|stretch| &stretch.ground).filter(|ground| ground.did == Did::Weeded);
     let mut lines = 0;
-    for ground in weeded.filter(|ground| ground.way_m.end > ground.way_m.start) {
+    for ground in weeded.filter(|ground| ground.distance_m.end > ground.distance_m.start) {
         let line = ground.lines.first().expect("it has places");
-        for (at, place) in [(ground.way_m.start, line.first()), (ground.way_m.end, line.last())] {
+        for (at, place) in [(ground.distance_m.start, line.first()), (ground.distance_m.end, line.last())] {
             let tool = truth.place(at, Offset { ahead_m: -0.4, right_m: 0.0 });
             let off_m = place.expect("a line has places").distance_m(tool);
             assert!(off_m < MACHINE_M, "{off_m}");

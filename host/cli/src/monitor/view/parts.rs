@@ -52,7 +52,7 @@ fn column_of(row: &RowModel, columns: usize, ahead_of_tool_mm: f64) -> f64 {
     (ahead_of_tool_mm + 0.25 * beam_to_tool) / mm_per_column
 }
 
-/// The column at which the tool is.
+/// The tool's column.
 pub(super) fn tool_column(row: &RowModel, columns: usize) -> usize {
     column_of(row, columns, 0.0).round() as usize
 }

@@ -69,7 +69,7 @@ fn zones_move_toward_the_tool() {
 }
 
 #[test]
-fn what_is_to_be_measured_next_is_said_once_calibrating_has_begun() {
+fn the_next_measurement_is_named_once_calibration_has_begun() {
     let timed = "calibrated lead_out_ms=158 lead_in_ms=52 set=yes";
     let told = |model: &Model| model.lines.iter().filter(|line| line.starts_with("-- next, ")).cloned().collect();
     let mut model = machine(&["state is=hold"]);
@@ -102,7 +102,7 @@ fn a_margin_that_nothing_was_measured_for_is_warned_of_once() {
 }
 
 #[test]
-fn an_alarm_is_shown_with_what_to_do_until_it_is_cleared() {
+fn an_alarm_is_shown_with_advice_until_it_is_cleared() {
     let mut lines = ROW.to_vec();
     lines.push("alarm code=1-1 name=beam_blocked pos=2700");
     lines.push("state is=alarm");
@@ -123,14 +123,14 @@ fn completions_are_offered_below_the_line() {
 }
 
 #[test]
-fn a_machine_that_is_gone_is_said_to_be() {
+fn a_lost_machine_is_shown_as_lost() {
     let mut model = machine(&ROW);
     model.update(0, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
     insta::assert_snapshot!(screen(&model));
 }
 
 #[test]
-fn of_a_machine_that_is_gone_nothing_stands_as_if_it_were_now() {
+fn a_lost_machine_shows_no_present_values() {
     let at_work = "state=work tool=in pos=2196 speed_mm_s=694 windows=1 unseen_mm=0";
     let mut model = machine(&[&ROW[..], &[at_work]].concat());
     assert!(screen(&model).contains("██"));
@@ -181,7 +181,7 @@ fn a_screen_too_small_for_all_of_it_is_drawn_as_far_as_it_goes() {
 }
 
 #[test]
-fn what_is_drawn_follows_the_machine_s_settings() {
+fn the_drawing_follows_the_machine_s_settings() {
     let mut lines = ROW.to_vec();
     lines.push("state=work tool=in pos=2196 speed_mm_s=556 windows=1 unseen_mm=0");
     let mut model = machine(&lines);
