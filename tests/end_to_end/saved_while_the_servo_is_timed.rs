@@ -24,7 +24,7 @@ fn follow(uno: &mut Uno, duration_ms: u64) {
 #[test]
 fn settings_that_were_saved_are_whole_although_the_servos_swings_end_meanwhile() {
     let mut meanwhile = 0;
-    for save_at_ms in [8850, 8900, 8950, 8980, 9000] {
+    for save_at_ms in [17_850, 17_900, 17_950, 17_980, 18_000] {
         let mut uno = started();
         uno.set(wiring::END_SWITCH, false);
         run_for_ms(&mut uno, 50);

@@ -61,8 +61,8 @@ impl Distance {
     }
 }
 
-/// Swings in and out.
-const ROUNDS: u8 = 3;
+/// Swings in and out: enough to meet the servo's quick and slow swings.
+const ROUNDS: u8 = 6;
 
 /// Time for a swing, several times as long as any servo needs.
 const SWING: Interval = Interval::from_ms(1500);
@@ -205,7 +205,7 @@ mod tests {
         Instant::new(u32::MAX - 500_000) + Interval::from_ms(milliseconds)
     }
 
-    /// Runs the swings with a switch that follows each command after this many milliseconds.
+    /// Runs the swings with a switch that follows each command after this many milliseconds, in turn.
     fn run(watched: bool, follows_ms: [u32; 6]) -> (Outcome, u32) {
         let mut swings = Swings::new(at_ms(0), watched, 3);
         let (mut commanded, mut out, mut count) = (0, true, 0);
@@ -214,7 +214,7 @@ mod tests {
                 // The previous step gave this command.
                 (commanded, out, count) = (now.saturating_sub(1), swings.tool_out(), count + 1);
             }
-            let arrived = now - commanded >= follows_ms[count.max(1) - 1];
+            let arrived = now - commanded >= follows_ms[(count.max(1) - 1) % 6];
             if let Some(outcome) = swings.step(at_ms(now), out == arrived) {
                 return (outcome, now);
             }
@@ -226,7 +226,7 @@ mod tests {
     fn the_end_switch_gives_the_longest_swing_out_and_the_shortest_swing_in() {
         let (outcome, lasted_ms) = run(true, [61, 180, 57, 195, 70, 170]);
         assert_eq!(outcome, Outcome::Measured(SwingTimes { out_ms: 195 + 11, in_ms: 57 }));
-        assert_eq!(lasted_ms, 9000);
+        assert_eq!(lasted_ms, 18_000);
     }
 
     #[test]
@@ -238,6 +238,6 @@ mod tests {
             run(true, [5, 180, 60, 180, 60, 180]).0,
             Outcome::Measured(SwingTimes { out_ms: 180 + 11, in_ms: 5 })
         );
-        assert_eq!(run(false, [0; 6]), (Outcome::Shown, 9000));
+        assert_eq!(run(false, [0; 6]), (Outcome::Shown, 18_000));
     }
 }

@@ -97,7 +97,7 @@ fn a_line_in_the_last_turn_of_a_dry_run_leaves_real_plants_their_zones() {
 
 #[test]
 fn a_save_is_complete_although_timed_swings_end_during_it() {
-    for ms in (8800..9020).step_by(4) {
+    for ms in (17_800..18_020).step_by(4) {
         for turns in [3, 100, 400] {
             let lines = format!("set end_switch on\nset k 5\nstand for 100 ms\ncalibrate servo\nstand for {ms} ms");
             let mut run = run(&ROW, &lines);

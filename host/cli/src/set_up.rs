@@ -45,7 +45,7 @@ pub struct Arguments {
     simulated: bool,
 }
 
-/// Time limit for the servo's three swings, and for waiting for plants.
+/// Time limit for the servo's six swings out and in, and for waiting for plants.
 const SWINGS: Duration = Duration::from_secs(30);
 const PLANTS: Duration = Duration::from_secs(600);
 

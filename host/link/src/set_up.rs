@@ -20,7 +20,7 @@ use super::settings::shown;
 use control::settings::{Setting, Settings};
 use std::{collections::VecDeque, fmt};
 
-/// Required timings of the servo, each with three swings out and three in, and measurements of the wheel.
+/// Required timings of the servo, each with six swings out and six in, and measurements of the wheel.
 const TIMINGS: usize = 2;
 const STRETCHES: usize = SetUp::STRETCHES;
 
@@ -28,7 +28,7 @@ const STRETCHES: usize = SetUp::STRETCHES;
 const PLANTS: usize = 12;
 
 /// The servo's least scatter, in milliseconds. By eye it is two frames of a phone's slow motion, and as much for the
-/// servo. By an end switch, six swings miss up to 12 ms of the default servo's slowest swing, and the pulse on the
+/// servo. By an end switch, twelve swings out miss up to 12 ms of the default servo's slowest swing, and the pulse on the
 /// line adds 2.
 const SERVO_MS: u16 = 15;
 

@@ -441,7 +441,7 @@ fn steps() -> BoxedStrategy<Vec<Step>> {
     // A dry run or the servo's test ends, and a line is typed in that turn or near it.
     let bench = prop_oneof![
         (900_u32..1300).prop_map(|mm_s| (format!("test row {mm_s}"), 3500 * 1000 / mm_s)),
-        Just(("calibrate servo".to_owned(), 9000)),
+        Just(("calibrate servo".to_owned(), 18_000)),
     ];
     let bench = (bench, 0_u32..20, line()).prop_map(|((bench, ms), off, line)| {
         vec![typed("hold"), Stand { ms: 200 }, Type(bench), Stand { ms: ms + off - 15 }, Type(line)]

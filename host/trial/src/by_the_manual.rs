@@ -131,7 +131,7 @@ impl Novice {
         let cycle = |milliseconds: u32| u64::from(milliseconds) * (CYCLES_PER_SECOND / 1000);
         let pulse = |rise: u64, width_us: f64| Pulse { rise, fall: rise + cycle(1) * width_us as u64 / 1000 };
         // The tool is out before the first swing, so that swing leads in.
-        let swings = (0..6).map(|swing| {
+        let swings = (0..12).map(|swing| {
             let width_us = if swing % 2 == 0 { servo.in_us } else { servo.out_us };
             pulse(cycle(SWING_MS * (swing + 1)), width_us)
         });

@@ -107,7 +107,7 @@ export class Calibration {
     }
 
     async #time(): Promise<void> {
-        await this.#do("servo-said", "calibrate servo", () => say("swingsThree"));
+        await this.#do("servo-said", "calibrate servo", () => say("swingsSix"));
     }
 
     async #leads(): Promise<void> {

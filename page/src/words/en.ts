@@ -232,12 +232,12 @@ export const en = {
         pulseOut: "{pulse} us is the tool out now. Not saved yet.",
         servoTime:
             "Time it with the tool in the soil. Without an end switch, film it: the lamp is lit while the tool is commanded out.",
-        swingThree: "Swing three times",
-        swingsThree: "The tool swings in and out three times. Keep clear of it.",
+        swingSix: "Swing six times",
+        swingsSix: "The tool swings in and out six times. Keep clear of it.",
         timedSet: "The end switch has timed it, and both leads are set. Not saved yet.",
         timedNotSet:
             "The end switch has timed it, but these leads need the beam farther ahead, or a lower top speed: nothing is set.",
-        timedByEye: "It has swung three times. Enter the longest swing out, and the shortest wait before the swing in.",
+        timedByEye: "It has swung six times. Enter the longest swing out, and the shortest wait before the swing in.",
         notTimed: "The end switch did not follow: see to it, or set end_switch off and go by eye.",
         leadOut: "Longest way out, and some more: lead_out_ms",
         leadIn: "Shortest wait before it comes in: lead_in_ms",

@@ -231,13 +231,13 @@ export const es: Language = {
         pulseOut: "Con {pulse} us la herramienta está fuera. Aún no guardado.",
         servoTime:
             "Mida su tiempo con la herramienta en el suelo. Sin final de carrera, grábelo en vídeo: la lámpara luce mientras se manda la herramienta fuera.",
-        swingThree: "Girar tres veces",
-        swingsThree: "La herramienta gira dentro y fuera tres veces. Manténgase lejos de ella.",
+        swingSix: "Girar seis veces",
+        swingsSix: "La herramienta gira dentro y fuera seis veces. Manténgase lejos de ella.",
         timedSet: "El final de carrera lo ha medido, y los dos adelantos están puestos. Aún no guardado.",
         timedNotSet:
             "El final de carrera lo ha medido, pero estos adelantos piden el haz más adelante, o menos velocidad máxima: no se ha puesto nada.",
         timedByEye:
-            "Ha girado tres veces. Ponga lo que vio, la salida más larga y la espera más corta antes de entrar.",
+            "Ha girado seis veces. Ponga lo que vio, la salida más larga y la espera más corta antes de entrar.",
         notTimed: "El final de carrera no ha respondido: revíselo, o ponga end_switch en off y mida a ojo.",
         leadOut: "La salida más larga, y algo más: lead_out_ms",
         leadIn: "La espera más corta antes de entrar: lead_in_ms",
@@ -498,7 +498,7 @@ export const es: Language = {
         ],
         "Time the servo": [
             "Mida el tiempo del servo",
-            "Dos veces, con la herramienta en el suelo. Manténgase lejos: gira tres veces. Sin final de carrera, grábelo en vídeo.",
+            "Dos veces, con la herramienta en el suelo. Manténgase lejos: gira seis veces. Sin final de carrera, grábelo en vídeo.",
         ],
         "Measure the wheel": ["Mida la rueda", "Tres veces sobre 10 m del campo, con las herramientas en el suelo."],
         "Lower the margin": [

@@ -230,13 +230,13 @@ export const fr: Language = {
         pulseOut: "À {pulse} us l'outil est dehors. Pas encore enregistré.",
         servoTime:
             "Chronométrez-le avec l'outil dans le sol. Sans fin de course, filmez : la lampe est allumée tant que l'outil doit être dehors.",
-        swingThree: "Pivoter trois fois",
-        swingsThree: "L'outil pivote trois fois dedans et dehors. Restez à distance.",
+        swingSix: "Pivoter six fois",
+        swingsSix: "L'outil pivote six fois dedans et dehors. Restez à distance.",
         timedSet: "La fin de course l'a chronométré, et les deux avances sont réglées. Pas encore enregistré.",
         timedNotSet:
             "La fin de course l'a chronométré, mais ces avances demandent le faisceau plus en avant, ou une vitesse maximale plus basse : rien n'est réglé.",
         timedByEye:
-            "Il a pivoté trois fois. Entrez ce que vous avez vu, la sortie la plus longue et l'attente la plus courte avant de rentrer.",
+            "Il a pivoté six fois. Entrez ce que vous avez vu, la sortie la plus longue et l'attente la plus courte avant de rentrer.",
         notTimed: "La fin de course n'a pas suivi : vérifiez-la, ou mettez end_switch à off et faites à l'œil.",
         leadOut: "La sortie la plus longue, et un peu plus : lead_out_ms",
         leadIn: "L'attente la plus courte avant de rentrer : lead_in_ms",
@@ -499,7 +499,7 @@ export const fr: Language = {
         ],
         "Time the servo": [
             "Chronométrez le servo",
-            "Deux fois, l'outil dans le sol. Restez à distance : il pivote trois fois. Sans fin de course, filmez.",
+            "Deux fois, l'outil dans le sol. Restez à distance : il pivote six fois. Sans fin de course, filmez.",
         ],
         "Measure the wheel": ["Mesurez la roue", "Trois fois sur 10 m du champ, les outils dans le sol."],
         "Lower the margin": [

@@ -57,7 +57,7 @@ fn follow_all(
 }
 
 #[test]
-fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_nor_more_than_a_zone_in_2000_reached() {
+fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_and_no_zone_reached() {
     // A step that the simulated machine already fulfils changes nothing, in any order.
     let box_machine = Novice::new(Conditions::default(), SEED);
     let changes = |step: &ManualStep| {
@@ -77,10 +77,7 @@ fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_nor_
     for (conditions, done) in found.into_values() {
         let total = weeded(&conditions, 10);
         let what = || format!("steps {done:?}: {:?} {:?}", conditions.settings, conditions.machine);
-        assert_eq!((total.effect.injured(), total.alarms), (0, 0), "{}", what());
-        // Beside a stem zone, the margin covers half of the worst sum. So the tool's edge reaches a zone now and then, by millimetres.
-        let allowed = if conditions.settings.contains_key("stem_zone_mm") { total.zones.all / 2000 } else { 0 };
-        assert!(total.zones.reached <= allowed, "{} of {}, {}", total.zones.reached, total.zones.all, what());
+        assert_eq!((total.effect.injured(), total.zones.reached, total.alarms), (0, 0, 0), "{}", what());
         assert!(total.effect.plants > 1000);
     }
 }
@@ -166,10 +163,10 @@ fn the_terminal_leads_through_the_steps_is_stopped_and_goes_on() {
     let conditions = Conditions::preset("set-up").expect("there is one").expect("it is right");
     let planting = Planting { plants: 7, ..Planting::default() };
     let row = planting.grow(SEED).expect("there is room");
-    // Fast, for a test. It stands until the servo is timed: two times six swings of 1.5 s, which end where it rolls.
+    // Fast, for a test. It stands until the servo is timed: two times twelve swings of 1.5 s, which end where it rolls.
     let course = Course::new(row, conditions.machine(SEED), 1200.0)
         .slipping(conditions.ground.slip_percent / 100.0)
-        .standing_first(45);
+        .standing_first(65);
     let rolls_mm = course.rolls_mm().round();
     let setup = Setup {
         elf: Some(firmware::build().expect("the firmware builds")),
