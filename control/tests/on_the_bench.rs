@@ -147,14 +147,14 @@ fn swings(machine: &mut Machine, out_ms: u32, in_ms: u32) -> Vec<Event> {
     machine.stand(1_000);
     machine.calibrate_servo().unwrap();
     let (mut told_out, mut told_at) = (true, 0);
-    for now in 1_000..13_000 {
+    for now in 1_000..22_000 {
         let after = if told_out { out_ms } else { in_ms };
         machine.readings.end_switch_on = told_out == (now - told_at >= after);
         machine.stand(1);
         if machine.tool_out() != told_out {
             (told_out, told_at) = (machine.tool_out(), now);
         }
-        assert!(now >= 9_990 || machine.lamp_is_lit() == machine.tool_out(), "the LED shows the commands");
+        assert!(now >= 18_990 || machine.lamp_is_lit() == machine.tool_out(), "the LED shows the commands");
     }
     machine.events()
 }

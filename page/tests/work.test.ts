@@ -258,7 +258,7 @@ test("the servo is calibrated by eye, and timed, while the machine stands", asyn
     await part(page, "servo-in-is").click();
     await part(page, "servo-said").filter({ hasText: "1510 us is the tool in the row now" }).waitFor();
     await part(page, "servo-time").click();
-    await part(page, "servo-said").filter({ hasText: "Enter the longest swing out" }).waitFor();
+    await part(page, "servo-said").filter({ hasText: "Enter the longest swing out" }).waitFor({ timeout: 60_000 });
     await part(page, "lead_out_ms").fill("150");
     await part(page, "servo-leads").click();
     await part(page, "servo-said").filter({ hasText: "Both leads are set" }).waitFor();

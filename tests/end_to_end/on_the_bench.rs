@@ -63,7 +63,7 @@ fn the_end_switch_times_the_servo() {
     run_for_ms(&mut uno, 50);
     ask(&mut uno, "set end_switch on");
     ask(&mut uno, "calibrate servo");
-    swing(&mut uno, 10_000, 150, 60);
+    swing(&mut uno, 19_000, 150, 60);
     let told = uno.received();
     let line = told.lines().find(|line| line.starts_with("calibrated ")).expect("how it ended");
     let number = |key| value(line, key).parse::<f64>().expect("a number");
