@@ -283,7 +283,7 @@ fn every_console_line_in_the_manual_gets_ok_and_the_printed_answer() {
 /// Waits for a line with this beginning. Drops it and the lines before it.
 #[track_caller]
 fn expect(uno: &mut Uno, said: &mut String, line: &str, place: &str) {
-    const PATIENCE_S: u64 = 15;
+    const PATIENCE_S: u64 = 25;
     for _ in 0..PATIENCE_S * 10 {
         let complete = said.rfind('\n').map_or("", |end| &said[..=end]);
         let mut end = 0;
