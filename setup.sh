@@ -3,7 +3,7 @@
 # toolchain of rust-toolchain.toml. It can run again, and keeps what is installed.
 #
 #     ./setup.sh         all that cargo needs
-#     ./setup.sh page    also builds the page, with all that it and its tests need: Node.js 18 or later with npm,
+#     ./setup.sh page    also builds the page, with all that it and its tests need: Node.js 18.19 or later with npm,
 #                        Chromium and Firefox ESR
 #     ./setup.sh slurm   also installs Slurm, to try an experiment in shards; several words are possible
 set -euo pipefail
@@ -81,8 +81,8 @@ else
 fi
 
 if [ "$page" = yes ]; then
-    if ! node --eval 'process.exit(process.versions.node.split(".")[0] >= 18 ? 0 : 1)'; then
-        echo "setup.sh: the page needs Node.js 18 or later, and this is $(node --version || echo none)." >&2
+    if ! node --eval 'const [major, minor] = process.versions.node.split(".").map(Number); process.exit(major > 18 || (major === 18 && minor >= 19) ? 0 : 1)'; then
+        echo "setup.sh: the page needs Node.js 18.19 or later, and this is $(node --version || echo none)." >&2
         exit 1
     fi
     echo "Node.js: $(node --version)."

@@ -1,7 +1,7 @@
 //! Model-based tests: random runs of a weeder on a row, checked by a slow and simple model of the ground.
 //!
 //! [`run`] defines the steps of a run. [`drive`] executes them on a [`Machine`](machine::Machine) and checks it after
-//! each turn. [`model`] stores what the beam has seen, and judges orders. [`stand`] has the real plants, and judges the
+//! each turn. `model` stores what the beam has seen, and judges orders. [`stand`] has the real plants, and judges the
 //! swinging tool. [`go_all`] executes many runs. It shrinks a failing run to a few steps, and prints them as lines to
 //! type and distances to roll.
 //!
