@@ -15,7 +15,7 @@ import { part, pass, tryIt } from "./trying.ts";
 
 const OTHERS = (Object.keys(LANGUAGES) as Code[]).filter((code) => code !== "en");
 /** Texts that are the same in another language. */
-const SAME: Partial<Record<Code, readonly string[]>> = { es: ["kmh"], fr: ["kmh", "console", "place", "windows"] };
+const SAME: Partial<Record<Code, readonly string[]>> = { es: ["kmh"], fr: ["kmh", "console", "place", "zones"] };
 const SMALL = { width: 360, height: 640 };
 
 /** A log with an alarm. */
@@ -163,7 +163,7 @@ test("what the session, weeder serve and the project's Rust say in English is kn
 
 test("what the machine refuses, and settings that contradict each other, are known by the tables", () => {
     const texts = readFileSync("../control/src/say/texts.rs", "utf8");
-    const refusals = texts.slice(texts.lastIndexOf("refusals! {"), texts.indexOf("macro_rules! commands"));
+    const refusals = texts.slice(texts.lastIndexOf("command_errors! {"), texts.indexOf("macro_rules! commands"));
     const named = (name: string) => new RegExp(`\\b${name} = "([^"]*)"`).exec(texts)?.[1] ?? assert.fail(name);
     const mistakes = ["TOO_LONG", "NOT_TEXT", "CHARACTERS_LOST", "UNKNOWN_COMMAND", "UNKNOWN_SETTING"].map(named);
     const again = named("LOOK_AGAIN");
