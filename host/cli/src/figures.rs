@@ -115,9 +115,9 @@ mod tests {
     #[test]
     fn a_figure_without_its_block_is_named_with_its_line() {
         for (page, complaint) in [
-            ("<!-- figures: weeder hex -->\nno block\n", "page.md:2: a block ```text has to stand"),
+            ("<!-- figures: weeder hex -->\nno block\n", "page.md:2: a block ```text must follow"),
             ("\n<!-- figures: weeder hex -->\n```text\n", "page.md:3: the figure's block has no end"),
-            ("<!-- figures: weeder hex -->\n", "page.md: no figure stands behind"),
+            ("<!-- figures: weeder hex -->\n", "page.md: no figure follows"),
             ("<!-- figures: rm it -->\n```text\n```\n", "page.md:2"),
         ] {
             let error = renew(page, Path::new("page.md")).expect_err("it is wrong");

@@ -209,7 +209,7 @@ fn a_preset_is_pushed_by_its_name_and_the_margin_stays() {
         assert_eq!(json[name].as_u64(), Some((*value).into()), "{name}");
     }
     let nothing = printed(&weeder(&["settings", "push", "from-the-box"], uno.path(), ""), 2);
-    assert!(nothing.contains("the preset from-the-box sets nothing"), "{nothing}");
+    assert!(nothing.contains("the preset from-the-box changes nothing"), "{nothing}");
 }
 
 #[test]

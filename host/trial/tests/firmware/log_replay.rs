@@ -299,7 +299,7 @@ fn a_log_without_a_machine_or_with_a_line_that_cannot_be_is_refused() {
     let far = "state=work tool=in pos=2000000000 speed_mm_s=1 windows=0 unseen_mm=0";
     let near = "state=work tool=in pos=0 speed_mm_s=1 windows=0 unseen_mm=0";
     let log = [entry(Kind::Connected, "0.2.0"), entry(Kind::Status, near), entry(Kind::Status, far)];
-    assert!(replay(&log).unwrap_err().to_string().contains("the machine cannot have come so far"));
+    assert!(replay(&log).unwrap_err().to_string().contains("the machine cannot have rolled so far"));
 }
 
 #[test]
