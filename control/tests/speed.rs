@@ -78,6 +78,23 @@ proptest! {
     }
 
     #[test]
+    fn the_expected_speed_is_never_below_the_measured_one(
+        // Up to the finest encoder at the greatest top speed, reached at once or in a second.
+        speed in 100_f64..60_000.0,
+        seconds in prop_oneof![Just(0.0), 0.01_f64..1.0],
+        backwards in any::<bool>(),
+        turn_us in 80_u64..1000,
+    ) {
+        let direction = if backwards { -1.0 } else { 1.0 };
+        let rolled = |time: f64| if time < seconds { time * time / (2.0 * seconds) } else { time - seconds / 2.0 };
+        let mut run = Run::new();
+        for _ in 0..150 {
+            run.roll(10, turn_us, |time| direction * speed * rolled(time));
+            prop_assert!(direction * run.expected() >= direction * run.speed(), "{}, {}", run.expected(), run.speed());
+        }
+    }
+
+    #[test]
     fn the_expected_speed_of_a_machine_that_brakes_is_the_measured_one(speed in 300_f64..2000.0, backwards in any::<bool>()) {
         let direction = if backwards { -1.0 } else { 1.0 };
         let mut run = Run::new();

@@ -89,7 +89,7 @@ impl SpeedMeter {
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn expected(&self) -> TicksPerSecond {
         // A tick in 80 ms is 12.5 ticks a second. The machine gained them in 80 ms, and gains 16 in 100 ms.
-        TicksPerSecond(self.speed.0 + i32::from(self.gain << 4))
+        TicksPerSecond(self.speed.0 + (i32::from(self.gain) << 4))
     }
 
     /// Takes a reading. Returns whether it may have changed the speeds. The caller calls it at least every few milliseconds.
@@ -121,7 +121,7 @@ impl SpeedMeter {
         let time = reading.time.since(oldest.time);
         let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
         self.speed = TicksPerSecond(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
-        // It wraps only beyond 40,000 ticks a second, which are no machine's.
+        // It wraps beyond 51,000 ticks a second: 9 km/h with the finest encoder. The lead is then longer, and never shorter.
         let gain = distance.wrapping_sub(self.trend >> 3);
         self.trend = self.trend.wrapping_add(gain);
         self.gain = if (gain ^ distance) < 0 { 0 } else { gain };

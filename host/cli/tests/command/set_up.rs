@@ -22,13 +22,13 @@ const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");
 /// Selects the random fields and measurements.
 const SEED: u64 = 1;
 
-/// The firmware in a field at 2.5 km/h.
-fn weeded(conditions: &Conditions, replications: u32) -> Total {
+/// The firmware at 2.5 km/h in the field of a seed.
+fn weeded(conditions: &Conditions, replications: u32, seed: u64) -> Total {
     let experiment = Experiment {
         speeds_km_h: vec![2.5],
         replications,
         controllers: vec![Treatment::Firmware],
-        ..Experiment::as_in_the_paper(conditions.clone(), SEED)
+        ..Experiment::as_in_the_paper(conditions.clone(), seed)
     };
     totals(&experiment.run(&Engine::Native, |_| ()).expect("it can be weeded"))[0]
 }
@@ -56,10 +56,13 @@ fn follow_all(
     }
 }
 
-#[test]
-fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_and_no_zone_reached() {
+/// Does the manual's steps in every order, with any left out. Returns the zones, and of these the reached ones, of all machines.
+///
+/// # Panics
+/// If a plant is damaged, or an alarm raised.
+fn zones_after_each_step(seed: u64) -> (u32, u32) {
     // A step that the simulated machine already fulfils changes nothing, in any order.
-    let box_machine = Novice::new(Conditions::default(), SEED);
+    let box_machine = Novice::new(Conditions::default(), seed);
     let changes = |step: &ManualStep| {
         step.tasks.iter().any(|task| match *task {
             Task::Set(setting, value) => box_machine.settings().get(setting) != value,
@@ -74,12 +77,28 @@ fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_and_
     // Each set of steps, some in several orders with different settings: the weeded ground depends on the settings
     // only.
     assert!(found.len() > 1 << (steps.len() - 1), "{}", found.len());
+    let (mut all, mut reached) = (0, 0);
     for (conditions, done) in found.into_values() {
-        let total = weeded(&conditions, 10);
+        let total = weeded(&conditions, 10, seed);
         let what = || format!("steps {done:?}: {:?} {:?}", conditions.settings, conditions.machine);
-        assert_eq!((total.effect.injured(), total.zones.reached, total.alarms), (0, 0, 0), "{}", what());
+        assert_eq!((total.effect.injured(), total.alarms), (0, 0), "{}", what());
         assert!(total.effect.plants > 1000);
+        (all, reached) = (all + total.zones.all, reached + total.zones.reached);
     }
+    (all, reached)
+}
+
+#[test]
+fn after_each_step_in_every_order_and_with_any_left_out_no_plant_is_damaged_and_no_zone_reached() {
+    assert_eq!(zones_after_each_step(SEED).1, 0);
+}
+
+#[test]
+fn other_measurements_damage_no_plant_either_and_reach_hardly_a_zone() {
+    // One servo of these shows none of its quick returns while it is timed.
+    let zones: Vec<(u32, u32)> = (SEED + 1..=SEED + 3).map(zones_after_each_step).collect();
+    let (all, reached) = zones.iter().fold((0, 0), |(all, reached), zones| (all + zones.0, reached + zones.1));
+    assert!(reached * 5000 < all, "{reached} of {all} zones: {zones:?}");
 }
 
 #[test]
@@ -89,7 +108,7 @@ fn a_lead_that_is_too_short_for_the_stroke_would_be_seen() {
     for (setting, value) in [("lead_out_ms", 180.0), ("ticks_per_m", 2010.0), ("margin_mm", 20.0)] {
         conditions.set(setting, value).expect("it is in its range");
     }
-    assert!(weeded(&conditions, 2).zones.reached > 0);
+    assert!(weeded(&conditions, 2, SEED).zones.reached > 0);
 }
 
 #[test]
@@ -120,7 +139,8 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
         let text = fs::read_to_string(root.join(file)).expect("it is there");
         assert!(text.contains(&named), "{file} does not have {named:?}");
     }
-    let [ours, theirs] = [&novice.conditions, &set_up].map(|conditions| 100.0 * weeded(conditions, 20).weeded_share);
+    let [ours, theirs] =
+        [&novice.conditions, &set_up].map(|conditions| 100.0 * weeded(conditions, 20, SEED).weeded_share);
     assert!((ours - theirs).abs() < 2.0, "{ours:.1} and {theirs:.1} %: {:?}", novice.conditions.settings);
 }
 
