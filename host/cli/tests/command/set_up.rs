@@ -98,7 +98,7 @@ fn other_measurements_damage_no_plant_either_and_reach_hardly_a_zone() {
     // One servo of these shows none of its quick returns while it is timed.
     let zones: Vec<(u32, u32)> = (SEED + 1..=SEED + 3).map(zones_after_each_step).collect();
     let (all, reached) = zones.iter().fold((0, 0), |(all, reached), zones| (all + zones.0, reached + zones.1));
-    assert!(reached * 5000 < all, "{reached} of {all} zones: {zones:?}");
+    assert!(reached * 2000 < all, "{reached} of {all} zones: {zones:?}");
 }
 
 #[test]
