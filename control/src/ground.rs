@@ -265,8 +265,8 @@ impl Ground {
     /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground.
     pub fn assume_bare(&mut self) {
         if self.is_unseen() {
-            // A margin behind the tool too, so that it does not stand on the border of the known ground.
-            self.keep_out.set_known_from(self.tool() - self.geometry.margin);
+            // Unknown ground has a margin ahead of it. The second margin keeps the tool off its border.
+            self.keep_out.set_known_from(self.tool() - self.geometry.margin - self.geometry.margin);
         }
     }
 

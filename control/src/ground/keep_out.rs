@@ -1,8 +1,8 @@
 //! The keep-out zones: ground where the tool must not work, and the paper's Y, Z and R.
 //!
 //! A zone is a canopy with a margin on both sides. Canopies are stored as stretches of ground, not as timed events. So stopping,
-//! rolling back and changing speed need no bookkeeping. Unseen and forgotten ground is closed. Forgotten ground is closed with a
-//! margin ahead of it, for a plant that may end there.
+//! rolling back and changing speed need no bookkeeping. Unseen and forgotten ground is closed with a margin ahead of it, for a plant
+//! that may end there.
 //!
 //! Zones are not merged. Two that overlap close the ground between them. The caller asks about a stretch as long as the servo
 //! needs. So a gap too short to swing in and out is closed too.
@@ -17,17 +17,6 @@ use heapless::Vec;
 /// Canopies remembered at once, ahead of the tool and behind it. Four plants fit between beam and tool at the longest distance and
 /// closest spacing. The others allow rolling back over some six metres.
 pub const CAPACITY: usize = 16;
-
-/// Why the ground behind `known_from` is unknown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Behind {
-    /// The beam never saw it.
-    Unseen,
-    /// The beam saw it, but a fault made the detections invalid.
-    Invalid,
-    /// The beam saw it, but it was dropped for distance or lack of room.
-    Left,
-}
 
 /// A canopy to keep out of: its full width, or the stem zone of a single plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,7 +94,8 @@ pub struct KeepOut {
     canopies: Vec<Canopy, CAPACITY, u8>,
     /// All ground behind this position is unknown.
     known_from: WrappedPosition,
-    behind: Behind,
+    /// Whether the beam saw that ground, and it was dropped for distance or lack of room.
+    has_dropped: bool,
 }
 
 /// All places hold canopies at the tool or ahead of it.
@@ -118,7 +108,7 @@ impl KeepOut {
 
     /// No canopies, with the ground known from `known_from` on.
     pub const fn new(known_from: WrappedPosition) -> Self {
-        Self { canopies: Vec::new(), known_from, behind: Behind::Unseen }
+        Self { canopies: Vec::new(), known_from, has_dropped: false }
     }
 
     /// Where the known ground begins.
@@ -129,18 +119,18 @@ impl KeepOut {
     /// Whether the ground at a position was seen, and dropped.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn has_left(&self, position: WrappedPosition) -> bool {
-        self.behind == Behind::Left && self.known_from.is_ahead_of(position)
+        self.has_dropped && self.known_from.is_ahead_of(position)
     }
 
     /// Declares the ground known from `position` on. `position` lies behind the frontier.
     pub fn set_known_from(&mut self, position: WrappedPosition) {
-        (self.known_from, self.behind) = (position, Behind::Unseen);
+        (self.known_from, self.has_dropped) = (position, false);
     }
 
     /// Forgets all canopies, because they are not reliable. The ground is known from `position` on.
     pub fn invalidate(&mut self, position: WrappedPosition) {
         self.canopies.clear();
-        (self.known_from, self.behind) = (position, Behind::Invalid);
+        self.set_known_from(position);
     }
 
     /// Adds a canopy. If all places are taken, drops the oldest canopy behind the tool, and the ground up to its end.
@@ -181,7 +171,7 @@ impl KeepOut {
         if !position.is_ahead_of(self.known_from) {
             return;
         }
-        (self.known_from, self.behind) = (position, Behind::Left);
+        (self.known_from, self.has_dropped) = (position, true);
         // They are in order, so only the first can lie behind.
         while self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(position)) {
             self.canopies.remove(0);
@@ -191,8 +181,7 @@ impl KeepOut {
     /// Whether any of the ground between two positions is closed: unknown, or within `margin` of a canopy.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_closed(&self, near: WrappedPosition, far: WrappedPosition, margin: Length) -> bool {
-        let open_from = if self.behind == Behind::Unseen { self.known_from } else { self.known_from + margin };
-        if open_from.is_ahead_of(near) {
+        if (self.known_from + margin).is_ahead_of(near) {
             return true;
         }
         // Distances from the near end are compared, so the counter may wrap.
@@ -255,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_zone_reaches_from_margin_to_margin() {
-        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
+        let mut keep_out = KeepOut::new(WrappedPosition::new(-1000));
         keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
         assert!(!closed(&keep_out, 904, 904));
         assert!(closed(&keep_out, 905, 905));
@@ -286,11 +275,12 @@ mod tests {
     }
 
     #[test]
-    fn ground_never_seen_is_closed() {
+    fn ground_never_seen_is_closed_with_a_margin_ahead_of_it() {
         let keep_out = KeepOut::new(WrappedPosition::new(0));
         assert!(closed(&keep_out, -1, -1));
-        assert!(closed(&keep_out, -1, 5));
-        assert!(!closed(&keep_out, 0, 5));
+        assert!(closed(&keep_out, 94, 94));
+        assert!(closed(&keep_out, 94, 100));
+        assert!(!closed(&keep_out, 95, 100));
     }
 
     #[test]

@@ -673,7 +673,7 @@ impl<M: Machine> Drive<M> {
         self.model = Model::new(self.here(), self.world.broken);
         let geometry = self.geometry();
         if let Some(stand) = &mut self.stand {
-            stand.reset(self.ground as i64, self.world.time_us, &geometry);
+            stand.forget(self.world.time_us, &geometry);
         }
         // The measured speed is 0 until the first measurement.
         self.speeds = Speeds::default();

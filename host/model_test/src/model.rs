@@ -281,9 +281,9 @@ impl Model {
         self.merge_gaps[first..].iter().map(|&(_, gap)| gap)
     }
 
-    /// Whether the beam has not seen the ground at `near`.
-    pub fn is_unseen(&self, near: i64) -> bool {
-        near + self.slack < self.known_from
+    /// Whether the beam has not seen the ground at `near`, or within the margin behind it.
+    pub fn is_unseen(&self, near: i64, margin: i64) -> bool {
+        near + self.slack < self.known_from + margin
     }
 
     /// A canopy that the tool must avoid, with its margin, between `near` and `far`.

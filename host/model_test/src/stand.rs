@@ -17,10 +17,6 @@ const BLIND_TICKS: f64 = 24.0;
 /// The measured speed, and so the leads, are right again this long after the encoder was silent.
 const SPEED_SETTLES_US: u64 = 100_000;
 
-/// Error from slip at the position of a reset, in ticks: 0.3 of the default margin. The firmware keeps no margin before ground
-/// that it has not seen since the reset, so a canopy that ended there has none.
-const RESET_TICKS: i64 = 29;
-
 /// Tolerance of a reported weed's ends, in ticks.
 const EDGE_TICKS: i64 = 4;
 
@@ -81,8 +77,6 @@ pub struct Stand {
     /// Error of the count, in ticks, over ground that the firmware still remembers.
     lost_ticks: i64,
     blind_until_us: u64,
-    /// The first beam's position at the last reset.
-    reset_at: i64,
 }
 
 impl Stand {
@@ -123,8 +117,8 @@ impl Stand {
         clear
     }
 
-    /// Judges the tool at a position. `is_unseen` tells that the firmware keeps the tool out because the beam has not
-    /// seen this ground since the last reset: there is no margin before such ground.
+    /// Judges the tool at a position. `is_unseen` tells that the beam has not seen this ground since the last reset, so that the
+    /// tool may have been ordered out too late.
     ///
     /// # Errors
     /// If the tool touches a plant without an excuse.
@@ -137,8 +131,7 @@ impl Stand {
         is_unseen: bool,
     ) -> Result<(), String> {
         let Some((number, start)) = self.plant_at(tool) else { return Ok(()) };
-        let is_at_reset = (tool - self.reset_at).abs() <= RESET_TICKS;
-        let is_blind = self.is_blind(geometry) || now_us <= self.blind_until_us || is_unseen || is_at_reset;
+        let is_blind = self.is_blind(geometry) || now_us <= self.blind_until_us || is_unseen;
         let fate = self.fates.entry(start).or_default();
         fate.passed = true;
         if clear {
@@ -183,12 +176,6 @@ impl Stand {
             self.blind_until_us = self.blind_until_us.max(now_us + geometry.swing_us);
         }
         self.lost_ticks = 0;
-    }
-
-    /// The firmware starts with the first beam at a position.
-    pub fn reset(&mut self, position: i64, now_us: u64, geometry: &Geometry) {
-        self.forget(now_us, geometry);
-        self.reset_at = position;
     }
 
     /// The firmware reported a weed of this width that begins at a position, `behind` ticks behind the beam.

@@ -12,8 +12,7 @@
 //! other cases are counted separately, and are allowed:
 //! - *mistaken*: plants that the classifier took for weeds;
 //! - *blind*: plants that the firmware could not protect. On the PC: plants reached while a faulty encoder had the
-//!   count off by a quarter of the margin, or within a swing and a tenth of a second of the fault; and canopies that
-//!   ended where the machine was reset, because the firmware keeps no margin before unseen ground. On the virtual Uno:
+//!   count off by a quarter of the margin, or within a swing and a tenth of a second of the fault. On the virtual Uno:
 //!   all plants of a row in which both channels jumped at once, and those reached within 0.7 s of a reset.
 
 mod core;

@@ -70,7 +70,7 @@ impl<M: Machine> Drive<M> {
         let far = tool + ticks(slowest.min(0.0), lead_in) - 1;
         let margin = self.ticks(Setting::MarginMm);
         let (from, to) = if slowest > 0.0 {
-            prop_assert!(!self.model.is_unseen(near), "the tool is in the row at {tool}, over unseen ground");
+            prop_assert!(!self.model.is_unseen(near, margin), "the tool is in the row at {tool}, over unseen ground");
             (near, tool + ticks(slowest, lead_out))
         } else if fastest < 0.0 {
             (tool + ticks(fastest, lead_out), far)
@@ -98,7 +98,7 @@ impl<M: Machine> Drive<M> {
             && self.speed.abs() > STEADY_SPEED
             && self.calm_since_us + STEADY_US < self.world.time_us
             && self.machine.reason().is_none_or(|reason| reason == Reason::Plant)
-            && !self.model.is_unseen(tool)
+            && !self.model.is_unseen(tool, self.ticks(Setting::MarginMm))
             // The machine may not have reported yet where it guards.
             && self.guard_spacings.is_empty()
             && !self.had_second_beam

@@ -117,7 +117,7 @@ impl<M: Machine> Drive<M> {
             let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
             // The distance rolled since the line was executed.
             let late = if M::IS_OPEN { 0 } else { (self.speed.abs() * ANSWERED_S) as i64 };
-            self.model.trust(tool - self.ticks(Setting::MarginMm) - late, tool + unseen as i64);
+            self.model.trust(tool - 2 * self.ticks(Setting::MarginMm) - late, tool + unseen as i64);
         }
     }
 }
