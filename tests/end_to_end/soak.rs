@@ -1,7 +1,7 @@
 //! A short soak: `weeder soak` runs a day and half an hour.
 
 use crate::common::elf;
-use trial::soak::{Plan, hours, minutes};
+use soak::{Plan, hours, minutes};
 
 /// A fault in nearly every row of the virtual Uno.
 const PLAN: Plan = Plan { seed: 1, faults_an_hour: 300.0 };

@@ -11,10 +11,10 @@ use clap::Args;
 use experiments::shard::{Numbered, Shard};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use soak::{Plan, SoakError, Tally};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trial::firmware;
-use trial::soak::{self, Plan, SoakError, Tally};
 
 /// The name of the command in its parts.
 pub const COMMAND: &str = "soak";

@@ -6,7 +6,7 @@
 //! - [`live`] runs it in real time, at a serial port for other programs. A [`receiver`] on the machine has another
 //!   port.
 //! - [`by_the_manual`] sets up and measures the simulated machine by the manual.
-//! - [`soak`] runs it for hours with random faults. [`mod@bench`] counts cycles and bytes.
+//! - [`mod@bench`] counts cycles and bytes.
 //!
 //! [`field`] simulates the machine and gives the verdicts, and [`uno`] simulates the chip. Experiments with many rows
 //! are in another crate.
@@ -23,7 +23,6 @@ pub mod receiver;
 pub mod replay;
 pub mod report;
 mod run;
-pub mod soak;
 
 pub use field::trial::{Start, Trial};
 pub use port::UnoPort;

@@ -7,7 +7,7 @@
 //! Unlike on the chip, clock and count continue over resets. They begin shortly before they overflow, so that each hour
 //! passes both overflows.
 
-use super::tally::{Plan, SoakError, Tally, chance, count, total};
+use crate::tally::{Plan, SoakError, Tally, chance, count, total};
 use control::{measure::reset::Cause, operate::state::State, settings::Setting};
 use field::machine::Machine;
 use field::motion::mm_s;

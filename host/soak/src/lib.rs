@@ -15,10 +15,10 @@
 //!   count off by a quarter of the margin, or within a swing and a tenth of a second of the fault. On the virtual Uno:
 //!   all plants of a row in which both channels jumped at once, and those reached within 0.7 s of a reset.
 
-mod core;
+mod decisions;
 mod elf;
 mod tally;
 
-pub use self::core::{hour, hours};
+pub use self::decisions::{hour, hours};
 pub use self::elf::{minutes, row, rows};
 pub use self::tally::{Plan, SoakError, Tally, total};

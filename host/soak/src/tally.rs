@@ -1,6 +1,5 @@
 //! The parameters of a soak, and the results of its hours, of its rows, and of all of them.
 
-use crate::run::TrialError;
 use field::planting::PlantingError;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -9,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::AddAssign;
 use thiserror::Error;
+use trial::TrialError;
 
 /// The parameters of a soak.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,10 +5,8 @@
 //! After a reset the firmware is in HOLD, and the operator lets it roll to the end of the row. From there on no plant
 //! may be harmed. Rows with a faulty encoder are checked only for their alarms.
 
-use super::core::{MISSED_ONCE_IN, PLANTING};
-use super::tally::{Plan, SoakError, Tally, chance, count, total};
-use crate::console::ask;
-use crate::run::{TrialError, boot, set_up};
+use crate::decisions::{MISSED_ONCE_IN, PLANTING};
+use crate::tally::{Plan, SoakError, Tally, chance, count, total};
 use field::machine::{Machine, cycle_at, time_at_s};
 use field::motion::mm_s;
 use field::planting::Planting;
@@ -20,6 +18,8 @@ use field::wiring;
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
+use trial::console::ask;
+use trial::{TrialError, boot, set_up};
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Pulse};
 use uno::{Uno, UnoError};
 
