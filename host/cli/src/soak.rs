@@ -136,7 +136,7 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
     Ok(Finding::Good)
 }
 
-/// Prints what all hours and rows have shown, which were computed somewhere.
+/// Prints the results of all hours and rows, which may come from several machines.
 ///
 /// # Errors
 /// If it cannot be printed.
