@@ -281,7 +281,7 @@ impl Model {
         self.merge_gaps[first..].iter().map(|&(_, gap)| gap)
     }
 
-    /// Whether the beam has not seen the ground at `near`, or within the margin behind it.
+    /// Whether the beam has not seen the ground at `near`, or in the margin ahead of unseen ground.
     pub fn is_unseen(&self, near: i64, margin: i64) -> bool {
         near + self.slack < self.known_from + margin
     }
