@@ -129,12 +129,12 @@ impl Ground {
         self.second_beam.begin(self.beam);
     }
 
-    /// Recalculates after a change of settings. A new scale makes all positions invalid, so the ground is then forgotten.
-    pub fn follow(&mut self, settings: &Settings, position: Position, speed: TicksPerSecond) {
+    /// Recalculates the distances after a change of settings. The caller then calls [`lead`](Self::lead). A new scale makes all
+    /// positions invalid, so the ground is then forgotten.
+    pub fn follow(&mut self, settings: &Settings, position: Position) {
         let scale = self.geometry.scale;
         let guard_spacing = self.geometry.guard_spacing;
         self.correct(settings);
-        self.lead(settings, speed);
         if self.geometry.guard_spacing != guard_spacing {
             self.guard = Guard::NONE;
         }
@@ -166,9 +166,9 @@ impl Ground {
         self.second_beam.begin(self.detector.frontier());
     }
 
-    /// Recalculates the leads for another speed.
-    pub fn lead(&mut self, settings: &Settings, speed: TicksPerSecond) {
-        self.leads = Leads::at(speed, settings, self.geometry.scale);
+    /// Recalculates the leads for another speed, see [`Leads::at`].
+    pub fn lead(&mut self, settings: &Settings, speed: TicksPerSecond, expected: TicksPerSecond) {
+        self.leads = Leads::at(speed, expected, settings, self.geometry.scale);
     }
 
     /// Takes a beam edge and its position. Returns the detection that was complete before this edge.
@@ -400,14 +400,15 @@ impl Ground {
         self.rolled_back_too_far
     }
 
-    /// Whether the tool is on unseen ground.
+    /// Whether unseen ground, or the margin ahead of it, keeps the tool out.
     pub fn is_unseen(&self) -> bool {
-        self.keep_out.known_from().is_ahead_of(self.tool())
+        let (from, to) = self.leads.stretch(true);
+        self.keep_out.open_from(self.geometry.margin).is_ahead_of(self.tool() + from.min(to))
     }
 
-    /// The distance until seen ground reaches the tool.
+    /// The distance until the tool has left unseen ground and its margin.
     pub fn unseen(&self) -> Ticks {
-        self.ticks((self.keep_out.known_from() - self.tool()).max(Length::ZERO))
+        self.ticks((self.keep_out.open_from(self.geometry.margin) - self.tool()).max(Length::ZERO))
     }
 
     /// The number of keep-out zones at the tool or ahead of it, with an open detection and an unclassified one.
@@ -497,7 +498,7 @@ mod tests {
         }
         let mut ground = Ground::NONE;
         ground.begin(&settings, Position::new(0), false);
-        ground.lead(&settings, SPEED);
+        ground.lead(&settings, SPEED, SPEED);
         ground.edge(Position::new(1000), true);
         ground.edge(Position::new(1300), false);
         let canopy = ground.roll_to(Position::new(1400)).expect("the gap has been seen");
@@ -522,7 +523,7 @@ mod tests {
         for (class, trim) in [(Class::Plant, 38), (Class::Unknown, 0)] {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::StemZoneMm, 100).expect("within its range");
-            ground.follow(&settings, Position::new(1400), SPEED);
+            ground.follow(&settings, Position::new(1400));
             ground.await_class(
                 Detection {
                     leading: WrappedPosition::new(1500),
@@ -571,7 +572,7 @@ mod tests {
     fn a_wheel_of_another_length_scale_forgets_and_closes_the_ground() {
         let (mut ground, mut settings) = ground();
         settings.set(Setting::TicksPerM, 15_000).expect("within its range");
-        ground.follow(&settings, Position::new(1400), SPEED);
+        ground.follow(&settings, Position::new(1400));
         assert_eq!((ground.zones(), ground.is_unseen()), (0, true));
         let (beam_to_tool, margin) = (6000, 750);
         let scale = ground.ticks(Length(1)).0;
@@ -590,7 +591,7 @@ mod tests {
     fn an_edge_lies_where_the_ground_was_when_the_beam_s_sensor_began_to_answer() {
         let (mut ground, mut settings) = ground();
         settings.set(Setting::BeamResponseMs, 10).expect("within its range");
-        ground.lead(&settings, SPEED);
+        ground.lead(&settings, SPEED, SPEED);
         ground.edge(Position::new(2000), true);
         ground.edge(Position::new(2300), false);
         assert!(!ground.is_unseen());
@@ -618,14 +619,15 @@ mod tests {
     #[test]
     fn the_end_of_remembered_ground_is_reported_once() {
         let (mut ground, _) = ground();
-        let memory = i32::from(ground.geometry.memory.0);
+        let [memory, margin] = [ground.geometry.memory, ground.geometry.margin].map(|length| i32::from(length.0));
         for position in (1400..=40_000).step_by(100) {
             ground.roll_to(Position::new(position));
             assert!(!ground.rolled_back_too_far());
         }
         for back in 0..=memory {
             ground.roll_to(Position::new(40_000 - back));
-            assert!(!ground.rolled_back_too_far() && !ground.is_unseen(), "{back}");
+            assert!(!ground.rolled_back_too_far(), "{back}");
+            assert_eq!(ground.is_unseen(), back >= memory - margin, "{back}");
         }
         ground.roll_to(Position::new(40_000 - memory - 1));
         assert!(ground.rolled_back_too_far());
@@ -657,13 +659,13 @@ mod tests {
         for (setting, value, is_due) in [(Setting::MarginMm, 60, true), (Setting::GuardSpacingMm, 510, false)] {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::GuardSpacingMm, 500).expect("within its range");
-            ground.follow(&settings, Position::new(1400), SPEED);
+            ground.follow(&settings, Position::new(1400));
             ground.edge(Position::new(2000), true);
             ground.edge(Position::new(2300), false);
             let canopy = ground.roll_to(Position::new(2400)).expect("the gap has been seen");
             keep(&mut ground, canopy).expect("there is room");
             settings.set(setting, value).expect("within its range");
-            ground.follow(&settings, Position::new(2400), SPEED);
+            ground.follow(&settings, Position::new(2400));
             assert_eq!(ground.roll_to(Position::new(3300)), None);
             assert_eq!(ground.guard().is_some(), is_due, "{setting:?}");
         }

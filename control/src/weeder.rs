@@ -309,7 +309,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         } else if self.ground.needs_correction() {
             self.ground.correct(self.configuration.settings());
         } else if self.leads_are_old {
-            self.ground.lead(self.configuration.settings(), self.sensors.meter.expected());
+            self.ground.lead(self.configuration.settings(), self.sensors.meter.speed(), self.sensors.meter.expected());
             self.leads_are_old = false;
         } else if self.ground.unclassified().is_some() {
             // Last, because one detection can follow right after another.

@@ -146,7 +146,7 @@ fn status_shows_the_distance_to_seen_ground() {
     assert_eq!(
         machine.ask("status"),
         [
-            "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400",
+            "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=449",
             "lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=65535 reset=power_on",
             "ok"
         ]

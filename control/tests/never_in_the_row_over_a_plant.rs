@@ -4,6 +4,8 @@
 //! The reference is slow and simple: it knows each plant's position and the real speed.
 
 mod common;
+#[path = "common/rolling.rs"]
+mod rolling;
 
 use common::machine;
 use control::{
@@ -13,6 +15,7 @@ use control::{
 };
 use proptest::prelude::*;
 use rig::Beams;
+use rolling::{BEAM_TO_TOOL_MM, MARGIN_MM, Rolling, TICKS_A_MM};
 
 /// Ticks a metre of the default wheel.
 const TICKS_A_METRE: f64 = 1909.86;
@@ -169,6 +172,32 @@ proptest! {
     #[test]
     fn the_same_without_leads_as_in_the_paper(distance_mm in 150_u16..=2000, plants in plants(), legs in legs()) {
         check(distance_mm, &plants, &legs, true)?;
+    }
+
+    #[test]
+    fn a_machine_that_starts_suddenly_brings_the_tool_back_no_earlier_than_its_real_speed_allows(
+        stands_at in -45_f64..190.0,
+        mm_s in 100_f64..800.0,
+        mm_s2 in prop_oneof![300_f64..3000.0, Just(1e9)],
+    ) {
+        let (begin_mm, end_mm) = (600.0, 750.0);
+        let mut rolling = Rolling::along(vec![(begin_mm, end_mm)], Vec::new(), &[]);
+        let mut speed: f64 = 300.0;
+        // The machine brakes over 45 mm and stands. Then it starts, or a dead encoder works again.
+        rolling.roll_to(begin_mm + BEAM_TO_TOOL_MM + stands_at - 45.0, speed);
+        while speed > 0.0 {
+            speed -= 1000.0 * TURN_S;
+            rolling.turn(speed.max(0.0) * TURN_S);
+        }
+        (0..1200).for_each(|_| rolling.turn(0.0));
+        prop_assert!(rolling.machine.tool_out() && rolling.machine.unseen_mm() == 0);
+        while rolling.machine.tool_out() {
+            speed = mm_s.min(speed + mm_s2 * TURN_S);
+            rolling.turn(speed * TURN_S);
+        }
+        let (tool_mm, lead_in_s) = (rolling.place_mm - BEAM_TO_TOOL_MM, 0.041);
+        let least_mm = end_mm + MARGIN_MM - speed * lead_in_s - 2.0 / TICKS_A_MM;
+        prop_assert!(tool_mm >= least_mm, "{tool_mm} mm at {speed} mm/s, {least_mm} mm is safe");
     }
 }
 

@@ -111,9 +111,9 @@ impl KeepOut {
         Self { canopies: Vec::new(), known_from, has_dropped: false }
     }
 
-    /// Where the known ground begins.
-    pub fn known_from(&self) -> WrappedPosition {
-        self.known_from
+    /// Where the unknown ground's margin ends. A plant may end where the known ground begins.
+    pub fn open_from(&self, margin: Length) -> WrappedPosition {
+        self.known_from + margin
     }
 
     /// Whether the ground at a position was seen, and dropped.
@@ -181,7 +181,7 @@ impl KeepOut {
     /// Whether any of the ground between two positions is closed: unknown, or within `margin` of a canopy.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_closed(&self, near: WrappedPosition, far: WrappedPosition, margin: Length) -> bool {
-        if (self.known_from + margin).is_ahead_of(near) {
+        if self.open_from(margin).is_ahead_of(near) {
             return true;
         }
         // Distances from the near end are compared, so the counter may wrap.

@@ -118,17 +118,18 @@ impl Leads {
     /// Leads of a machine at rest.
     pub const NONE: Self = Self { out: Length::ZERO, back: Length::ZERO, response: Length::ZERO };
 
-    /// The leads at a speed.
-    pub fn at(speed: TicksPerSecond, settings: &Settings, scale: LengthScale) -> Self {
+    /// The leads at a measured speed, if the machine reaches the `expected` speed, at least as high, while the tool swings out. The
+    /// way back begins in a moment, at the measured speed. A lead that is too long would let the tool in too early.
+    pub fn at(speed: TicksPerSecond, expected: TicksPerSecond, settings: &Settings, scale: LengthScale) -> Self {
         let out_ms = settings.get(Setting::LeadOutMs);
-        let rolled = |milliseconds| scale.length(speed.distance_in_ms(milliseconds));
+        let rolled = |speed: TicksPerSecond, milliseconds| scale.length(speed.distance_in_ms(milliseconds));
         // 1 ms is added for the mean delay of a command: half a tick, half a turn, half a pulse. A lead of 0 stays 0, as the paper
         // has it.
-        let lead = |milliseconds: u16| rolled(milliseconds + u16::from(milliseconds > 0));
+        let lead = |speed, milliseconds: u16| rolled(speed, milliseconds + u16::from(milliseconds > 0));
         Self {
-            out: lead(out_ms),
-            back: lead(settings.get(Setting::LeadInMs).min(out_ms)),
-            response: rolled(settings.get(Setting::BeamResponseMs)),
+            out: lead(expected, out_ms),
+            back: lead(speed, settings.get(Setting::LeadInMs).min(out_ms)),
+            response: rolled(speed, settings.get(Setting::BeamResponseMs)),
         }
     }
 
@@ -185,7 +186,8 @@ mod tests {
     fn a_lead_is_the_distance_in_its_time_and_a_millisecond_and_zero_stays_zero() {
         let mut settings = Settings::new();
         let leads = |settings: &Settings| {
-            let Leads { out, back, response } = Leads::at(TicksPerSecond(1000), settings, LengthScale::TICK);
+            let (speed, expected) = (TicksPerSecond(1000), TicksPerSecond(1100));
+            let Leads { out, back, response } = Leads::at(speed, expected, settings, LengthScale::TICK);
             (out, back, response)
         };
         for (setting, milliseconds) in
@@ -193,7 +195,7 @@ mod tests {
         {
             settings.set(setting, milliseconds).expect("within its range");
         }
-        assert_eq!(leads(&settings), (Length(181), Length(41), Length(7)));
+        assert_eq!(leads(&settings), (Length(199), Length(41), Length(7)), "only the way out is led at the expected speed");
         settings.set(Setting::LeadOutMs, 0).expect("within its range");
         assert_eq!(leads(&settings), (Length::ZERO, Length::ZERO, Length(7)));
     }

@@ -29,7 +29,8 @@ pub struct DryRun {
 impl DryRun {
     /// Starts half a metre before the first plant, at a speed in mm/s, with the settings' margin and leads.
     pub fn new(begin: Instant, speed_mm_s: u16, settings: &Settings) -> Self {
-        let leads = Leads::at(TicksPerSecond(speed_mm_s.into()), settings, LengthScale::TICK);
+        let speed = TicksPerSecond(speed_mm_s.into());
+        let leads = Leads::at(speed, speed, settings, LengthScale::TICK);
         Self { begin, speed_mm_s, leads, margin_mm: settings.get(Setting::MarginMm) as i16 }
     }
 

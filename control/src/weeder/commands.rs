@@ -87,9 +87,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.ground.forget_slip();
         }
         let settings = self.configuration.settings();
-        self.ground.follow(settings, self.sensors.readings.position, self.sensors.meter.expected());
+        self.ground.follow(settings, self.sensors.readings.position);
         self.limits = Limits::of(settings, self.ground.wheel());
-        self.leads_are_old = false;
+        self.leads_are_old = true;
     }
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.

@@ -111,6 +111,8 @@ pub struct Drive<M> {
     /// Whether the tool was stuck since the machine started.
     tool_was_stuck: bool,
     out_since_us: Option<u64>,
+    /// Turns in which the tool was out for a plant that the model does not know.
+    unexplained_turns: u32,
     turns: u64,
     steady_swings: u32,
     /// Ticks rolled in this row, and with the tool in the row.
@@ -176,6 +178,7 @@ impl<M: Machine> Drive<M> {
             tool_is_stuck: false,
             tool_was_stuck: false,
             out_since_us: Some(0),
+            unexplained_turns: 0,
             turns: 0,
             steady_swings: 0,
             rolled: 0.0,
@@ -608,6 +611,9 @@ impl<M: Machine> Drive<M> {
             self.suspect = None;
         } else {
             self.check(place)?;
+        }
+        if M::IS_OPEN && works && out {
+            self.check_reason(place)?;
         }
         if works && out && !self.was_out {
             self.check_swing(place.tool)?;

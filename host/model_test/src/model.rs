@@ -301,6 +301,15 @@ impl Model {
         self.bounds(stretch, margin).is_some_and(|(from, to)| from <= far && to >= near)
     }
 
+    /// Whether any canopy lies within `reach` of a position, weeds included.
+    pub fn has_canopy_near(&self, place: i64, reach: i64) -> bool {
+        let is_near = |stretch: &Stretch| {
+            let reach = reach + self.slack + 2 * stretch.blur;
+            stretch.leading - reach <= place && place <= stretch.trailing + reach
+        };
+        self.stretches.iter().chain(&self.guarded).any(is_near)
+    }
+
     /// The last canopy between `near` and `far`, if canopies and their margins close all of that ground.
     pub fn canopies_all_over(&self, mut near: i64, far: i64, margin: i64) -> Option<Stretch> {
         loop {

@@ -14,6 +14,9 @@ use proptest::prelude::*;
 const STEADY_US: u64 = 1_200_000;
 const STEADY_SPEED: f64 = 60.0;
 
+/// Turns after which new leads have an effect.
+const RECALCULATION_TURNS: u32 = 3;
+
 impl<M: Machine> Drive<M> {
     /// Checks that the tool may be in the row. A tool over a canopy may be on its way out. If it is not, the ground at
     /// the first such position counts, because later the machine may have forgotten it.
@@ -88,6 +91,25 @@ impl<M: Machine> Drive<M> {
             canopy.is_none(),
             "the tool is in the row at {tool}, rolling {slowest:.0} to {fastest:.0} ticks/s, margin {margin}, leads \
              {lead_out} s and {lead_in} s: {canopy:?}"
+        );
+        Ok(())
+    }
+
+    /// Checks that a tool stays out for a plant only if the beam has seen one near it.
+    pub(super) fn check_reason(&mut self, Place { tool, slowest, fastest, .. }: Place) -> Checked {
+        // The machine expects at most all of its speed once more, and comes in only if the row is open for twice the lead.
+        let lead_s = f64::from(self.machine.settings().get(Setting::LeadOutMs) + 1) / 1000.0;
+        let reach = (4.0 * fastest.max(-slowest) * lead_s) as i64 + self.ticks(Setting::MarginMm);
+        let is_explained = self.machine.reason() != Some(Reason::Plant)
+            || self.model.has_canopy_near(tool, reach)
+            // The machine may guard ground that it has not reported yet, and a second beam closes more.
+            || !self.guard_spacings.is_empty()
+            || self.had_second_beam
+            || self.model.is_in_doubt();
+        self.unexplained_turns = if is_explained { 0 } else { self.unexplained_turns + 1 };
+        prop_assert!(
+            self.unexplained_turns <= RECALCULATION_TURNS,
+            "the tool at {tool} stays out for a plant, but none is within {reach} ticks"
         );
         Ok(())
     }

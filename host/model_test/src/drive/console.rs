@@ -113,11 +113,12 @@ impl<M: Machine> Drive<M> {
     /// Opens the ground that the machine has not seen, if the line is the operator's `start now`.
     fn trust(&mut self, line: &str, unseen_mm: i16) {
         if words(line) == ["start", "now"] && unseen_mm > 0 {
-            let tool = self.here() - self.ticks(Setting::BeamToToolMm);
+            let (tool, margin) = (self.here() - self.ticks(Setting::BeamToToolMm), self.ticks(Setting::MarginMm));
             let unseen = f64::from(unseen_mm + 1) * f64::from(self.machine.settings().wheel().ticks(1000).0) / 1000.0;
             // The distance rolled since the line was executed.
             let late = if M::IS_OPEN { 0 } else { (self.speed.abs() * ANSWERED_S) as i64 };
-            self.model.trust(tool - 2 * self.ticks(Setting::MarginMm) - late, tool + unseen as i64);
+            // That distance includes the margin ahead of the ground.
+            self.model.trust(tool - 2 * margin - late, tool + unseen as i64 - margin);
         }
     }
 }
