@@ -83,8 +83,8 @@ fn the_status_says_how_far_seen_ground_still_is() {
         run.roll_to(place_mm);
         number(&status(&mut run.uno), "unseen_mm")
     };
-    // The answer is for a moment some milliseconds later, and the beam's response is a millisecond.
-    for (place_mm, unseen_mm) in [(50.0, 350), (300.0, 100), (390.0, 10)] {
+    // The margin ahead of that ground counts. The answer is for a moment some milliseconds later, and the beam's response is a millisecond.
+    for (place_mm, unseen_mm) in [(50.0, 400), (300.0, 150), (390.0, 60), (440.0, 10)] {
         let said = uno_says(place_mm);
         assert!((unseen_mm - 3..=unseen_mm + 1).contains(&said), "{said} mm at {place_mm} mm");
     }
@@ -130,7 +130,7 @@ fn nothing_that_was_scheduled_survives_a_reset() {
         assert_in_hold_with_tool_out(&mut run.uno);
         let after = status(&mut run.uno);
         assert_eq!((number(&after, "pos"), number(&after, "windows")), (0, 0), "{after}");
-        assert_eq!(number(&after, "unseen_mm"), 400, "{after}");
+        assert_eq!(number(&after, "unseen_mm"), 459, "{after}");
         let pulses = run.uno.pulses(wiring::SERVO);
         let mut since = pulses.iter().filter(|pulse| pulse.rise > cycle);
         assert!(since.all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));

@@ -107,7 +107,7 @@ macro_rules! status_table {
                     "the machine's speed in mm/s, negative backwards";
                 "windows" = count(machine.zones()) => zones: u32, "keep-out zones at the tool or ahead of it";
                 "unseen_mm" = number(machine.unseen_mm()) => unseen_mm: i32,
-                    "distance until ground that the beam has seen reaches the tool, in mm";
+                    "distance until the tool has left unseen ground and its margin, in mm";
             } if true = machine.has_second_beam() => {
                 "slip_permille" = optional(machine.slip_permille()) => slip_permille: Option<i32>,
                     "with a second beam: the wheel's slip in thousandths, as the event has it, or `none`";

@@ -48,7 +48,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.ground.zones()
     }
 
-    /// The distance in mm until ground that the beam has seen reaches the tool.
+    /// The distance in mm until the tool has left unseen ground and its margin.
     pub fn unseen_mm(&self) -> i16 {
         self.ground.millimetres(self.ground.unseen())
     }

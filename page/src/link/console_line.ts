@@ -112,7 +112,7 @@ export interface Status {
     readonly speedMmS: number;
     /** Keep-out zones at the tool or ahead of it. */
     readonly zones: number;
-    /** Distance until ground that the beam has seen reaches the tool, in mm. */
+    /** Distance until the tool has left unseen ground and its margin, in mm. */
     readonly unseenMm: number;
     /** With a second beam: the wheel's slip in thousandths, as the event has it, or `none`. */
     readonly slipPermille?: number;

@@ -45,7 +45,8 @@ impl<M: Machine> Drive<M> {
             stand.mistrust_speed(now_us, &geometry);
         }
         let clear = stand.is_clear(out, now_us, &geometry);
-        let is_unseen = out && self.machine.unseen_mm() > 0;
+        let margin_mm = self.machine.settings().get(Setting::MarginMm) as i16;
+        let is_unseen = out && self.machine.unseen_mm() > margin_mm;
         stand.judge(clear, ground, now_us, &geometry, is_unseen).map_err(TestCaseError::fail)
     }
 
