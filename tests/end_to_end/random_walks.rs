@@ -11,25 +11,32 @@
 //! WEEDER_SEED=7 WEEDER_CASES=3000 cargo test --test end_to_end random_walks
 //! ```
 
-mod board;
+use crate::common::elf;
+use model_test::{Extent, Failure, drive::Drive, go_all, run, run::Run};
+use soak::Board;
+use std::path::PathBuf;
+use std::sync::LazyLock;
 
-use board::Board;
-use model_test::{Extent, drive::Drive, go_all, run};
+static ELF: LazyLock<PathBuf> = LazyLock::new(elf);
+
+fn go(run: &Run) -> Result<u64, Failure> {
+    Drive::go(run, |beginning, world| Board::boot(&ELF, beginning, world))
+}
 
 #[test]
 fn in_random_runs_of_the_firmware_the_tool_keeps_off_every_canopy_that_was_seen() {
     let extent = Extent { runs: 60, least_turns: 200_000, shrinkings: 300 };
-    go_all(extent, &run::wild(14), Drive::<Board>::go);
+    go_all(extent, &run::wild(14), go);
 }
 
 #[test]
 fn with_a_slipping_wheel_and_beams_that_miss_plants_the_firmware_keeps_off_every_plant() {
     let extent = Extent { runs: 24, least_turns: 150_000, shrinkings: 300 };
-    go_all(extent, &run::beams(10), Drive::<Board>::go);
+    go_all(extent, &run::beams(10), go);
 }
 
 #[test]
 fn at_a_steady_speed_the_firmware_has_the_tool_leave_the_row_once_for_a_canopy() {
     let extent = Extent { runs: 12, least_turns: 50_000, shrinkings: 300 };
-    go_all(extent, &run::calm(4), Drive::<Board>::go);
+    go_all(extent, &run::calm(4), go);
 }

@@ -17,7 +17,7 @@ fn twenty_minutes_of_the_decisions_with_faults_harm_no_plant() {
 
 #[test]
 fn a_minute_of_the_firmware_with_faults_harms_no_plant() {
-    let tally = minutes(PLAN, 1.0, &elf(), |_| {}).expect("the firmware runs");
+    let tally = minutes(PLAN, 1, &elf(), |_| {}).expect("the firmware runs");
     assert!(tally.violations.is_empty(), "{tally}");
     assert!(tally.plants > 20 && tally.faults.len() > 2, "{tally}");
     assert!(tally.weeded_metres > 0.1 * tally.metres, "{tally}");

@@ -195,7 +195,11 @@ mod tests {
         {
             settings.set(setting, milliseconds).expect("within its range");
         }
-        assert_eq!(leads(&settings), (Length(199), Length(41), Length(7)), "only the way out is led at the expected speed");
+        assert_eq!(
+            leads(&settings),
+            (Length(199), Length(41), Length(7)),
+            "only the way out is led at the expected speed"
+        );
         settings.set(Setting::LeadOutMs, 0).expect("within its range");
         assert_eq!(leads(&settings), (Length::ZERO, Length::ZERO, Length(7)));
     }

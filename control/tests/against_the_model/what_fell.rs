@@ -28,7 +28,7 @@ fn run(row: &[(u32, u32)], lines: &str) -> Run {
 /// Executes the steps, checked after each. Returns the machine.
 #[track_caller]
 fn go(run: &Run) -> Drive {
-    let driven = Drive::new(run).and_then(|mut drive| {
+    let driven = Drive::new(run, Decisions::boot).and_then(|mut drive| {
         run.steps.iter().try_for_each(|step| drive.execute(step))?;
         Ok(drive)
     });

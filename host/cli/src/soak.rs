@@ -72,11 +72,6 @@ impl Study {
     fn plan(&self) -> Plan {
         Plan { seed: self.seed, faults_an_hour: self.faults.into() }
     }
-
-    /// Rows of the firmware on the virtual Uno.
-    fn rows(&self) -> Result<u64> {
-        Ok(soak::rows(self.plan(), self.uno_minutes.into())?)
-    }
 }
 
 /// Runs it and prints what it has shown, or writes a part of it.
@@ -114,10 +109,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     conclude(&study, &stages, json)
 }
 
-/// Computes a shard's hours and rows. The numbers of rows follow those of hours.
+/// Computes a shard's hours and minutes. The numbers of minutes follow those of hours.
 fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> {
     let hours = u64::from(study.hours);
-    let all = hours + study.rows()?;
+    let all = hours + u64::from(study.uno_minutes);
     let numbers = part.shard().numbers(all);
     let count = numbers.len() as f64;
     let bar = Progress::new("soaking");
@@ -125,8 +120,8 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
     for (number, begun) in numbers.zip(0..) {
         let show = |share: f64| bar.show((f64::from(begun) + share) / count);
         let outcome = match elf {
-            Some(elf) if number >= hours => soak::row(study.plan(), number - hours, elf)?,
-            _ => soak::hour(study.plan(), number, 1.0, show)?,
+            Some(elf) if number >= hours => soak::minute(study.plan(), number - hours, elf, show)?,
+            _ => soak::hour(study.plan(), number, show)?,
         };
         show(1.0);
         tallies.push(Numbered { number, outcome });
@@ -136,14 +131,14 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
     Ok(Finding::Good)
 }
 
-/// Prints the results of all hours and rows, which may come from several machines.
+/// Prints the results of all hours and minutes, which may come from several machines.
 ///
 /// # Errors
 /// If it cannot be printed.
 pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Finding> {
-    let rows = tallies.split_off((study.hours as usize).min(tallies.len()));
+    let minutes = tallies.split_off((study.hours as usize).min(tallies.len()));
     let mut stages = Vec::new();
-    for (title, tallies) in [(DECISIONS, tallies), (FIRMWARE, rows)] {
+    for (title, tallies) in [(DECISIONS, tallies), (FIRMWARE, minutes)] {
         if !tallies.is_empty() {
             let stage = Stage { title, tally: soak::total(tallies.into_iter().map(Ok::<_, SoakError>))? };
             stage.say(json)?;

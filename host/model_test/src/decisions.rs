@@ -136,12 +136,12 @@ fn unwrapped(count: i64, position: Position) -> i64 {
     count + i64::from((position - Position::new(count as i32)).0)
 }
 
-impl Machine for Decisions {
-    const IS_OPEN: bool = true;
-    const NARROW_MM: u16 = 0;
-    const LATENESS_US: u64 = 0;
-
-    fn new(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError> {
+impl Decisions {
+    /// A new machine. It always starts.
+    ///
+    /// # Errors
+    /// None; a [`Drive`](crate::drive::Drive) starts every machine in this way.
+    pub fn boot(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError> {
         let (eeprom, weed) = (Eeprom::new(), Rc::default());
         let weeder = init(&eeprom, &weed, beginning, world, Cause::PowerOn);
         Ok(Self {
@@ -154,6 +154,12 @@ impl Machine for Decisions {
             beginning: beginning.clone(),
         })
     }
+}
+
+impl Machine for Decisions {
+    const IS_OPEN: bool = true;
+    const NARROW_MM: u16 = 0;
+    const LATENESS_US: u64 = 0;
 
     fn count(&mut self, _: bool) {}
 
@@ -263,8 +269,9 @@ impl Machine for Decisions {
         from_the_field(self.weeder.classifier())
     }
 
-    fn spoil(&mut self, address: usize, byte: u8) {
+    fn spoil(&mut self, address: usize, byte: u8) -> Checked {
         self.eeprom.spoil(address, byte);
+        Ok(())
     }
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
@@ -281,8 +288,8 @@ impl Machine for Decisions {
     }
 }
 
-/// The field examples.
-fn from_the_field(classifier: &impl Classifier) -> Vec<Listed> {
+/// The field examples of a classifier.
+pub fn from_the_field(classifier: &impl Classifier) -> Vec<Listed> {
     let all = std::iter::successors(classifier.listed(0), |&(_, next)| classifier.listed(next));
     all.map(|(listed, _)| listed).filter(|listed| listed.from_field).collect()
 }

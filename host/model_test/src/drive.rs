@@ -50,8 +50,6 @@ const TOO_MANY: u32 = 40;
 #[derive(Clone, Copy, Debug)]
 struct Place {
     tool: i64,
-    /// The same on the ground, independent of the wheel's slip.
-    ground: i64,
     slowest: f64,
     fastest: f64,
 }
@@ -127,11 +125,14 @@ pub struct Drive<M> {
 }
 
 impl<M: Machine> Drive<M> {
-    /// Starts a new machine. The operator clears the alarm about its settings.
+    /// Starts a new machine with `boot`. The operator clears the alarm about its settings.
     ///
     /// # Errors
-    /// If a check fails.
-    pub fn new(run: &Run) -> Result<Self, TestCaseError> {
+    /// If it does not start, or a check fails.
+    pub fn new(
+        run: &Run,
+        boot: impl FnOnce(&Beginning, &World) -> Result<M, TestCaseError>,
+    ) -> Result<Self, TestCaseError> {
         let (beginning, row) = (run.beginning.clone(), run.levels());
         let world = World {
             time_us: 0,
@@ -143,7 +144,7 @@ impl<M: Machine> Drive<M> {
             end_switch_on: false,
             stack_is_low: false,
         };
-        let machine = M::new(&beginning, &world)?;
+        let machine = boot(&beginning, &world)?;
         let mut drive = Self {
             scale: scale(machine.settings()),
             machine,
@@ -195,8 +196,11 @@ impl<M: Machine> Drive<M> {
     ///
     /// # Errors
     /// If a check fails.
-    pub fn go(run: &Run) -> Result<u64, TestCaseError> {
-        let mut drive = Self::new(run)?;
+    pub fn go(
+        run: &Run,
+        boot: impl FnOnce(&Beginning, &World) -> Result<M, TestCaseError>,
+    ) -> Result<u64, TestCaseError> {
+        let mut drive = Self::new(run, boot)?;
         run.steps.iter().try_for_each(|step| drive.execute(step))?;
         // Where the real plants are checked, the row goes on.
         if drive.stand.is_none() {
@@ -288,7 +292,7 @@ impl<M: Machine> Drive<M> {
             }),
             Step::Reset(cause) => self.init(cause, None),
             Step::Spoil { address, byte } => {
-                self.machine.spoil(address, byte);
+                self.machine.spoil(address, byte)?;
                 self.is_spoiled = true;
                 self.init(Cause::PowerOn, None)
             }
@@ -603,10 +607,8 @@ impl<M: Machine> Drive<M> {
         let (slowest, fastest) = self.speeds.extremes();
         let (slowest, fastest) = (slowest - SPEED_RESOLUTION, fastest + SPEED_RESOLUTION);
         let ground = self.ground.floor() as i64 - self.geometry().beam_to_tool;
-        let place = Place { tool: place - self.ticks(Setting::BeamToToolMm), ground, slowest, fastest };
-        if M::IS_OPEN {
-            self.check_stand(ground, out)?;
-        }
+        let place = Place { tool: place - self.ticks(Setting::BeamToToolMm), slowest, fastest };
+        self.check_stand(ground, out || self.is_tried)?;
         if out || !works || self.machine.settings_are_in_doubt() {
             self.suspect = None;
         } else {

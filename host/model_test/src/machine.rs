@@ -3,7 +3,6 @@
 //! A test can inspect the decisions at any moment. The firmware in an Uno shows only its pins, and its answers on the
 //! console. So each implementation of the trait returns the facts that are visible, and the drive checks those.
 
-use crate::run::Beginning;
 use control::{
     ground::class::Listed,
     measure::reset::Cause,
@@ -55,12 +54,6 @@ pub trait Machine: Sized {
 
     /// Longest time from the decision to leave the row until that is visible.
     const LATENESS_US: u64;
-
-    /// Starts a new machine.
-    ///
-    /// # Errors
-    /// If it does not start.
-    fn new(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError>;
 
     /// The encoder counts a tick, `up` or down.
     fn count(&mut self, up: bool);
@@ -138,8 +131,11 @@ pub trait Machine: Sized {
     /// The stored examples from the field.
     fn examples(&self) -> Vec<Listed>;
 
-    /// Changes a byte of the EEPROM. Only the decisions have it, and the runs of an Uno do not draw this step.
-    fn spoil(&mut self, _address: usize, _byte: u8) {}
+    /// Changes a byte of the EEPROM. The caller then resets the machine.
+    ///
+    /// # Errors
+    /// If the machine cannot be started with it.
+    fn spoil(&mut self, address: usize, byte: u8) -> Checked;
 
     /// Resets the machine. If the power fails, a byte that is being written to the EEPROM becomes `torn`.
     ///

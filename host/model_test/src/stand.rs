@@ -102,8 +102,9 @@ impl Stand {
         (start > 0).then_some((number, start))
     }
 
-    /// Follows the tool's orders. Returns whether the tool is clear of the row.
-    pub fn is_clear(&mut self, out: bool, now_us: u64, geometry: &Geometry) -> bool {
+    /// Follows the tool's orders. Returns whether the tool is clear of the row. An order to leave may be `lateness_us` old when it
+    /// is seen.
+    pub fn is_clear(&mut self, out: bool, now_us: u64, lateness_us: u64, geometry: &Geometry) -> bool {
         let age_us = now_us - self.ordered_us;
         let clear = if self.in_row {
             !self.was_in_row && age_us < geometry.dead_us
@@ -112,7 +113,8 @@ impl Stand {
         };
         if out == self.in_row {
             // A tool that has not begun to move yet is still where it was.
-            (self.in_row, self.ordered_us, self.was_in_row) = (!out, now_us, !clear);
+            let lateness_us = if out { lateness_us } else { 0 };
+            (self.in_row, self.ordered_us, self.was_in_row) = (!out, now_us.saturating_sub(lateness_us), !clear);
         }
         clear
     }

@@ -1,4 +1,4 @@
-//! The parameters of a soak, and the results of its hours, of its rows, and of all of them.
+//! The parameters of a soak, and the results of its hours or minutes, and of all of them.
 
 use field::planting::PlantingError;
 use rand::SeedableRng;
@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::AddAssign;
 use thiserror::Error;
-use trial::TrialError;
 
 /// The parameters of a soak.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,9 +24,9 @@ pub enum SoakError {
     /// A row did not grow.
     #[error(transparent)]
     Planting(#[from] PlantingError),
-    /// The virtual Uno or its console failed.
-    #[error(transparent)]
-    Trial(#[from] TrialError),
+    /// A new machine does not start.
+    #[error("a new machine does not start: {0}")]
+    Start(String),
 }
 
 /// The result of a soak.
@@ -57,7 +56,7 @@ pub struct Tally {
     pub resets: BTreeMap<String, u64>,
     /// Warnings by name.
     pub warnings: BTreeMap<String, u64>,
-    /// Failed checks, each with its hour or row, and the time in it.
+    /// Failed checks, each with its hour or minute, and the time in it.
     pub violations: Vec<String>,
 }
 
@@ -109,10 +108,10 @@ impl AddAssign for Tally {
     }
 }
 
-/// Adds the hours or rows of a soak, up to the first with a violation. Later ones are not computed.
+/// Adds the hours or minutes of a soak, up to the first with a violation. Later ones are not computed.
 ///
 /// # Errors
-/// The first error of an hour or a row.
+/// The first error of an hour or a minute.
 pub fn total<E>(tallies: impl IntoIterator<Item = Result<Tally, E>>) -> Result<Tally, E> {
     let mut total = Tally::default();
     for tally in tallies {
@@ -124,7 +123,7 @@ pub fn total<E>(tallies: impl IntoIterator<Item = Result<Tally, E>>) -> Result<T
     Ok(total)
 }
 
-/// The random numbers of an hour or a row.
+/// The random numbers of an hour or a minute.
 pub(super) fn chance(plan: Plan, number: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
     rng.set_stream(number);
@@ -139,10 +138,10 @@ pub(super) fn count(names: &mut BTreeMap<String, u64>, name: &str) {
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "Worked      {:.2} h, {:.2} km, {} rows", self.seconds / 3600.0, self.metres / 1000.0, self.rows)?;
-        writeln!(f, "Weeded      {:.0} % of the way", 100.0 * self.weeded_metres / self.metres.max(1.0))?;
+        writeln!(f, "Weeded      {:.0} % of the distance", 100.0 * self.weeded_metres / self.metres.max(1.0))?;
         writeln!(
             f,
-            "Plants      {} passed, {} harmed; excused: {} taken for weeds, {} reached while the firmware could not know",
+            "Plants      {} passed, {} harmed; excused: {} classified as weeds, {} reached while the firmware could not know",
             self.plants, self.harmed, self.mistaken, self.blind
         )?;
         for (title, names) in

@@ -44,21 +44,14 @@ impl<M: Machine> Drive<M> {
         if self.encoder != Encoder::Works {
             stand.mistrust_speed(now_us, &geometry);
         }
-        let clear = stand.is_clear(out, now_us, &geometry);
+        let clear = stand.is_clear(out, now_us, M::LATENESS_US, &geometry);
         let margin_mm = self.machine.settings().get(Setting::MarginMm) as i16;
         let is_unseen = out && self.machine.unseen_mm() > margin_mm;
         stand.judge(clear, ground, now_us, &geometry, is_unseen).map_err(TestCaseError::fail)
     }
 
     /// Checks a position of the tool in the row.
-    fn check_place(&mut self, Place { tool, ground, slowest, fastest }: Place) -> Checked {
-        if !M::IS_OPEN {
-            // The order is visible only as a pulse, too late to judge the swing.
-            let geometry = self.geometry();
-            if let Some(stand) = &mut self.stand {
-                stand.judge(false, ground, self.world.time_us, &geometry, false).map_err(TestCaseError::fail)?;
-            }
-        }
+    fn check_place(&mut self, Place { tool, slowest, fastest }: Place) -> Checked {
         // With two beams the machine corrects slip, which the model of the ground does not know.
         if self.stand.is_some() && self.had_second_beam {
             return Ok(());

@@ -1,15 +1,16 @@
-//! Hours of the decisions on the host: a model-based run of chance steps, from row to row.
+//! Field work: a model-based run of random steps, from row to row.
 //!
 //! [`Drive`] executes each step and checks it. This file draws the machines, the rows, the steps and the faults, and
 //! counts. Each row has another machine, with a second beam or without, and a wheel whose slip changes. Now and then one
 //! of two beams misses a plant. The tool must be clear of every plant that a beam has seen.
 //!
-//! Unlike on the chip, clock and count continue over resets. They begin shortly before they overflow, so that each hour
-//! passes both overflows.
+//! The decisions' clock and count continue over resets. They begin shortly before they overflow, so that each hour passes
+//! both overflows.
 
+use crate::board::Board;
 use crate::tally::{Plan, SoakError, Tally, chance, count, total};
 use control::{measure::reset::Cause, operate::state::State, settings::Setting};
-use field::machine::Machine;
+use field::machine;
 use field::motion::mm_s;
 use field::planting::Planting;
 use field::row::Row;
@@ -18,18 +19,19 @@ use link::settings;
 use model_test::Failure;
 use model_test::decisions::{CHIP_SIZE, Decisions};
 use model_test::drive::Drive;
-use model_test::machine::Checked;
+use model_test::machine::{Checked, Machine, World};
 use model_test::run::{Beginning, Classification, Encoder, Run, Sight, Step, TICKS_A_MM};
 use model_test::stand::{Geometry, Score};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use std::path::Path;
 
 /// The clock begins a minute before its overflow, and the count 200 m before its own.
 const FIRST_STEPS: u32 = u32::MAX - 15_000_000;
 const FIRST_COUNT: i32 = i32::MAX - 382_000;
 
 /// The rows: plants half a metre apart, as for the built-in examples.
-pub(super) const PLANTING: Planting = Planting {
+const PLANTING: Planting = Planting {
     plants: 40,
     spacing_mm: 500.0,
     spacing_scatter_mm: 40.0,
@@ -53,7 +55,7 @@ const DENSE: Planting = Planting {
 const SECOND_BEAM_TO_TOOL_MM: u16 = 300;
 
 /// Either of two beams misses one canopy in this many.
-pub(super) const MISSED_ONCE_IN: usize = 16;
+const MISSED_ONCE_IN: usize = 16;
 
 /// Ground before and behind each row.
 const HEADLAND_MM: f64 = 1000.0;
@@ -62,9 +64,9 @@ const HEADLAND_MM: f64 = 1000.0;
 const SAVE_TURNS: u32 = 160;
 
 /// A machine and its operator in the field.
-struct Field {
+struct Field<M> {
     rng: ChaCha8Rng,
-    drive: Drive<Decisions>,
+    drive: Drive<M>,
     /// The settings that the operator types for the present machine.
     typed: Vec<(Setting, u16)>,
     /// The position at which the present row ends.
@@ -76,30 +78,62 @@ struct Field {
     tally: Tally,
 }
 
-/// Works for this many simulated hours. `progress` gets the share done, from 0 to 1.
+/// Runs the decisions for this many simulated hours. `progress` gets the share done, from 0 to 1.
 ///
 /// # Errors
-/// [`SoakError::Planting`].
+/// [`SoakError`].
 pub fn hours(plan: Plan, hours: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
     total((0..hours.ceil() as u64).map(|number| {
         let begun = number as f64;
-        hour(plan, number, (hours - begun).min(1.0), |share| progress((begun + share) / hours))
+        let share = (hours - begun).min(1.0);
+        part(plan, ("hour", number), share * 3600.0, Decisions::boot, |done| progress((begun + share * done) / hours))
     }))
 }
 
-/// Works for an hour of a soak, with this number from 0, or for a part of it. `progress` gets the share of the hour.
+/// Runs the decisions for an hour of a soak, with this number from 0. `progress` gets the share of the hour.
 ///
 /// # Errors
-/// [`SoakError::Planting`].
-pub fn hour(plan: Plan, number: u64, part: f64, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
-    let field = Field::new(chance(plan, number), plan.faults_an_hour);
-    let mut tally = field.work_for(part * 3600.0, &mut |share| progress(share * part))?;
-    tally.violations = tally.violations.iter().map(|what| format!("hour {}, {what}", number + 1)).collect();
+/// [`SoakError`].
+pub fn hour(plan: Plan, number: u64, progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
+    part(plan, ("hour", number), 3600.0, Decisions::boot, progress)
+}
+
+/// Runs the firmware at `elf` for this many simulated minutes. `progress` gets the share done, from 0 to 1.
+///
+/// # Errors
+/// [`SoakError`].
+pub fn minutes(plan: Plan, minutes: u64, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
+    total(
+        (0..minutes)
+            .map(|number| minute(plan, number, elf, |share| progress((number as f64 + share) / minutes as f64))),
+    )
+}
+
+/// Runs the firmware at `elf` for a minute of a soak, with this number from 0. `progress` gets the share of the minute.
+///
+/// # Errors
+/// [`SoakError`].
+pub fn minute(plan: Plan, number: u64, elf: &Path, progress: impl FnMut(f64)) -> Result<Tally, SoakError> {
+    part(plan, ("minute", number), 60.0, |beginning, world| Board::boot(elf, beginning, world), progress)
+}
+
+/// Runs a machine for a part of a soak, which has a name and a number from 0. `progress` gets the share done.
+fn part<M: Machine>(
+    plan: Plan,
+    (name, number): (&str, u64),
+    seconds: f64,
+    boot: impl FnOnce(&Beginning, &World) -> Result<M, Failure>,
+    mut progress: impl FnMut(f64),
+) -> Result<Tally, SoakError> {
+    let field = Field::new(chance(plan, number), plan.faults_an_hour, boot);
+    let field = field.map_err(|failure| SoakError::Start(failure.to_string()))?;
+    let mut tally = field.work_for(seconds, &mut progress)?;
+    tally.violations = tally.violations.iter().map(|what| format!("{name} {}, {what}", number + 1)).collect();
     Ok(tally)
 }
 
 /// A run without steps, over a row as each of the machine's beams sees it. Now and then one of two beams misses a canopy.
-fn run_over(row: &Row, machine: &Machine, rng: &mut ChaCha8Rng) -> Run {
+fn run_over(row: &Row, machine: &machine::Machine, rng: &mut ChaCha8Rng) -> Run {
     let start_mm = row.span_mm().start - HEADLAND_MM;
     let mut run = standing();
     let mut end_mm = 0;
@@ -131,11 +165,15 @@ fn standing() -> Run {
     Run { beginning, row: vec![(1000, 0)], sights: Vec::new(), steps: Vec::new() }
 }
 
-impl Field {
-    fn new(rng: ChaCha8Rng, faults_an_hour: f64) -> Self {
+impl<M: Machine> Field<M> {
+    fn new(
+        rng: ChaCha8Rng,
+        faults_an_hour: f64,
+        boot: impl FnOnce(&Beginning, &World) -> Result<M, Failure>,
+    ) -> Result<Self, Failure> {
         let mut field = Self {
             rng,
-            drive: Drive::new(&standing()).expect("a new machine starts"),
+            drive: Drive::new(&standing(), boot)?,
             typed: Vec::new(),
             row_end: 0,
             faults_a_second: faults_an_hour / 3600.0,
@@ -145,9 +183,9 @@ impl Field {
         };
         field.draw_fault_time();
         // A new machine has an alarm about its settings until they are saved, which is no result of the soak.
-        field.type_in(&["save"]).expect("a machine in HOLD saves");
+        field.type_in(&["save"])?;
         field.tally = Tally::default();
-        field
+        Ok(field)
     }
 
     /// Draws the time of the next fault.
@@ -169,8 +207,8 @@ impl Field {
     }
 
     /// Draws a machine, and its stem zone in millimetres. The operator types its settings for the next row.
-    fn draw_machine(&mut self) -> (Machine, u16) {
-        let mut machine = Machine::default();
+    fn draw_machine(&mut self) -> (machine::Machine, u16) {
+        let mut machine = machine::Machine::default();
         if self.rng.random() {
             let to_tool_mm = self.rng.random_range(470..=1000_u16);
             let apart_mm = self.rng.random_range(to_tool_mm * 7 / 20..=to_tool_mm - SECOND_BEAM_TO_TOOL_MM);
@@ -186,7 +224,7 @@ impl Field {
     }
 
     /// Works a row from its headland to its end, or to the soak's end.
-    fn work(&mut self, row: &Row, machine: &Machine, stem_zone_mm: u16, last_s: f64) {
+    fn work(&mut self, row: &Row, machine: &machine::Machine, stem_zone_mm: u16, last_s: f64) {
         let run = run_over(row, machine, &mut self.rng);
         let outcome = self.work_run(&run, machine, stem_zone_mm, last_s);
         let Score { metres, weeded_metres, plants, harmed, mistaken, blind } = self.drive.score();
@@ -200,7 +238,7 @@ impl Field {
         }
     }
 
-    fn work_run(&mut self, run: &Run, machine: &Machine, stem_zone_mm: u16, last_s: f64) -> Checked {
+    fn work_run(&mut self, run: &Run, machine: &machine::Machine, stem_zone_mm: u16, last_s: f64) -> Checked {
         let ticks = |mm: f64| (mm * TICKS_A_MM) as i64;
         let us = |ms: f64| (ms * 1000.0) as u64;
         let geometry = Geometry {
@@ -330,6 +368,10 @@ impl Field {
                 let mut noise: String = (0..rng.random_range(1..300))
                     .map(|_| if rng.random_range(0..4) == 0 { '\n' } else { char::from(rng.random::<u8>()) })
                     .collect();
+                // The chip drops what comes while it answers, so on its line the noise is one line.
+                if !M::IS_OPEN {
+                    noise = noise.replace(['\n', '\r'], "#");
+                }
                 noise += "\nstatus\nget\ndump\nexamples";
                 ("console_noise", Step::Type(noise))
             }
@@ -347,8 +389,8 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    fn field() -> Field {
-        Field::new(ChaCha8Rng::seed_from_u64(1), 0.0)
+    fn field() -> Field<Decisions> {
+        Field::new(ChaCha8Rng::seed_from_u64(1), 0.0, Decisions::boot).expect("a new machine starts")
     }
 
     /// Six minutes of work without faults by a machine with these leads.

@@ -1,17 +1,13 @@
-//! The firmware in the virtual Uno as a machine for model-based tests. The test drives its pins, and observes the
-//! servo's pulse and the console.
+//! The firmware in the virtual Uno as a machine for model-based runs. The run drives its pins, and observes the servo's
+//! pulse and the console.
 //!
 //! The settings in use follow from acknowledged commands. Values that only the firmware knows, such as measured times
 //! of its servo, make them uncertain until `get` is typed. Saved data is read from the EEPROM, and compared with the
 //! output of the restarted firmware.
 
-use crate::common::{elf, number, value};
 use control::alarm::Alarm;
 use control::ground::examples::EXAMPLES;
-use control::ground::{
-    class::{Classifier, Listed},
-    nearest::Nearest,
-};
+use control::ground::{class::Listed, nearest::Nearest};
 use control::measure::reset::Cause;
 use control::memory::{SIZE, Volatile};
 use control::operate::{state::State, tool::Reason};
@@ -19,18 +15,16 @@ use control::say::command::{Command, parse};
 use control::settings::{Setting, Settings};
 use field::wiring;
 use model_test::Failure;
+use model_test::decisions::from_the_field;
 use model_test::drive::is_end;
 use model_test::machine::{Attended, Checked, Machine, World};
 use model_test::run::Beginning;
 use std::collections::VecDeque;
 use std::fmt;
-use std::path::PathBuf;
-use std::sync::LazyLock;
+use std::path::{Path, PathBuf};
 use trial::console::{ConsoleError, ask};
 use uno::{CYCLES_PER_SECOND, Pin, PinChange};
 use uno::{Uno, UnoError};
-
-static ELF: LazyLock<PathBuf> = LazyLock::new(elf);
 
 const CYCLES_A_US: u64 = CYCLES_PER_SECOND / 1_000_000;
 
@@ -75,6 +69,7 @@ impl ServoLine {
 
 /// The machine, see the module's words.
 pub struct Board {
+    elf: PathBuf,
     uno: Uno,
     /// Levels of this turn, and whether each is the encoder's; those keep their order in time.
     to_come: Vec<(Vec<(Pin, bool)>, bool)>,
@@ -118,6 +113,42 @@ fn unanswered(error: ConsoleError) -> Failure {
 const CHANNELS: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
 
 impl Board {
+    /// Powers up an Uno with the firmware at `elf`, and starts clock and count as `beginning` has them.
+    ///
+    /// # Errors
+    /// If the firmware cannot be read, or does not start.
+    pub fn boot(elf: &Path, beginning: &Beginning, world: &World) -> Result<Self, Failure> {
+        let mut uno = Uno::boot(elf).map_err(stopped)?;
+        show_beams(&mut uno, world);
+        uno.run_until_symbol("main", GREETING_CYCLES).map_err(stopped)?;
+        let (count, overflows) = (beginning.count.to_le_bytes(), (beginning.steps >> 8).to_le_bytes());
+        uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2]).map_err(stopped)?;
+        uno.write("weeder_firmware::encoder::COUNT_HIGH", &count[2..]).map_err(stopped)?;
+        uno.write("weeder_firmware::clock::OVERFLOWS_LOW", &overflows[..1]).map_err(stopped)?;
+        uno.write("weeder_firmware::clock::OVERFLOWS_HIGH", &overflows[1..3]).map_err(stopped)?;
+        let mut board = Self {
+            elf: elf.to_owned(),
+            uno,
+            to_come: Vec::new(),
+            phase: 0,
+            zero: 0,
+            servo: ServoLine::default(),
+            typed: VecDeque::new(),
+            current: None,
+            heard: String::new(),
+            settings: Settings::new(),
+            in_doubt: false,
+            times_the_servo: false,
+            state: State::Hold,
+            unseen_mm: 0,
+            rests_since: None,
+            resets: 0,
+            stack_was_low: false,
+        };
+        board.init()?;
+        Ok(board)
+    }
+
     fn init(&mut self) -> Result<String, Failure> {
         let greeting = self.uno.run_until_serial("commands\r\n", GREETING_CYCLES).map_err(stopped)?;
         let state = greeting.rsplit_once(", state ").and_then(|(_, rest)| rest.split(',').next());
@@ -144,7 +175,7 @@ impl Board {
                 "work" => State::Work,
                 _ => self.alarm(value(line, "name"))?,
             };
-            self.unseen_mm = number(line, "unseen_mm") as i16;
+            self.unseen_mm = value(line, "unseen_mm").parse().unwrap_or_default();
             let rests = self.state != State::Work;
             self.rests_since = rests.then(|| self.rests_since.unwrap_or(self.uno.cycle()));
             self.times_the_servo &= self.state == State::Hold;
@@ -213,6 +244,16 @@ impl Board {
     }
 }
 
+fn show_beams(uno: &mut Uno, world: &World) {
+    uno.set(wiring::BEAM, !world.broken);
+    uno.set(wiring::SECOND_BEAM, !world.second_broken);
+}
+
+/// The value of a key in a line; empty if it is not there.
+fn value<'a>(line: &'a str, key: &str) -> &'a str {
+    line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('=')).unwrap_or_default()
+}
+
 /// The setting that a line of `get` shows, and its value.
 fn setting(line: &str) -> Option<(Setting, u16)> {
     let (name, rest) = line.split_once('=')?;
@@ -230,38 +271,6 @@ impl Machine for Board {
     const NARROW_MM: u16 = 45;
     /// A frame of the servo, a pulse that is known at its end, and a turn.
     const LATENESS_US: u64 = 26_000;
-
-    fn new(beginning: &Beginning, world: &World) -> Result<Self, Failure> {
-        let mut uno = Uno::boot(&ELF).map_err(stopped)?;
-        uno.set(wiring::BEAM, !world.broken);
-        uno.set(wiring::SECOND_BEAM, !world.second_broken);
-        uno.run_until_symbol("main", GREETING_CYCLES).map_err(stopped)?;
-        let (count, overflows) = (beginning.count.to_le_bytes(), (beginning.steps >> 8).to_le_bytes());
-        uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2]).map_err(stopped)?;
-        uno.write("weeder_firmware::encoder::COUNT_HIGH", &count[2..]).map_err(stopped)?;
-        uno.write("weeder_firmware::clock::OVERFLOWS_LOW", &overflows[..1]).map_err(stopped)?;
-        uno.write("weeder_firmware::clock::OVERFLOWS_HIGH", &overflows[1..3]).map_err(stopped)?;
-        let mut board = Self {
-            uno,
-            to_come: Vec::new(),
-            phase: 0,
-            zero: 0,
-            servo: ServoLine::default(),
-            typed: VecDeque::new(),
-            current: None,
-            heard: String::new(),
-            settings: Settings::new(),
-            in_doubt: false,
-            times_the_servo: false,
-            state: State::Hold,
-            unseen_mm: 0,
-            rests_since: None,
-            resets: 0,
-            stack_was_low: false,
-        };
-        board.init()?;
-        Ok(board)
-    }
 
     fn count(&mut self, up: bool) {
         let (a, b) = CHANNELS[self.phase];
@@ -409,12 +418,21 @@ impl Machine for Board {
     fn examples(&self) -> Vec<Listed> {
         let mut bytes = [0; SIZE];
         bytes.copy_from_slice(&self.uno.eeprom()[SIZE..]);
-        let kept = Nearest::new(&EXAMPLES[..], Volatile::holding(bytes));
-        let all = std::iter::successors(kept.listed(0), |&(_, next)| kept.listed(next));
-        all.map(|(listed, _)| listed).filter(|listed| listed.from_field).collect()
+        from_the_field(&Nearest::new(&EXAMPLES[..], Volatile::holding(bytes)))
+    }
+
+    fn spoil(&mut self, address: usize, byte: u8) -> Checked {
+        let mut eeprom = self.uno.eeprom();
+        eeprom[address] = byte;
+        self.uno = Uno::boot_with_eeprom(&self.elf, &eeprom).map_err(stopped)?;
+        let (a, b) = CHANNELS[self.phase];
+        self.uno.set(wiring::ENCODER_A, a);
+        self.uno.set(wiring::ENCODER_B, b);
+        Ok(())
     }
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
+        show_beams(&mut self.uno, world);
         // A line on its way would otherwise reach the restarted machine.
         while self.uno.bytes_pending() > 0 {
             self.uno.run_for_ms(1).map_err(stopped)?;
@@ -435,7 +453,7 @@ impl Machine for Board {
         if !greeting.contains(&format!("reset by {text},")) {
             return Err(Failure::fail(format!("reset by {text}, and it says {greeting:?}")));
         }
-        (self.current, self.heard) = (None, String::new());
+        (self.current, self.heard) = (None, greeting);
         self.typed.clear();
         self.uno.take_changes();
         self.servo = ServoLine::default();
