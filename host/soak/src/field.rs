@@ -351,8 +351,10 @@ impl<M: Machine> Field<M> {
             3 => ("lost_edges", Step::LoseEdges { turns: rng.random_range(0..3) }),
             4 => ("low_stack", Step::LowerStack { turns: 1 }),
             5 => {
-                let causes = [Cause::PowerOn, Cause::BrownOut, Cause::Watchdog, Cause::LoopStalled];
-                ("reset", Step::Reset(causes[rng.random_range(0..causes.len())]))
+                let causes = [Cause::PowerOn, Cause::BrownOut, Cause::LoopStalled, Cause::Watchdog];
+                // On the chip, the loop's monitor comes before the watchdog.
+                let possible = if M::IS_OPEN { &causes[..] } else { &causes[..3] };
+                ("reset", Step::Reset(possible[rng.random_range(0..possible.len())]))
             }
             6 => {
                 let no_plant_m = rng.random_range(1..8);
