@@ -123,10 +123,7 @@ impl Ground {
     pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
         self.correct(settings);
         self.beam = self.geometry.scale.wrap(position);
-        self.detector.begin(self.beam, broken);
-        self.keep_out.set_known_from(self.beam);
-        self.last_plant = self.beam;
-        self.second_beam.begin(self.beam);
+        self.begin_here(broken);
     }
 
     /// Recalculates the distances after a change of settings. The caller then calls [`lead`](Self::lead). A new scale makes all
@@ -140,7 +137,7 @@ impl Ground {
         }
         if self.geometry.scale != scale {
             self.beam = self.geometry.scale.wrap(position);
-            self.begin_here();
+            self.begin_here(self.detector.is_broken());
         }
     }
 
@@ -216,7 +213,7 @@ impl Ground {
         // After rolling back this far, the beam sees the same ground again.
         let is_beyond_memory = self.detector.frontier() - self.beam > memory;
         if is_beyond_memory {
-            self.begin_here();
+            self.begin_here(self.detector.is_broken());
         }
         let complete = self.detector.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
         // Counted from the frontier: the beam is at most the memory behind it. From the tool, the distance could exceed the range
@@ -254,9 +251,10 @@ impl Ground {
         self.forget();
     }
 
-    /// Forgets everything, and starts detection at the beam's position.
-    fn begin_here(&mut self) {
-        self.detector.begin(self.beam, self.detector.is_broken());
+    /// Forgets everything, and starts detection at the beam's position. `broken` is its level.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn begin_here(&mut self, broken: bool) {
+        self.detector.begin(self.beam, broken);
         self.last_plant = self.beam;
         self.forget();
         self.unclassified.known = Known::Nothing;

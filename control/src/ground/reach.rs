@@ -82,10 +82,7 @@ impl Geometry {
         self.stem_zone = length(self, Setting::StemZoneMm);
         self.merge_gap = length(self, Setting::MergeGapMm);
         self.guard_spacing = length(self, Setting::GuardSpacingMm);
-        self.guard_scatter = Length::ZERO;
-        if self.guard_spacing > Length::ZERO {
-            self.guard_scatter = length(self, Setting::GuardScatterMm);
-        }
+        self.guard_scatter = length(self, Setting::GuardScatterMm);
         self.guarded = self.guard_scatter + Length(self.stem_zone.0 >> 1);
         self.memory = Length(self.scale.length(metre).0 * MEMORY_M);
     }
