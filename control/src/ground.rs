@@ -119,9 +119,9 @@ impl Ground {
         rolled_back_too_far: false,
     };
 
-    /// Starts detection on unknown ground. The beam is at `position`; `broken` is its level.
-    pub fn begin(&mut self, settings: &Settings, position: Position, broken: bool) {
-        self.correct(settings);
+    /// Starts detection on unknown ground, with the distances of the last [`follow`](Self::follow). The beam is at `position`;
+    /// `broken` is its level.
+    pub fn begin(&mut self, position: Position, broken: bool) {
         self.beam = self.geometry.scale.wrap(position);
         self.begin_here(broken);
     }
@@ -495,7 +495,8 @@ mod tests {
             settings.set(setting, 0).expect("within its range");
         }
         let mut ground = Ground::NONE;
-        ground.begin(&settings, Position::new(0), false);
+        ground.follow(&settings, Position::new(0));
+        ground.begin(Position::new(0), false);
         ground.lead(&settings, SPEED, SPEED);
         ground.edge(Position::new(1000), true);
         ground.edge(Position::new(1300), false);
@@ -636,7 +637,8 @@ mod tests {
     #[test]
     fn rolling_back_to_dropped_ground_is_reported_once() {
         let mut ground = Ground::NONE;
-        ground.begin(&Settings::new(), Position::new(0), false);
+        ground.follow(&Settings::new(), Position::new(0));
+        ground.begin(Position::new(0), false);
         let plants = 20;
         for leading in (0..plants).map(|plant| 1000 + 400 * plant) {
             ground.edge(Position::new(leading), true);

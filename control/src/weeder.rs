@@ -127,7 +127,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
         controller.classifier.init();
         controller.state = controller.configuration.load().map_or(State::Hold, State::Alarm);
         controller.follow_settings();
-        controller.ground.begin(controller.configuration.settings(), position, beam_broken);
+        controller.ground.begin(position, beam_broken);
         controller.cause = cause;
         controller.sensors.init(startup);
         controller.tool.init(now);
