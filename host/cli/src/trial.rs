@@ -13,7 +13,7 @@ use clap::{Args, Command, FromArgMatches, ValueEnum};
 use comfy_table::{CellAlignment, Table};
 use experiments::evaluation::{Analysis, published};
 use experiments::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
-use experiments::page::{Page, RowPicture};
+use experiments::page::Page;
 use experiments::shard::{Numbered, Shard};
 use experiments::statistics::Share;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
@@ -525,10 +525,6 @@ fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, find
     }));
     let settings = experiment.conditions.settings.iter();
     parameters.extend(settings.map(|(setting, value)| (format!("settings.{setting}"), value.to_string())));
-    let row = picture.map(|drawing| RowPicture {
-        drawing,
-        caption: "The first metres of a row at the highest speed, as the firmware weeded them.".to_owned(),
-    });
     let words = [study.words.clone(), vec!["--out".to_owned(), folder.path().display().to_string()]].concat();
     let page = Page {
         title: "Field trial of the intra-row weeder, simulated",
@@ -536,8 +532,8 @@ fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, find
         command: &shlex::try_join(words.iter().map(String::as_str))?,
         parameters: &parameters,
         analysis: &findings.analysis,
-        comparison: Some(&experiment::compare(&findings.totals)),
-        row: row.as_ref(),
+        totals: &findings.totals,
+        row: picture.as_deref(),
     };
     let html = page.html()?;
     let [report, plots, controllers] = REPORT;

@@ -4,13 +4,12 @@
 //! with `#`, and the `ok` that ends the console's answer. All features are whole numbers. A label is `plant`, `weed`,
 //! or empty for an unlabelled detection.
 
-use super::labelled::Labelled;
+use super::Labelled;
 use control::ground::features::Features;
 use field::row::Kind;
+use files::FileError;
 use files::csv_table::{CsvTable, Line};
 use std::path::{Path, PathBuf};
-
-pub use files::FileError;
 
 /// The columns of the features, in the order of [`Features::values`].
 pub const COLUMNS: [&str; 5] = ["speed_mm_s", "spacing_mm", "delay_mm", "hold_mm", "actuation_mm"];
