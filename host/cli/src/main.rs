@@ -37,7 +37,7 @@ mod train;
 mod trial;
 mod virtual_uno;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -46,6 +46,8 @@ use sim::{course, destination, finding, numbers, output, progress, row, source};
 use std::env;
 use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Tries the intra-row weeder's firmware on a simulated field, and puts it on an Arduino Uno.
 #[derive(Parser)]
@@ -155,6 +157,14 @@ fn main() -> ExitCode {
         Err(error) => error.exit(),
     };
     finding::exit(run(arguments.command))
+}
+
+/// A flag that Ctrl-C sets, and SIGTERM and SIGHUP: it asks a command to end.
+fn ctrl_c() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked_to_stop = Arc::clone(&stop);
+    ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    Ok(stop)
 }
 
 /// Runs a command and returns its finding.

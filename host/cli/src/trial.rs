@@ -17,7 +17,7 @@ use experiments::page::Page;
 use experiments::shard::{Numbered, Shard};
 use experiments::statistics::Share;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
-use experiments::table::in_two_lines;
+use experiments::table::{distinct, in_two_lines};
 use field::budget;
 use field::conditions::{Conditions, presets};
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
@@ -228,8 +228,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let shown = Shown { out: arguments.out.clone().filter(|_| part.is_none()), replace, json, brief };
     let folder = shown.folder()?;
     let experiment = Experiment {
-        speeds_km_h: ascending(&arguments.speeds),
-        spacings_cm: ascending(&arguments.spacings),
+        speeds_km_h: distinct(arguments.speeds.clone()),
+        spacings_cm: distinct(arguments.spacings.clone()),
         replications: arguments.replications,
         controllers: arguments.controllers(),
         conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
@@ -341,14 +341,6 @@ struct Findings<'a> {
     totals: Vec<Total>,
     analysis: Analysis,
     summary: Vec<String>,
-}
-
-/// Levels in ascending order, each once.
-fn ascending(levels: &[f64]) -> Vec<f64> {
-    let mut levels = levels.to_vec();
-    levels.sort_by(f64::total_cmp);
-    levels.dedup();
-    levels
 }
 
 /// The totals of one controller, by speed.

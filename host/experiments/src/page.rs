@@ -11,7 +11,7 @@ use crate::evaluation::published::{Coefficients, MACHINES};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::experiment::{Total, Treatment};
 use crate::statistics::NoModel;
-use crate::table::{Table, fixed, optional, short, significant};
+use crate::table::{Table, distinct, fixed, optional, short, significant};
 use anyhow::{Context, Result};
 use askama::Template;
 use field::budget::Part;
@@ -154,9 +154,7 @@ impl Controllers {
 
 /// Curves over speed as a table, a row a speed.
 fn by_speed(caption: &str, curves: &[Curve]) -> Table {
-    let mut speeds: Vec<f64> = curves.iter().flat_map(|curve| &curve.points).map(|point| point.0).collect();
-    speeds.sort_by(f64::total_cmp);
-    speeds.dedup();
+    let speeds = distinct(curves.iter().flat_map(|curve| &curve.points).map(|point| point.0));
     let names = curves.iter().map(|curve| curve.name.as_str());
     let mut table = Table::new(caption, ["speed"].into_iter().chain(names));
     for speed in speeds {

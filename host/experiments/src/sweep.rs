@@ -271,12 +271,6 @@ mod tests {
     }
 
     #[test]
-    fn two_axes_of_one_parameter_are_refused() {
-        let error = sweep("speed=1..2:1", Some("speed=3..4:1")).run(|_| panic!("nothing is weeded")).unwrap_err();
-        assert!(error.to_string().starts_with("both axes are `speed`"), "{error}");
-    }
-
-    #[test]
     fn a_value_that_cannot_be_is_refused_before_anything_is_weeded() {
         let run = |x: &str| sweep(x, None).run(|_| panic!("nothing is weeded")).unwrap_err().to_string();
         assert!(run("lead_out_ms=400..600:200").contains("settings.lead_out_ms is 600, but has to be 0 to 500"));

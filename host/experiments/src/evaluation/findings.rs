@@ -2,6 +2,7 @@
 
 use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment};
 use crate::statistics::{LinearModel, SIGNIFICANCE, Share, Term, probability};
+use crate::table::distinct;
 use field::counted;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -29,12 +30,7 @@ impl Analysis {
     /// How large the trial was.
     fn size(&self) -> String {
         let treatments = self.treatments();
-        let levels = |quantity: fn(&Treatment) -> f64| {
-            let mut levels: Vec<f64> = treatments.iter().map(quantity).collect();
-            levels.sort_by(f64::total_cmp);
-            levels.dedup();
-            list(&levels)
-        };
+        let levels = |quantity: fn(&Treatment) -> f64| list(&distinct(treatments.iter().map(quantity)));
         let plots = treatments.iter().map(|treatment| treatment.plots);
         let (fewest, most) = (plots.clone().min().unwrap_or_default(), plots.max().unwrap_or_default());
         let replications = if fewest == most { format!("{fewest}") } else { format!("{fewest} to {most}") };

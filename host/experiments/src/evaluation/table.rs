@@ -146,17 +146,4 @@ mod tests {
             assert_eq!(read(&format!("# a trial\n{HEADER}{wrong}\n")), Err(format!("trial.csv, line 3: {said}")));
         }
     }
-
-    #[test]
-    fn a_replication_that_stands_there_twice_is_named_with_both_lines() {
-        let said = read(&format!("{HEADER}{LINE}\n{LINE}")).unwrap_err();
-        let right = "trial.csv, line 4: replication 1 of 1.5 km/h and 50 cm is already in line 2: ";
-        assert!(said.starts_with(right), "{said}");
-    }
-
-    #[test]
-    fn a_missing_column_is_named() {
-        let said = read(&format!("{HEADER}{LINE}").replace("width_m", "width_cm")).unwrap_err();
-        assert!(said.starts_with("trial.csv, line 1: the column `width_m` is missing: "), "{said}");
-    }
 }

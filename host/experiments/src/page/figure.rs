@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Look, Series, key, range_of};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
-use crate::table::{fixed, short};
+use crate::table::{distinct, fixed, short};
 use anyhow::Result;
 
 /// A chart with its texts.
@@ -143,10 +143,7 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Option<Fi
 
 /// The spacings of a trial, narrow first.
 fn spacings_cm(analysis: &Analysis) -> Vec<f64> {
-    let mut spacings: Vec<f64> = analysis.records.iter().map(|record| record.spacing_cm).collect();
-    spacings.sort_by(f64::total_cmp);
-    spacings.dedup();
-    spacings
+    distinct(analysis.records.iter().map(|record| record.spacing_cm))
 }
 
 fn spacing(spacing_cm: f64) -> String {

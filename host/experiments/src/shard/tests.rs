@@ -93,12 +93,6 @@ fn parts_that_are_missing_are_named() {
 }
 
 #[test]
-fn a_part_that_is_there_twice_is_named_with_its_double() {
-    let said = refusal(&[header("1/2", 5), header("2/2", 5), header("1/2", 5)]);
-    assert_eq!(said, "c and a are both part 1/2: name each part once");
-}
-
-#[test]
 fn a_part_of_another_study_is_named_with_the_difference() {
     let other = |change: &dyn Fn(&mut Header)| {
         let mut changed = header("2/2", 5);
@@ -115,22 +109,6 @@ fn a_part_of_another_study_is_named_with_the_difference() {
     assert!(of.ends_with("its number of parts is 3, not 2"), "{of}");
     let size = other(&|header| header.all = 6);
     assert!(size.ends_with("its size is 6, not 5"), "{size}");
-}
-
-#[test]
-fn a_part_of_another_version_or_build_is_named_with_both() {
-    for (change, theirs) in [
-        ((|program| program.version = "0.3.0".to_owned()) as fn(&mut Program), "0.3.0 (build 1234abcd)"),
-        (|program| program.build = "ffff0000".to_owned(), "0.2.0 (build ffff0000)"),
-    ] {
-        let mut changed = header("2/2", 5);
-        change(&mut changed.program);
-        let said = refusal(&[header("1/2", 5), changed]);
-        assert!(
-            said.starts_with(&format!("b is of weeder {theirs}, and this is weeder 0.2.0 (build 1234abcd)")),
-            "{said}"
-        );
-    }
 }
 
 #[test]
