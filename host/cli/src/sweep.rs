@@ -7,8 +7,8 @@ use crate::part::Part;
 use crate::progress::Progress;
 use crate::source::{self, offering};
 use anyhow::Result;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
 use experiments::experiment::{PlotOutcome, Treatment};
 use experiments::shard::Shard;
@@ -41,29 +41,19 @@ An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its 
 /// The examples, and all possible axes.
 fn long_help() -> String {
     let lines = axes();
-    let longest = |part: fn(&AxisHelp) -> &str| lines.iter().map(|line| part(line).len()).max().unwrap_or(0);
-    let (name_width, range_width) = (longest(|line| &line.name), longest(|line| &line.range));
+    let [name_width, range_width] = [0, 1].map(|part| lines.iter().map(|line| line[part].len()).max().unwrap_or(0));
     let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
-    for AxisHelp { name, range, meaning } in &lines {
+    for [name, range, meaning] in &lines {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "  {name:<name_width$}  {range:<range_width$}  {meaning}");
     }
     text
 }
 
-/// The help of an axis.
-struct AxisHelp {
-    name: String,
-    range: String,
-    meaning: String,
-}
-
-/// All possible axes.
-fn axes() -> Vec<AxisHelp> {
-    let line = |name: &str, least: f64, greatest: f64, meaning: &str| AxisHelp {
-        name: name.to_owned(),
-        range: format!("{least} to {greatest}"),
-        meaning: meaning.to_owned(),
+/// All possible axes: the name, the range and the meaning of each.
+fn axes() -> Vec<[String; 3]> {
+    let line = |name: &str, least: f64, greatest: f64, meaning: &str| {
+        [name.to_owned(), format!("{least} to {greatest}"), meaning.to_owned()]
     };
     let speed = line("speed", SPEEDS_KM_H.0, SPEEDS_KM_H.1, "forward speed in km/h");
     let spacing = line("spacing", SPACINGS_CM.0, SPACINGS_CM.1, "plant spacing in cm");
@@ -78,8 +68,20 @@ fn axes() -> Vec<AxisHelp> {
 /// An axis; a shell that completes offers the names.
 fn axis() -> impl TypedValueParser<Value = Axis> {
     static NAMES: LazyLock<Vec<String>> =
-        LazyLock::new(|| axes().into_iter().map(|axis| format!("{}=", axis.name)).collect());
+        LazyLock::new(|| axes().into_iter().map(|[name, ..]| format!("{name}=")).collect());
     offering(|| NAMES.iter().map(String::as_str).collect(), |text: &str| text.parse::<Axis>())
+}
+
+/// A controller by its name.
+fn controller() -> impl TypedValueParser<Value = Treatment> {
+    let ideal = PossibleValue::new("ideal").alias("all-knowing");
+    let names = ["firmware", "without-look-ahead", "paper"].map(PossibleValue::new);
+    PossibleValuesParser::new(names.into_iter().chain([ideal])).map(|name| match name.as_str() {
+        "firmware" => Treatment::Firmware,
+        "without-look-ahead" => Treatment::WithoutLookAhead,
+        "paper" => Treatment::Paper,
+        _ => Treatment::Ideal,
+    })
 }
 
 /// The arguments.
@@ -96,8 +98,8 @@ pub struct Arguments {
     #[arg(long, default_value = RESULT, value_parser = PossibleValuesParser::new(RESULTS))]
     result: String,
     /// The controller: the firmware, the firmware without leads, the paper's, or the ideal controller.
-    #[arg(long, value_enum, default_value = "firmware")]
-    controller: ControllerName,
+    #[arg(long, value_parser = controller(), default_value = "firmware")]
+    controller: Treatment,
     /// The field: a preset or a TOML file, as for `weeder trial`.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = "transplanted")]
     field: String,
@@ -121,27 +123,6 @@ pub struct Arguments {
     /// Print all results of all points as JSON instead of a table.
     #[arg(long)]
     json: bool,
-}
-
-/// The controllers by their names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ControllerName {
-    Firmware,
-    WithoutLookAhead,
-    Paper,
-    #[value(alias = "all-knowing")]
-    Ideal,
-}
-
-impl From<ControllerName> for Treatment {
-    fn from(name: ControllerName) -> Self {
-        match name {
-            ControllerName::Firmware => Self::Firmware,
-            ControllerName::WithoutLookAhead => Self::WithoutLookAhead,
-            ControllerName::Paper => Self::Paper,
-            ControllerName::Ideal => Self::Ideal,
-        }
-    }
 }
 
 /// How to show a sweep's points.
@@ -171,7 +152,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let sweep = Sweep {
         x: arguments.x.clone(),
         y: arguments.y.clone(),
-        controller: arguments.controller.into(),
+        controller: arguments.controller,
         conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
         speed_km_h: arguments.speed,
         spacing_cm: arguments.spacing,

@@ -138,11 +138,11 @@ impl Arguments {
         if self.synthetic {
             return synthetic::objects(self.crop, self.seed);
         }
-        let lesson = table::read_labelled(&self.files)?;
-        if lesson.unlabelled > 0 {
-            tell!("Passed over {} without a label", lesson.unlabelled);
+        let (objects, unlabelled) = table::read_labelled(&self.files)?;
+        if unlabelled > 0 {
+            tell!("Passed over {unlabelled} without a label");
         }
-        Ok(lesson.objects)
+        Ok(objects)
     }
 
     /// The command that gives the same table again.

@@ -316,8 +316,7 @@ fn show(
     if let Some(folder) = folder {
         // Only the report has the comparison with the paper.
         let summary = [summary, against_the_paper(outcomes)].concat();
-        let findings = Findings { outcomes, totals, analysis, summary };
-        write_report(folder, study, picture()?, &findings)?;
+        write_report(folder, study, picture()?, outcomes, &totals, &analysis, summary)?;
         if !json {
             say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
         }
@@ -333,14 +332,6 @@ fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
     let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
     said.into_iter().map(|said| format!("The paper's controller at {slowest} to {fastest} km/h: {said}")).collect()
-}
-
-/// All results of a trial.
-struct Findings<'a> {
-    outcomes: &'a [PlotOutcome],
-    totals: Vec<Total>,
-    analysis: Analysis,
-    summary: Vec<String>,
 }
 
 /// The totals of one controller, by speed.
@@ -500,7 +491,15 @@ fn damage(totals: &[Total], controller: Treatment) -> String {
     }
 }
 
-fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, findings: &Findings) -> Result<()> {
+fn write_report(
+    folder: &OutFolder,
+    study: &Study,
+    picture: Option<String>,
+    outcomes: &[PlotOutcome],
+    totals: &[Total],
+    analysis: &Analysis,
+    summary: Vec<String>,
+) -> Result<()> {
     let Study { experiment, field, .. } = study;
     let engine_name = match study.engine {
         EngineName::Native => "the firmware's code, compiled for the host",
@@ -520,18 +519,18 @@ fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, find
     let words = [study.words.clone(), vec!["--out".to_owned(), folder.path().display().to_string()]].concat();
     let page = Page {
         title: "Field trial of the intra-row weeder, simulated",
-        summary: findings.summary.clone(),
+        summary,
         command: &shlex::try_join(words.iter().map(String::as_str))?,
         parameters: &parameters,
-        analysis: &findings.analysis,
-        totals: &findings.totals,
+        analysis,
+        totals,
         row: picture.as_deref(),
     };
     let html = page.html()?;
     let [report, plots, controllers] = REPORT;
     folder.write(report, |to| to.write_all(html.as_bytes()))?;
-    folder.write(plots, |to| experiment::write_csv(findings.outcomes, &[Treatment::Firmware], to))?;
-    folder.write(controllers, |to| experiment::write_csv(findings.outcomes, &experiment.controllers, to))
+    folder.write(plots, |to| experiment::write_csv(outcomes, &[Treatment::Firmware], to))?;
+    folder.write(controllers, |to| experiment::write_csv(outcomes, &experiment.controllers, to))
 }
 
 fn in_json(outcome: &PlotOutcome) -> serde_json::Value {

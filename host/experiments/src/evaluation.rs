@@ -10,11 +10,9 @@ mod findings;
 mod plot;
 pub mod published;
 pub(crate) mod report;
-mod response;
 pub mod table;
 
-pub use self::plot::{Performance, PlotRecord};
-pub use self::response::Response;
+pub use self::plot::{Performance, PlotRecord, Response};
 pub use self::table::read_csv;
 
 use self::published::Published;

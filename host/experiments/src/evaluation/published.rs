@@ -11,7 +11,7 @@
 //! to grow with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, follows from Eq. 27 for one
 //! engine. Eq. 30, where it falls, does not.
 
-use super::response::Response;
+use super::plot::Response;
 use serde::Serialize;
 
 /// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
