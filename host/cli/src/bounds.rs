@@ -36,21 +36,16 @@ pub struct Arguments {
 /// If the firmware cannot be built, read or followed, or the budgets not be read.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut options = arguments.options.clone();
-    options.budgets.get_or_insert_with(repository_budgets);
+    options.budgets.get_or_insert_with(|| budgets("budgets.toml"));
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     let Report { text, keeps } = report(&elf, &options)?;
     print(format_args!("{text}"))?;
     Ok(if keeps { Finding::Good } else { Finding::Bad })
 }
 
-/// Path of this repository's budgets.
-fn repository_budgets() -> PathBuf {
-    firmware::workspace_root().join("budgets.toml")
-}
-
-/// The same for the tester's firmware.
-fn tester_budgets() -> PathBuf {
-    firmware::workspace_root().join("tester/budgets.toml")
+/// A budget file of this repository.
+fn budgets(name: &str) -> PathBuf {
+    firmware::workspace_root().join(name)
 }
 
 /// The bounds of a firmware, each beside its budget.
@@ -96,7 +91,7 @@ impl Firmware {
     /// # Errors
     /// If it fails, or a bound is over its budget, without `--unproved`.
     pub fn check(&self, elf: &Path) -> Result<()> {
-        let budgets = if self.tester { tester_budgets() } else { repository_budgets() };
+        let budgets = budgets(if self.tester { "tester/budgets.toml" } else { "budgets.toml" });
         let why = match prove(elf, &budgets) {
             Ok(held) => match held.into_iter().find(|held| !held.keeps) {
                 Some(Held { name, proved, budget, .. }) => format!("{name} is {proved}, and its budget is {budget}"),

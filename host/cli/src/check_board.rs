@@ -1,18 +1,17 @@
 //! `weeder check-board`: a second Uno, the tester, drives the weeder's inputs and measures its outputs.
 
+use crate::ctrl_c;
 use crate::destination::{FileName, Replace};
 use crate::finding::Finding;
 use crate::output::{print, say, tell};
 use crate::progress::Progress;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use check::desk::Desk;
 use check::ports;
 use check::run::{Extent, run as check_run};
 use clap::Args;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
 
 /// The arguments.
@@ -64,13 +63,9 @@ pub struct Arguments {
 /// If a board does not answer, or the page cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let page = arguments.page.as_ref().map(|page| page.check(arguments.replace)).transpose()?;
-    let desk = match arguments.simulated {
-        true => {
-            let second = arguments.second_simulator.as_deref();
-            Some(Desk::start(&firmware::build_tester()?, &firmware::build()?, second)?)
-        }
-        false => None,
-    };
+    let second = arguments.second_simulator.as_deref();
+    let start = || Desk::start(&firmware::build_tester()?, &firmware::build()?, second);
+    let desk = arguments.simulated.then(start).transpose()?;
     let name = |path: &Path| Some(path.to_string_lossy().into_owned());
     let (port, tester) = match &desk {
         Some(desk) => (name(desk.weeder()), name(desk.tester())),
@@ -78,9 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     };
     let unos = if port.is_some() && tester.is_some() { vec![] } else { link::find_unos()? };
     let (mut weeder, mut tester) = ports::open(port.as_deref(), tester.as_deref(), &unos)?;
-    let interrupt = Arc::new(AtomicBool::new(false));
-    tester.interrupted_by(Arc::clone(&interrupt));
-    ctrlc::set_handler(move || interrupt.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    tester.interrupted_by(ctrl_c()?);
     let bar = Progress::new("checking");
     let extent = Extent { brief: arguments.brief, simulated: arguments.simulated };
     let last = Cell::new("");
@@ -97,11 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
     let mut report = result?;
     report.board.clone_from(&arguments.board);
-    let printed = if arguments.json {
-        print(format_args!("{}", report.json()))
-    } else {
-        print(format_args!("{}", report.text()))
-    };
+    let printed = print(format_args!("{}", if arguments.json { report.json() } else { report.text() }));
     if let Some(page) = page {
         page.write(|to| to.write_all(report.page().as_bytes()))?;
         if !arguments.json {

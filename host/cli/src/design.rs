@@ -56,13 +56,11 @@ fn design(machine: &Machine, json: bool) -> Result<()> {
     let figures = design.figures(machine);
     let swing = Swing::of(machine, design.servo_torque);
     if json {
-        let no_swing = swing.err().map(|problem| problem.to_string());
-        let swing = swing.ok();
-        let set = swing.map(|swing| swing.set_lines());
-        let (inputs, figures) = (machine.inputs(), figures);
+        let set = swing.as_ref().ok().map(Swing::set_lines);
+        let (inputs, no_swing) = (machine.inputs(), swing.as_ref().err());
         return say!(
             "{:#}",
-            json!({ "inputs": inputs, "figures": figures, "swing": swing, "no_swing": no_swing, "set": set })
+            json!({ "inputs": inputs, "figures": figures, "swing": swing.as_ref().ok(), "no_swing": no_swing, "set": set })
         );
     }
     let (inputs, paper) = (machine.inputs(), Machine::default().inputs());

@@ -66,7 +66,7 @@ fn write_report(analysis: &Analysis, file: &Path, folder: &OutFolder) -> Result<
             ("weeder's version".to_owned(), env!("WEEDER_VERSION").to_owned()),
         ],
         analysis,
-        comparison: None,
+        totals: &[],
         row: None,
     };
     let html = page.html()?;

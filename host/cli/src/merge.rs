@@ -8,7 +8,7 @@ use crate::{part, soak, sweep, trial};
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, builder::PossibleValuesParser};
 use experiments::shard::{self, Header};
-use experiments::sweep::Results;
+use experiments::sweep::RESULTS;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ffi::OsString;
@@ -43,7 +43,7 @@ pub struct Arguments {
     #[arg(long, conflicts_with = "json")]
     brief: bool,
     /// The result to show for a sweep with two axes. Default: plant_damage.
-    #[arg(long, value_parser = PossibleValuesParser::new(Results::NAMES))]
+    #[arg(long, value_parser = PossibleValuesParser::new(RESULTS))]
     result: Option<String>,
 }
 
@@ -100,7 +100,7 @@ fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
     let read = |path: &PathBuf| {
         let mut file = open(path)?;
         let header = shard::read_header(&name(path), &mut file)?;
-        shard::read_outcomes(&name(path), header, &mut file)
+        shard::read_outcomes(&name(path), &header, &mut file)
     };
     Ok(shard::outcomes(parts.iter().map(read).collect::<Result<_>>()?))
 }

@@ -42,26 +42,16 @@ pub struct Arguments {
     log: Option<PathBuf>,
 }
 
-/// The rows that a line addresses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum To {
-    /// The line names no row: the chosen rows.
-    Chosen,
-    /// All rows.
-    All,
-    /// One row.
-    Row(usize),
-}
-
-/// Parses a typed line: the row before a colon, or `all`, and the command.
+/// Parses a typed line: the row before a colon, or `all`, and the command. Without a row it goes to `chosen`. `None` is
+/// all rows.
 ///
 /// # Errors
 /// If there is no such row, or the rest is no command; in words.
-fn addressed<'a>(line: &'a str, names: &[String]) -> Result<(To, &'a str), String> {
+fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Result<(Option<usize>, &'a str), String> {
     let (to, command) = match line.split_once(':').map(|(name, command)| (row(name.trim(), names), command.trim())) {
         Some((Ok(to), command)) => (to, command),
         Some((Err(why), _)) if names.len() > 1 => return Err(why),
-        _ => (To::Chosen, line.trim()),
+        _ => (chosen, line.trim()),
     };
     match link::is_command(command) {
         true => Ok((to, command)),
@@ -72,11 +62,10 @@ fn addressed<'a>(line: &'a str, names: &[String]) -> Result<(To, &'a str), Strin
     }
 }
 
-fn row(name: &str, names: &[String]) -> Result<To, String> {
+fn row(name: &str, names: &[String]) -> Result<Option<usize>, String> {
     match names.iter().position(|known| known == name) {
-        Some(row) => Ok(To::Row(row)),
-        None if name == ALL => Ok(To::All),
-        None => Err(format!("there is no row {name}: there are {}", names.join(", "))),
+        None if name != ALL => Err(format!("there is no row {name}: there are {}", names.join(", "))),
+        row => Ok(row),
     }
 }
 

@@ -7,6 +7,7 @@ use anyhow::Result;
 use clap::Args;
 use experiments::plan::Plan;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use experiments::table::distinct;
 
 /// The arguments.
 #[derive(Args)]
@@ -48,8 +49,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.as_ref().map(|out| out.check(arguments.replace)).transpose()?;
     let plan = Plan {
-        speeds_km_h: distinct(&arguments.speeds),
-        spacings_cm: distinct(&arguments.spacings),
+        speeds_km_h: distinct(arguments.speeds.clone()),
+        spacings_cm: distinct(arguments.spacings.clone()),
         blocks: arguments.blocks,
         width_m: arguments.width,
         power_hp: arguments.power,
@@ -74,12 +75,4 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             say!("Written: {}, {} plots in {} blocks", out.path().display(), plan.plots().len(), plan.blocks)
         }
     }
-}
-
-/// Levels in ascending order, each once.
-fn distinct(levels: &[f64]) -> Vec<f64> {
-    let mut levels = levels.to_vec();
-    levels.sort_by(f64::total_cmp);
-    levels.dedup();
-    levels
 }

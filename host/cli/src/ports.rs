@@ -55,6 +55,15 @@ impl NamesFile {
         );
         Ok(Names::read(&path)?)
     }
+
+    /// The board of the row with this name, or else the one at this port. A path is no name, and needs no file of names.
+    fn board(&self, port: &str) -> Result<Board> {
+        let at_port = || Board::Port(port.to_owned());
+        if port.contains(['/', '\\']) {
+            return Ok(at_port());
+        }
+        Ok(self.read()?.find(port).map_or_else(at_port, |row| row.board.clone()))
+    }
 }
 
 /// The ports of one row or several.
@@ -88,8 +97,7 @@ impl Port {
     /// If the file of the names cannot be read.
     pub fn board(&self) -> Result<Board> {
         match &self.port {
-            Some(port) if may_be_name(port) => Ok(board(port, Some(&self.names.read()?))),
-            Some(port) => Ok(board(port, None)),
+            Some(port) => self.names.board(port),
             None => Ok(Board::Only),
         }
     }
@@ -150,12 +158,7 @@ impl Ports {
         } else if self.port.is_empty() {
             vec![Row { name: "Uno".to_owned(), board: Board::Only }]
         } else {
-            let names = if self.port.iter().any(|machine| may_be_name(&machine.port)) {
-                Some(self.names.read()?)
-            } else {
-                None
-            };
-            self.port.iter().map(|machine| row(machine, names.as_ref())).collect::<Result<_>>()?
+            self.port.iter().map(|machine| row(machine, &self.names)).collect::<Result<_>>()?
         };
         let mut seen = HashSet::new();
         if let Some(row) = rows.iter().find(|row| !seen.insert(row.name.to_lowercase())) {
@@ -168,28 +171,22 @@ impl Ports {
     }
 }
 
-/// Whether it may be a row's name. A path is no name, and needs no file of names.
-fn may_be_name(port: &str) -> bool {
-    !port.contains(['/', '\\'])
-}
-
-/// The board of the row with this name, or else the one at this port.
-fn board(port: &str, names: Option<&Names>) -> Board {
-    let known = names.and_then(|names| names.find(port));
-    known.map_or_else(|| Board::Port(port.to_owned()), |row| row.board.clone())
-}
-
 /// The row of a `--port`.
-fn row(machine: &Named, names: Option<&Names>) -> Result<Row> {
-    let board = board(&machine.port, names);
+fn row(machine: &Named, names: &NamesFile) -> Result<Row> {
+    let board = names.board(&machine.port)?;
     let name = match &machine.name {
         Some(name) => name.clone(),
-        None => Path::new(&machine.port).file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        None => end_of(&machine.port),
     };
     if let Some(problem) = wrong_with(&name) {
         bail!("{name:?} cannot be a row's name: {problem}: put one before it, as left={}", machine.port);
     }
     Ok(Row { name, board })
+}
+
+/// The last part of a port's path.
+fn end_of(port: &str) -> String {
+    Path::new(port).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Every row with a name, and every other Uno.
@@ -199,8 +196,7 @@ fn every_row(names: &Names) -> Result<Vec<Row>> {
     for uno in plugged()? {
         let is_named = rows.iter().any(|row| row.board == uno.board) || have_ports.contains(&Some(uno.port.clone()));
         if !is_named {
-            let name = Path::new(&uno.port).file_name().unwrap_or_default().to_string_lossy().into_owned();
-            rows.push(Row { name, board: uno.board });
+            rows.push(Row { name: end_of(&uno.port), board: uno.board });
         }
     }
     ensure!(
@@ -292,13 +288,15 @@ mod tests {
 
     #[test]
     fn a_row_has_the_name_that_is_given_or_the_end_of_its_port_s() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let no_names = NamesFile { rows_file: Some(file.path().to_owned()) };
         for (text, name, port) in [
             ("/dev/ttyACM0", "ttyACM0", "/dev/ttyACM0"),
             ("uno", "uno", "uno"),
             ("left=/dev/ttyACM0", "left", "/dev/ttyACM0"),
             ("row 3 = left=COM3", "row 3", " left=COM3"),
         ] {
-            let row = row(&named(text).unwrap(), None).unwrap();
+            let row = row(&named(text).unwrap(), &no_names).unwrap();
             assert_eq!((row.name.as_str(), row.board), (name, Board::Port(port.to_owned())), "{text}");
         }
         assert_eq!(read("/dev/serial/by-id/a=b").unwrap().1, "/dev/serial/by-id/a=b");
@@ -311,7 +309,12 @@ mod tests {
         }
         assert!(read("all=COM3").unwrap_err().contains("`all` means every row"));
         let long = named("/dev/serial/by-id/usb-Arduino__www.arduino.cc__0043-if00").unwrap();
-        assert!(row(&long, None).unwrap_err().to_string().contains("put one before it, as left=/dev/"));
+        assert!(
+            row(&long, &NamesFile { rows_file: None })
+                .unwrap_err()
+                .to_string()
+                .contains("put one before it, as left=/dev/")
+        );
     }
 
     #[test]

@@ -1,18 +1,18 @@
 //! `weeder record`: logs the machine's output to a file, or each row's to its own file.
 
+use crate::ctrl_c;
 use crate::destination::{FolderName, Replace};
 use crate::output::tell;
 use crate::ports::{Chosen, Ports};
 use crate::receiver::GpsArguments;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, bail, ensure};
 use clap::Args;
 use gps::recorder::Lines;
 use link::log::{LogError, LogWriter};
 use link::rows::{Rows, What};
 use link::session::Happening;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Time between two checks whether to end.
@@ -56,9 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         None => None,
     };
     let (rows, _) = open(&chosen)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked_to_stop = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let stop = ctrl_c()?;
     tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
     while !stop.load(Ordering::Relaxed) {
         if let Some(gps) = &mut gps {

@@ -1,9 +1,10 @@
 //! `weeder serve`: the page, from the computer that has the serial port to a phone.
 
+use crate::ctrl_c;
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::ports::Ports;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use serve::page::Page;
 use serve::{Server, Setup};
@@ -12,7 +13,6 @@ use std::net::Ipv4Addr;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use trial::firmware;
 
 /// The default TCP port.
@@ -78,9 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         may_start: arguments.allow_start,
         tell: Arc::new(|line| tell!("{line}")),
     })?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked_to_stop = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let stop = ctrl_c()?;
     say!("http://{}/ is the page, for this computer alone.", server.here())?;
     if let Some((address, code)) = server.lan() {
         say!("http://{address}/#{} is the page for a phone in the network.", code.text())?;

@@ -106,18 +106,11 @@ impl State {
     }
 }
 
-/// The user's answer to a step.
+/// The user's answer to a step, and how the step ended.
 enum Answer {
     Go,
     LeaveOut,
     Stop,
-}
-
-/// How a step ended.
-enum Ended {
-    Done,
-    LeftOut,
-    Stopped,
 }
 
 /// Leads the user through the steps.
@@ -146,12 +139,12 @@ impl Guide {
             }
             say!("\nStep {number} of {count}: {title}\n  {how}")?;
             match self.step(tasks)? {
-                Ended::Done => {
+                Answer::Go => {
                     self.state.done.insert(*number);
                     self.keep()?;
                 }
-                Ended::LeftOut => say!("  Left out.")?,
-                Ended::Stopped => return say!("Stopped. The same command continues here."),
+                Answer::LeaveOut => say!("  Left out.")?,
+                Answer::Stop => return say!("Stopped. The same command continues here."),
             }
         }
         say!("\nThe settings are saved on the machine. The measurements are in {}.", self.path.display())
@@ -188,38 +181,35 @@ impl Guide {
         }
     }
 
-    fn step(&mut self, tasks: &[Task]) -> Result<Ended> {
+    fn step(&mut self, tasks: &[Task]) -> Result<Answer> {
         for task in tasks {
             if let Task::Fit(part, value) = task {
                 say!("  Part: {part} = {value} on the simulated machine")?;
             }
         }
-        match self.go("Do it")? {
-            Answer::Go => {}
-            Answer::LeaveOut => return Ok(Ended::LeftOut),
-            Answer::Stop => return Ok(Ended::Stopped),
+        let answer = self.go("Do it")?;
+        if !matches!(answer, Answer::Go) {
+            return Ok(answer);
         }
         let mut wanted = Vec::new();
         for task in tasks {
             let goes_on = match *task {
                 Task::Fit(..) => true,
-                Task::Set(setting, of_the_manual) => match self.value(setting, Some(of_the_manual))? {
-                    Some(value) => {
-                        wanted.push((setting, value));
-                        true
-                    }
-                    None => false,
-                },
+                Task::Set(setting, of_the_manual) => {
+                    let value = self.value(setting, Some(of_the_manual))?;
+                    wanted.extend(value.map(|value| (setting, value)));
+                    value.is_some()
+                }
                 Task::TimeServo => self.time_servo()?,
                 Task::MeasureWheel(length_mm) => self.measure_wheel(length_mm)?,
                 Task::SetMargin => self.set_margin()?,
             };
             if !goes_on {
-                return Ok(Ended::Stopped);
+                return Ok(Answer::Stop);
             }
         }
         self.push(&wanted)?;
-        Ok(Ended::Done)
+        Ok(Answer::Go)
     }
 
     /// Sets and saves.
@@ -434,31 +424,5 @@ impl Guide {
         self.state.measured.take_line(&line);
         self.keep()?;
         Ok(true)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn saved_progress_is_continued() {
-        let kept = [
-            HEAD,
-            "done 2",
-            "servo_in_us=1500",
-            "servo_out_us=1795",
-            "calibrated lead_out_ms=160 lead_in_ms=55 set=yes",
-            "> calibrate 10000",
-            "ticks_per_m=2010",
-            "slip permille=12",
-            "",
-        ]
-        .join("\n");
-        let state = State::parse(&kept).expect("it is right");
-        assert_eq!(state.done, [2].into());
-        assert_eq!(state.text(), kept);
-        assert!(State::parse("").expect("a new one").done.is_empty());
-        assert!(State::parse("wheel_mm = 400\n").is_err());
     }
 }

@@ -193,23 +193,8 @@ impl Stage {
     }
 
     fn in_json(&self) -> Value {
-        let Tally { seconds, metres, rows, plants, weeded_metres, harmed, mistaken, blind, .. } = self.tally;
-        let Tally { faults, alarms, resets, warnings, violations, .. } = &self.tally;
-        json!({
-            "part": self.title.0,
-            "seconds": seconds,
-            "metres": metres,
-            "rows": rows,
-            "plants": plants,
-            "weeded_metres": weeded_metres,
-            "harmed": harmed,
-            "mistaken": mistaken,
-            "blind": blind,
-            "faults": faults,
-            "alarms": alarms,
-            "resets": resets,
-            "warnings": warnings,
-            "violations": violations,
-        })
+        let mut value = json!(self.tally);
+        value["part"] = self.title.0.into();
+        value
     }
 }

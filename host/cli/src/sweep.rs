@@ -7,12 +7,12 @@ use crate::part::Part;
 use crate::progress::Progress;
 use crate::source::{self, offering};
 use anyhow::Result;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
 use experiments::experiment::{PlotOutcome, Treatment};
 use experiments::shard::Shard;
-use experiments::sweep::{Axis, Point, Results, SPACINGS_CM, SPEEDS_KM_H, Sweep};
+use experiments::sweep::{Axis, Point, RESULTS, SPACINGS_CM, SPEEDS_KM_H, Sweep};
 use field::conditions::{Conditions, PARAMETERS};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
@@ -25,7 +25,7 @@ use trial::report::number_table;
 pub const COMMAND: &str = "sweep";
 
 /// The default result.
-pub const RESULT: &str = Results::NAMES[0];
+pub const RESULT: &str = RESULTS[0];
 
 /// The examples in the help.
 const EXAMPLES: &str = "\
@@ -41,29 +41,19 @@ An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its 
 /// The examples, and all possible axes.
 fn long_help() -> String {
     let lines = axes();
-    let longest = |part: fn(&AxisHelp) -> &str| lines.iter().map(|line| part(line).len()).max().unwrap_or(0);
-    let (name_width, range_width) = (longest(|line| &line.name), longest(|line| &line.range));
+    let [name_width, range_width] = [0, 1].map(|part| lines.iter().map(|line| line[part].len()).max().unwrap_or(0));
     let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
-    for AxisHelp { name, range, meaning } in &lines {
+    for [name, range, meaning] in &lines {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "  {name:<name_width$}  {range:<range_width$}  {meaning}");
     }
     text
 }
 
-/// The help of an axis.
-struct AxisHelp {
-    name: String,
-    range: String,
-    meaning: String,
-}
-
-/// All possible axes.
-fn axes() -> Vec<AxisHelp> {
-    let line = |name: &str, least: f64, greatest: f64, meaning: &str| AxisHelp {
-        name: name.to_owned(),
-        range: format!("{least} to {greatest}"),
-        meaning: meaning.to_owned(),
+/// All possible axes: the name, the range and the meaning of each.
+fn axes() -> Vec<[String; 3]> {
+    let line = |name: &str, least: f64, greatest: f64, meaning: &str| {
+        [name.to_owned(), format!("{least} to {greatest}"), meaning.to_owned()]
     };
     let speed = line("speed", SPEEDS_KM_H.0, SPEEDS_KM_H.1, "forward speed in km/h");
     let spacing = line("spacing", SPACINGS_CM.0, SPACINGS_CM.1, "plant spacing in cm");
@@ -78,8 +68,20 @@ fn axes() -> Vec<AxisHelp> {
 /// An axis; a shell that completes offers the names.
 fn axis() -> impl TypedValueParser<Value = Axis> {
     static NAMES: LazyLock<Vec<String>> =
-        LazyLock::new(|| axes().into_iter().map(|axis| format!("{}=", axis.name)).collect());
+        LazyLock::new(|| axes().into_iter().map(|[name, ..]| format!("{name}=")).collect());
     offering(|| NAMES.iter().map(String::as_str).collect(), |text: &str| text.parse::<Axis>())
+}
+
+/// A controller by its name.
+fn controller() -> impl TypedValueParser<Value = Treatment> {
+    let ideal = PossibleValue::new("ideal").alias("all-knowing");
+    let names = ["firmware", "without-look-ahead", "paper"].map(PossibleValue::new);
+    PossibleValuesParser::new(names.into_iter().chain([ideal])).map(|name| match name.as_str() {
+        "firmware" => Treatment::Firmware,
+        "without-look-ahead" => Treatment::WithoutLookAhead,
+        "paper" => Treatment::Paper,
+        _ => Treatment::Ideal,
+    })
 }
 
 /// The arguments.
@@ -93,11 +95,11 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME=FROM..TO:STEP", value_parser = axis(), hide_possible_values = true)]
     y: Option<Axis>,
     /// The result to show for two axes.
-    #[arg(long, default_value = RESULT, value_parser = PossibleValuesParser::new(Results::NAMES))]
+    #[arg(long, default_value = RESULT, value_parser = PossibleValuesParser::new(RESULTS))]
     result: String,
     /// The controller: the firmware, the firmware without leads, the paper's, or the ideal controller.
-    #[arg(long, value_enum, default_value = "firmware")]
-    controller: ControllerName,
+    #[arg(long, value_parser = controller(), default_value = "firmware")]
+    controller: Treatment,
     /// The field: a preset or a TOML file, as for `weeder trial`.
     #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = "transplanted")]
     field: String,
@@ -121,27 +123,6 @@ pub struct Arguments {
     /// Print all results of all points as JSON instead of a table.
     #[arg(long)]
     json: bool,
-}
-
-/// The controllers by their names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ControllerName {
-    Firmware,
-    WithoutLookAhead,
-    Paper,
-    #[value(alias = "all-knowing")]
-    Ideal,
-}
-
-impl From<ControllerName> for Treatment {
-    fn from(name: ControllerName) -> Self {
-        match name {
-            ControllerName::Firmware => Self::Firmware,
-            ControllerName::WithoutLookAhead => Self::WithoutLookAhead,
-            ControllerName::Paper => Self::Paper,
-            ControllerName::Ideal => Self::Ideal,
-        }
-    }
 }
 
 /// How to show a sweep's points.
@@ -171,7 +152,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let sweep = Sweep {
         x: arguments.x.clone(),
         y: arguments.y.clone(),
-        controller: arguments.controller.into(),
+        controller: arguments.controller,
         conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
         speed_km_h: arguments.speed,
         spacing_cm: arguments.spacing,
@@ -227,7 +208,7 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
         ),
         None => format!("{}\n", list(sweep, points)),
     };
-    if points.iter().any(|point| point.results.alarms_percent > 0.0) {
+    if points.iter().any(|point| point.has_alarm) {
         text += "! an alarm took the tool out in some of the rows: --result alarms shows in how many\n";
     }
     text
@@ -236,7 +217,7 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
 /// All results of all points, by the names of the file's columns. A missing result is null.
 fn in_json(sweep: &Sweep, points: &[Point]) -> Value {
     let point = |point: &Point| {
-        let values = place(point).chain(point.results.values()).map(Value::from);
+        let values = place(point).chain(point.results).map(Value::from);
         Map::from_iter(columns(sweep).map(str::to_owned).zip(values))
     };
     json!({ "points": points.iter().map(point).collect::<Vec<_>>() })
@@ -245,7 +226,7 @@ fn in_json(sweep: &Sweep, points: &[Point]) -> Value {
 /// The axes by their names, and then the results.
 fn columns(sweep: &Sweep) -> impl Iterator<Item = &str> {
     let axes = [Some(&sweep.x), sweep.y.as_ref()].into_iter().flatten();
-    axes.map(|axis| axis.parameter.as_str()).chain(Results::NAMES)
+    axes.map(|axis| axis.parameter.as_str()).chain(RESULTS)
 }
 
 /// A point's values on the axes.
@@ -255,7 +236,7 @@ fn place(point: &Point) -> impl Iterator<Item = f64> {
 
 /// A value as text: with a mark if alarms make it invalid, and a dash if there is none.
 fn shown(value: f64, point: &Point) -> String {
-    match (value.is_finite(), point.results.alarms_percent > 0.0) {
+    match (value.is_finite(), point.has_alarm) {
         (false, _) => "-".to_owned(),
         (true, true) => format!("{value:.1} !"),
         (true, false) => format!("{value:.1}"),
@@ -264,10 +245,10 @@ fn shown(value: f64, point: &Point) -> String {
 
 /// A line a value of the second axis, a column a value of the first.
 fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
-    let result = Results::NAMES.iter().position(|name| *name == result).unwrap_or(0);
+    let result = RESULTS.iter().position(|name| *name == result).unwrap_or(0);
     let mut table = number_table([String::new()].into_iter().chain(sweep.x.values.iter().map(f64::to_string)), 0);
     for (value, line) in y.values.iter().zip(points.chunks(sweep.x.values.len())) {
-        let results = line.iter().map(|point| shown(point.results.values()[result], point));
+        let results = line.iter().map(|point| shown(point.results[result], point));
         table.add_row([value.to_string()].into_iter().chain(results));
     }
     table
@@ -275,10 +256,10 @@ fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
 
 /// A line a value of the only axis, a column a result.
 fn list(sweep: &Sweep, points: &[Point]) -> Table {
-    let names = Results::NAMES.iter().map(|name| name.replace('_', " "));
+    let names = RESULTS.iter().map(|name| name.replace('_', " "));
     let mut table = number_table([sweep.x.parameter.clone()].into_iter().chain(names), 0);
     for point in points {
-        let results = point.results.values().map(|value| shown(value, point));
+        let results = point.results.map(|value| shown(value, point));
         table.add_row([point.x.to_string()].into_iter().chain(results));
     }
     table
@@ -289,7 +270,7 @@ fn write(out: &OutFile, sweep: &Sweep, points: &[Point]) -> Result<()> {
         let mut writer = csv::Writer::from_writer(to);
         writer.write_record(columns(sweep))?;
         for point in points {
-            let values = place(point).chain(point.results.values());
+            let values = place(point).chain(point.results);
             // A missing result has an empty cell.
             writer
                 .write_record(values.map(|value| if value.is_finite() { value.to_string() } else { String::new() }))?;

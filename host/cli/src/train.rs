@@ -6,7 +6,7 @@ use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::source::{self, offering};
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgGroup, Args};
 use experiments::training::synthetic::{CROPS, Crop};
@@ -16,8 +16,7 @@ use experiments::training::{
 };
 use link::examples::CAPACITY;
 use serde_json::{Value, json};
-use std::path::PathBuf;
-use std::str::FromStr;
+use std::path::{Path, PathBuf};
 
 /// The arguments.
 #[derive(Args)]
@@ -45,7 +44,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.rs|FILE.csv")]
     out: Option<FileName>,
     /// Examples that vote: 1 to 15, or `auto` for the best number.
-    #[arg(long, value_name = "auto|N", default_value = "auto")]
+    #[arg(long, value_name = "auto|N", default_value = "auto", value_parser = votes)]
     k: Votes,
     #[arg(
         long,
@@ -68,12 +67,8 @@ pub struct Arguments {
     json: bool,
 }
 
-/// How many examples vote.
-#[derive(Clone, Copy)]
-enum Votes {
-    Auto,
-    Given(u8),
-}
+/// How many examples vote; `None` for the best number.
+type Votes = Option<u8>;
 
 /// A crop; a shell that completes offers the names.
 fn crop() -> impl TypedValueParser<Value = &'static Crop> {
@@ -91,16 +86,12 @@ fn find_crop(name: &str) -> Result<&'static Crop, String> {
     })
 }
 
-impl FromStr for Votes {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "auto" {
-            return Ok(Self::Auto);
-        }
-        let given = text.parse().ok().filter(|k| (1..=training::MAX_K).contains(k));
-        given.map(Self::Given).ok_or_else(|| format!("it has to be auto or a number from 1 to {}", training::MAX_K))
+fn votes(text: &str) -> Result<Votes, String> {
+    let given = text.parse().ok().filter(|k| (1..=training::MAX_K).contains(k));
+    if text == "auto" || given.is_some() {
+        return Ok(given);
     }
+    Err(format!("it has to be auto or a number from 1 to {}", training::MAX_K))
 }
 
 /// Trains, and prints the result.
@@ -109,37 +100,27 @@ impl FromStr for Votes {
 /// If a file or its contents are wrong, or the table would not fit.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
-    let table = arguments.out.as_ref().map(|out| Destination::of(out, replace)).transpose()?;
+    let table = arguments.out.as_ref().map(|out| destination(out, replace)).transpose()?;
     let picture = arguments.picture.as_ref().map(|picture| picture.check(replace)).transpose()?;
     let objects = arguments.objects()?;
-    let k = match arguments.k {
-        Votes::Auto => None,
-        Votes::Given(k) => Some(k),
-    };
     if arguments.beside {
-        return beside(arguments, table.as_ref(), &objects, k);
+        return beside(arguments, table.as_ref(), &objects);
     }
-    let training = training::train(&objects, k, arguments.max)?;
-    let another_field = match arguments.synthetic {
-        true => {
-            let seed = arguments.seed.wrapping_add(1);
-            Some((seed, training.model().classify(&synthetic::objects(arguments.crop, seed)?)))
-        }
-        false => None,
-    };
+    let training = training::train(&objects, arguments.k, arguments.max)?;
+    let seed = arguments.seed.wrapping_add(1);
+    let another = arguments.synthetic.then(|| synthetic::objects(arguments.crop, seed)).transpose()?;
+    let another_field = another.map(|objects| (seed, training.model().classify(&objects)));
     let printed = match arguments.json {
         true => say!("{:#}", in_json(&training, &objects, another_field.as_ref())),
         false => report(&training, &objects, another_field.as_ref()),
     };
     if let Some(table) = &table {
-        match table.form {
-            Form::Rust => {
-                table.file.write(|to| to.write_all(listing::rust(&training, &arguments.command()).as_bytes()))?
-            }
-            Form::Csv => table.file.write(|to| listing::write_csv(&training.kept, to))?,
+        match is_rust(table.path()) {
+            true => table.write(|to| to.write_all(listing::rust(&training, &arguments.command()).as_bytes()))?,
+            false => table.write(|to| listing::write_csv(&training.kept, to))?,
         }
         if !arguments.json {
-            say!("Table       {}", table.file.path().display())?;
+            say!("Table       {}", table.path().display())?;
         }
     }
     if let Some(picture) = &picture {
@@ -157,11 +138,11 @@ impl Arguments {
         if self.synthetic {
             return synthetic::objects(self.crop, self.seed);
         }
-        let lesson = table::read_labelled(&self.files)?;
-        if lesson.unlabelled > 0 {
-            tell!("Passed over {} without a label", lesson.unlabelled);
+        let (objects, unlabelled) = table::read_labelled(&self.files)?;
+        if unlabelled > 0 {
+            tell!("Passed over {unlabelled} without a label");
         }
-        Ok(lesson.objects)
+        Ok(objects)
     }
 
     /// The command that gives the same table again.
@@ -175,7 +156,7 @@ impl Arguments {
             words.push(format!("--seed {}", self.seed));
         }
         words.extend(self.files.iter().map(|file| file.display().to_string()));
-        if let Votes::Given(k) = self.k {
+        if let Some(k) = self.k {
             words.push(format!("--k {k}"));
         }
         words.push(format!("--max {}", self.max));
@@ -184,11 +165,11 @@ impl Arguments {
 }
 
 /// Chooses the examples to teach in addition to the built-in table, and prints the result.
-fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelled], k: Option<u8>) -> Result<Finding> {
-    if table.is_some_and(|table| matches!(table.form, Form::Rust)) {
+fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) -> Result<Finding> {
+    if table.is_some_and(|table| is_rust(table.path())) {
         bail!("examples to teach beside the built-in table are written as CSV (.csv)");
     }
-    let Beside { chosen, before, after } = training::beside(objects, k, usize::from(CAPACITY))?;
+    let Beside { chosen, before, after } = training::beside(objects, arguments.k, usize::from(CAPACITY))?;
     let printed = match arguments.json {
         true => say!(
             "{:#}",
@@ -206,9 +187,9 @@ fn beside(arguments: &Arguments, table: Option<&Destination>, objects: &[Labelle
         ),
     };
     if let Some(table) = table {
-        table.file.write(|to| listing::write_csv(&chosen, to))?;
+        table.write(|to| listing::write_csv(&chosen, to))?;
         if !arguments.json {
-            say!("Table       {}", table.file.path().display())?;
+            say!("Table       {}", table.path().display())?;
         }
     }
     printed?;
@@ -254,26 +235,15 @@ fn counts_in_json(classified: &Confusion) -> Value {
     json!({ "objects": classified.total(), "plants_taken_for_weeds": classified.plants_taken_for_weeds() })
 }
 
-/// The format of a written table.
-enum Form {
-    Rust,
-    Csv,
+/// Whether a table is written as Rust, by the ending of its name, and not as CSV.
+fn is_rust(table: &Path) -> bool {
+    table.extension().is_some_and(|ending| ending == "rs")
 }
 
-/// The table's destination and format.
-struct Destination<'a> {
-    file: OutFile<'a>,
-    form: Form,
-}
-
-impl<'a> Destination<'a> {
-    /// A file. The ending of its name selects the format.
-    fn of(name: &'a FileName, replace: Replace) -> Result<Self> {
-        let form = match name.path().extension().and_then(|ending| ending.to_str()) {
-            Some("rs") => Form::Rust,
-            Some("csv") => Form::Csv,
-            _ => bail!("{}: a table is written as Rust (.rs) or as CSV (.csv)", name.path().display()),
-        };
-        Ok(Self { file: name.check(replace)?, form })
-    }
+/// The table's file, if the ending of its name selects a format.
+fn destination(name: &FileName, replace: Replace) -> Result<OutFile<'_>> {
+    let path = name.path();
+    let has_format = is_rust(path) || path.extension().is_some_and(|ending| ending == "csv");
+    ensure!(has_format, "{}: a table is written as Rust (.rs) or as CSV (.csv)", path.display());
+    name.check(replace)
 }

@@ -13,11 +13,11 @@ use clap::{Args, Command, FromArgMatches, ValueEnum};
 use comfy_table::{CellAlignment, Table};
 use experiments::evaluation::{Analysis, published};
 use experiments::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
-use experiments::page::{Page, RowPicture};
+use experiments::page::Page;
 use experiments::shard::{Numbered, Shard};
 use experiments::statistics::Share;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
-use experiments::table::in_two_lines;
+use experiments::table::{distinct, in_two_lines};
 use field::budget;
 use field::conditions::{Conditions, presets};
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
@@ -228,8 +228,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let shown = Shown { out: arguments.out.clone().filter(|_| part.is_none()), replace, json, brief };
     let folder = shown.folder()?;
     let experiment = Experiment {
-        speeds_km_h: ascending(&arguments.speeds),
-        spacings_cm: ascending(&arguments.spacings),
+        speeds_km_h: distinct(arguments.speeds.clone()),
+        spacings_cm: distinct(arguments.spacings.clone()),
         replications: arguments.replications,
         controllers: arguments.controllers(),
         conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
@@ -316,8 +316,7 @@ fn show(
     if let Some(folder) = folder {
         // Only the report has the comparison with the paper.
         let summary = [summary, against_the_paper(outcomes)].concat();
-        let findings = Findings { outcomes, totals, analysis, summary };
-        write_report(folder, study, picture()?, &findings)?;
+        write_report(folder, study, picture()?, outcomes, &totals, &analysis, summary)?;
         if !json {
             say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
         }
@@ -333,22 +332,6 @@ fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
     let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
     said.into_iter().map(|said| format!("The paper's controller at {slowest} to {fastest} km/h: {said}")).collect()
-}
-
-/// All results of a trial.
-struct Findings<'a> {
-    outcomes: &'a [PlotOutcome],
-    totals: Vec<Total>,
-    analysis: Analysis,
-    summary: Vec<String>,
-}
-
-/// Levels in ascending order, each once.
-fn ascending(levels: &[f64]) -> Vec<f64> {
-    let mut levels = levels.to_vec();
-    levels.sort_by(f64::total_cmp);
-    levels.dedup();
-    levels
 }
 
 /// The totals of one controller, by speed.
@@ -508,7 +491,15 @@ fn damage(totals: &[Total], controller: Treatment) -> String {
     }
 }
 
-fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, findings: &Findings) -> Result<()> {
+fn write_report(
+    folder: &OutFolder,
+    study: &Study,
+    picture: Option<String>,
+    outcomes: &[PlotOutcome],
+    totals: &[Total],
+    analysis: &Analysis,
+    summary: Vec<String>,
+) -> Result<()> {
     let Study { experiment, field, .. } = study;
     let engine_name = match study.engine {
         EngineName::Native => "the firmware's code, compiled for the host",
@@ -525,25 +516,21 @@ fn write_report(folder: &OutFolder, study: &Study, picture: Option<String>, find
     }));
     let settings = experiment.conditions.settings.iter();
     parameters.extend(settings.map(|(setting, value)| (format!("settings.{setting}"), value.to_string())));
-    let row = picture.map(|drawing| RowPicture {
-        drawing,
-        caption: "The first metres of a row at the highest speed, as the firmware weeded them.".to_owned(),
-    });
     let words = [study.words.clone(), vec!["--out".to_owned(), folder.path().display().to_string()]].concat();
     let page = Page {
         title: "Field trial of the intra-row weeder, simulated",
-        summary: findings.summary.clone(),
+        summary,
         command: &shlex::try_join(words.iter().map(String::as_str))?,
         parameters: &parameters,
-        analysis: &findings.analysis,
-        comparison: Some(&experiment::compare(&findings.totals)),
-        row: row.as_ref(),
+        analysis,
+        totals,
+        row: picture.as_deref(),
     };
     let html = page.html()?;
     let [report, plots, controllers] = REPORT;
     folder.write(report, |to| to.write_all(html.as_bytes()))?;
-    folder.write(plots, |to| experiment::write_csv(findings.outcomes, &[Treatment::Firmware], to))?;
-    folder.write(controllers, |to| experiment::write_csv(findings.outcomes, &experiment.controllers, to))
+    folder.write(plots, |to| experiment::write_csv(outcomes, &[Treatment::Firmware], to))?;
+    folder.write(controllers, |to| experiment::write_csv(outcomes, &experiment.controllers, to))
 }
 
 fn in_json(outcome: &PlotOutcome) -> serde_json::Value {

@@ -1,15 +1,14 @@
 //! `weeder virtual-uno`: an Uno without an Uno, at a pseudo terminal that any serial program opens.
 
 use crate::course::CourseArguments;
+use crate::ctrl_c;
 use crate::flash;
 use crate::numbers::{number_within, whole_within};
 use crate::output::{say, tell};
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use clap::Args;
 use field::motion::mm_s;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use trial::firmware;
 use trial::live::rows::{LiveRows, Ran};
@@ -127,9 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let (rate_hz, error_mm) = (arguments.gps_rate, arguments.gps_error);
         (ReceiverSetup { rate_hz, error_mm, began_ms, trouble, ..ReceiverSetup::default() }, Some(link))
     });
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked_to_stop = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let stop = ctrl_c()?;
 
     let of_row = |path: &Option<PathBuf>, row: usize| path.as_ref().map(|path| of_row(path, row, count));
     let setup = |(row, course)| Setup {

@@ -2,7 +2,7 @@
 //! to models and analyses of variance, beside the paper's own figures.
 //!
 //! A trial has plots at some speeds and plant spacings, with replications. [`PlotRecord`] is one plot. [`table`] reads
-//! and writes plots as CSV. [`PlotRecord::performance`] calculates the measures of one plot, and [`Analysis`] analyses
+//! plots from CSV. [`PlotRecord::performance`] calculates the measures of one plot, and [`Analysis`] analyses
 //! all plots. [`published`] holds the paper's printed figures. The code does not distinguish real plots from simulated
 //! plots.
 
@@ -10,12 +10,10 @@ mod findings;
 mod plot;
 pub mod published;
 pub(crate) mod report;
-mod response;
 pub mod table;
 
-pub use self::plot::{Performance, PlotRecord};
-pub use self::response::Response;
-pub use self::table::{FileError, read_csv, write_csv};
+pub use self::plot::{Performance, PlotRecord, Response};
+pub use self::table::read_csv;
 
 use self::published::Published;
 use crate::statistics::{AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share};

@@ -40,7 +40,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use uno::Pulse;
 
 pub use table::write_csv;
-pub use total::{Total, compare, totals};
+pub use total::{Total, totals};
 
 /// How the firmware is run.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -18,7 +18,3 @@ pub mod statistics;
 pub mod sweep;
 pub mod table;
 pub mod training;
-
-pub use evaluation::{Analysis, PlotRecord};
-pub use experiment::{Engine, Experiment, Treatment};
-pub use sweep::Sweep;

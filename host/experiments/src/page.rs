@@ -5,30 +5,17 @@
 //! texts and their order are in `templates/page.html`, and the style is in `templates/page.css`.
 
 mod chart;
-mod comparison;
 mod figure;
-mod losses;
-mod response;
 
-pub use self::comparison::{Comparison, ControllerCurve, ControllerPoint, Work};
-
-use crate::evaluation::published::{MACHINES, PublishedMachine};
-use crate::evaluation::{Analysis, Response};
-use crate::table::{Table, fixed, optional, short};
-use anyhow::{Context, Result, bail};
+use crate::evaluation::published::{Coefficients, MACHINES};
+use crate::evaluation::{Analysis, Response, ResponseAnalysis};
+use crate::experiment::{Total, Treatment};
+use crate::statistics::NoModel;
+use crate::table::{Table, distinct, fixed, optional, short, significant};
+use anyhow::{Context, Result};
 use askama::Template;
-use figure::Figure;
-use losses::Losses;
-use response::Chapter;
-
-/// A picture of one row along the ground, by [`trial::picture::draw`].
-#[derive(Debug, Clone)]
-pub struct RowPicture {
-    /// The drawing, as SVG.
-    pub drawing: String,
-    /// Its content, in a sentence.
-    pub caption: String,
-}
+use field::budget::Part;
+use figure::{Curve, Figure};
 
 /// A trial's report.
 #[derive(Debug, Clone)]
@@ -43,34 +30,33 @@ pub struct Page<'a> {
     pub parameters: &'a [(String, String)],
     /// The plots and their analysis.
     pub analysis: &'a Analysis,
-    /// Controllers side by side; `None` for a real trial.
-    pub comparison: Option<&'a Comparison>,
-    /// One row of the trial; `None` for a real trial.
-    pub row: Option<&'a RowPicture>,
+    /// The totals of each controller, with growing speed; empty for a real trial.
+    pub totals: &'a [Total],
+    /// The first metres of a row, as SVG by [`trial::picture::draw`]; `None` for a real trial.
+    pub row: Option<&'a str>,
 }
 
 impl Page<'_> {
     /// The page as HTML, a complete file.
     ///
     /// # Errors
-    /// If a figure of the comparison is not finite, or plotters cannot draw.
+    /// If plotters cannot draw.
     pub fn html(&self) -> Result<String> {
-        let comparison = self.comparison.map(Headline::of).transpose()?;
         let analysis = self.analysis;
         let figures = Response::ALL.map(|response| figure::response(analysis, response));
+        let chapter = |of| Ok((of, figure::residuals(analysis, of)?));
         let sheet = Sheet {
-            title: self.title,
-            summary: &self.summary,
-            command: self.command,
-            comparison,
+            page: self,
+            controllers: (!self.totals.is_empty()).then(|| Controllers::of(self.totals)).transpose()?,
             figures: figures.into_iter().collect::<Result<_>>()?,
-            row: self.row.map(|row| (row.drawing.clone(), row.caption.as_str())),
-            chapters: analysis.responses.iter().map(|of| Chapter::of(analysis, of)).collect::<Result<_>>()?,
-            means: analysis.means(),
-            plots: analysis.plots(),
-            parameters: parameters(self.parameters),
+            chapters: analysis.responses.iter().map(chapter).collect::<Result<_>>()?,
         };
         sheet.render().context("the page cannot be put together")
+    }
+
+    fn parameters(&self) -> Table {
+        let rows = self.parameters.iter().map(|(name, value)| vec![name.clone(), value.clone()]).collect();
+        Table { rows, is_prose: true, ..Table::new("Parameters of the trial", ["parameter", "value"]) }
     }
 }
 
@@ -78,114 +64,203 @@ impl Page<'_> {
 #[derive(Template)]
 #[template(path = "page.html")]
 struct Sheet<'a> {
-    title: &'a str,
-    summary: &'a [String],
-    command: &'a str,
-    comparison: Option<Headline>,
+    page: &'a Page<'a>,
+    controllers: Option<Controllers>,
     figures: Vec<Figure>,
-    row: Option<(String, &'a str)>,
-    chapters: Vec<Chapter>,
-    means: Table,
-    plots: Table,
-    parameters: Table,
+    /// The analysis of each measure, and its residuals if it has a model.
+    chapters: Vec<(&'a ResponseAnalysis, Option<Figure>)>,
 }
 
-/// The controllers side by side, as charts and as tables.
-struct Headline {
-    figures: [Figure; 3],
-    tables: [Table; 3],
-    losses: Option<Losses>,
-    beside_others: Option<Table>,
+/// The controllers side by side, as charts and as tables, and the firmware's machine beside others.
+struct Controllers {
+    figures: Vec<Figure>,
+    tables: Vec<Table>,
+    /// A bar a speed; none without the firmware.
+    losses: Vec<Bar>,
+    losses_table: Table,
+    beside_others: Table,
 }
 
-impl Headline {
-    fn of(comparison: &Comparison) -> Result<Self> {
-        comparison.check()?;
-        let of_controllers = |value: fn(&ControllerPoint) -> f64| {
-            let curve = move |controller: &ControllerCurve| {
-                let points = controller.points.iter().map(|point| (point.speed_km_h, value(point)));
-                (controller.name.clone(), points.collect())
-            };
-            comparison.controllers.iter().map(curve).collect::<Vec<(String, Vec<(f64, f64)>)>>()
+/// A measure of the controllers.
+struct Measure {
+    /// Title, unit and caption of its chart.
+    chart: [&'static str; 3],
+    /// Caption of its table.
+    table: &'static str,
+    value: fn(&Total) -> f64,
+}
+
+const DAMAGE: Measure = Measure {
+    chart: [
+        "Plant damage",
+        "% of the plants",
+        "Share of the plants whose stem zone the tool entered. Lower is better.",
+    ],
+    table: "Plants damaged by each controller, %",
+    value: Total::plant_damage_percent,
+};
+
+const WEEDING: Measure = Measure {
+    chart: [
+        "In-row weeding",
+        "% of the row's ground",
+        "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.",
+    ],
+    table: "Ground of the row weeded by each controller, %",
+    value: |total| 100.0 * total.weeded_share,
+};
+
+const ZONES: Measure = Measure {
+    chart: [
+        "Zones reached",
+        "% of the plants' zones",
+        "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.",
+    ],
+    table: "Zones reached by each controller, %",
+    value: Total::zones_reached_percent,
+};
+
+/// The name of the line below which a controller cuts no margin.
+const BOUND: &str = "most with every zone and margin kept";
+
+impl Controllers {
+    fn of(totals: &[Total]) -> Result<Self> {
+        let of = |controller| totals.iter().filter(move |total| total.controller == controller);
+        let curve = |name: &str, controller, value: fn(&Total) -> f64| Curve {
+            name: name.to_owned(),
+            points: of(controller).map(|total| (total.speed_km_h, value(total))).collect(),
         };
-        let damage = of_controllers(|point| point.plant_damage_percent);
-        let zones = of_controllers(|point| point.zones_reached_percent);
-        let mut weeding = of_controllers(|point| point.in_row_weeding_percent);
-        if !comparison.bound.is_empty() {
-            weeding.push((figure::BOUND.to_owned(), comparison.bound.clone()));
+        // The largest share that this servo can weed is that of every controller.
+        let first = totals.first().map_or(Treatment::Firmware, |total| total.controller);
+        let bound = curve(BOUND, first, |total| 100.0 * total.weedable_share);
+        let present = || Treatment::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
+        let (mut figures, mut tables) = (Vec::new(), Vec::new());
+        for (Measure { chart, table, value }, bound) in [(DAMAGE, None), (WEEDING, Some(bound)), (ZONES, None)] {
+            let mut curves: Vec<Curve> = present().map(|one| curve(one.title(), one, value)).collect();
+            figures.push(figure::curves(chart, &curves, bound.as_ref())?);
+            curves.extend(bound);
+            tables.push(by_speed(table, &curves));
         }
+        let firmware: Vec<&Total> = of(Treatment::Firmware).collect();
         Ok(Self {
-            figures: [figure::damage(comparison)?, figure::weeding(comparison)?, figure::zones(comparison)?],
-            tables: [
-                by_speed("Plants damaged by each controller, %", &damage),
-                by_speed("Ground of the row weeded by each controller, %", &weeding),
-                by_speed("Zones reached by each controller, %", &zones),
-            ],
-            losses: Losses::of(&comparison.work),
-            beside_others: (!comparison.work.is_empty()).then(|| beside_others(&comparison.work)),
+            figures,
+            tables,
+            losses: firmware.iter().map(|total| Bar::of(total)).collect(),
+            losses_table: losses(&firmware),
+            beside_others: beside_others(&firmware),
         })
     }
 }
 
-impl Comparison {
-    /// Checks that every figure is finite. The error names controller and speed.
-    fn check(&self) -> Result<()> {
-        let of_controllers = self.controllers.iter().flat_map(|controller| {
-            controller.points.iter().flat_map(|point| {
-                let figures = [point.plant_damage_percent, point.zones_reached_percent, point.in_row_weeding_percent];
-                figures.map(|value| (controller.name.as_str(), point.speed_km_h, value))
-            })
-        });
-        let of_bound = self.bound.iter().map(|&(speed_km_h, value)| ("the bound", speed_km_h, value));
-        let wrong = of_controllers.chain(of_bound).find(|(_, speed, value)| !(speed + value).is_finite());
-        if let Some((what, speed_km_h, value)) = wrong {
-            bail!("{what} is {value} at {speed_km_h} km/h: a report shows finite figures only");
-        }
-        Ok(())
-    }
-}
-
 /// Curves over speed as a table, a row a speed.
-fn by_speed(caption: &str, curves: &[(String, Vec<(f64, f64)>)]) -> Table {
-    let mut speeds: Vec<f64> = curves.iter().flat_map(|(_, points)| points).map(|point| point.0).collect();
-    speeds.sort_by(f64::total_cmp);
-    speeds.dedup();
-    let names = curves.iter().map(|(name, _)| name.as_str());
+fn by_speed(caption: &str, curves: &[Curve]) -> Table {
+    let speeds = distinct(curves.iter().flat_map(|curve| &curve.points).map(|point| point.0));
+    let names = curves.iter().map(|curve| curve.name.as_str());
     let mut table = Table::new(caption, ["speed"].into_iter().chain(names));
     for speed in speeds {
-        let at_speed = |points: &[(f64, f64)]| points.iter().find(|point| point.0 == speed).map(|point| point.1);
-        let cells = curves.iter().map(|(_, points)| optional(at_speed(points), |value| fixed(value, 1)));
+        let value = |curve: &Curve| curve.points.iter().find(|point| point.0 == speed).map(|point| point.1);
+        let cells = curves.iter().map(|curve| optional(value(curve), |value| fixed(value, 1)));
         table.rows.push([format!("{} km/h", short(speed))].into_iter().chain(cells).collect());
     }
     table
 }
 
 /// The simulated machine beside published ones, in their measures.
-fn beside_others(work: &[Work]) -> Table {
+fn beside_others(firmware: &[&Total]) -> Table {
     let columns = ["machine", "crop", "sees by", "speed, km/h", "weeds gone, %", "plants damaged, %", "source"];
     let mut table = Table { is_prose: true, ..Table::new("This machine, simulated, and machines in fields", columns) };
-    for at in work {
+    for total in firmware {
         let gone = |percent: Option<f64>| optional(percent, |percent| fixed(percent, 1));
+        let [in_row, in_plot] =
+            [total.effect.in_row, total.effect.in_plot].map(|weeds| gone(weeds.efficiency_percent()));
         table.rows.push(vec![
             "this firmware, SIMULATED".to_owned(),
             "the simulated field's".to_owned(),
             "a light beam".to_owned(),
-            short(at.speed_km_h),
-            format!("{} in the row, {} in the plot", gone(at.in_row_percent), gone(at.in_plot_percent)),
-            format!("{} ({})", fixed(at.damage.percent(), 2), at.damage),
+            short(total.speed_km_h),
+            format!("{in_row} in the row, {in_plot} in the plot"),
+            format!("{} ({})", fixed(total.plant_damage_percent(), 2), total.damage()),
             "this report".to_owned(),
         ]);
     }
-    let published = |machine: &PublishedMachine| {
-        let PublishedMachine { name, crop, sees_by, speed_km_h, weeds_gone_percent, damaged_percent, source } =
-            *machine;
-        [name, crop, sees_by, speed_km_h, weeds_gone_percent, damaged_percent, source].map(str::to_owned).to_vec()
-    };
-    table.rows.extend(MACHINES.iter().map(published));
+    table.rows.extend(MACHINES.iter().map(|machine| machine.map(str::to_owned).to_vec()));
     table
 }
 
-fn parameters(parameters: &[(String, String)]) -> Table {
-    let rows = parameters.iter().map(|(name, value)| vec![name.clone(), value.clone()]).collect();
-    Table { rows, is_prose: true, ..Table::new("Parameters of the trial", ["parameter", "value"]) }
+/// Parts narrower than this, in tenths of a percent, have no room for their figure in a bar.
+const LEAST_LABELLED: u32 = 45;
+
+/// The loss budget of one speed, as a stacked bar.
+struct Bar {
+    /// The speed.
+    name: String,
+    /// The bar in words.
+    words: String,
+    /// The key of each part that there is, its share in thousandths, and its label.
+    pieces: Vec<(&'static str, u32, String)>,
+}
+
+impl Bar {
+    fn of(total: &Total) -> Self {
+        let name = format!("{} km/h", short(total.speed_km_h));
+        let parts = total.budget.tenths().into_iter().filter(|(_, tenths)| *tenths > 0);
+        let words: Vec<String> =
+            parts.clone().map(|(part, tenths)| format!("{} {} %", part.title(), percent(tenths))).collect();
+        let label = |tenths| if tenths < LEAST_LABELLED { String::new() } else { percent(tenths) };
+        Self {
+            words: format!("{name}: {}", words.join(", ")),
+            name,
+            pieces: parts.map(|(part, tenths)| (part.key(), tenths, label(tenths))).collect(),
+        }
+    }
+}
+
+/// The loss budget as a table.
+fn losses(firmware: &[&Total]) -> Table {
+    let titles = Part::ALL.map(|part| format!("{}, %", part.title()));
+    let mut table = Table::new("Where the row's ground went", ["speed".to_owned()].into_iter().chain(titles));
+    for total in firmware {
+        let shares = total.budget.tenths().map(|(_, tenths)| percent(tenths));
+        let speed = format!("{} km/h", short(total.speed_km_h));
+        table.rows.push([speed].into_iter().chain(shares).collect());
+    }
+    table
+}
+
+fn percent(tenths: u32) -> String {
+    fixed(f64::from(tenths) / 10.0, 1)
+}
+
+impl ResponseAnalysis {
+    /// The model as an equation, or why there is none.
+    fn equation(&self) -> Result<String, NoModel> {
+        let model = self.model.as_ref().map_err(|why| *why)?;
+        let estimate = |name| model.term(name).map(|term| term.estimate);
+        let coefficients =
+            Coefficients { constant: estimate("constant"), per_km_h: estimate("speed"), per_cm: estimate("spacing") };
+        Ok(self.written(&coefficients, significant))
+    }
+
+    /// The paper's equation. Empty if it is illegible.
+    fn published_equation(&self) -> String {
+        self.written(&self.published.equation, short)
+    }
+
+    /// The measure as an equation. Empty if no coefficient is known.
+    fn written(&self, coefficients: &Coefficients, said: fn(f64) -> String) -> String {
+        let factors =
+            [(coefficients.constant, ""), (coefficients.per_km_h, " × speed"), (coefficients.per_cm, " × spacing")];
+        let mut right = String::new();
+        for (value, factor) in factors {
+            let Some(value) = value else { continue };
+            let sign = match (value < 0.0, right.is_empty()) {
+                (true, true) => "\u{2212}",
+                (true, false) => " \u{2212} ",
+                (false, true) => "",
+                (false, false) => " + ",
+            };
+            right += &format!("{sign}{}{factor}", said(value.abs()));
+        }
+        if right.is_empty() { right } else { format!("{} = {right}", self.response.title().to_lowercase()) }
+    }
 }

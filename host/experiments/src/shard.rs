@@ -97,17 +97,6 @@ pub struct Header {
     pub settings: Value,
 }
 
-/// A part of a study, after reading.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Part<T> {
-    /// Its file's name.
-    pub name: String,
-    /// Its header.
-    pub header: Header,
-    /// The outcomes of its shard, by their numbers.
-    pub outcomes: Vec<Numbered<T>>,
-}
-
 /// An outcome, and the number of the plot, point or run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered<T> {
@@ -186,7 +175,11 @@ const MOST_HEADER: u64 = 1 << 24;
 ///
 /// # Errors
 /// If it cannot be read, a line is wrong, or an outcome is missing or surplus.
-pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut dyn BufRead) -> Result<Part<T>> {
+pub fn read_outcomes<T: DeserializeOwned>(
+    name: &str,
+    header: &Header,
+    from: &mut dyn BufRead,
+) -> Result<Vec<Numbered<T>>> {
     let shard = header.shard;
     let damaged = |line: usize, problem: String| {
         anyhow!("{name}, line {line}: {problem}; compute part {shard} again, with --force")
@@ -209,7 +202,7 @@ pub fn read_outcomes<T: DeserializeOwned>(name: &str, header: Header, from: &mut
     }
     match expected.next() {
         Some(number) => Err(damaged(last + 1, format!("the part ends before number {number}"))),
-        None => Ok(Part { name: name.to_owned(), header, outcomes }),
+        None => Ok(outcomes),
     }
 }
 
@@ -258,8 +251,8 @@ pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
 }
 
 /// All outcomes in the order of their numbers. The parts must have passed [`together`].
-pub fn outcomes<T>(parts: Vec<Part<T>>) -> Vec<T> {
-    let mut outcomes: Vec<Numbered<T>> = parts.into_iter().flat_map(|part| part.outcomes).collect();
+pub fn outcomes<T>(parts: Vec<Vec<Numbered<T>>>) -> Vec<T> {
+    let mut outcomes: Vec<Numbered<T>> = parts.into_iter().flatten().collect();
     outcomes.sort_by_key(|outcome| outcome.number);
     outcomes.into_iter().map(|outcome| outcome.outcome).collect()
 }

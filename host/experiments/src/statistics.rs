@@ -17,6 +17,7 @@ mod variance;
 
 pub use binomial::{BinomialModel, OddsTerm};
 pub use checks::Checks;
+pub(crate) use checks::{SIGNIFICANCE, probability};
 pub use design::{Design, NoModel, Remark};
 pub use interval::{CONFIDENCE, Mean, Share};
 pub use linear::{LinearModel, Term};

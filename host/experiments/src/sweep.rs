@@ -56,67 +56,33 @@ impl FromStr for Axis {
     }
 }
 
-/// The results of a point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Results {
-    /// Plants damaged, % (Eq. 23).
-    pub plant_damage_percent: f64,
-    /// Weeds gone from the whole plot, % (Eq. 22).
-    pub weeding_efficiency_percent: f64,
-    /// Ground of the row that was weeded, %.
-    pub in_row_weeding_percent: f64,
-    /// The largest share that the servo allows with every canopy and margin kept, %.
-    pub in_row_bound_percent: f64,
-    /// Field efficiency, % (Eq. 24).
-    pub field_efficiency_percent: f64,
-    /// Performance index, ha %2/(h hp) (Eq. 27).
-    pub performance_index: f64,
-    /// Rows in which an alarm took the tool out, %.
-    pub alarms_percent: f64,
-}
+/// The names of a point's results: plants damaged (Eq. 23), weeds gone from the whole plot (Eq. 22), ground of the row
+/// that was weeded, the largest share that the servo allows with every canopy and margin kept, field efficiency
+/// (Eq. 24), performance index in ha %2/(h hp) (Eq. 27), and rows in which an alarm took the tool out. The others are
+/// in percent.
+pub const RESULTS: [&str; 7] = [
+    "plant_damage",
+    "weeding_efficiency",
+    "in_row_weeding",
+    "in_row_bound",
+    "field_efficiency",
+    "performance_index",
+    "alarms",
+];
 
-impl Results {
-    /// Their names, in the order of [`Results::values`].
-    pub const NAMES: [&str; 7] = [
-        "plant_damage",
-        "weeding_efficiency",
-        "in_row_weeding",
-        "in_row_bound",
-        "field_efficiency",
-        "performance_index",
-        "alarms",
-    ];
-
-    /// All results.
-    pub fn values(&self) -> [f64; 7] {
-        [
-            self.plant_damage_percent,
-            self.weeding_efficiency_percent,
-            self.in_row_weeding_percent,
-            self.in_row_bound_percent,
-            self.field_efficiency_percent,
-            self.performance_index,
-            self.alarms_percent,
-        ]
-    }
-
-    fn of(outcome: &PlotOutcome, rows: u32) -> Self {
-        let performance = outcome.record.performance();
-        Self {
-            plant_damage_percent: performance.plant_damage_percent,
-            // From all weeds: the scatter of a square metre would hide the effect.
-            weeding_efficiency_percent: outcome
-                .effect
-                .in_plot
-                .efficiency_percent()
-                .unwrap_or(performance.weeding_efficiency_percent),
-            in_row_weeding_percent: 100.0 * outcome.weeded_share,
-            in_row_bound_percent: 100.0 * outcome.weedable_share,
-            field_efficiency_percent: performance.field_efficiency_percent,
-            performance_index: performance.performance_index,
-            alarms_percent: 100.0 * f64::from(outcome.alarms) / f64::from(rows),
-        }
-    }
+fn results(outcome: &PlotOutcome, rows: u32) -> [f64; RESULTS.len()] {
+    let performance = outcome.record.performance();
+    // From all weeds: the scatter of a square metre would hide the effect.
+    let weeding = outcome.effect.in_plot.efficiency_percent();
+    [
+        performance.plant_damage_percent,
+        weeding.unwrap_or(performance.weeding_efficiency_percent),
+        100.0 * outcome.weeded_share,
+        100.0 * outcome.weedable_share,
+        performance.field_efficiency_percent,
+        performance.performance_index,
+        100.0 * f64::from(outcome.alarms) / f64::from(rows),
+    ]
 }
 
 /// A sweep.
@@ -145,8 +111,10 @@ pub struct Point {
     pub x: f64,
     /// Its value on the second axis.
     pub y: Option<f64>,
-    /// The result.
-    pub results: Results,
+    /// The results, in the order of [`RESULTS`].
+    pub results: [f64; RESULTS.len()],
+    /// Whether an alarm took the tool out in one of its rows: the other results are then invalid.
+    pub has_alarm: bool,
 }
 
 /// A point's values, and its conditions.
@@ -196,8 +164,8 @@ impl Sweep {
     /// If an axis has an invalid value.
     pub fn points(&self, outcomes: &[PlotOutcome]) -> Result<Vec<Point>> {
         let point = |(place, outcome): (&Place, &PlotOutcome)| {
-            let results = Results::of(outcome, place.experiment.conditions.plot.rows);
-            Point { x: place.x, y: place.y, results }
+            let results = results(outcome, place.experiment.conditions.plot.rows);
+            Point { x: place.x, y: place.y, results, has_alarm: outcome.alarms > 0 }
         };
         Ok(self.places()?.iter().zip(outcomes).map(point).collect())
     }
@@ -296,16 +264,10 @@ mod tests {
         assert_eq!(points.len(), 6);
         let damage = |x: f64, y: f64| {
             let point = points.iter().find(|point| point.x == x && point.y == Some(y)).unwrap();
-            point.results.plant_damage_percent
+            point.results[0]
         };
         assert!(damage(0.0, 4.0) > 20.0, "{points:?}");
         assert_eq!((damage(0.0, 1.0), damage(180.0, 4.0)), (0.0, 0.0), "{points:?}");
-    }
-
-    #[test]
-    fn two_axes_of_one_parameter_are_refused() {
-        let error = sweep("speed=1..2:1", Some("speed=3..4:1")).run(|_| panic!("nothing is weeded")).unwrap_err();
-        assert!(error.to_string().starts_with("both axes are `speed`"), "{error}");
     }
 
     #[test]

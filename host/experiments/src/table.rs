@@ -48,6 +48,14 @@ pub fn in_two_lines(heading: &str) -> String {
     format!("{}\n{}", &heading[..at], heading[at..].trim_start())
 }
 
+/// The values in ascending order, each once.
+pub fn distinct(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    values
+}
+
 /// The text of a missing number.
 pub const NOTHING: &str = "\u{2013}";
 

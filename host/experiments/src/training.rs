@@ -9,7 +9,6 @@
 
 pub mod condense;
 mod confusion;
-mod labelled;
 pub mod listing;
 mod model;
 pub mod regions;
@@ -17,15 +16,36 @@ pub mod synthetic;
 pub mod table;
 
 pub use self::confusion::Confusion;
-pub use self::labelled::{Labelled, label_of};
 pub use self::model::{Model, class_of};
 pub use knn::MAX_K;
 
 use self::model::{answer_of_others, quantised};
 use anyhow::{Context, Result, bail, ensure};
-use control::ground::{class::Class, examples, features::COUNT};
+use control::ground::{
+    class::{Class, label},
+    examples,
+    features::{COUNT, Features},
+};
 use field::counted;
+use field::row::Kind;
 use knn::{Example, Range, Scale, squared_distance};
+
+/// A detection with a known kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Labelled {
+    /// The measured features.
+    pub features: Features,
+    /// Its true kind.
+    pub kind: Kind,
+}
+
+/// The label for a kind in an example.
+pub const fn label_of(kind: Kind) -> u8 {
+    match kind {
+        Kind::Plant => label::PLANT,
+        Kind::Weed => label::WEED,
+    }
+}
 
 /// Most examples that the firmware's flash budget has room for.
 pub const MOST_EXAMPLES: usize = examples::CAPACITY;

@@ -195,8 +195,8 @@ const HEADER: &str = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label\
 /// The result of reading files with these texts. Their names are 0.csv, 1.csv and so on.
 fn read_text(texts: &[&str]) -> Result<Vec<Labelled>, String> {
     let (folder, paths) = files(texts);
-    let lesson = read_labelled(&paths).map(|lesson| lesson.objects);
-    lesson.map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
+    let read = read_labelled(&paths).map(|(objects, _)| objects);
+    read.map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
 }
 
 fn files(texts: &[&str]) -> (TempDir, Vec<PathBuf>) {
@@ -272,8 +272,8 @@ fn a_dump_can_be_pasted_with_the_ok_that_ends_it() {
 fn objects_without_a_label_are_passed_over_and_counted() {
     let text = format!("{HEADER}694,500,226,250,573,plant\n694,520,226,250,573,\n694,300,226,117,440,weed\n");
     let (_folder, paths) = files(&[&text]);
-    let lesson = read_labelled(&paths).unwrap();
-    assert_eq!((lesson.objects.len(), lesson.unlabelled), (2, 1));
+    let (objects, unlabelled) = read_labelled(&paths).unwrap();
+    assert_eq!((objects.len(), unlabelled), (2, 1));
 }
 
 #[test]

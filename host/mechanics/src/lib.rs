@@ -1,10 +1,9 @@
 //! The design calculations of an intra-row weeder, for any machine: the required engine, servo, shanks, chain, wheels
 //! and handle, and whether the given ones suffice.
 //!
-//! A [`machine::Machine`] is the paper's or comes from a [`mod@file`]. It is checked against its ranges. The equations
-//! of [`traction`], [`tool`], [`shank`], [`drive`], [`mod@wheel`], [`handle`] and [`capacity`] give its
-//! [`design::Design`]. [`sense`] interprets the design, and [`report`] prints it. [`paper`] compares the paper's
-//! printed figures with these results. All quantities are those of `uom`, in f64.
+//! A [`machine::Machine`] is the paper's or comes from a [`mod@file`]. It is checked against its ranges. The
+//! [`equations`] give its [`design::Design`]. [`sense`] interprets the design, and [`report`] prints it. [`paper`]
+//! compares the paper's printed figures with these results. All quantities are those of `uom`, in f64.
 //!
 //! The equations are the paper's, Eq. 4 to 21, 24 and 25. They give first dimensions, without fatigue, slopes, or the
 //! effect of speed on the soil.
@@ -19,19 +18,13 @@
 //! # Ok::<(), mechanics::machine::MachineError>(())
 //! ```
 
-pub mod capacity;
 pub mod design;
-pub mod drive;
+pub mod equations;
 pub mod figure;
 pub mod file;
-pub mod handle;
 pub mod machine;
 pub mod paper;
 pub mod report;
 pub mod sense;
-pub mod shank;
 pub mod swing;
-pub mod tool;
-pub mod traction;
 pub mod unit;
-pub mod wheel;

@@ -4,11 +4,11 @@
 //! range and the meaning. The structures, their defaults, the check of the ranges and the commented file are made from
 //! it.
 
+use crate::equations as eq;
 use crate::figure::digits;
 use crate::unit::{
     COUNT, DEGREE, FACTOR, HP, KG, KG_CM, KM_H, KPA, MM, MPA, PERCENT, RPM, SECOND, Unit, Written, read,
 };
-use crate::{drive, tool};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use thiserror::Error;
@@ -61,48 +61,12 @@ impl Input {
 
 /// Why a machine cannot be calculated.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum MachineError {
-    /// A value is out of its range.
-    #[error("{}.{} is {}: it has to be {}", .0.section, .0.key, .0.written().replace('"', ""), .0.range())]
-    OutOfRange(Input),
-    /// The crop's protection zones and the broken soil beside a sweep take the whole row spacing.
-    #[error(
-        "crop.row_spacing leaves no room for a sweep: the protection zones leave {:.0} mm, and soil breaks over \
-         {beside_mm:.0} mm beside a sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth",
-        .failure_zone_mm.max(0.0)
-    )]
-    NoRoomForSweep {
-        /// Eq. 11; negative if the protection zones overlap.
-        failure_zone_mm: f64,
-        /// The second term of Eq. 12.
-        beside_mm: f64,
-    },
-    /// The wheel's rim is thicker than the wheel has room for.
-    #[error(
-        "wheel.rim_thickness is {} mm: it has to be less than half of wheel.diameter, {} mm",
-        digits(*.thickness_mm),
-        digits(*.diameter_mm)
-    )]
-    ThickRim {
-        /// Thickness of the rim.
-        thickness_mm: f64,
-        /// Outer diameter of the wheel.
-        diameter_mm: f64,
-    },
-    /// No sprocket gives the wheels their required speed.
-    #[error(
-        "engine.gear_box_ratio is {}: the driven sprocket would need {} teeth and can have 1 to {MOST_TEETH}; \
-         at these speeds a ratio near {} makes it {USUAL_TEETH} teeth",
-        digits(*.ratio),
-        digits(*.teeth),
-        digits(.ratio * .teeth / f64::from(USUAL_TEETH))
-    )]
-    NoSprocket {
-        /// Ratio of the gear box.
-        ratio: f64,
-        /// Teeth that the speeds ask for.
-        teeth: f64,
-    },
+#[error("{problem}")]
+pub struct MachineError {
+    /// Section and key of the value to change first.
+    pub place: (&'static str, &'static str),
+    /// The problem, and what would be right.
+    pub problem: String,
 }
 
 /// Teeth of the largest accepted sprocket.
@@ -110,18 +74,6 @@ const MOST_TEETH: u32 = 1000;
 
 /// Teeth of a common driven sprocket.
 const USUAL_TEETH: u32 = 40;
-
-impl MachineError {
-    /// Section and key of the value to change first.
-    pub fn place(&self) -> (&'static str, &'static str) {
-        match self {
-            Self::OutOfRange(input) => (input.section, input.key),
-            Self::NoRoomForSweep { .. } => ("crop", "row_spacing"),
-            Self::ThickRim { .. } => ("wheel", "rim_thickness"),
-            Self::NoSprocket { .. } => ("engine", "gear_box_ratio"),
-        }
-    }
-}
 
 /// Declares the sections of a machine file and their values, and makes the code for them.
 macro_rules! sections {
@@ -310,32 +262,55 @@ sections! {
 }
 
 impl Machine {
+    /// Number of tools: those between the rows, and one in the row.
+    pub fn tools(&self) -> u32 {
+        self.inter_row.tools + 1
+    }
+
     /// Checks every value against its range, and values that depend on each other.
     ///
     /// # Errors
     /// The first value out of range, or the first contradiction, with what would be right.
     pub fn check(&self) -> Result<(), MachineError> {
+        let error = |section, key, problem| Err(MachineError { place: (section, key), problem });
         if let Some(input) = self.inputs().into_iter().find(|input| !input.is_in_range()) {
-            return Err(MachineError::OutOfRange(input));
+            let (Input { section, key, .. }, written) = (input, input.written().replace('"', ""));
+            return error(section, key, format!("{section}.{key} is {written}: it has to be {}", input.range()));
         }
-        let failure_zone = tool::failure_zone(self.crop.row_spacing, self.crop.protection_zone);
-        let sweep = tool::sweep_width(failure_zone, self.soil.depth, self.soil.internal_friction);
+        // The crop's protection zones and the broken soil beside a sweep may take the whole row spacing.
+        let failure_zone = eq::failure_zone(self.crop.row_spacing, self.crop.protection_zone);
+        let sweep = eq::sweep_width(failure_zone, self.soil.depth, self.soil.internal_friction);
         if MM.value(sweep) <= 0.0 {
-            return Err(MachineError::NoRoomForSweep {
-                failure_zone_mm: MM.value(failure_zone),
-                beside_mm: MM.value(failure_zone - sweep),
-            });
+            let problem = format!(
+                "crop.row_spacing leaves no room for a sweep: the protection zones leave {:.0} mm, and soil breaks over \
+                 {:.0} mm beside a sweep; widen crop.row_spacing, or lessen crop.protection_zone or soil.depth",
+                MM.value(failure_zone).max(0.0),
+                MM.value(failure_zone - sweep)
+            );
+            return error("crop", "row_spacing", problem);
         }
         let (thickness_mm, diameter_mm) = (MM.value(self.wheel.rim_thickness), MM.value(self.wheel.diameter));
         if 2.0 * thickness_mm >= diameter_mm {
-            return Err(MachineError::ThickRim { thickness_mm, diameter_mm });
+            let problem = format!(
+                "wheel.rim_thickness is {} mm: it has to be less than half of wheel.diameter, {} mm",
+                digits(thickness_mm),
+                digits(diameter_mm)
+            );
+            return error("wheel", "rim_thickness", problem);
         }
         let ratio = self.engine.gear_box_ratio;
-        let wheel_speed = drive::wheel_speed(self.weeder.speed, self.wheel.diameter);
-        let reduction = drive::chain_reduction(self.engine.speed, ratio, wheel_speed);
-        let teeth = drive::driven_teeth(self.chain.drive_teeth, reduction);
+        let wheel_speed = eq::wheel_speed(self.weeder.speed, self.wheel.diameter);
+        let reduction = eq::chain_reduction(self.engine.speed, ratio, wheel_speed);
+        let teeth = eq::driven_teeth(self.chain.drive_teeth, reduction);
         if !(1.0..=f64::from(MOST_TEETH)).contains(&teeth) {
-            return Err(MachineError::NoSprocket { ratio, teeth });
+            let problem = format!(
+                "engine.gear_box_ratio is {}: the driven sprocket would need {} teeth and can have 1 to {MOST_TEETH}; \
+                 at these speeds a ratio near {} makes it {USUAL_TEETH} teeth",
+                digits(ratio),
+                digits(teeth),
+                digits(ratio * teeth / f64::from(USUAL_TEETH))
+            );
+            return error("engine", "gear_box_ratio", problem);
         }
         Ok(())
     }

@@ -5,15 +5,13 @@
 //! prints them.
 
 use crate::design::Design;
+use crate::equations as eq;
 use crate::figure::{digits, written};
 use crate::machine::{Machine, MachineError};
 use crate::unit::{
-    CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM, Unit,
-    WATT,
+    CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM, WATT,
 };
-use crate::{capacity, drive, handle, shank, tool, traction, wheel};
 use serde::Serialize;
-use uom::si::f64::Ratio;
 
 /// Whether a printed figure is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -71,41 +69,35 @@ impl Verdict {
     }
 }
 
-/// The two machines that are compared with the paper's figures.
-struct Machines {
-    paper: Design,
-    own: Option<Design>,
+/// Makes the comparisons, each with the field of a design that holds the result:
+/// `name, equation, printed value, unit, field: result for the printed inputs, remark`.
+macro_rules! comparisons {
+    ($paper:ident, $own:ident;
+     $($name:literal, $equation:literal, $printed:literal, $unit:ident, $field:ident: $from_printed:expr, $remark:expr;)+) => {
+        vec![$(Comparison::new(
+            ($name, $equation),
+            ($printed, $unit.name),
+            $unit.value($from_printed),
+            $unit.value($paper.$field),
+            $own.map(|own| $unit.value(own.$field)),
+            $remark.into(),
+        )),+]
+    };
 }
 
-impl Machines {
-    /// One row. `printed` is the figure and its decimals. `from_printed_inputs` is the equation's result for the
-    /// printed inputs. `calculated` finds the result in a design.
-    fn compare<Q>(
-        &self,
+impl Comparison {
+    fn new(
         (name, equation): (&'static str, &'static str),
-        (printed, decimals): (f64, usize),
-        unit: Unit<Q>,
-        from_printed_inputs: Q,
-        calculated: impl Fn(&Design) -> Q,
-        remark: impl Into<String>,
-    ) -> Comparison {
-        let from_printed_inputs = unit.value(from_printed_inputs);
-        let own = self.own.as_ref().map(|own| unit.value(calculated(own)));
-        let calculated = unit.value(calculated(&self.paper));
+        (printed, unit): (&str, &'static str),
+        from_printed_inputs: f64,
+        calculated: f64,
+        own: Option<f64>,
+        remark: String,
+    ) -> Self {
+        let decimals = printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        let printed = printed.parse().unwrap_or(f64::NAN);
         let verdict = Verdict::of(printed, decimals, calculated, from_printed_inputs);
-        let remark = remark.into();
-        Comparison {
-            name,
-            equation,
-            unit: unit.name,
-            printed,
-            decimals,
-            from_printed_inputs,
-            calculated,
-            own,
-            verdict,
-            remark,
-        }
+        Self { name, equation, unit, printed, decimals, from_printed_inputs, calculated, own, verdict, remark }
     }
 }
 
@@ -113,313 +105,99 @@ impl Machines {
 ///
 /// # Errors
 /// If the machine of one's own cannot be calculated.
-pub fn compare(own: Option<&Machine>) -> Result<Vec<Comparison>, MachineError> {
-    let machines = Machines { paper: Design::of(&Machine::default())?, own: own.map(Design::of).transpose()? };
-    let mut comparisons = traction(&machines);
-    comparisons.extend(tools(&machines));
-    comparisons.extend(shanks(&machines));
-    comparisons.extend(drive(&machines));
-    comparisons.extend(wheel_and_handle(&machines));
-    comparisons.extend(capacity(&machines));
-    Ok(comparisons)
-}
+pub fn compare(own_machine: Option<&Machine>) -> Result<Vec<Comparison>, MachineError> {
+    let Machine { weeder, soil, crop, shank, engine, chain, .. } = Machine::default();
+    let (paper, own) = (Design::of(&Machine::default())?, own_machine.map(Design::of).transpose()?);
 
-/// The printed tractive force. Many other figures depend on it.
-const PRINTED_TRACTIVE_FORCE_N: f64 = 1082.4;
-
-fn traction(machines: &Machines) -> Vec<Comparison> {
-    let Machine { weeder, engine, .. } = Machine::default();
-    let paper = &machines.paper;
-    let tractive_force = NEWTON.of(PRINTED_TRACTIVE_FORCE_N);
-    let power = traction::power(tractive_force, weeder.speed, engine.safety_factor);
+    // The printed tractive force. Many other figures depend on it.
+    let tractive_force = NEWTON.of(1082.4);
+    let power = eq::power(tractive_force, weeder.speed, engine.safety_factor);
     let excess = f64::from(engine.power / paper.engine_power);
-    let from_tractive_force = format!("from {PRINTED_TRACTIVE_FORCE_N} N");
-    vec![
-        machines.compare(
-            ("rolling resistance coefficient", "Eq. 5"),
-            (0.95, 2),
-            FACTOR,
-            f64::from(traction::rolling_resistance_coefficient(Ratio::from(21.95))),
-            |design| f64::from(design.rolling_resistance_coefficient),
-            "a slip of the decimal point",
-        ),
-        machines.compare(
-            ("rolling resistance", "Eq. 4"),
-            (605.77, 2),
-            NEWTON,
-            traction::rolling_resistance(Ratio::from(0.95), paper.weight),
-            |design| design.rolling_resistance,
-            "from the coefficient 0.95",
-        ),
-        machines.compare(("draft", "Eq. 7"), (453.7, 1), NEWTON, paper.draft, |design| design.draft, ""),
-        machines.compare(
-            ("acceleration force", "Eq. 8"),
-            (23.0, 0),
-            NEWTON,
-            paper.acceleration_force,
-            |design| design.acceleration_force,
-            "",
-        ),
-        machines.compare(
-            ("tractive force", "below Eq. 8"),
-            (PRINTED_TRACTIVE_FORCE_N, 1),
-            NEWTON,
-            traction::tractive_force(NEWTON.of(605.77), NEWTON.of(453.7), NEWTON.of(23.0)),
-            |design| design.tractive_force,
-            "from the rolling resistance",
-        ),
-        machines.compare(
-            ("power", "Eq. 9"),
-            (1503.3, 1),
-            WATT,
-            power,
-            |design| design.power,
-            from_tractive_force.as_str(),
-        ),
-        machines.compare(
-            ("engine", "below Eq. 9"),
-            (2.24, 2),
-            HP,
-            traction::engine_power(power, engine.transmission_efficiency),
-            |design| design.engine_power,
-            format!("{from_tractive_force}: the engine is {excess:.1} times too large"),
-        ),
-    ]
-}
 
-fn tools(machines: &Machines) -> Vec<Comparison> {
-    let Machine { soil, crop, .. } = Machine::default();
-    let paper = &machines.paper;
-    let printed_zone = CM.of(10.0);
-    vec![
-        machines.compare(
-            ("soil force on the tool", "Eq. 10"),
-            (11.04, 2),
-            NEWTON,
-            paper.soil_force,
-            |design| design.soil_force,
-            "",
-        ),
-        machines.compare(
-            ("servo torque", "above Eq. 10"),
-            (3.86, 2),
-            NEWTON_METRE,
-            paper.servo_torque,
-            |design| design.servo_torque,
-            "",
-        ),
-        machines.compare(
-            ("servo torque", "above Eq. 10"),
-            (39.4, 1),
-            KG_CM,
-            paper.servo_torque,
-            |design| design.servo_torque,
-            "",
-        ),
-        machines.compare(
-            ("soil failure zone", "Eq. 11"),
-            (10.0, 0),
-            CM,
-            tool::failure_zone(crop.row_spacing, crop.protection_zone),
-            |design| design.failure_zone,
-            "30 cm less twice 5 cm; 10 cm would need rows 20 cm apart",
-        ),
-        machines.compare(
-            ("sweep width", "Eq. 12"),
-            (8.0, 0),
-            CM,
-            tool::sweep_width(printed_zone, soil.depth, soil.internal_friction),
-            |design| design.sweep_width,
-            "neither of the two zones gives it",
-        ),
-        machines.compare(
-            ("apex angle", "Eq. 13"),
-            (120.0, 0),
-            DEGREE,
-            tool::apex_angle(crop.weed_friction),
-            |design| design.apex_angle,
-            format!(
-                "it needs a friction angle of {}, not {}",
-                written(tool::weed_friction_for(DEGREE.of(120.0)), DEGREE),
-                written(crop.weed_friction, DEGREE)
-            ),
-        ),
-        machines.compare(
-            ("number of tools", "above Eq. 13"),
-            (5.0, 0),
-            COUNT,
-            tool::tools_that_fit(CM.of(40.0), CM.of(8.0)),
-            |design| design.tools_that_fit,
-            "",
-        ),
-        machines.compare(
-            ("draft of one tool", "Eq. 14"),
-            (216.48, 2),
-            NEWTON,
-            tool::tool_draft(NEWTON.of(PRINTED_TRACTIVE_FORCE_N), 5),
-            |design| design.tool_draft,
-            format!("from {PRINTED_TRACTIVE_FORCE_N} N"),
-        ),
-    ]
-}
+    let friction = written(eq::weed_friction_for(DEGREE.of(120.0)), DEGREE);
+    let friction = format!("it needs a friction angle of {friction}, not {}", written(crop.weed_friction, DEGREE));
 
-fn shanks(machines: &Machines) -> Vec<Comparison> {
-    let steel = Machine::default().shank;
     let (inter_row_moment, intra_row_moment) = (NEWTON_METRE.of(345.6), NEWTON_METRE.of(302.4));
-    let moment = |length_cm: f64| {
-        shank::bending_moment(NEWTON.of(216.0), steel.impact_factor, steel.safety_factor, CM.of(length_cm))
-    };
+    let moment =
+        |length_cm| eq::bending_moment(NEWTON.of(216.0), shank.impact_factor, shank.safety_factor, CM.of(length_cm));
+    let diameter = |moment| eq::rod_diameter(moment, shank.allowed_stress);
     let stress = |moment, diameter_cm: f64| {
-        let stress = written(shank::bending_stress(moment, CM.of(diameter_cm)), MPA);
-        format!("{diameter_cm} cm would bear {stress}, {} are allowed", written(steel.allowed_stress, MPA))
+        let stress = written(eq::bending_stress(moment, CM.of(diameter_cm)), MPA);
+        format!("{diameter_cm} cm would bear {stress}, {} are allowed", written(shank.allowed_stress, MPA))
     };
-    vec![
-        machines.compare(
-            ("bending moment, between rows", "above Eq. 15"),
-            (345.6, 1),
-            NEWTON_METRE,
-            moment(40.0),
-            |design| design.inter_row_shank.bending_moment,
-            "from the draft of one tool",
-        ),
-        machines.compare(
-            ("bending moment, in the row", "above Eq. 15"),
-            (302.4, 1),
-            NEWTON_METRE,
-            moment(35.0),
-            |design| design.intra_row_shank.bending_moment,
-            "from the draft of one tool",
-        ),
-        machines.compare(
-            ("shank diameter, between rows", "Eq. 15, 16"),
-            (1.6, 1),
-            CM,
-            shank::diameter(inter_row_moment, steel.allowed_stress),
-            |design| design.inter_row_shank.diameter,
-            stress(inter_row_moment, 1.6),
-        ),
-        machines.compare(
-            ("shank diameter, in the row", "Eq. 15, 16"),
-            (1.4, 1),
-            CM,
-            shank::diameter(intra_row_moment, steel.allowed_stress),
-            |design| design.intra_row_shank.diameter,
-            stress(intra_row_moment, 1.4),
-        ),
-    ]
-}
 
-fn drive(machines: &Machines) -> Vec<Comparison> {
-    let Machine { engine, chain, .. } = Machine::default();
-    let paper = &machines.paper;
-    let reduction = drive::chain_reduction(engine.speed, engine.gear_box_ratio, RPM.of(33.0));
-    let links = drive::chain_links(14, 38, MM.of(379.0), chain.pitch);
-    vec![
-        machines.compare(
-            ("wheel speed", "Eq. 17"),
-            (33.17, 2),
-            RPM,
-            paper.wheel_speed,
-            |design| design.wheel_speed,
-            "with 3.14 for pi",
-        ),
-        machines.compare(
-            ("reduction by the chain", "below Eq. 17"),
-            (2.72, 2),
-            FACTOR,
-            reduction,
-            |design| design.chain_reduction,
-            "from 33 rpm",
-        ),
-        machines.compare(
-            ("driven sprocket", "below Eq. 17"),
-            (38.0, 0),
-            FACTOR,
-            drive::driven_teeth(chain.drive_teeth, reduction),
-            |design| design.exact_driven_teeth,
-            "from 33 rpm",
-        ),
-        machines.compare(
-            ("chain links", "Eq. 18"),
-            (88.0, 0),
-            COUNT,
-            drive::even_links(links),
-            |design| design.chain_links,
-            format!("{}, rounded up to the next even number", digits(links)),
-        ),
-        machines.compare(
-            ("chain length", "Eq. 19"),
-            (1118.0, 0),
-            MM,
-            drive::chain_length(88, chain.pitch),
-            |design| design.chain_length,
-            "",
-        ),
-    ]
-}
+    let reduction = eq::chain_reduction(engine.speed, engine.gear_box_ratio, RPM.of(33.0));
+    let links = eq::chain_links(14, 38, MM.of(379.0), chain.pitch);
 
-fn wheel_and_handle(machines: &Machines) -> Vec<Comparison> {
     let (outer, inner) = (M.of(0.400), M.of(0.397));
-    let torque = wheel::torque(NEWTON.of(1082.0), outer);
-    let stress =
-        |thickness_mm: f64| wheel::shear_stress(torque, outer, wheel::inner_diameter(outer, MM.of(thickness_mm)));
-    let thickness = wheel::thickness(outer, inner);
-    let (elbow_height, operator_distance) = (CM.of(80.0), CM.of(40.0));
-    vec![
-        // The default machine has the sheet of Table 1, so both columns start from the diameters of the text.
-        Comparison {
-            calculated: MM.value(thickness),
-            verdict: Verdict::of(3.0, 0, MM.value(thickness), MM.value(thickness)),
-            ..machines.compare(
-                ("wheel thickness", "below Eq. 20"),
-                (3.0, 0),
-                MM,
-                thickness,
-                |design| design.rim_thickness,
-                "0.400 and 0.397 m were subtracted, not halved; the sheet of Table 1 has 3 mm",
-            )
-        },
-        machines.compare(
-            ("shear stress in the wheel", "Eq. 20"),
-            (293.5, 1),
-            KPA,
-            stress(3.0),
-            |design| design.shear_stress,
-            format!("from 1082 N with 3 mm; {} with 1.5 mm", written(stress(1.5), KPA)),
-        ),
-        machines.compare(
-            ("slope of the handle", "Eq. 21"),
-            (63.43, 2),
-            DEGREE,
-            handle::angle(elbow_height, operator_distance),
-            |design| design.handle_angle,
-            "",
-        ),
-        machines.compare(
-            ("length of the handle", "below Eq. 21"),
-            (89.44, 2),
-            CM,
-            handle::length(elbow_height, operator_distance),
-            |design| design.handle_length,
-            "",
-        ),
-    ]
-}
+    let torque = eq::wheel_torque(NEWTON.of(1082.0), outer);
+    let shear = |thickness_mm| eq::shear_stress(torque, outer, MM.of(thickness_mm));
+    let thin = written(shear(1.5), KPA);
+    // The default machine has the sheet of Table 1, so both columns start from the diameters of the text.
+    let thickness_mm = MM.value((outer - inner) / 2.0);
+    let thickness = Comparison::new(
+        ("wheel thickness", "below Eq. 20"),
+        ("3", MM.name),
+        thickness_mm,
+        thickness_mm,
+        own_machine.map(|own| MM.value(own.wheel.rim_thickness)),
+        "0.400 and 0.397 m were subtracted, not halved; the sheet of Table 1 has 3 mm".into(),
+    );
 
-fn capacity(machines: &Machines) -> Vec<Comparison> {
-    let weeder = Machine::default().weeder;
-    let theoretical = capacity::theoretical(KM_H.of(2.5), M.of(0.4));
-    let width = HECTARE_PER_HOUR.of(0.041) / weeder.field_efficiency / weeder.speed;
-    vec![machines.compare(
-        ("field capacity at 86.25 %", "Eq. 24, 25"),
-        (0.041, 3),
-        HECTARE_PER_HOUR,
-        capacity::effective(theoretical, weeder.field_efficiency),
-        |design| design.effective_capacity,
-        format!(
-            "of {} in theory; 0.041 would be a width of {}",
-            written(theoretical, HECTARE_PER_HOUR),
-            written(width, M)
-        ),
-    )]
+    let (speed, width) = (KM_H.of(2.5), M.of(0.4));
+    let capacity = format!(
+        "of {} in theory; 0.041 would be a width of {}",
+        written(speed * width, HECTARE_PER_HOUR),
+        written(HECTARE_PER_HOUR.of(0.041) / weeder.field_efficiency / weeder.speed, M)
+    );
+
+    let mut comparisons = comparisons! { paper, own;
+        "rolling resistance coefficient", "Eq. 5", "0.95", FACTOR, rolling_resistance_coefficient:
+            eq::rolling_resistance_coefficient(21.95), "a slip of the decimal point";
+        "rolling resistance", "Eq. 4", "605.77", NEWTON, rolling_resistance:
+            0.95 * paper.weight, "from the coefficient 0.95";
+        "draft", "Eq. 7", "453.7", NEWTON, draft: paper.draft, "";
+        "acceleration force", "Eq. 8", "23", NEWTON, acceleration_force: paper.acceleration_force, "";
+        "tractive force", "below Eq. 8", "1082.4", NEWTON, tractive_force:
+            NEWTON.of(605.77) + NEWTON.of(453.7) + NEWTON.of(23.0), "from the rolling resistance";
+        "power", "Eq. 9", "1503.3", WATT, power: power, "from 1082.4 N";
+        "engine", "below Eq. 9", "2.24", HP, engine_power:
+            power / engine.transmission_efficiency,
+            format!("from 1082.4 N: the engine is {excess:.1} times too large");
+        "soil force on the tool", "Eq. 10", "11.04", NEWTON, soil_force: paper.soil_force, "";
+        "servo torque", "above Eq. 10", "3.86", NEWTON_METRE, servo_torque: paper.servo_torque, "";
+        "servo torque", "above Eq. 10", "39.4", KG_CM, servo_torque: paper.servo_torque, "";
+        "soil failure zone", "Eq. 11", "10", CM, failure_zone:
+            paper.failure_zone, "30 cm less twice 5 cm; 10 cm would need rows 20 cm apart";
+        "sweep width", "Eq. 12", "8", CM, sweep_width:
+            eq::sweep_width(CM.of(10.0), soil.depth, soil.internal_friction), "neither of the two zones gives it";
+        "apex angle", "Eq. 13", "120", DEGREE, apex_angle: paper.apex_angle, friction;
+        "number of tools", "above Eq. 13", "5", COUNT, tools: eq::tools_that_fit(CM.of(40.0), CM.of(8.0)), "";
+        "draft of one tool", "Eq. 14", "216.48", NEWTON, tool_draft: tractive_force / 5.0, "from 1082.4 N";
+        "bending moment, between rows", "above Eq. 15", "345.6", NEWTON_METRE, inter_row_bending_moment:
+            moment(40.0), "from the draft of one tool";
+        "bending moment, in the row", "above Eq. 15", "302.4", NEWTON_METRE, intra_row_bending_moment:
+            moment(35.0), "from the draft of one tool";
+        "shank diameter, between rows", "Eq. 15, 16", "1.6", CM, inter_row_shank_diameter:
+            diameter(inter_row_moment), stress(inter_row_moment, 1.6);
+        "shank diameter, in the row", "Eq. 15, 16", "1.4", CM, intra_row_shank_diameter:
+            diameter(intra_row_moment), stress(intra_row_moment, 1.4);
+        "wheel speed", "Eq. 17", "33.17", RPM, wheel_speed: paper.wheel_speed, "with 3.14 for pi";
+        "reduction by the chain", "below Eq. 17", "2.72", FACTOR, chain_reduction: reduction, "from 33 rpm";
+        "driven sprocket", "below Eq. 17", "38", FACTOR, driven_teeth:
+            eq::driven_teeth(chain.drive_teeth, reduction), "from 33 rpm";
+        "chain links", "Eq. 18", "88", COUNT, chain_links:
+            eq::even_links(links), format!("{}, rounded up to the next even number", digits(links));
+        "chain length", "Eq. 19", "1118", MM, chain_length: 88.0 * chain.pitch, "";
+    };
+    comparisons.push(thickness);
+    comparisons.extend(comparisons! { paper, own;
+        "shear stress in the wheel", "Eq. 20", "293.5", KPA, shear_stress:
+            shear(3.0), format!("from 1082 N with 3 mm; {thin} with 1.5 mm");
+        "slope of the handle", "Eq. 21", "63.43", DEGREE, handle_angle: CM.of(80.0).atan2(CM.of(40.0)), "";
+        "length of the handle", "below Eq. 21", "89.44", CM, handle_length: CM.of(80.0).hypot(CM.of(40.0)), "";
+        "field capacity at 86.25 %", "Eq. 24, 25", "0.041", HECTARE_PER_HOUR, effective_capacity:
+            eq::effective_capacity(speed, width, weeder.field_efficiency), capacity;
+    });
+    Ok(comparisons)
 }

@@ -3,17 +3,6 @@
 use crate::figure::{Figure, digits, digits_beside};
 use crate::paper::{Comparison, Verdict};
 use comfy_table::{Attribute, Cell, CellAlignment, Color, ContentArrangement, Table, presets};
-use std::fmt::{self, Display, Formatter};
-
-impl Display for Verdict {
-    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
-        formatter.pad(match self {
-            Self::Right => "right",
-            Self::Follows => "follows from an error",
-            Self::Wrong => "wrong",
-        })
-    }
-}
 
 /// Every figure with its equation and its interpretation, and a `!` if the machine should be changed.
 pub fn design_table(figures: &[Figure]) -> Table {
@@ -79,10 +68,9 @@ fn align_right(table: &mut Table, columns: std::ops::Range<usize>) {
 }
 
 fn verdict_cell(verdict: Verdict) -> Cell {
-    let cell = Cell::new(verdict);
     match verdict {
-        Verdict::Right => cell.fg(Color::Green),
-        Verdict::Follows => cell.fg(Color::Yellow),
-        Verdict::Wrong => cell.fg(Color::Red).add_attribute(Attribute::Bold),
+        Verdict::Right => Cell::new("right").fg(Color::Green),
+        Verdict::Follows => Cell::new("follows from an error").fg(Color::Yellow),
+        Verdict::Wrong => Cell::new("wrong").fg(Color::Red).add_attribute(Attribute::Bold),
     }
 }

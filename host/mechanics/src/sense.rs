@@ -1,16 +1,15 @@
 //! Interprets a design for its machine: each figure gets a line in plain words.
 
-use crate::design::{Design, ShankDesign};
+use crate::design::Design;
+use crate::equations::{TYRE_TRACTION_LIMIT, WHEELS_OWN_RESISTANCE, bending_stress, weed_friction_for};
 use crate::figure::{Figure, digits, written};
 use crate::machine::Machine;
-use crate::traction::TYRE_TRACTION_LIMIT;
 use crate::unit::{
-    CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM, Unit,
+    self, CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM,
     WATT,
 };
-use crate::{tool, unit};
 use std::ops::RangeInclusive;
-use uom::si::f64::{Force, Length, Ratio};
+use uom::si::f64::{Force, Length, Ratio, Torque};
 
 /// Teeth of a good sprocket: fewer wear the chain out quickly, on more a worn chain climbs.
 const GOOD_TEETH: RangeInclusive<u32> = 9..=120;
@@ -41,16 +40,15 @@ fn concern(words: String) -> Sense {
     Sense { words, concern: true }
 }
 
-/// A figure from its parts.
-fn figure<Q>(
-    key: &'static str,
-    name: &'static str,
-    equation: &'static str,
-    quantity: Q,
-    unit: Unit<Q>,
-    Sense { words, concern }: Sense,
-) -> Figure {
-    Figure { key, name, equation, value: unit.value(quantity), unit: unit.name, sense: words, concern }
+/// Makes the figures of a design, each from the field of its key: `key: name, equation, unit => sense`.
+macro_rules! figures {
+    ($design:ident; $($key:ident: $name:literal, $equation:literal, $unit:ident => $sense:expr;)+) => {
+        vec![$({
+            let Sense { words: sense, concern } = $sense;
+            let (key, value) = (stringify!($key), $unit.value($design.$key));
+            Figure { key, name: $name, equation: $equation, value, unit: $unit.name, sense, concern }
+        }),+]
+    };
 }
 
 /// A share in whole percents.
@@ -72,16 +70,16 @@ impl Design {
     }
 
     fn traction(&self, machine: &Machine) -> Vec<Figure> {
-        let numeric = f64::from(self.wheel_numeric);
         let load = written(self.wheel_load, NEWTON);
-        let ground = match numeric {
+        let ground = match self.wheel_numeric {
             ..SOFT_WHEEL_NUMERIC => {
                 concern(format!("under {load} the wheels sink in as on soft soil: take wider ones"))
             }
             ..TILLED_WHEEL_NUMERIC => fine(format!("under {load} each, the wheels run as on tilled soil")),
             _ => fine(format!("under {load} each, the wheels run as on firm soil")),
         };
-        let soil_part = (self.rolling_resistance_coefficient - Ratio::from(0.04)) / self.rolling_resistance_coefficient;
+        let coefficient = self.rolling_resistance_coefficient;
+        let soil_part = Ratio::from((coefficient - WHEELS_OWN_RESISTANCE) / coefficient);
         let part = |force: Force| fine(format!("{} of the tractive force", percent(force / self.tractive_force)));
         let pull = self.tractive_force / self.weight;
         let grip = if f64::from(pull) > TYRE_TRACTION_LIMIT {
@@ -93,45 +91,19 @@ impl Design {
         } else {
             fine(format!("{} of the weight: wheels can pull that", percent(pull)))
         };
-        let steady = self.power / machine.engine.safety_factor;
-        vec![
-            figure("wheel_numeric", "wheel numeric", "Eq. 6", numeric, FACTOR, ground),
-            figure(
-                "rolling_resistance_coefficient",
-                "rolling resistance coefficient",
-                "Eq. 5",
-                f64::from(self.rolling_resistance_coefficient),
-                FACTOR,
-                fine(format!("{} of it is the soil's, the rest the wheel's own", percent(soil_part))),
-            ),
-            figure(
-                "rolling_resistance",
-                "rolling resistance",
-                "Eq. 4",
-                self.rolling_resistance,
-                NEWTON,
-                part(self.rolling_resistance),
-            ),
-            figure("draft", "draft of all tools", "Eq. 7", self.draft, NEWTON, part(self.draft)),
-            figure(
-                "acceleration_force",
-                "acceleration force",
-                "Eq. 8",
-                self.acceleration_force,
-                NEWTON,
-                part(self.acceleration_force),
-            ),
-            figure("tractive_force", "tractive force", "below Eq. 8", self.tractive_force, NEWTON, grip),
-            figure(
-                "power",
-                "power at the wheels",
-                "Eq. 9",
-                self.power,
-                WATT,
-                fine(format!("{} are used, the rest is the factor of safety", written(steady, WATT))),
-            ),
-            figure("engine_power", "engine", "below Eq. 9", self.engine_power, HP, self.engine(machine)),
-        ]
+        let steady = written(self.power / machine.engine.safety_factor, WATT);
+        figures! { self;
+            wheel_numeric: "wheel numeric", "Eq. 6", FACTOR => ground;
+            rolling_resistance_coefficient: "rolling resistance coefficient", "Eq. 5", FACTOR
+                => fine(format!("{} of it is the soil's, the rest the wheel's own", percent(soil_part)));
+            rolling_resistance: "rolling resistance", "Eq. 4", NEWTON => part(self.rolling_resistance);
+            draft: "draft of all tools", "Eq. 7", NEWTON => part(self.draft);
+            acceleration_force: "acceleration force", "Eq. 8", NEWTON => part(self.acceleration_force);
+            tractive_force: "tractive force", "below Eq. 8", NEWTON => grip;
+            power: "power at the wheels", "Eq. 9", WATT
+                => fine(format!("{steady} are used, the rest is the factor of safety"));
+            engine_power: "engine", "below Eq. 9", HP => self.engine(machine);
+        }
     }
 
     fn engine(&self, machine: &Machine) -> Sense {
@@ -161,7 +133,7 @@ impl Design {
         } else {
             fine(format!("the servo's {} are {ratio:.2} times that: strong enough", written(servo, KG_CM)))
         };
-        let at_depth = tool::servo_torque(self.soil_force_at_depth, machine.intra_row.shank_length);
+        let at_depth = self.servo_torque_at_depth;
         let depth = written(machine.soil.depth, MM);
         let depth_words = format!("a blade {depth} high, as deep as it weeds, would ask {}", written(at_depth, KG_CM));
         let depth_sense = if at_depth > servo {
@@ -179,50 +151,40 @@ impl Design {
         };
         let apex = machine.inter_row.apex_angle;
         let apex_sense = if apex > self.apex_angle {
-            let friction = written(tool::weed_friction_for(apex), DEGREE);
+            let friction = written(weed_friction_for(apex), DEGREE);
             concern(format!("the sweeps' {} are too blunt: right for a friction of {friction}", written(apex, DEGREE)))
         } else {
             fine(format!("weeds slide along the sweeps' {}", written(apex, DEGREE)))
         };
-        let fit_sense = if self.tools > self.tools_that_fit {
-            concern(format!("the machine has {}: they do not fit into its working width", self.tools))
+        let tools = machine.tools();
+        let fit_sense = if tools > self.tools {
+            concern(format!("the machine has {tools}: they do not fit into its working width"))
         } else {
-            fine(format!("the machine has {}: they fit into its working width", self.tools))
+            fine(format!("the machine has {tools}: they fit into its working width"))
         };
-        let draft_alone = written(self.draft / f64::from(self.tools), NEWTON);
+        let draft_alone = written(self.draft / f64::from(tools), NEWTON);
         let rows = written(machine.crop.row_spacing, MM);
-        vec![
-            figure("soil_force", "soil on the blade in the row", "Eq. 10", self.soil_force, NEWTON, depth_sense),
-            figure("servo_torque", "servo torque", "above Eq. 10", self.servo_torque, KG_CM, servo_sense),
-            figure(
-                "failure_zone",
-                "soil failure zone",
-                "Eq. 11",
-                self.failure_zone,
-                MM,
-                fine(format!("{rows} between rows, less the protection zones")),
-            ),
-            figure("sweep_width", "widest sweep", "Eq. 12", self.sweep_width, MM, sweep_sense),
-            figure("apex_angle", "bluntest apex angle", "Eq. 13", self.apex_angle, DEGREE, apex_sense),
-            figure("tools", "tools that fit", "above Eq. 13", self.tools_that_fit, COUNT, fit_sense),
-            figure(
-                "tool_draft",
-                "draft of one tool",
-                "Eq. 14",
-                self.tool_draft,
-                NEWTON,
-                fine(format!("of the whole tractive force; the soil alone pulls with {draft_alone}")),
-            ),
-        ]
+        figures! { self;
+            soil_force: "soil on the blade in the row", "Eq. 10", NEWTON => depth_sense;
+            servo_torque: "servo torque", "above Eq. 10", KG_CM => servo_sense;
+            failure_zone: "soil failure zone", "Eq. 11", MM
+                => fine(format!("{rows} between rows, less the protection zones"));
+            sweep_width: "widest sweep", "Eq. 12", MM => sweep_sense;
+            apex_angle: "bluntest apex angle", "Eq. 13", DEGREE => apex_sense;
+            tools: "tools that fit", "above Eq. 13", COUNT => fit_sense;
+            tool_draft: "draft of one tool", "Eq. 14", NEWTON
+                => fine(format!("of the whole tractive force; the soil alone pulls with {draft_alone}"));
+        }
     }
 
     fn shanks(&self, machine: &Machine) -> Vec<Figure> {
         let Machine { inter_row, intra_row, shank, .. } = machine;
         let times = digits(shank.impact_factor * shank.safety_factor);
         let moment = |length: Length| fine(format!("{times} times the draft, on {}", written(length, MM)));
-        let bend = |design: &ShankDesign, diameter: Length| {
-            let (given, stress) = (written(diameter, MM), written(design.stress, MPA));
-            let ratio = f64::from(design.stress / shank.allowed_stress);
+        let bend = |moment: Torque, diameter: Length| {
+            let stress = bending_stress(moment, diameter);
+            let (given, ratio) = (written(diameter, MM), f64::from(stress / shank.allowed_stress));
+            let stress = written(stress, MPA);
             if ratio > 1.0 {
                 concern(format!(
                     "the shank's {given} would bear {stress}, {ratio:.1} times the allowed stress: it bends"
@@ -231,47 +193,22 @@ impl Design {
                 fine(format!("the shank's {given} bear {stress}, {} of the allowed stress", percent(ratio.into())))
             }
         };
-        let (inter, intra) = (&self.inter_row_shank, &self.intra_row_shank);
-        vec![
-            figure(
-                "inter_row_bending_moment",
-                "bending moment, between rows",
-                "above Eq. 15",
-                inter.bending_moment,
-                NEWTON_METRE,
-                moment(inter_row.shank_length),
-            ),
-            figure(
-                "intra_row_bending_moment",
-                "bending moment, in the row",
-                "above Eq. 15",
-                intra.bending_moment,
-                NEWTON_METRE,
-                moment(intra_row.shank_length),
-            ),
-            figure(
-                "inter_row_shank_diameter",
-                "shank, between rows",
-                "Eq. 15, 16",
-                inter.diameter,
-                MM,
-                bend(inter, inter_row.shank_diameter),
-            ),
-            figure(
-                "intra_row_shank_diameter",
-                "shank, in the row",
-                "Eq. 15, 16",
-                intra.diameter,
-                MM,
-                bend(intra, intra_row.shank_diameter),
-            ),
-        ]
+        figures! { self;
+            inter_row_bending_moment: "bending moment, between rows", "above Eq. 15", NEWTON_METRE
+                => moment(inter_row.shank_length);
+            intra_row_bending_moment: "bending moment, in the row", "above Eq. 15", NEWTON_METRE
+                => moment(intra_row.shank_length);
+            inter_row_shank_diameter: "shank, between rows", "Eq. 15, 16", MM
+                => bend(self.inter_row_bending_moment, inter_row.shank_diameter);
+            intra_row_shank_diameter: "shank, in the row", "Eq. 15, 16", MM
+                => bend(self.intra_row_bending_moment, intra_row.shank_diameter);
+        }
     }
 
     fn drive(&self, machine: &Machine) -> Vec<Figure> {
         let speed = written(self.ground_speed, KM_H);
         let miss = f64::from(self.ground_speed / machine.weeder.speed) - 1.0;
-        let teeth = self.driven_teeth;
+        let teeth = self.driven_teeth.round() as u32;
         let teeth_sense = if teeth < *GOOD_TEETH.start() {
             concern(format!("{teeth} teeth are too few for a chain: take a smaller gear box ratio"))
         } else if teeth > *GOOD_TEETH.end() {
@@ -281,46 +218,21 @@ impl Design {
         } else {
             fine(format!("{teeth} teeth give {speed}"))
         };
+        let turn_s = digits(60.0 / RPM.value(self.wheel_speed));
+        let shaft = written(self.gear_box_speed, RPM);
+        let links = digits(self.exact_chain_links);
         let spare = (f64::from(self.chain_links) - self.exact_chain_links) / 2.0 * machine.chain.pitch;
-        vec![
-            figure(
-                "wheel_speed",
-                "wheel speed",
-                "Eq. 17",
-                self.wheel_speed,
-                RPM,
-                fine(format!("a turn every {} s", digits(60.0 / RPM.value(self.wheel_speed)))),
-            ),
-            figure(
-                "chain_reduction",
-                "reduction by the chain",
-                "below Eq. 17",
-                self.chain_reduction,
-                FACTOR,
-                fine(format!("from the {} of the gear box's shaft", written(self.gear_box_speed, RPM))),
-            ),
-            figure("driven_teeth", "driven sprocket", "below Eq. 17", self.exact_driven_teeth, FACTOR, teeth_sense),
-            figure(
-                "chain_links",
-                "chain links",
-                "Eq. 18",
-                self.chain_links,
-                COUNT,
-                fine(format!("{} links, rounded up to an even number", digits(self.exact_chain_links))),
-            ),
-            figure(
-                "chain_length",
-                "chain length",
-                "Eq. 19",
-                self.chain_length,
-                MM,
-                fine(format!(
-                    "taut with the shafts {} apart: {} more than planned",
-                    written(self.centre_distance + spare, MM),
-                    written(spare, MM)
-                )),
-            ),
-        ]
+        let (taut, longer) = (written(self.centre_distance + spare, MM), written(spare, MM));
+        figures! { self;
+            wheel_speed: "wheel speed", "Eq. 17", RPM => fine(format!("a turn every {turn_s} s"));
+            chain_reduction: "reduction by the chain", "below Eq. 17", FACTOR
+                => fine(format!("from the {shaft} of the gear box's shaft"));
+            driven_teeth: "driven sprocket", "below Eq. 17", FACTOR => teeth_sense;
+            chain_links: "chain links", "Eq. 18", COUNT
+                => fine(format!("{links} links, rounded up to an even number"));
+            chain_length: "chain length", "Eq. 19", MM
+                => fine(format!("taut with the shafts {taut} apart: {longer} more than planned"));
+        }
     }
 
     fn wheel_and_handle(&self, machine: &Machine) -> Vec<Figure> {
@@ -331,73 +243,35 @@ impl Design {
         } else {
             fine(format!("the steel's {} are {} times that: the wheel is safe", written(strength, MPA), digits(ratio)))
         };
-        let rim = written(self.rim_thickness, MM);
-        let rim_sense = if self.rim_thickness < self.least_rim_thickness {
+        let rim = written(machine.wheel.rim_thickness, MM);
+        let rim_sense = if machine.wheel.rim_thickness < self.least_rim_thickness {
             concern(format!("the rim's {rim} are too thin"))
         } else {
             fine(format!("by shear alone; the rim's {rim} are enough"))
         };
-        let hands = machine.handle.elbow_height + machine.wheel.diameter / 2.0;
-        vec![
-            figure(
-                "least_rim_thickness",
-                "least wheel thickness",
-                "below Eq. 20",
-                self.least_rim_thickness,
-                MM,
-                rim_sense,
-            ),
-            figure(
-                "wheel_torque",
-                "torque on a wheel",
-                "below Eq. 20",
-                self.wheel_torque,
-                NEWTON_METRE,
-                fine("as if one wheel gave the whole tractive force".into()),
-            ),
-            figure("shear_stress", "shear stress in the wheel", "Eq. 20", self.shear_stress, KPA, safe),
-            figure(
-                "handle_angle",
-                "slope of the handle",
-                "Eq. 21",
-                self.handle_angle,
-                DEGREE,
-                fine(format!("it rises {} on each metre", written(M.of(f64::from(self.handle_angle.tan())), M))),
-            ),
-            figure(
-                "handle_length",
-                "length of the handle",
-                "below Eq. 21",
-                self.handle_length,
-                CM,
-                fine(format!("from the wheel's centre to hands {} above the ground", written(hands, CM))),
-            ),
-        ]
+        let rise = written(M.of(f64::from(self.handle_angle.tan())), M);
+        let hands = written(machine.handle.elbow_height + machine.wheel.diameter / 2.0, CM);
+        figures! { self;
+            least_rim_thickness: "least wheel thickness", "below Eq. 20", MM => rim_sense;
+            wheel_torque: "torque on a wheel", "below Eq. 20", NEWTON_METRE
+                => fine("as if one wheel gave the whole tractive force".into());
+            shear_stress: "shear stress in the wheel", "Eq. 20", KPA => safe;
+            handle_angle: "slope of the handle", "Eq. 21", DEGREE
+                => fine(format!("it rises {rise} on each metre"));
+            handle_length: "length of the handle", "below Eq. 21", CM
+                => fine(format!("from the wheel's centre to hands {hands} above the ground"));
+        }
     }
 
     fn capacity(&self, machine: &Machine) -> Vec<Figure> {
         let hours = |rate| digits(1.0 / HECTARE_PER_HOUR.value(rate));
-        vec![
-            figure(
-                "theoretical_capacity",
-                "theoretical field capacity",
-                "Eq. 25",
-                self.theoretical_capacity,
-                HECTARE_PER_HOUR,
-                fine(format!("{} h a hectare without a turn or stop", hours(self.theoretical_capacity))),
-            ),
-            figure(
-                "effective_capacity",
-                "effective field capacity",
-                "Eq. 24",
-                self.effective_capacity,
-                HECTARE_PER_HOUR,
-                fine(format!(
-                    "{} h a hectare at {} field efficiency",
-                    hours(self.effective_capacity),
-                    written(machine.weeder.field_efficiency, unit::PERCENT)
-                )),
-            ),
-        ]
+        let (theoretical_h, effective_h) = (hours(self.theoretical_capacity), hours(self.effective_capacity));
+        let efficiency = written(machine.weeder.field_efficiency, unit::PERCENT);
+        figures! { self;
+            theoretical_capacity: "theoretical field capacity", "Eq. 25", HECTARE_PER_HOUR
+                => fine(format!("{theoretical_h} h a hectare without a turn or stop"));
+            effective_capacity: "effective field capacity", "Eq. 24", HECTARE_PER_HOUR
+                => fine(format!("{effective_h} h a hectare at {efficiency} field efficiency"));
+        }
     }
 }

@@ -54,35 +54,12 @@ pub struct Swing {
     pub filling_tool_mm: f64,
 }
 
-/// Why a tool cannot make the required swing.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum NoSwing {
-    /// The arm is too short.
-    #[error(
-        "an arm of {arm_mm:.0} mm cannot bring the tool {aside_mm:.0} mm aside, which the plant asks for: take a longer one"
-    )]
-    ShortArm {
-        /// Its length.
-        arm_mm: f64,
-        /// The required distance aside.
-        aside_mm: f64,
-    },
-    /// The servo stalls.
-    #[error("the soil takes {needed_kg_cm:.1} of the servo's {stall_kg_cm:.1} kg cm: it stalls; take a stronger one")]
-    Stalls {
-        /// The soil's torque.
-        needed_kg_cm: f64,
-        /// The servo's torque.
-        stall_kg_cm: f64,
-    },
-}
-
 impl Swing {
     /// The swing of a machine, whose servo turns against this torque.
     ///
     /// # Errors
-    /// If the arm is too short or the servo too weak.
-    pub fn of(machine: &Machine, torque: Torque) -> Result<Self, NoSwing> {
+    /// If the arm is too short or the servo too weak, in words.
+    pub fn of(machine: &Machine, torque: Torque) -> Result<Self, String> {
         Self::with_tool(machine, torque, MM.value(machine.intra_row.width))
     }
 
@@ -90,17 +67,22 @@ impl Swing {
     ///
     /// # Errors
     /// As [`Swing::of`].
-    pub fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64) -> Result<Self, NoSwing> {
+    pub fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64) -> Result<Self, String> {
         let inputs = machine.swing;
         let arm_mm = MM.value(machine.intra_row.shank_length);
         let aside_mm = kept_mm(machine) / 2.0 + MM.value(inputs.room) + tool_mm / 2.0;
         if aside_mm >= arm_mm {
-            return Err(NoSwing::ShortArm { arm_mm, aside_mm });
+            return Err(format!(
+                "an arm of {arm_mm:.0} mm cannot bring the tool {aside_mm:.0} mm aside, which the plant asks for: \
+                 take a longer one"
+            ));
         }
         let (needed_kg_cm, stall_kg_cm) = (KG_CM.value(torque), KG_CM.value(machine.intra_row.servo_torque));
         let load = needed_kg_cm / stall_kg_cm;
         if load >= 1.0 {
-            return Err(NoSwing::Stalls { needed_kg_cm, stall_kg_cm });
+            return Err(format!(
+                "the soil takes {needed_kg_cm:.1} of the servo's {stall_kg_cm:.1} kg cm: it stalls; take a stronger one"
+            ));
         }
         let exact_degrees = (aside_mm / arm_mm).asin().to_degrees();
         let us_a_degree = inputs.pulse_for_90 / 90.0;

@@ -1,6 +1,5 @@
 //! The state of each row, and its changes by events.
 
-use super::To;
 use super::command_line::CommandLine;
 use link::advice;
 use link::examples::Heading;
@@ -123,15 +122,6 @@ impl Model {
     /// The rows' names.
     pub fn names(&self) -> Vec<String> {
         self.rows.iter().map(|row| row.name.clone()).collect()
-    }
-
-    /// The addressed row. `None` for all.
-    pub fn meant(&self, to: To) -> Option<usize> {
-        match to {
-            To::Chosen => self.target,
-            To::All => None,
-            To::Row(row) => Some(row),
-        }
     }
 
     /// The numbers of a row, or of all.
@@ -344,14 +334,9 @@ impl RowModel {
             }
             EventLine::Alarm { .. } => self.zones.clear(),
             EventLine::Warning { warning } => {
-                self.advice =
-                    Some(format!("warning {}: {}", name_of(warning.text().bytes()), advice::warning(warning)));
+                self.advice = Some(format!("warning {}: {}", warning.text(), advice::warning(warning)));
             }
             _ => {}
         }
     }
-}
-
-fn name_of(bytes: impl Iterator<Item = u8>) -> String {
-    bytes.map(char::from).collect()
 }

@@ -4,7 +4,7 @@
 //! the row's name. A `hold` to all goes to all rows at the same moment, and its result includes the time of the last
 //! row.
 
-use super::{To, addressed};
+use super::addressed;
 use crate::finding::Finding;
 use crate::output::tell;
 use crate::ports::Chosen;
@@ -101,15 +101,12 @@ impl Talk<'_> {
 
     /// Types a line to the addressed rows.
     fn command(&mut self, line: &str, output: &mut impl Write) -> Result<()> {
-        let (to, command) = addressed(line, &self.chosen.names()).map_err(Error::msg)?;
+        let (to, command) = addressed(line, &self.chosen.names(), None).map_err(Error::msg)?;
         // The machine does not answer a line without a word.
         if command.is_empty() {
             return Ok(());
         }
-        let to = match to {
-            To::Row(row) => row..row + 1,
-            To::Chosen | To::All => 0..self.rows.count(),
-        };
+        let to = to.map_or(0..self.rows.count(), |row| row..row + 1);
         if self.chosen.are_several && to.len() == self.rows.count() && command == "hold" {
             self.hold = Some(Hold::new(Instant::now(), self.standing.iter().map(|row| row.is_there)));
         }

@@ -70,8 +70,8 @@ fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
         KeyCode::PageDown => model.choose(true),
         _ => {
             let Some(line) = model.line.key(key) else { return };
-            let (to, command) = match addressed(&line, &model.names()) {
-                Ok((to, command)) => (model.meant(to), command),
+            let (to, command) = match addressed(&line, &model.names(), model.target) {
+                Ok(meant) => meant,
                 Err(why) => {
                     model.say(format!("-- {why}; nothing was sent"));
                     return;

@@ -1,14 +1,20 @@
 //! The monitor's screen: draws the model, and does nothing else.
 //!
 //! State, alarm and the key for HOLD are at the top, so they are visible on a small terminal too. [`one`] draws one
-//! row. [`several`] draws all rows of a machine. Both use the same [`parts`].
+//! row. [`several`] draws all rows of a machine. Here are the parts of both: the line with the key for HOLD, the ground
+//! ahead of a tool, the console's output, and its input.
 
 mod one;
-mod parts;
 mod several;
 
-use super::model::Model;
+use super::model::{Model, RowModel};
+use link::settings::Setting;
+use link::{Class, Mode};
 use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Position, Rect};
+use ratatui::style::{Color, Style, Stylize};
+use ratatui::text::Line;
+use ratatui::widgets::{Block, Paragraph};
 
 /// Draws all of it.
 pub fn draw(model: &Model, frame: &mut Frame) {
@@ -16,6 +22,123 @@ pub fn draw(model: &Model, frame: &mut Frame) {
         [row] => one::draw(model, row, frame),
         rows => several::draw(model, rows, frame),
     }
+}
+
+/// The label of the key that holds all rows.
+const HOLD_KEY: &str = "Esc HOLD";
+
+/// A line with the key for HOLD at its end. The key is visible on the narrowest screen too.
+fn draw_top(left: Line, frame: &mut Frame, area: Rect) {
+    let width = HOLD_KEY.len() as u16;
+    let [left_area, key] = Layout::horizontal([Constraint::Min(0), Constraint::Length(width)]).areas(area);
+    frame.render_widget(left, left_area);
+    frame.render_widget(Line::raw(HOLD_KEY).style(hold_style()), key);
+}
+
+/// The style of the key for HOLD.
+fn hold_style() -> Style {
+    Style::new().fg(Color::White).bg(Color::Red).bold()
+}
+
+/// The colour of a state.
+fn colour(mode: Mode) -> Color {
+    match mode {
+        Mode::Hold => Color::Yellow,
+        Mode::Work => Color::Green,
+        Mode::Alarm => Color::Red,
+    }
+}
+
+/// The content of a column. A later variant has priority.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Ground {
+    Bare,
+    Weed,
+    Margin,
+    Canopy,
+}
+
+/// The column of a position ahead of the tool, out of `columns`. A quarter of the distance from beam to tool is shown
+/// behind the tool.
+fn column_of(row: &RowModel, columns: usize, ahead_of_tool_mm: f64) -> f64 {
+    let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
+    let mm_per_column = 1.25 * beam_to_tool / columns.max(1) as f64;
+    (ahead_of_tool_mm + 0.25 * beam_to_tool) / mm_per_column
+}
+
+/// The tool's column.
+fn tool_column(row: &RowModel, columns: usize) -> usize {
+    column_of(row, columns, 0.0).round() as usize
+}
+
+/// The ground from a little behind the tool to the beam. The machine rolls to the right.
+fn ground(row: &RowModel, columns: usize) -> String {
+    let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
+    let mut ground = vec![Ground::Bare; columns];
+    let margin = f64::from(row.settings.get(Setting::MarginMm));
+    for seen in &row.zones {
+        let from = row.millimetres(seen.leading.wrapping_sub(row.status.position)) + beam_to_tool;
+        let to = from + row.millimetres(seen.width);
+        let mut paint = |from: f64, to: f64, what: Ground| {
+            let (from, to) = (column_of(row, columns, from).round(), column_of(row, columns, to).round());
+            // Draws also what is narrower than a column, and cuts off what is beyond the left edge.
+            let to = to.max(from + 1.0).max(0.0) as usize;
+            for place in ground.iter_mut().take(to).skip(from.max(0.0) as usize) {
+                *place = what.max(*place);
+            }
+        };
+        if seen.class == Class::Weed {
+            paint(from, to, Ground::Weed);
+        } else {
+            paint(from - margin, to + margin, Ground::Margin);
+            paint(from, to, Ground::Canopy);
+        }
+    }
+    ground.iter().map(symbol).collect()
+}
+
+fn symbol(ground: &Ground) -> char {
+    match ground {
+        Ground::Bare => '_',
+        Ground::Weed => '\'',
+        Ground::Margin => '░',
+        Ground::Canopy => '█',
+    }
+}
+
+/// The last lines of the console's output, as many as there is room for.
+fn last_lines(model: &Model, room: u16) -> Paragraph<'_> {
+    let lines = model.lines.iter().skip(model.lines.len().saturating_sub(usize::from(room)));
+    Paragraph::new(lines.map(|line| Line::raw(line.as_str())).collect::<Vec<_>>())
+}
+
+/// The same, in a frame.
+fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
+    let block = Block::bordered().title(" console ");
+    frame.render_widget(last_lines(model, block.inner(area).height).block(block), area);
+}
+
+/// The line that is being typed and its addressee. Below it is the result of HOLD, the completions, or the list of
+/// keys.
+fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect) {
+    let prompt = format!("{to}> ");
+    // A line has at most 80 characters.
+    let column = (area.x + (prompt.chars().count() + model.line.cursor()) as u16).min(area.right().saturating_sub(1));
+    frame.render_widget(Line::from(vec![prompt.bold(), model.line.text().into()]), area);
+    frame.set_cursor_position(Position::new(column, area.y));
+    let candidates = model.line.candidates();
+    let text = if !candidates.is_empty() {
+        let last = |line: &String| line.rsplit(' ').next().unwrap_or_default().to_owned();
+        Line::raw(candidates.iter().map(last).collect::<Vec<_>>().join("  ")).dim()
+    } else if let Some(hold) = &model.hold {
+        let colour = if hold.is_obeyed() { Color::Green } else { Color::Red };
+        Line::raw(hold.summary(&model.names())).style(Style::new().fg(colour).bold())
+    } else if model.are_several() {
+        Line::raw("PgUp, PgDn: to whom; Tab completes, Up and Down go through the history, Ctrl-C ends").dim()
+    } else {
+        Line::raw("Tab completes, Up and Down go through the history, Ctrl-C ends").dim()
+    };
+    frame.render_widget(text, hint);
 }
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
 //! A trial's findings, in sentences.
 
 use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment};
-use crate::statistics::{LinearModel, Share, Term};
+use crate::statistics::{LinearModel, SIGNIFICANCE, Share, Term, probability};
+use crate::table::distinct;
+use field::counted;
 use statrs::distribution::{ContinuousCDF, StudentsT};
-
-/// A coefficient counts as an effect if its p-value is below this.
-pub const SIGNIFICANCE: f64 = 0.05;
 
 impl Analysis {
     /// The findings, a sentence each: the plots, the damage, the effects on each measure, and impossible values.
@@ -31,12 +30,7 @@ impl Analysis {
     /// How large the trial was.
     fn size(&self) -> String {
         let treatments = self.treatments();
-        let levels = |quantity: fn(&Treatment) -> f64| {
-            let mut levels: Vec<f64> = treatments.iter().map(quantity).collect();
-            levels.sort_by(f64::total_cmp);
-            levels.dedup();
-            list(&levels)
-        };
+        let levels = |quantity: fn(&Treatment) -> f64| list(&distinct(treatments.iter().map(quantity)));
         let plots = treatments.iter().map(|treatment| treatment.plots);
         let (fewest, most) = (plots.clone().min().unwrap_or_default(), plots.max().unwrap_or_default());
         let replications = if fewest == most { format!("{fewest}") } else { format!("{fewest} to {most}") };
@@ -153,16 +147,6 @@ fn effect(term: &Term, response: Response, name: &str, unit: &str) -> String {
 /// How much the model explains.
 fn explained(model: &LinearModel) -> String {
     format!("the model explains {:.1} % of its variation", model.r_squared * 100.0)
-}
-
-/// A p-value with its sign: four digits, or the limit that it is below.
-pub fn probability(p: f64) -> String {
-    if p < 0.0001 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") }
-}
-
-/// A count with its noun.
-fn counted(count: usize, thing: &str) -> String {
-    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Numbers as in a sentence.

@@ -11,91 +11,75 @@
 //! to grow with it, from 1.5 to 3.5 hp. So Fig. 10, where the index rises with speed, follows from Eq. 27 for one
 //! engine. Eq. 30, where it falls, does not.
 
-use super::response::Response;
+use super::plot::Response;
 use serde::Serialize;
 
 /// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
 pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
 
-/// A machine that weeds in the row, as measured by its authors in a field or on a test track. Each source counts weeds
-/// in its own way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct PublishedMachine {
-    /// Who built it.
-    pub name: &'static str,
-    /// Its crop.
-    pub crop: &'static str,
-    /// Its sensor for plants.
-    pub sees_by: &'static str,
-    /// Its speeds.
-    pub speed_km_h: &'static str,
-    /// Weeds removed, in percent, and the ground on which they were counted.
-    pub weeds_gone_percent: &'static str,
-    /// Crop plants that were damaged.
-    pub damaged_percent: &'static str,
-    /// The publication.
-    pub source: &'static str,
-}
-
 /// The text of a missing figure.
 const NOT_SAID: &str = "\u{2013}";
 
-/// Published machines, those with a beam first.
-pub const MACHINES: &[PublishedMachine] = &[
-    PublishedMachine {
-        name: "the paper's",
-        crop: "chilli",
-        sees_by: "a light beam",
-        speed_km_h: "1 to 2.5",
-        weeds_gone_percent: "80.1 to 89.5, in the plot",
-        damaged_percent: "0 to 3.92",
-        source: "the paper, Eq. 28 and 29",
-    },
-    PublishedMachine {
-        name: "Jia et al., a tool that moves in a spiral",
-        crop: "maize",
-        sees_by: "an infrared beam",
-        speed_km_h: "4 to 7",
-        weeds_gone_percent: "95.8",
-        damaged_percent: "0.6",
-        source: "Int. J. Agric. Biol. Eng. 14(6), 2021, doi 10.25165/j.ijabe.20211406.6542",
-    },
-    PublishedMachine {
-        name: "Cordill and Grift, two tines",
-        crop: "maize",
-        sees_by: "the stalk's width",
-        speed_km_h: NOT_SAID,
-        weeds_gone_percent: NOT_SAID,
-        damaged_percent: "8.8 without weeds, 23.7 among weeds",
-        source: "Biosystems Engineering, 2011, doi 10.1016/j.biosystemseng.2011.07.007",
-    },
-    PublishedMachine {
-        name: "Tillett et al., a rotating disc",
-        crop: "cabbage",
-        sees_by: "a camera",
-        speed_km_h: "1.8",
-        weeds_gone_percent: "62 to 87, within 240 mm of a plant",
-        damaged_percent: "low",
-        source: "Biosystems Engineering, 2008",
-    },
-    PublishedMachine {
-        name: "Jiang et al., knives and herbicide",
-        crop: "maize; cabbage",
-        sees_by: "a camera",
-        speed_km_h: "2.0",
-        weeds_gone_percent: "90.0; 94.5",
-        damaged_percent: "1.9; 0.8",
-        source: "Soil and Tillage Research, 2023, doi 10.1016/j.still.2023.105837",
-    },
-    PublishedMachine {
-        name: "electric swinging knives",
-        crop: "cabbage",
-        sees_by: "a camera",
-        speed_km_h: "low, in a laboratory",
-        weeds_gone_percent: "96.67",
-        damaged_percent: "0.83",
-        source: "Agronomy 15(1) 112, 2025",
-    },
+/// Machines that weed in the row, those with a beam first, as measured by their authors in a field or on a test track.
+/// Each source counts weeds in its own way.
+///
+/// The name, the crop, the sensor for plants, the speeds in km/h, the weeds removed in percent and where they were
+/// counted, the crop plants damaged in percent, and the publication.
+pub const MACHINES: [[&str; 7]; 6] = [
+    [
+        "the paper's",
+        "chilli",
+        "a light beam",
+        "1 to 2.5",
+        "80.1 to 89.5, in the plot",
+        "0 to 3.92",
+        "the paper, Eq. 28 and 29",
+    ],
+    [
+        "Jia et al., a tool that moves in a spiral",
+        "maize",
+        "an infrared beam",
+        "4 to 7",
+        "95.8",
+        "0.6",
+        "Int. J. Agric. Biol. Eng. 14(6), 2021, doi 10.25165/j.ijabe.20211406.6542",
+    ],
+    [
+        "Cordill and Grift, two tines",
+        "maize",
+        "the stalk's width",
+        NOT_SAID,
+        NOT_SAID,
+        "8.8 without weeds, 23.7 among weeds",
+        "Biosystems Engineering, 2011, doi 10.1016/j.biosystemseng.2011.07.007",
+    ],
+    [
+        "Tillett et al., a rotating disc",
+        "cabbage",
+        "a camera",
+        "1.8",
+        "62 to 87, within 240 mm of a plant",
+        "low",
+        "Biosystems Engineering, 2008",
+    ],
+    [
+        "Jiang et al., knives and herbicide",
+        "maize; cabbage",
+        "a camera",
+        "2.0",
+        "90.0; 94.5",
+        "1.9; 0.8",
+        "Soil and Tillage Research, 2023, doi 10.1016/j.still.2023.105837",
+    ],
+    [
+        "electric swinging knives",
+        "cabbage",
+        "a camera",
+        "low, in a laboratory",
+        "96.67",
+        "0.83",
+        "Agronomy 15(1) 112, 2025",
+    ],
 ];
 
 /// A response as a linear function of speed (A, km/h) and plant spacing (B, cm), with the printed coefficients.

@@ -41,7 +41,7 @@ impl Display for ResponseAnalysis {
         writeln!(f, "\n{}\n\n{}", self.terms(), self.fit())?;
         match &self.binomial {
             Some(Ok(model)) => {
-                writeln!(f, "\n{}", odds(model))?;
+                writeln!(f, "\n{}", model.table())?;
                 writeln!(
                     f,
                     "deviance {:.3} with {} degrees of freedom, of {:.3} without speed and spacing; dispersion {:.2}",
@@ -52,7 +52,7 @@ impl Display for ResponseAnalysis {
             None => {}
         }
         match &self.variance {
-            Ok(variance) => writeln!(f, "\n{}", sources(variance))?,
+            Ok(variance) => writeln!(f, "\n{}", variance.table())?,
             Err(reason) => writeln!(f, "\nNo analysis of variance: {reason}.")?,
         }
         self.remarks().iter().try_for_each(|remark| writeln!(f, "Note: {remark}"))?;
@@ -225,44 +225,50 @@ impl ResponseAnalysis {
     }
 }
 
-/// The effects of speed and spacing on the odds.
-pub(crate) fn odds(model: &BinomialModel) -> Table {
-    let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
-    let mut table = Table::new("Binomial model of the counts", columns);
-    for term in &model.terms {
-        let (times, least, greatest) = term.odds_ratio();
-        let (name, times) = match term.name {
-            "speed" => {
-                ("for each km/h", format!("{} ({} to {})", fixed(times, 2), fixed(least, 2), fixed(greatest, 2)))
-            }
-            "spacing" => (
-                "for each cm of spacing",
-                format!("{} ({} to {})", fixed(times, 3), fixed(least, 3), fixed(greatest, 3)),
-            ),
-            name => (name, NOTHING.to_owned()),
-        };
-        let cells =
-            [significant(term.estimate), significant(term.standard_error), fixed(term.z, 2), probability(term.p)];
-        table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());
+impl BinomialModel {
+    /// The effects of speed and spacing on the odds.
+    pub(crate) fn table(&self) -> Table {
+        let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
+        let mut table = Table::new("Binomial model of the counts", columns);
+        for term in &self.terms {
+            let (times, least, greatest) = term.odds_ratio();
+            let (name, times) = match term.name {
+                "speed" => {
+                    ("for each km/h", format!("{} ({} to {})", fixed(times, 2), fixed(least, 2), fixed(greatest, 2)))
+                }
+                "spacing" => (
+                    "for each cm of spacing",
+                    format!("{} ({} to {})", fixed(times, 3), fixed(least, 3), fixed(greatest, 3)),
+                ),
+                name => (name, NOTHING.to_owned()),
+            };
+            let cells =
+                [significant(term.estimate), significant(term.standard_error), fixed(term.z, 2), probability(term.p)];
+            table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());
+        }
+        table
     }
-    table
 }
 
-/// The part of the variation of each factor.
-pub(crate) fn sources(variance: &AnalysisOfVariance) -> Table {
-    let mut table =
-        Table::new("Analysis of variance", ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"]);
-    for source in &variance.sources {
-        table.rows.push(vec![
-            source.name.replace(" x ", " × "),
-            source.degrees_of_freedom.to_string(),
-            significant(source.sum_of_squares),
-            significant(source.mean_square),
-            optional(source.f, |f| fixed(f, 2)),
-            optional(source.p, probability),
-        ]);
+impl AnalysisOfVariance {
+    /// The part of the variation of each factor.
+    pub(crate) fn table(&self) -> Table {
+        let mut table = Table::new(
+            "Analysis of variance",
+            ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"],
+        );
+        for source in &self.sources {
+            table.rows.push(vec![
+                source.name.replace(" x ", " × "),
+                source.degrees_of_freedom.to_string(),
+                significant(source.sum_of_squares),
+                significant(source.mean_square),
+                optional(source.f, |f| fixed(f, 2)),
+                optional(source.p, probability),
+            ]);
+        }
+        table
     }
-    table
 }
 
 /// Words with a capital letter in front and a full stop behind.

@@ -4,9 +4,8 @@
 //! comments. Every line is checked before any is used.
 
 use super::plot::PlotRecord;
-pub use files::FileError;
+use files::FileError;
 use files::csv_table::{CsvTable, Line};
-use std::io;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -98,19 +97,6 @@ impl FromStr for Number {
     }
 }
 
-/// Writes the plots as a table that [`read_csv`] reads.
-///
-/// # Errors
-/// The errors of the writer.
-pub fn write_csv(records: &[PlotRecord], to: impl io::Write) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_writer(to);
-    for record in records {
-        writer.serialize(record)?;
-    }
-    writer.flush()?;
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,16 +112,6 @@ mod tests {
         let path = folder.path().join("trial.csv");
         fs::write(&path, text).unwrap();
         read_csv(&path).map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
-    }
-
-    #[test]
-    fn a_written_table_is_read_again() {
-        let plots = read(&format!("{HEADER}{LINE}2,2.25,60,10,0,7,7,1.5,0.1,0.055,0.5\n")).unwrap();
-        let mut text = Vec::new();
-        write_csv(&plots, &mut text).unwrap();
-        let text = String::from_utf8(text).unwrap();
-        assert!(text.starts_with(HEADER), "{text}");
-        assert_eq!(read(&text), Ok(plots));
     }
 
     #[test]
@@ -169,18 +145,5 @@ mod tests {
         ] {
             assert_eq!(read(&format!("# a trial\n{HEADER}{wrong}\n")), Err(format!("trial.csv, line 3: {said}")));
         }
-    }
-
-    #[test]
-    fn a_replication_that_stands_there_twice_is_named_with_both_lines() {
-        let said = read(&format!("{HEADER}{LINE}\n{LINE}")).unwrap_err();
-        let right = "trial.csv, line 4: replication 1 of 1.5 km/h and 50 cm is already in line 2: ";
-        assert!(said.starts_with(right), "{said}");
-    }
-
-    #[test]
-    fn a_missing_column_is_named() {
-        let said = read(&format!("{HEADER}{LINE}").replace("width_m", "width_cm")).unwrap_err();
-        assert!(said.starts_with("trial.csv, line 1: the column `width_m` is missing: "), "{said}");
     }
 }

@@ -52,25 +52,3 @@ fn a_treatment_has_the_means_of_its_plots() {
     assert_eq!(found, [(1.0, 1), (1.5, 2)]);
     assert!((treatments[1].mean.plant_damage_percent - 4.0).abs() < 1e-12);
 }
-
-#[test]
-fn ground_covered_faster_than_the_machine_drives_is_noticed() {
-    let hasty = PlotRecord { replication: 2, time_s: 100.0, ..PLOT };
-    assert_eq!(Analysis::of(vec![PLOT, hasty]).unwrap().faster_than_possible(), [2]);
-}
-
-#[test]
-fn without_damage_anywhere_the_other_measures_still_have_their_models() {
-    let plot = |(index, speed_km_h): (u32, f64)| PlotRecord {
-        replication: index,
-        speed_km_h,
-        damaged: 0,
-        weeds_after: 30 + index,
-        ..PLOT
-    };
-    let analysis = Analysis::of((0..).zip([1.0, 1.0, 2.0, 2.0]).map(plot).collect()).unwrap();
-    let [damage, weeding, ..] = analysis.responses.as_slice() else { panic!("there are four") };
-    assert_eq!(damage.model, Err(NoModel::Constant { value: 0.0 }));
-    assert_eq!(damage.variance, Err(NoModel::Constant { value: 0.0 }));
-    assert!(weeding.model.is_ok() && weeding.variance.is_ok(), "{weeding:?}");
-}

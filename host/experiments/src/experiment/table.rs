@@ -4,7 +4,8 @@ use super::{PlotOutcome, Treatment};
 use field::budget::Part;
 use std::io;
 
-/// A line of [`write_csv`]: a [`PlotRecord`](crate::PlotRecord), and what only a simulated field can tell; each cell behind its column's name.
+/// A line of [`write_csv`]: a plot's record, and what only a simulated field can tell; each cell behind its column's
+/// name.
 fn line(outcome: &PlotOutcome) -> [(&'static str, String); 31] {
     let PlotOutcome { record, zones, effect, .. } = outcome;
     let percent = |share: f64| thousandth(100.0 * share).to_string();

@@ -229,22 +229,6 @@ fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
 }
 
 #[test]
-fn a_firmware_with_wrong_leads_damages_avoidable_plants() {
-    let mut experiment = experiment(&[3.5], "transplanted");
-    for lead in ["lead_out_ms", "lead_in_ms"] {
-        experiment.conditions.set(lead, 0.0).unwrap();
-    }
-    let totals = totals(&run(&experiment));
-    assert!(totals[0].effect.damaged > 0 && totals[3].effect.damaged == 0, "{totals:?}");
-}
-
-#[test]
-fn a_machine_that_outruns_its_beam_ends_in_alarms_and_not_in_a_clean_result() {
-    let totals = totals(&run(&experiment(&[7.0], "transplanted")));
-    assert!(totals[0].alarms > 0, "{totals:?}");
-}
-
-#[test]
 fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
     for parameter in PARAMETERS.iter().filter(|parameter| !["plot.rows", "plot.row_m"].contains(&parameter.name)) {
         for end in [parameter.least, parameter.greatest] {
@@ -269,12 +253,4 @@ fn no_parameter_at_an_end_of_its_range_upsets_a_trial() {
             }
         }
     }
-}
-
-#[test]
-fn every_plot_can_be_evaluated_like_a_real_one() {
-    let outcomes = run(&experiment(&[1.0, 2.5], "weedy"));
-    let analysis = Analysis::of(records(&outcomes, Treatment::Firmware)).unwrap();
-    assert_eq!(analysis.records.len(), 4);
-    assert!(analysis.performances.iter().all(|plot| plot.field_efficiency_percent < 100.0));
 }

@@ -1,7 +1,6 @@
-//! Totals of each controller at each speed, over all plots, and their comparison.
+//! Totals of each controller at each speed, over all plots.
 
 use super::{PlotOutcome, Treatment, Zones};
-use crate::page::{Comparison, ControllerCurve, ControllerPoint, Work};
 use crate::statistics::{Mean, Share};
 use field::budget::Budget;
 use field::tool_path::Effect;
@@ -114,33 +113,4 @@ fn by_replication(plots: &[&PlotOutcome]) -> Vec<f64> {
         blocks.entry(plot.record.replication).or_default().push(100.0 * plot.weeded_share);
     }
     blocks.values().map(|shares| shares.iter().sum::<f64>() / shares.len() as f64).collect()
-}
-
-/// The controllers side by side, for the report.
-pub fn compare(totals: &[Total]) -> Comparison {
-    let point = |total: &Total| ControllerPoint {
-        speed_km_h: total.speed_km_h,
-        plant_damage_percent: total.plant_damage_percent(),
-        zones_reached_percent: total.zones_reached_percent(),
-        in_row_weeding_percent: 100.0 * total.weeded_share,
-    };
-    let of = |controller: Treatment| totals.iter().filter(move |total| total.controller == controller);
-    let curve = |controller: Treatment| ControllerCurve {
-        name: controller.title().to_owned(),
-        points: of(controller).map(point).collect(),
-    };
-    let first = totals.first().map_or(Treatment::Firmware, |total| total.controller);
-    Comparison {
-        controllers: Treatment::ALL.into_iter().filter(|&one| of(one).next().is_some()).map(curve).collect(),
-        bound: of(first).map(|total| (total.speed_km_h, 100.0 * total.weedable_share)).collect(),
-        work: of(Treatment::Firmware)
-            .map(|total| Work {
-                speed_km_h: total.speed_km_h,
-                damage: total.damage(),
-                in_row_percent: total.effect.in_row.efficiency_percent(),
-                in_plot_percent: total.effect.in_plot.efficiency_percent(),
-                budget: total.budget,
-            })
-            .collect(),
-    }
 }

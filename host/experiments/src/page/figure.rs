@@ -1,10 +1,8 @@
 //! The page's figures: their charts and legends, and texts for readers who cannot see the charts.
 
 use super::chart::{Chart, Look, Series, key, range_of};
-use super::comparison::{Comparison, ControllerPoint};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
-use crate::statistics::LinearModel;
-use crate::table::{fixed, short};
+use crate::table::{distinct, fixed, short};
 use anyhow::Result;
 
 /// A chart with its texts.
@@ -33,60 +31,35 @@ pub struct Key {
 
 const SPEED: &str = "speed, km/h";
 
-/// The name of the line below which a controller cuts no margin.
-pub const BOUND: &str = "most with every zone and margin kept";
-
-/// Plant damage of each controller against speed.
-pub fn damage(comparison: &Comparison) -> Result<Figure> {
-    let title = ("Plant damage", "% of the plants");
-    let caption = "Share of the plants whose stem zone the tool entered. Lower is better.";
-    curves(comparison, title, caption, |point| point.plant_damage_percent, &[])
+/// Values over speed in km/h, with growing speed.
+pub struct Curve {
+    /// Its name in the legend.
+    pub name: String,
+    /// Speeds and values.
+    pub points: Vec<(f64, f64)>,
 }
 
-/// Weeding in the row of each controller against speed.
-pub fn weeding(comparison: &Comparison) -> Result<Figure> {
-    let title = ("In-row weeding", "% of the row's ground");
-    let caption = "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.";
-    curves(comparison, title, caption, |point| point.in_row_weeding_percent, &comparison.bound)
-}
-
-/// Plants whose zone each controller's tool reached against speed.
-pub fn zones(comparison: &Comparison) -> Result<Figure> {
-    let title = ("Zones reached", "% of the plants' zones");
-    let caption = "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.";
-    curves(comparison, title, caption, |point| point.zones_reached_percent, &[])
-}
-
-fn curves(
-    comparison: &Comparison,
-    (title, unit): (&str, &str),
-    caption: &str,
-    value: fn(&ControllerPoint) -> f64,
-    limit: &[(f64, f64)],
-) -> Result<Figure> {
+/// A measure of several controllers against speed, and its upper limit if it has one.
+pub fn curves([title, unit, caption]: [&str; 3], curves: &[Curve], limit: Option<&Curve>) -> Result<Figure> {
     let mut series = Vec::new();
     let mut legend = Vec::new();
     let mut words = format!("{title} in {unit} against speed.");
-    for (index, controller) in comparison.controllers.iter().enumerate() {
-        let look = Look::of_series(index);
-        let line: Vec<_> = controller.points.iter().map(|point| (point.speed_km_h, value(point))).collect();
-        words += &said(&controller.name, &line);
-        legend.push(Key { svg: key(look, true)?, meaning: controller.name.clone() });
-        series.push(Series { look, line, cloud: Vec::new() });
+    let looks = (0..curves.len()).map(Look::of_series);
+    for (look, Curve { name, points }) in looks.chain([Look::LIMIT]).zip(curves.iter().chain(limit)) {
+        words += &said(name, points);
+        legend.push(Key { svg: key(look, true)?, meaning: name.clone() });
+        series.push(Series { look, line: points.clone(), cloud: Vec::new() });
     }
-    if !limit.is_empty() {
-        words += &said(BOUND, limit);
-        legend.push(Key { svg: key(Look::LIMIT, true)?, meaning: BOUND.to_owned() });
-    }
-    // The first series is drawn last: it stays visible where lines meet.
+    // The first series is drawn last: it stays visible where lines meet. The chart draws the limit itself.
+    series.truncate(curves.len());
     series.reverse();
-    let points = || series.iter().flat_map(|series| &series.line).chain(limit);
+    let points = || curves.iter().chain(limit).flat_map(|curve| &curve.points);
     let chart = Chart {
         x_label: SPEED,
         x: range_of(points().map(|point| point.0), false),
         y: range_of(points().map(|point| point.1), true),
         series: &series,
-        limit,
+        limit: limit.map_or(&[], |limit| &limit.points),
     };
     Ok(Figure { title: title.into(), unit: unit.into(), svg: chart.svg()?, legend, words, caption: caption.into() })
 }
@@ -132,12 +105,14 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
         svg: chart.svg()?,
         legend,
         words,
-        caption: format!("The paper's Fig. {}.", paper_figure(response)),
+        // Its figures 8 to 11 have the measures in their order.
+        caption: format!("The paper's Fig. {}.", 8 + response as usize),
     })
 }
 
-/// A model's residuals against its fitted values.
-pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel) -> Result<Figure> {
+/// A model's residuals against its fitted values; `None` without a model.
+pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Option<Figure>> {
+    let Ok(model) = &of.model else { return Ok(None) };
     let x = range_of(model.fitted.iter().copied(), false);
     let mut series = vec![Series { look: Look::LIMIT, line: vec![(x.start, 0.0), (x.end, 0.0)], cloud: Vec::new() }];
     let mut legend = Vec::new();
@@ -152,7 +127,7 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel
     let unit = of.response.unit();
     let label = format!("by the model, {unit}");
     let chart = Chart { x_label: &label, x, y: range_of([-farthest, farthest], false), series: &series, limit: &[] };
-    Ok(Figure {
+    Ok(Some(Figure {
         title: "Residuals".into(),
         unit: unit.into(),
         svg: chart.svg()?,
@@ -163,15 +138,12 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis, model: &LinearModel
             fixed(farthest, 2),
         ),
         caption: "The residual of each plot. A curve or a funnel shows that a straight line is wrong.".into(),
-    })
+    }))
 }
 
 /// The spacings of a trial, narrow first.
 fn spacings_cm(analysis: &Analysis) -> Vec<f64> {
-    let mut spacings: Vec<f64> = analysis.records.iter().map(|record| record.spacing_cm).collect();
-    spacings.sort_by(f64::total_cmp);
-    spacings.dedup();
-    spacings
+    distinct(analysis.records.iter().map(|record| record.spacing_cm))
 }
 
 fn spacing(spacing_cm: f64) -> String {
@@ -182,13 +154,4 @@ fn spacing(spacing_cm: f64) -> String {
 fn said(name: &str, line: &[(f64, f64)]) -> String {
     let points: Vec<String> = line.iter().map(|(x, y)| format!("{} at {} km/h", fixed(*y, 1), short(*x))).collect();
     format!(" {name}: {}.", points.join(", "))
-}
-
-fn paper_figure(response: Response) -> u32 {
-    match response {
-        Response::PlantDamage => 8,
-        Response::WeedingEfficiency => 9,
-        Response::PerformanceIndex => 10,
-        Response::FieldEfficiency => 11,
-    }
 }

@@ -10,15 +10,15 @@
 //! Normality of the residuals is not tested. A few dozen plots are too few for such a test, and means tolerate
 //! deviations.
 
-use super::design::{Design, is_zero, scatter, varies};
+use super::design::{Design, is_zero, scatter};
 use super::linear::LinearModel;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 use std::collections::BTreeMap;
 
-/// A check has a finding if its p-value is below this.
-const SIGNIFICANCE: f64 = 0.05;
+/// A coefficient counts as an effect, and a check has a finding, if the p-value is below this.
+pub(crate) const SIGNIFICANCE: f64 = 0.05;
 
 /// The checks of a model. A check that the plots do not allow is `None`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -67,22 +67,18 @@ impl Checks {
                 probability(p)
             ));
         }
-        let (made, possible) =
-            ([self.lack_of_fit_p, self.unequal_scatter_p, self.farthest.map(|(_, p)| p)].iter().flatten().count(), 3);
-        if said.is_empty() && made > 0 {
-            let which =
-                if made == possible { "straight lines, even scatter and no outlier" } else { "what can be checked" };
-            said.push(format!("The residuals of {} are as they should be: {which}.", lower(name)));
+        let made = [self.lack_of_fit_p, self.unequal_scatter_p, self.farthest.map(|(_, p)| p)];
+        if said.is_empty() && made.iter().any(Option::is_some) {
+            let is_all = made.iter().all(Option::is_some);
+            let which = if is_all { "straight lines, even scatter and no outlier" } else { "what can be checked" };
+            said.push(format!("The residuals of {} are as they should be: {which}.", name.to_lowercase()));
         }
         said
     }
 }
 
-fn lower(name: &str) -> String {
-    name.to_lowercase()
-}
-
-fn probability(p: f64) -> String {
+/// A p-value with its sign: four digits, or the limit that it is below.
+pub(crate) fn probability(p: f64) -> String {
     if p < 0.0001 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") }
 }
 
@@ -111,14 +107,9 @@ fn unequal_scatter(design: &Design, model: &LinearModel) -> Option<f64> {
 }
 
 fn farthest(design: &Design, model: &LinearModel) -> Option<(usize, f64)> {
-    let columns: Vec<&Vec<f64>> =
-        [&design.speeds_km_h, &design.spacings_cm].into_iter().filter(|levels| varies(levels)).collect();
+    let (columns, _) = design.columns().ok()?;
     let plots = design.plots();
-    let matrix = DMatrix::from_fn(
-        plots,
-        columns.len() + 1,
-        |plot, column| if column == 0 { 1.0 } else { columns[column - 1][plot] },
-    );
+    let matrix = DMatrix::from_fn(plots, columns.len(), |plot, column| columns[column].1[plot]);
     let inverse = (matrix.transpose() * &matrix).try_inverse()?;
     let freedom = model.degrees_of_freedom.checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
     let residual: f64 = model.residuals.iter().map(|residual| residual * residual).sum();

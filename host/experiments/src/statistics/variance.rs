@@ -106,8 +106,7 @@ impl AnalysisOfVariance {
                 remarks.push(Remark::Unbalanced);
             }
         }
-        let [_, .., (_, last)] = fits.as_slice() else { return Err(NoModel::OneTreatment) };
-        let last = *last;
+        let (_, last) = fits[fits.len() - 1];
         if last.parameters >= values.len() {
             return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters });
         }
@@ -124,7 +123,8 @@ impl AnalysisOfVariance {
             let sum_of_squares = (before.sum_of_squares - after.sum_of_squares).max(0.0);
             let mean_square = sum_of_squares / degrees_of_freedom as f64;
             let f = scatters.then(|| mean_square / residual_mean_square);
-            let p = f.and_then(|f| probability(f, degrees_of_freedom, residual_freedom));
+            let distribution = FisherSnedecor::new(degrees_of_freedom as f64, residual_freedom as f64).ok();
+            let p = f.zip(distribution).map(|(f, distribution)| distribution.sf(f));
             Source { name, degrees_of_freedom, sum_of_squares, mean_square, f, p }
         };
         let mut sources: Vec<Source> = fits.windows(2).map(source).collect();
@@ -143,11 +143,6 @@ impl AnalysisOfVariance {
     pub fn source(&self, name: &str) -> Option<&Source> {
         self.sources.iter().find(|source| source.name == name)
     }
-}
-
-/// How probable an F as large as this is by chance.
-fn probability(f: f64, of_source: usize, of_residual: usize) -> Option<f64> {
-    FisherSnedecor::new(of_source as f64, of_residual as f64).ok().map(|distribution| distribution.sf(f))
 }
 
 /// The level of a factor that each plot has.

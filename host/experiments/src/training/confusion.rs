@@ -15,19 +15,8 @@ pub struct Confusion {
     weeds: Counts,
 }
 
-/// Objects of one kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Counts {
-    taken_for_plant: usize,
-    taken_for_weed: usize,
-    unknown: usize,
-}
-
-impl Counts {
-    fn total(self) -> usize {
-        self.taken_for_plant + self.taken_for_weed + self.unknown
-    }
-}
+/// Objects of one kind: those taken for a plant, the unknown ones, and those taken for a weed.
+type Counts = [usize; 3];
 
 impl FromIterator<(Kind, Class)> for Confusion {
     fn from_iter<I: IntoIterator<Item = (Kind, Class)>>(classified: I) -> Self {
@@ -37,11 +26,11 @@ impl FromIterator<(Kind, Class)> for Confusion {
                 Kind::Plant => &mut confusion.plants,
                 Kind::Weed => &mut confusion.weeds,
             };
-            *match class {
-                Class::Plant => &mut counts.taken_for_plant,
-                Class::Weed => &mut counts.taken_for_weed,
-                Class::Unknown => &mut counts.unknown,
-            } += 1;
+            counts[match class {
+                Class::Plant => 0,
+                Class::Unknown => 1,
+                Class::Weed => 2,
+            }] += 1;
         }
         confusion
     }
@@ -51,29 +40,29 @@ impl Confusion {
     /// The objects of a kind.
     pub fn count(&self, kind: Kind) -> usize {
         match kind {
-            Kind::Plant => self.plants.total(),
-            Kind::Weed => self.weeds.total(),
+            Kind::Plant => self.plants.iter().sum(),
+            Kind::Weed => self.weeds.iter().sum(),
         }
     }
 
     /// All objects.
     pub fn total(&self) -> usize {
-        self.plants.total() + self.weeds.total()
+        self.count(Kind::Plant) + self.count(Kind::Weed)
     }
 
     /// Plants that the machine would cut.
     pub fn plants_taken_for_weeds(&self) -> usize {
-        self.plants.taken_for_weed
+        self.plants[2]
     }
 
     /// Weeds that the machine would spare, including unknown ones.
     pub fn weeds_taken_for_plants(&self) -> usize {
-        self.weeds.taken_for_plant + self.weeds.unknown
+        self.weeds[0] + self.weeds[1]
     }
 
     /// Plants that are spared because they are unknown.
     pub fn plants_unknown(&self) -> usize {
-        self.plants.unknown
+        self.plants[1]
     }
 
     /// Share of detections that the machine treats correctly, from 0 to 1.
@@ -91,12 +80,11 @@ impl fmt::Display for Confusion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut table = number_table(["", "taken for\nplant", "\nunknown", "taken for\nweed"], 1);
         for (name, counts) in [("plants", self.plants), ("weeds", self.weeds)] {
-            let counts = [counts.taken_for_plant, counts.unknown, counts.taken_for_weed];
             table.add_row([name.to_owned()].into_iter().chain(counts.map(|count| count.to_string())));
         }
         writeln!(f, "{table}")?;
         let percent = |part: usize, total: usize| format!("{part} of {total}, {:.2} %", 100.0 * share(part, total));
-        let (plants, weeds) = (self.plants.total(), self.weeds.total());
+        let (plants, weeds) = (self.count(Kind::Plant), self.count(Kind::Weed));
         writeln!(f, "Plants taken for weeds   {}", percent(self.plants_taken_for_weeds(), plants))?;
         writeln!(f, "Weeds taken for plants   {}", percent(self.weeds_taken_for_plants(), weeds))?;
         writeln!(f, "Plants spared unknown    {}", percent(self.plants_unknown(), plants))?;

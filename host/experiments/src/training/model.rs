@@ -1,8 +1,8 @@
 //! A classifier like the firmware's, and its classes for detections.
 
 use super::confusion::Confusion;
-use super::labelled::{Labelled, label_of};
 use super::table::Recorded;
+use super::{Labelled, label_of};
 use comfy_table::{CellAlignment, Table, presets};
 use control::ground::{
     class::{Class, label},

@@ -4,9 +4,8 @@
 //! detections. Those that were chosen as examples have a ring. Delay and actuation follow from the other features, so
 //! the two drawn ones suffice.
 
-use super::Training;
-use super::labelled::Labelled;
 use super::model::Model;
+use super::{Labelled, Training};
 use control::ground::class::Class;
 use control::ground::features::{Features, SPEED_CLASSES_MM_S, speed_class};
 use drawing::{INK, Legend, MARK_SIZE, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};

@@ -8,7 +8,7 @@
 //! The classifier here records features. It answers with each detection's true class, in the order of the row, so that
 //! spacing is counted from plants.
 
-use super::labelled::Labelled;
+use super::Labelled;
 use anyhow::{Result, ensure};
 use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
 use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};

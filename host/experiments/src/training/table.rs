@@ -4,13 +4,12 @@
 //! with `#`, and the `ok` that ends the console's answer. All features are whole numbers. A label is `plant`, `weed`,
 //! or empty for an unlabelled detection.
 
-use super::labelled::Labelled;
+use super::Labelled;
 use control::ground::features::Features;
 use field::row::Kind;
+use files::FileError;
 use files::csv_table::{CsvTable, Line};
 use std::path::{Path, PathBuf};
-
-pub use files::FileError;
 
 /// The columns of the features, in the order of [`Features::values`].
 pub const COLUMNS: [&str; 5] = ["speed_mm_s", "spacing_mm", "delay_mm", "hold_mm", "actuation_mm"];
@@ -35,39 +34,30 @@ pub fn read(path: &Path) -> Result<Vec<Recorded>, FileError> {
     CsvTable::read(path, &COLUMNS)?.lines().map(object).collect()
 }
 
-/// Objects to learn from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Lesson {
-    /// The labelled ones, of both classes.
-    pub objects: Vec<Labelled>,
-    /// The number of unlabelled ones, which are not used.
-    pub unlabelled: usize,
-}
-
-/// Reads detections of both classes from files that together make one table.
+/// Reads detections of both classes from files that together make one table. Returns the labelled ones, and the number
+/// of unlabelled ones.
 ///
 /// # Errors
 /// Names the file, the line and what would be right.
-pub fn read_labelled(paths: &[PathBuf]) -> Result<Lesson, FileError> {
+pub fn read_labelled(paths: &[PathBuf]) -> Result<(Vec<Labelled>, usize), FileError> {
     let columns: Vec<&str> = COLUMNS.into_iter().chain([LABEL]).collect();
     let tables = paths.iter().map(|path| CsvTable::read(path, &columns)).collect::<Result<Vec<_>, _>>()?;
-    let mut lesson = Lesson { objects: Vec::new(), unlabelled: 0 };
-    let mut last = None;
+    let (mut labelled, mut unlabelled, mut last) = (Vec::new(), 0, None);
     for line in tables.iter().flat_map(CsvTable::lines) {
         let Recorded { features, kind } = object(line)?;
         match kind {
-            Some(kind) => lesson.objects.push(Labelled { features, kind }),
-            None => lesson.unlabelled += 1,
+            Some(kind) => labelled.push(Labelled { features, kind }),
+            None => unlabelled += 1,
         }
         last = Some(line);
     }
-    let has = |kind: Kind| lesson.objects.iter().any(|object| object.kind == kind);
+    let has = |kind: Kind| labelled.iter().any(|object: &Labelled| object.kind == kind);
     let missing = [Kind::Plant, Kind::Weed].into_iter().find(|&kind| !has(kind));
     match (missing, last) {
         (Some(kind), Some(line)) => {
             Err(line.error(format!("up to here there is no {LABEL} {kind}: some objects of either class are needed")))
         }
-        _ => Ok(lesson),
+        _ => Ok((labelled, unlabelled)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The screen of one row: its machine, the ground between beam and tool, its detections, and its console. A small
 //! screen shows only the state and the ground, in a few lines.
 
-use super::parts::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, tool_column};
+use super::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, last_lines, tool_column};
 use crate::monitor::model::{Connection, Model, RowModel, Seen};
 use link::names;
 use ratatui::Frame;
@@ -79,8 +79,7 @@ fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
     frame
         .render_widget(Text::from(vec![self::ground(row, columns).green().into(), marks(row, columns).into()]), ground);
     frame.render_widget(Line::raw(speed_and_place(row)), speed);
-    let lines = model.lines.iter().skip(model.lines.len().saturating_sub(usize::from(said.height)));
-    frame.render_widget(Paragraph::new(lines.map(|line| Line::raw(line.as_str())).collect::<Vec<_>>()), said);
+    frame.render_widget(last_lines(model, said.height), said);
     draw_line(model, "", frame, line, hint);
 }
 

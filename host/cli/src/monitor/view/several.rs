@@ -2,7 +2,7 @@
 //! tool, and the state of the last command. If there is not room for all, rows that are lost or in alarm come first,
 //! and the rest are counted by state.
 
-use super::parts::{colour, draw_line, draw_said, draw_top, ground};
+use super::{colour, draw_line, draw_said, draw_top, ground, last_lines};
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
 use link::{Mode, advice};
 use ratatui::Frame;
@@ -44,8 +44,7 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     if is_roomy {
         draw_said(model, frame, said);
     } else {
-        let lines = model.lines.iter().skip(model.lines.len().saturating_sub(usize::from(said.height)));
-        frame.render_widget(Paragraph::new(lines.map(|line| Line::raw(line.as_str())).collect::<Vec<_>>()), said);
+        frame.render_widget(last_lines(model, said.height), said);
     }
     let to = model.target.map_or("all", |row| rows[row].name.as_str());
     draw_line(model, to, frame, line, hint);
