@@ -6,7 +6,8 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// The meaning of a line, in the form of `page/src/link/console_line.ts`: its name, and its fields.
+/// The meaning of a line, in the form of `page/src/link/console_line.ts`: its name, its fields, and `isEvent` if it is
+/// an event.
 pub fn read(line: &str) -> Value {
     let said = ConsoleLine::parse(line);
     let (name, fields) = said.fields();
@@ -22,6 +23,9 @@ pub fn read(line: &str) -> Value {
     });
     let mut meaning: Map<String, Value> =
         [("is".to_owned(), camel_case(name).into())].into_iter().chain(fields).collect();
+    if let ConsoleLine::Event(_) = said {
+        meaning.insert("isEvent".to_owned(), true.into());
+    }
     // A newer firmware's alarm has its name too.
     if let (ConsoleLine::Status(_), Some(alarm)) = (said, Values(line).text("name")) {
         meaning.insert("alarm".to_owned(), alarm.into());
@@ -100,64 +104,56 @@ mod tests {
     use expect_test::expect_file;
     use link::{ANSWERS, EVENTS, LineDescription, Mode, STATUS, ValueDescription};
 
-    /// A comment.
-    fn comment(indent: &str, meaning: &str) -> String {
-        let mut letters = meaning.trim().trim_end_matches('.').chars();
-        let first = letters.next().map_or(String::new(), |first| first.to_uppercase().to_string());
-        format!("{indent}/** {first}{}. */\n", letters.as_str())
-    }
-
-    /// The TypeScript type of a field in the result of [`read`].
-    fn type_of(rust: &str) -> &str {
-        match rust {
+    /// A field with its TypeScript type, in the result of [`read`].
+    fn field(value: &ValueDescription) -> Option<String> {
+        let (name, rust) = value.field?;
+        let (name, rust) = (camel_case(name), rust.replace(' ', ""));
+        let optional = rust.strip_prefix("Option<").and_then(|rust| rust.strip_suffix('>'));
+        let kind = match optional.unwrap_or(&rust) {
             "i32" | "u32" | "u16" | "u8" => "number",
             "[u8;COUNT]" => "readonly number[]",
             "bool" => "boolean",
-            "Mode" => "Mode",
-            "Class" => "\"plant\" | \"weed\" | \"unknown\"",
+            known @ ("Mode" | "Class") => known,
             "Alarm" | "Warning" | "String" => "string",
-            _ => panic!("say what {rust} is in TypeScript"),
-        }
+            other => panic!("say what {other} is in TypeScript"),
+        };
+        Some(format!("{name}{}: {kind}", if optional.is_some() { "?" } else { "" }))
     }
 
-    fn field(value: &ValueDescription) -> Option<String> {
-        let (name, rust) = value.field?;
-        let (about, name, rust) = (comment("    ", value.meaning), camel_case(name), rust.replace(' ', ""));
-        let optional = rust.strip_prefix("Option<").and_then(|rust| rust.strip_suffix('>'));
-        let (name, rust) = optional.map_or((name.clone(), &*rust), |rust| (name + "?", rust));
-        Some(format!("{about}    readonly {name}: {};\n", type_of(rust)))
+    /// A line with its fields, as Biome formats it.
+    fn shape(line: &LineDescription) -> String {
+        let fields: Vec<String> = line.values.iter().filter_map(field).collect();
+        let name = camel_case(line.name);
+        let in_a_line = format!("    {name}: {{ {} }};\n", fields.join("; "));
+        match in_a_line.trim_end().len() {
+            _ if fields.is_empty() => format!("    {name}: object;\n"),
+            ..=120 => in_a_line,
+            _ => format!("    {name}: {{\n        {};\n    }};\n", fields.join(";\n        ")),
+        }
     }
 
     #[test]
     fn the_page_s_types_of_lines_are_the_tables_of_lines() {
-        let shape = |line: &LineDescription| {
-            let fields: String = line.values.iter().filter_map(field).collect();
-            let (about, is) = (comment("", line.meaning), camel_case(line.name));
-            format!("{about}export interface {} {{\n    readonly is: \"{is}\";\n{fields}}}\n\n", line.name)
-        };
-        let plot =
-            LineDescription { name: "Plot", meaning: "points of a plotter's curves", beginning: "", values: &[] };
-        let other = LineDescription { name: "Other", meaning: "something else", ..plot };
-        let events = [EVENTS, &[plot]].concat();
-        let answers = [STATUS, ANSWERS, &[other]].concat();
-        let shapes: String = events.iter().chain(&answers).map(shape).collect();
-        let list =
-            |lines: &[LineDescription], between| lines.iter().map(|line| line.name).collect::<Vec<_>>().join(between);
-        let names: String = events.iter().map(|event| format!("    \"{}\",\n", camel_case(event.name))).collect();
+        let plot = LineDescription { name: "Plot", meaning: "", beginning: "", values: &[] };
+        let other = LineDescription { name: "Other", ..plot };
+        let shapes = |lines: Vec<LineDescription>| lines.iter().map(shape).collect::<String>();
         let modes = [Mode::Hold, Mode::Work, Mode::Alarm].map(|mode| format!("\"{}\"", mode.name())).join(" | ");
         expect_file!["../../../page/src/link/console_line.ts"].assert_eq(&format!(
-            "// What a line of the machine says: the tables of control/src/say/line_tables.rs and host/link/src/console_line.rs, as types.\n\
+            "// What a line of the machine says. The tables of control/src/say/line_tables.rs and\n\
+             // host/link/src/console_line.rs have the meaning and the unit of each field.\n\
              // `UPDATE_EXPECT=1 cargo test -p page lines` writes this file.\n\n\
-             /** What the machine is doing. */\n\
-             export type Mode = {modes};\n\n\
-             {shapes}/** What the machine tells by itself. */\n\
-             export type EventLine =\n    | {};\n\n\
-             /** The events' names. */\n\
-             export const EVENT_NAMES: readonly EventLine[\"is\"][] = [\n{names}];\n\n\
-             /** What a line says. */\n\
-             export type ConsoleLine = EventLine | {};\n",
-            list(&events, "\n    | "),
-            list(&answers, " | "),
+             export type Mode = {modes};\n\
+             type Class = \"plant\" | \"weed\" | \"unknown\";\n\n\
+             interface Events {{\n{}}}\n\n\
+             interface Answers {{\n{}}}\n\n\
+             type Named<Lines> = {{ [Name in keyof Lines]: {{ readonly is: Name }} & Readonly<Lines[Name]> }}[keyof Lines];\n\n\
+             /** What the machine tells by itself. */\n\
+             export type EventLine = Named<Events> & {{ readonly isEvent: true }};\n\
+             export type ConsoleLine = EventLine | Named<Answers>;\n\
+             export type Line<Name extends ConsoleLine[\"is\"]> = Extract<ConsoleLine, {{ readonly is: Name }}>;\n\
+             export type Setting = Line<\"setting\">;\n",
+            shapes([EVENTS, &[plot]].concat()),
+            shapes([STATUS, ANSWERS, &[other]].concat()),
         ));
     }
 
@@ -166,7 +162,10 @@ mod tests {
         for (line, said) in [
             ("ok", json!({ "is": "end" })),
             ("error: no", json!({ "is": "end", "error": "no" })),
-            ("alarm code=3-1 name=too_fast pos=7", json!({ "is": "alarm", "alarm": "too_fast", "position": 7 })),
+            (
+                "alarm code=3-1 name=too_fast pos=7",
+                json!({ "is": "alarm", "isEvent": true, "alarm": "too_fast", "position": 7 }),
+            ),
             (
                 "state=alarm code=9-9 name=boredom tool=out pos=1 speed_mm_s=-2 windows=3 unseen_mm=4",
                 json!({
@@ -177,8 +176,8 @@ mod tests {
             (
                 "plant pos=-7 votes=3 spacing=1 delay=2 hold=3 actuation=5",
                 json!({
-                    "is": "detection", "class": "plant", "position": -7, "votes": 3, "spacing": 1, "delay": 2, "hold": 3,
-                    "actuation": 5,
+                    "is": "detection", "isEvent": true, "class": "plant", "position": -7, "votes": 3, "spacing": 1,
+                    "delay": 2, "hold": 3, "actuation": 5,
                 }),
             ),
             (
@@ -188,10 +187,10 @@ mod tests {
                     "isSwitched": true, "default": 0,
                 }),
             ),
-            ("calibrated by=eye, set them", json!({ "is": "calibratedByEye" })),
+            ("calibrated by=eye, set them", json!({ "is": "calibratedByEye", "isEvent": true })),
             (
                 "calibrated lead_out_ms=150 lead_in_ms=40 set=yes",
-                json!({ "is": "calibratedBySwitch", "outMs": 150, "inMs": 40, "isSet": true }),
+                json!({ "is": "calibratedBySwitch", "isEvent": true, "outMs": 150, "inMs": 40, "isSet": true }),
             ),
         ] {
             assert_eq!(read(line), said, "{line}");

@@ -5,7 +5,7 @@
 // After every start of the Uno it asks for version, settings and examples, and turns the events on. `hold` does not wait. A
 // session ends with its wire.
 
-import type { EventLine, Setting, Status } from "./console_line.ts";
+import type { EventLine, Line, Setting } from "./console_line.ts";
 import { isEvent, read, settingsOf } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
@@ -41,7 +41,7 @@ export type Happening =
     | { is: "connected"; version: string; settings: readonly Setting[]; examples: readonly string[] }
     /** The machine is lost: for good, as the operator wanted or not, or until it has restarted. */
     | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
-    | { is: "status"; status: Status; line: string }
+    | { is: "status"; status: Line<"status">; line: string }
     /** The machine sent an event line. */
     | { is: "event"; event: EventLine; line: string }
     | { is: "command"; line: string }

@@ -1,7 +1,7 @@
 // The state of the machine at the other end of the wire, updated by events, with its texts for the operator.
 
 import faults from "faults.json";
-import type { Detection, EventLine, Mode, Setting, Status } from "../link/console_line.ts";
+import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
@@ -48,15 +48,15 @@ export class Machine {
     alarm: string | undefined;
     /** The last warning's name. */
     warning: string | undefined;
-    status: Status | undefined;
+    status: Line<"status"> | undefined;
     /** When the status came. */
     statusMs = 0;
     settings: readonly Setting[] = [];
     help: ReadonlyMap<string, string> = new Map();
     examples: readonly string[] = [];
     /** The last detections, the newest first, and those with a zone that the machine still stores. */
-    objects: Detection[] = [];
-    zones: Detection[] = [];
+    objects: Line<"detection">[] = [];
+    zones: Line<"detection">[] = [];
 
     /** Takes an event at a time. */
     take(happening: Happening, nowMs: number): void {
@@ -144,7 +144,7 @@ export class Machine {
     }
 
     /** How wide an object was. */
-    widthMm({ hold }: Detection): number {
+    widthMm({ hold }: Line<"detection">): number {
         return hold * this.tickMm - 2 * this.setting("margin_mm");
     }
 

@@ -3,7 +3,7 @@
 // `advance` lets time pass. The operator may change the machine or the row between two calls. `outcome` has the result
 // for each plant behind the tool.
 
-import type { Detection } from "../link/console_line.ts";
+import type { Line } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { Machine, type MachineKind, PIN } from "../row/machine.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
@@ -115,7 +115,7 @@ export class Trial {
      * The ground of a zone. The paper's delay and hold count from the moment when the leading edge is in the beam and
      * the tool is beamToToolMm behind it. Counts are converted to ground by the present slip.
      */
-    #zone({ position, delay, hold }: Detection): Zone {
+    #zone({ position, delay, hold }: Line<"detection">): Zone {
         const { placeMm, ticks, groundMmATick, dimensions } = this.machine;
         const startMm = placeMm + (position + delay + this.#zero - ticks) * groundMmATick - dimensions.beamToToolMm;
         return { startMm, endMm: startMm + hold * groundMmATick };
