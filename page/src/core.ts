@@ -5,7 +5,7 @@ import packed from "page.wasm";
 import { Rust } from "./rust.ts";
 import { unpack } from "./unpack.ts";
 
-/** The module, for workers. */
+/** The module: for workers, and for further instances with their own state. */
 export let module: WebAssembly.Module;
 let rust: Rust;
 
@@ -14,9 +14,6 @@ export const ready: Promise<void> = unpack(packed).then((bytes) => {
     module = new WebAssembly.Module(bytes);
     rust = new Rust(module);
 });
-
-/** Another instance, with its own state. */
-export const another = (): Rust => new Rust(module);
 
 /** Asks a question. Throws if it is invalid: the page and its Rust are then of different versions. */
 export const ask = <Answer>(question: unknown): Answer => rust.ask(question);

@@ -9,11 +9,8 @@ interface Exports {
     readonly length: () => number;
     readonly read: () => void;
     readonly table: (number: number) => number;
-    readonly table_length: (number: number) => number;
     readonly roll: (cycle: number) => void;
     readonly hear: (rise: number, fall: number) => void;
-    readonly trial_table: (number: number) => number;
-    readonly trial_table_length: (number: number) => number;
 }
 
 const [encoder, decoder] = [new TextEncoder(), new TextDecoder()];
@@ -44,14 +41,11 @@ export class Rust {
         this.#exports.read();
     }
 
-    /** A copy of a table of the log's picture. */
+    /** A table of the log's picture or of the rolling machine, valid until the next call. */
     table(number: number): Float64Array<ArrayBuffer> {
-        const { memory, table, table_length } = this.#exports;
-        return new Float64Array(
-            memory.buffer,
-            table(number),
-            table_length(number),
-        ).slice() as Float64Array<ArrayBuffer>;
+        const { memory, table, length } = this.#exports;
+        const at = table(number);
+        return new Float64Array(memory.buffer as ArrayBuffer, at, length());
     }
 
     /** Rolls the machine until a cycle. */
@@ -62,13 +56,6 @@ export class Rust {
     /** Passes a pulse to the machine's servo, by the cycles of its edges. */
     hear(rise: number, fall: number): void {
         this.#exports.hear(rise, fall);
-    }
-
-    /** A table of the rolling machine, valid until the next call. */
-    trialTable(number: number): Float64Array {
-        const { memory, trial_table, trial_table_length } = this.#exports;
-        const at = trial_table(number);
-        return new Float64Array(memory.buffer, at, trial_table_length(number));
     }
 
     #put(bytes: Uint8Array): void {

@@ -204,13 +204,6 @@ mod tests {
     }
 
     #[test]
-    fn settings_go_in_an_order_that_the_firmware_takes() {
-        let swapped = steps_to(&[("beam_to_tool_mm", 2000), ("lead_out_ms", 500), ("margin_mm", 200)]);
-        assert_eq!(swapped["steps"][0], json!(["beam_to_tool_mm", 2000]), "{swapped}");
-        assert_eq!(swapped["steps"].as_array().map(Vec::len), Some(3), "{swapped}");
-    }
-
-    #[test]
     fn a_contradiction_is_said_before_anything_is_sent() {
         let answer = steps_to(&[("beam_to_tool_mm", 100)]);
         assert!(answer["contradiction"].as_str().is_some_and(|why| why.contains("raise it")), "{answer}");

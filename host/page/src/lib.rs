@@ -15,8 +15,8 @@ mod trial;
 
 #[cfg(target_arch = "wasm32")]
 use exports::progress;
-pub use record::{table, take};
-pub use trial::{hear, roll, table as trial_table};
+pub use record::take;
+pub use trial::{hear, roll};
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -54,6 +54,15 @@ enum Question {
 /// Ignores the progress: only a browser shows it.
 #[cfg(not(target_arch = "wasm32"))]
 fn progress(_share: f64) {}
+
+/// A table, by its number: those of the log's picture, and from [`record::TABLES`] on those of the rolling machine. Empty
+/// if there is no such table.
+pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
+    match number.checked_sub(record::TABLES) {
+        None => record::table(number, read),
+        Some(number) => trial::table(number, read),
+    }
+}
 
 /// Answers a question: `{"answer": ...}`, or `{"error": "..."}` if the question is invalid.
 pub fn answer(question: &[u8]) -> String {

@@ -50,35 +50,14 @@ fn task(task: &Task) -> String {
 mod tests {
     use super::*;
 
-    fn advice(lines: &[&str], values: &[(&str, u16)]) -> Value {
-        Heard {
-            lines: lines.iter().map(|&line| line.to_owned()).collect(),
-            settings: values.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
-        }
-        .advice()
-    }
-
-    #[test]
-    fn the_page_has_the_manual_s_steps_and_what_is_missing() {
-        let nothing = advice(&[], &[]);
-        assert_eq!(nothing["steps"].as_array().map(Vec::len), Some(steps().len()));
-        assert_eq!(
-            (&nothing["next"], &nothing["marginMm"], &nothing["warning"]),
-            (&Value::Null, &Value::Null, &Value::Null)
-        );
-        assert_eq!(nothing["missing"].as_array().map(Vec::len), Some(2), "{nothing}");
-        let timed = "calibrated lead_out_ms=158 lead_in_ms=52 set=yes";
-        let begun = advice(&[timed, "> set margin_mm 13"], &[("margin_mm", 13)]);
-        assert_eq!(begun["next"], "time the servo: `calibrate servo` (1 of 2 done)");
-        assert!(begun["warning"].as_str().is_some_and(|warning| warning.ends_with("50 is safe")), "{begun}");
-    }
-
     #[test]
     fn the_page_is_told_the_margin_once_all_was_measured() {
         let timed = "calibrated lead_out_ms=158 lead_in_ms=40 set=yes";
         let stretch = ["> calibrate 10000", "ticks_per_m=2010"];
         let all = [&[timed, timed][..], &stretch, &stretch, &stretch].concat();
+        let lines = all.into_iter().map(str::to_owned).collect();
+        let advice = Heard { lines, settings: [("ticks_per_m".to_owned(), 2010)].into() }.advice();
         // 3 % of 400 mm, 15 ms at 2.5 km/h and the firmware's 5 mm.
-        assert_eq!(advice(&all, &[("ticks_per_m", 2010)])["marginMm"], 28);
+        assert_eq!(advice["marginMm"], 28);
     }
 }

@@ -5,7 +5,8 @@
 // Uno's clock run: encoder and beams change their pins at their exact cycles, and the servo receives each pulse. Speed,
 // slip, faults and the parameters of the sowing may change between two calls.
 
-import { another } from "../core.ts";
+import { module } from "../core.ts";
+import { Rust } from "../rust.ts";
 import type { Uno } from "../uno/uno.ts";
 import type { Thing } from "./row.ts";
 
@@ -45,7 +46,7 @@ export interface Dimensions {
 }
 
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
-export type Verdict = "kept" | "margin cut" | "damaged";
+export type Verdict = "kept" | "marginCut" | "damaged";
 
 /** A pin change within a turn. */
 export type Change =
@@ -63,7 +64,7 @@ export type Change =
 type Levels = [pin: number, high: boolean][];
 
 /** The tables of host/page/src/trial.rs. */
-const TABLE = { now: 0, changes: 1, sown: 2 } as const;
+const TABLE = { now: 3, changes: 4, sown: 5 } as const;
 
 export class Machine {
     readonly uno: Uno;
@@ -92,7 +93,7 @@ export class Machine {
     groundMmATick = 0;
     /** Changes of the tool's command so far. The first is not a swing. */
     commands = 0;
-    readonly #rust = another();
+    readonly #rust = new Rust(module);
     #pulseRise = 0;
 
     /** Places a standing machine in front of a row, at the Uno's cycle. */
@@ -123,7 +124,7 @@ export class Machine {
         const { uno } = this;
         this.#rust.roll(cycle);
         // A copy: the servo's pulses call the core, which changes its memory.
-        const changes = this.#rust.trialTable(TABLE.changes).slice();
+        const changes = this.#rust.table(TABLE.changes).slice();
         for (let at = 0; at < changes.length; at += 3) {
             uno.runUntil(changes[at] ?? 0);
             uno.set(changes[at + 1] ?? 0, changes[at + 2] === 1);
@@ -146,12 +147,12 @@ export class Machine {
 
     /** Reads the machine's state and the newly sown things. */
     #look(): void {
-        const now = this.#rust.trialTable(TABLE.now);
+        const now = this.#rust.table(TABLE.now);
         const [placeMm = 0, toolMm = 0, speedMmS = 0, degrees = 0, acrossMm = 0] = now;
         const [isClear, isWeeding, isBroken, ticks = 0, groundMmATick = 0, commands = 0] = now.subarray(5);
         const numbers = { placeMm, toolMm, speedMmS, degrees, acrossMm, ticks, groundMmATick, commands };
         Object.assign(this, numbers, { isClear: isClear === 1, isWeeding: isWeeding === 1, isBroken: isBroken === 1 });
-        const sown = this.#rust.trialTable(TABLE.sown);
+        const sown = this.#rust.table(TABLE.sown);
         for (let at = 0; at < sown.length; at += 3) {
             const [kind, placeMm = 0, widthMm = 0] = sown.subarray(at, at + 3);
             this.things.push({ kind: kind === 0 ? "plant" : "weed", placeMm, widthMm });

@@ -20,7 +20,7 @@ const SPECK_ACROSS_MM = 150;
 /** A tick for a kept plant, a bar for a cut margin, and a cross for a damaged plant. */
 const SIGNS: Readonly<Record<Verdict, string>> = {
     kept: "M-16 0L-5 12L17 -13",
-    "margin cut": "M-16 0H16",
+    marginCut: "M-16 0H16",
     damaged: "M-14 -14L14 14M-14 14L14 -14",
 };
 

@@ -19,7 +19,7 @@ export class Outcome {
     /** Why plants were not kept. */
     readonly notKept = new Map<number, NotKept>();
     /** The totals so far. */
-    totals: Totals = { plants: { kept: 0, "margin cut": 0, damaged: 0 }, weeds: { cut: 0, passed: 0 } };
+    totals: Totals = { plants: { kept: 0, marginCut: 0, damaged: 0 }, weeds: { cut: 0, passed: 0 } };
     /** The firmware's margin on both sides of a canopy. */
     marginMm = 50;
     /** The firmware's zone of a single plant; 0 for its whole canopy. */
@@ -44,7 +44,7 @@ export class Outcome {
     }
 
     #count(): void {
-        const plants = { kept: 0, "margin cut": 0, damaged: 0 };
+        const plants = { kept: 0, marginCut: 0, damaged: 0 };
         for (const verdict of this.plants.values()) plants[verdict] += 1;
         const cut = [...this.weeds.values()].filter((cut) => cut).length;
         this.totals = { plants, weeds: { cut, passed: this.weeds.size } };
@@ -53,10 +53,10 @@ export class Outcome {
 
 /** The totals in words. */
 export function inWords({ plants, weeds }: Totals): string {
-    const passed = plants.kept + plants["margin cut"] + plants.damaged;
+    const passed = plants.kept + plants.marginCut + plants.damaged;
     if (passed === 0) return say("noPlantYet");
     const words = [plants.kept === passed ? say("allKept") : say("someKept", { kept: plants.kept })];
-    if (plants["margin cut"] > 0) words.push(say("someCut", { cut: plants["margin cut"] }));
+    if (plants.marginCut > 0) words.push(say("someCut", { cut: plants.marginCut }));
     if (plants.damaged > 0) words.push(say("damaged", { count: plants.damaged }));
     const sentences = [say("passed", { count: passed, rest: words.join("; ") })];
     if (weeds.passed > 0) sentences.push(say("weedsCut", { count: weeds.passed, cut: weeds.cut }));
