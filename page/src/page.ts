@@ -127,9 +127,8 @@ async function workServed(): Promise<void> {
     try {
         workPanels = await showServed(served);
     } catch (error) {
-        const why = error instanceof Error ? error.message : String(error);
         const said = document.createElement("p");
-        show(said, () => say("noMachinesList", { why: told(why) }));
+        show(said, () => say("noMachinesList", { why: told(error) }));
         served.append(said);
     }
 }

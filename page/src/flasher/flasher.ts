@@ -74,8 +74,7 @@ export class Flasher {
             });
             this.#parts.html("to-work").hidden = false;
         } catch (error) {
-            const why = error instanceof Error ? error.message : String(error);
-            this.#say("failed", () => say("notFlashed", { why: told(why) }));
+            this.#say("failed", () => say("notFlashed", { why: told(error) }));
             if (!(error instanceof PortError || error instanceof FlashError)) throw error;
         } finally {
             this.#isBusy = false;

@@ -5,6 +5,7 @@
 // After every start of the Uno it asks for version, settings and examples, and turns the events on. `hold` does not wait. A
 // session ends with its wire.
 
+import { reason } from "../words/words.ts";
 import type { EventLine, Line, Setting } from "./console_line.ts";
 import { isEvent, read, settingsOf } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
@@ -177,7 +178,7 @@ export class Session implements Link {
             } catch (error) {
                 if (this.#ended || beginning !== this.#beginnings) return;
                 if (tries === TRIES) {
-                    this.#end(error instanceof Error ? error.message : String(error));
+                    this.#end(reason(error));
                     return;
                 }
             }

@@ -28,7 +28,7 @@ export class Overview {
             show(said, () => say("waitingForAll"));
             holdAll().then(
                 (held) => show(said, () => inWords(held)),
-                (error: Error) => show(said, () => say("holdFailed", { why: told(error.message) })),
+                (error: Error) => show(said, () => say("holdFailed", { why: told(error) })),
             );
         });
         into.append(make("ul", "", ...rows), make("div", "hold-bar", said, hold));

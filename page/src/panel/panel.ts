@@ -260,7 +260,7 @@ export class Panel {
     }
 
     #say(error: unknown): void {
-        this.#parts.say("drive-said", () => sentence(told(error instanceof Error ? error.message : String(error))));
+        this.#parts.say("drive-said", () => sentence(told(error)));
     }
 
     #wireTabs(name: string, tabs: readonly (typeof TABS)[number][]): void {

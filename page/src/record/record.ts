@@ -3,13 +3,12 @@
 //
 // Only the visible part of a log is drawn. Reading and replay run beside the page, which can be used meanwhile.
 
-import { make as element, Parts } from "../dom.ts";
+import { draw, make, Parts } from "../dom.ts";
 import { fault, sentence } from "../panel/machine.ts";
 import { onLanguage, quantity, say } from "../words/words.ts";
 import { map, type Picture, picture, type Replayed, replay, type Speed } from "./picture.ts";
 import { Cancelled } from "./reading.ts";
 
-const SVG = "http://www.w3.org/2000/svg";
 /** Ground in the window: at first, the least and the most. */
 const WINDOW_MM = { first: 8000, least: 1000, most: 200_000 };
 /** The zoom of a press, and the share of the window that it moves. */
@@ -152,7 +151,7 @@ export class RecordView {
         this.#parts.html("log-body").hidden = rows.length === 0;
         this.#parts.html("log-places").hidden = !rows.some(({ picture }) => picture.hasPlaces);
         this.#showMap(null);
-        this.#parts.html("log-rows").replaceChildren(...rows.map(({ drawing, at }) => element("div", "", drawing, at)));
+        this.#parts.html("log-rows").replaceChildren(...rows.map(({ drawing, at }) => make("div", "", drawing, at)));
         for (const { drawing } of rows) this.#resized.observe(drawing);
         this.#place.max = String(Math.ceil(this.#endMm));
         this.#windowMm = WINDOW_MM.first;
@@ -251,7 +250,7 @@ export class RecordView {
         const x = (mm: number) => ((mm - fromMm) / this.#windowMm) * clientWidth;
         const isSeen = (one: number, other: number) => Math.max(one, other) >= fromMm && Math.min(one, other) <= toMm;
         const bar = (className: string, one: number, other: number, top: number, height: number) =>
-            make("rect", { class: className, x: x(one), width: Math.max(x(other) - x(one), 1), y: top, height });
+            draw("rect", { class: className, x: x(one), width: Math.max(x(other) - x(one), 1), y: top, height });
         const objects = shown.objects
             .near(fromMm, toMm)
             .filter(({ zoneMm, zoneEndMm, toMm }) => isSeen(zoneMm, Math.max(zoneEndMm, toMm)));
@@ -261,10 +260,10 @@ export class RecordView {
         drawing.replaceChildren(
             ...objects
                 .filter((object) => object.class !== "weed")
-                .map(({ zoneMm, zoneEndMm }) => bar("strip-margin", zoneMm, zoneEndMm, AT.row, row)),
+                .map(({ zoneMm, zoneEndMm }) => bar("window", zoneMm, zoneEndMm, AT.row, row)),
             ...objects.map((object) =>
                 bar(
-                    object.class === "weed" ? "strip-weed" : `strip-canopy ${object.class}`,
+                    object.class === "weed" ? "weed" : `canopy ${object.class}`,
                     object.fromMm,
                     object.toMm,
                     AT.row + row / 4,
@@ -274,16 +273,22 @@ export class RecordView {
             ...shown.worked
                 .near(fromMm, toMm)
                 .filter(({ startMm, endMm }) => isSeen(startMm, endMm))
-                .map(({ startMm, endMm }) => bar("log-worked", startMm, endMm, AT.track, 10)),
-            make("path", {
-                class: "log-speed",
+                .map(({ startMm, endMm }) => bar("worked", startMm, endMm, AT.track, 10)),
+            draw("path", {
+                class: "fast outline",
                 d: this.#speedLine(shown.speeds.near(fromMm, toMm), shown.fastestMmS, x, isSeen),
             }),
-            make("line", { class: "log-middle", x1: x(this.#middleMm), x2: x(this.#middleMm), y1: 0, y2: AT.speedEnd }),
+            draw("line", {
+                class: "not-seen outline",
+                x1: x(this.#middleMm),
+                x2: x(this.#middleMm),
+                y1: 0,
+                y2: AT.speedEnd,
+            }),
             ...shown.alarms
                 .filter(({ mm }) => isSeen(mm, mm))
                 .map(({ mm, isWarning }) =>
-                    make("path", {
+                    draw("path", {
                         class: isWarning ? "log-warning" : "log-alarm",
                         d: `M${x(mm)} ${AT.alarm}l14 9l-14 9V${AT.speedEnd}`,
                     }),
@@ -315,9 +320,8 @@ export class RecordView {
         const apart = MARKS_MM.find((apart) => (toMm - fromMm) / apart <= MARKS) ?? (toMm - fromMm) / MARKS;
         const marks: SVGElement[] = [];
         for (let mm = Math.ceil(Math.max(fromMm, 0) / apart) * apart; mm <= toMm; mm += apart) {
-            const note = make("text", { class: "strip-note", x: x(mm), y: AT.note, "text-anchor": "middle" });
-            note.textContent = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
-            marks.push(note);
+            const text = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
+            marks.push(draw("text", { class: "note", x: x(mm), y: AT.note, "text-anchor": "middle" }, text));
         }
         return marks;
     }
@@ -325,8 +329,8 @@ export class RecordView {
 
 /** A log as a row. */
 function row(file: File, picture: Picture): Row {
-    const drawing = make("svg", { class: "log-row", role: "img", "data-part": "log-drawing" }) as SVGSVGElement;
-    const at = element("p", "log-at");
+    const drawing = draw("svg", { class: "log-row", role: "img", "data-part": "log-drawing" });
+    const at = make("p", "log-at");
     return { file, picture, drawing, at };
 }
 
@@ -362,10 +366,4 @@ function duration(ms: number): string {
     const seconds = ms / 1000;
     if (seconds < MINUTE_S) return quantity(seconds, "second", 1);
     return seconds < HOUR_S ? quantity(seconds / 60, "minute", 1) : quantity(seconds / 3600, "hour", 1);
-}
-
-function make(name: string, attributes: Readonly<{ [name: string]: string | number }>): SVGElement {
-    const element = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-    return element;
 }

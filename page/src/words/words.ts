@@ -132,8 +132,12 @@ const heard = Object.entries(en.heard)
         return { word: word as HeardWord, holes, pattern: new RegExp(`^${parts.join("(.*)")}$`, "s") };
     });
 
-/** Translates such a text, with its values. Unknown text stays: the machine itself speaks English. */
-export function told(text: string): string {
+/** The text of an error. */
+export const reason = (error: unknown): string => (error instanceof Error ? error.message : String(error));
+
+/** Translates such a text or an error's, with its values. Unknown text stays: the machine itself speaks English. */
+export function told(english: unknown): string {
+    const text = reason(english);
     if (code === "en") return text;
     // The same text as a sentence or within one.
     const bare = `${text.charAt(0).toLowerCase()}${text.slice(1).replace(/\.$/, "")}`;
