@@ -24,8 +24,8 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     if (overview) into.append(all);
     const panels = served.machines.map((machine, number) => {
         const { name } = machine;
-        const element = make("div", overview ? "panel" : "panel alone");
-        const section = make("section", "served", make("h2", "", name), element);
+        const element = make("div", overview ? "panel stack" : "panel stack alone");
+        const section = make("section", "served stack", make("h2", "", name), element);
         section.ariaLabel = name;
         into.append(section);
         const panel = new Panel(element, `served-${number}`, served.allowed, overview ? name : "");

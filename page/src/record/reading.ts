@@ -13,17 +13,19 @@ export interface Answer<Said> {
 /** The question was cancelled. */
 export class Cancelled extends Error {}
 
+/** How work goes on: `progress` gets its share that is done, from 0 to 1, and `cancel` ends it. */
+export interface Work {
+    readonly progress: (share: number) => void;
+    readonly cancel: AbortSignal;
+}
+
 let address: string | undefined;
 
-/**
- * Asks a question. `progress` gets the progress, from 0 to 1. The worker ends with its answer, or when `cancel`
- * resolves.
- */
+/** Asks a question. The worker ends with its answer, or when the work is cancelled. */
 export function read<Said>(
     logs: readonly File[],
     wants: Asked["wants"],
-    progress: (share: number) => void,
-    cancel: AbortSignal,
+    { progress, cancel }: Work,
 ): Promise<Answer<Said>> {
     address ??= URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
     const worker = new Worker(address);

@@ -5,9 +5,9 @@
 
 import { draw, make, Parts } from "../dom.ts";
 import { fault, sentence } from "../panel/machine.ts";
-import { onLanguage, quantity, say } from "../words/words.ts";
-import { map, type Picture, picture, type Replayed, replay, type Speed } from "./picture.ts";
-import { Cancelled } from "./reading.ts";
+import { onLanguage, quantity, reason, say } from "../words/words.ts";
+import { type GroundMap, type Picture, type Problem, picture, type Replayed, type Speed } from "./picture.ts";
+import { Cancelled, read, type Work } from "./reading.ts";
 
 /** Ground in the window: at first, the least and the most. */
 const WINDOW_MM = { first: 8000, least: 1000, most: 200_000 };
@@ -20,6 +20,8 @@ const AT = { alarm: 0, row: 24, rowEnd: 84, track: 100, speed: 120, speedEnd: 18
 /** The possible distances between two marks. The first with few enough marks in the window is used. */
 const MARKS_MM = [200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000];
 const MARKS = 8;
+/** Ground beside the window from which the line of the speed comes. Speeds are nearer to each other. */
+const BESIDE_MM = 1500;
 /** From here on a duration is shown in minutes, and in hours. */
 const MINUTE_S = 120;
 const HOUR_S = 7200;
@@ -89,8 +91,8 @@ export class RecordView {
         for (const name of ["log-replayed", "log-alarm", "log-mapped"]) this.#parts.write(name, "");
         const texts: (() => string)[] = [];
         const rows: Row[] = [];
-        const isWhole = await this.#eachOf(files, "log-said", async (file, progress, cancel) => {
-            const found = await picture(file, progress, cancel);
+        const isWhole = await this.#eachOf(files, "log-said", async (file, work) => {
+            const found = await picture(file, work);
             if ("problem" in found) texts.push(() => say("noLog", { file: file.name, why: found.problem }));
             else if (found.speeds.length === 0) texts.push(() => say("emptyLog", { file: file.name }));
             else {
@@ -110,7 +112,7 @@ export class RecordView {
     async #eachOf(
         files: readonly File[],
         said: string,
-        use: (file: File, progress: (share: number) => void, cancel: AbortSignal) => Promise<void>,
+        use: (file: File, work: Work) => Promise<void>,
     ): Promise<boolean> {
         this.#work.abort();
         const work = new AbortController();
@@ -124,21 +126,16 @@ export class RecordView {
         try {
             for (const [done, file] of files.entries()) {
                 at = file.name;
-                await use(
-                    file,
-                    (share) => {
-                        bar.value = (done + share) / files.length;
-                    },
-                    work.signal,
-                );
+                const progress = (share: number) => {
+                    bar.value = (done + share) / files.length;
+                };
+                await use(file, { progress, cancel: work.signal });
             }
             return true;
         } catch (error) {
             if (this.#work !== work) return false;
-            const why = error instanceof Error ? error.message : String(error);
-            this.#parts.say(said, () =>
-                error instanceof Cancelled ? say("cancelled") : say("notRead", { file: at, why }),
-            );
+            const why = () => say("notRead", { file: at, why: reason(error) });
+            this.#parts.say(said, () => (error instanceof Cancelled ? say("cancelled") : why()));
             return false;
         } finally {
             if (this.#work === work) busy.hidden = true;
@@ -195,8 +192,8 @@ export class RecordView {
     async #replay(): Promise<void> {
         const files = this.#rows.map(({ file }) => file);
         const results: (() => string)[] = [];
-        const isWhole = await this.#eachOf(files, "log-replayed", async (file, progress, cancel) => {
-            const result = await replay(file, progress, cancel);
+        const isWhole = await this.#eachOf(files, "log-replayed", async (file, work) => {
+            const { said: result } = await read<Replayed | Problem>([file], "replay", work);
             results.push(() => this.#of(file, "problem" in result ? sentence(result.problem) : agreement(result)));
         });
         if (isWhole) this.#parts.say("log-replayed", () => results.map((result) => result()).join(" "));
@@ -218,8 +215,8 @@ export class RecordView {
             withoutPlace: say("mapMissing"),
             north: say("north"),
         };
-        await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, progress, cancel) => {
-            const { svg, placed } = await map(files, words, progress, cancel);
+        await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, work) => {
+            const { svg, placed } = (await read<GroundMap>(files, { map: words }, work)).said;
             this.#parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
             this.#showMap(svg);
         });
@@ -248,12 +245,9 @@ export class RecordView {
         const fromMm = this.#middleMm - this.#windowMm / 2;
         const toMm = fromMm + this.#windowMm;
         const x = (mm: number) => ((mm - fromMm) / this.#windowMm) * clientWidth;
-        const isSeen = (one: number, other: number) => Math.max(one, other) >= fromMm && Math.min(one, other) <= toMm;
         const bar = (className: string, one: number, other: number, top: number, height: number) =>
             draw("rect", { class: className, x: x(one), width: Math.max(x(other) - x(one), 1), y: top, height });
-        const objects = shown.objects
-            .near(fromMm, toMm)
-            .filter(({ zoneMm, zoneEndMm, toMm }) => isSeen(zoneMm, Math.max(zoneEndMm, toMm)));
+        const objects = shown.objects.near(fromMm, toMm);
         const row = AT.rowEnd - AT.row;
         drawing.ariaLabel = `${file.name}: ${say("logDrawing")}`;
         drawing.setAttribute("viewBox", `0 0 ${clientWidth} ${HEIGHT}`);
@@ -270,13 +264,10 @@ export class RecordView {
                     row / 2,
                 ),
             ),
-            ...shown.worked
-                .near(fromMm, toMm)
-                .filter(({ startMm, endMm }) => isSeen(startMm, endMm))
-                .map(({ startMm, endMm }) => bar("worked", startMm, endMm, AT.track, 10)),
+            ...shown.worked.near(fromMm, toMm).map(({ startMm, endMm }) => bar("worked", startMm, endMm, AT.track, 10)),
             draw("path", {
                 class: "fast outline",
-                d: this.#speedLine(shown.speeds.near(fromMm, toMm), shown.fastestMmS, x, isSeen),
+                d: speedLine(shown.speeds.near(fromMm - BESIDE_MM, toMm + BESIDE_MM), shown.fastestMmS, x),
             }),
             draw("line", {
                 class: "not-seen outline",
@@ -286,45 +277,38 @@ export class RecordView {
                 y2: AT.speedEnd,
             }),
             ...shown.alarms
-                .filter(({ mm }) => isSeen(mm, mm))
+                .filter(({ mm }) => mm >= fromMm && mm <= toMm)
                 .map(({ mm, isWarning }) =>
                     draw("path", {
                         class: isWarning ? "log-warning" : "log-alarm",
                         d: `M${x(mm)} ${AT.alarm}l14 9l-14 9V${AT.speedEnd}`,
                     }),
                 ),
-            ...this.#marks(fromMm, toMm, x),
+            ...marks(fromMm, toMm, x),
         );
-        const here = nearest(shown.speeds.nearest(this.#middleMm), this.#middleMm);
-        if (here)
-            at.textContent = say("atPlace", {
-                distance: metres(this.#middleMm),
-                time: duration(here.timeMs),
-                speed: quantity(here.mmS * 0.0036, "kilometer-per-hour", 1),
-            });
+        const { timeMs, mmS } = shown.speeds.nearest(this.#middleMm);
+        at.textContent = say("atPlace", {
+            distance: metres(this.#middleMm),
+            time: duration(timeMs),
+            speed: quantity(mmS * 0.0036, "kilometer-per-hour", 1),
+        });
     }
+}
 
-    #speedLine(
-        speeds: readonly Speed[],
-        fastestMmS: number,
-        x: (mm: number) => number,
-        isSeen: (one: number, other: number) => boolean,
-    ): string {
-        const y = (mmS: number) => AT.speedEnd - (Math.abs(mmS) / fastestMmS) * (AT.speedEnd - AT.speed);
-        const seen = speeds.filter(({ mm }, at) => isSeen(speeds[at - 1]?.mm ?? mm, speeds[at + 1]?.mm ?? mm));
-        const points = seen.map(({ mm, mmS }) => `${x(mm).toFixed(1)} ${y(mmS).toFixed(1)}`);
-        return points.length > 0 ? `M${points.join("L")}` : "";
-    }
+function speedLine(speeds: readonly Speed[], fastestMmS: number, x: (mm: number) => number): string {
+    const y = (mmS: number) => AT.speedEnd - (Math.abs(mmS) / fastestMmS) * (AT.speedEnd - AT.speed);
+    const points = speeds.map(({ mm, mmS }) => `${x(mm).toFixed(1)} ${y(mmS).toFixed(1)}`);
+    return points.length > 0 ? `M${points.join("L")}` : "";
+}
 
-    #marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElement[] {
-        const apart = MARKS_MM.find((apart) => (toMm - fromMm) / apart <= MARKS) ?? (toMm - fromMm) / MARKS;
-        const marks: SVGElement[] = [];
-        for (let mm = Math.ceil(Math.max(fromMm, 0) / apart) * apart; mm <= toMm; mm += apart) {
-            const text = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
-            marks.push(draw("text", { class: "note", x: x(mm), y: AT.note, "text-anchor": "middle" }, text));
-        }
-        return marks;
+function marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElement[] {
+    const apart = MARKS_MM.find((apart) => (toMm - fromMm) / apart <= MARKS) ?? (toMm - fromMm) / MARKS;
+    const marks: SVGElement[] = [];
+    for (let mm = Math.ceil(Math.max(fromMm, 0) / apart) * apart; mm <= toMm; mm += apart) {
+        const text = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
+        marks.push(draw("text", { class: "note", x: x(mm), y: AT.note, "text-anchor": "middle" }, text));
     }
+    return marks;
 }
 
 /** A log as a row. */
@@ -350,14 +334,6 @@ function agreement({ objects, alarms, swings, difference, notes }: Replayed): st
         difference === null ? say("replayWhole") : say("replayDiffers", { difference }),
         ...notes.map(sentence),
     ].join(" ");
-}
-
-/** The speed nearest to a position. */
-function nearest(speeds: readonly Speed[], placeMm: number): Speed | undefined {
-    return speeds.reduce<Speed | undefined>(
-        (best, speed) => (best && Math.abs(best.mm - placeMm) <= Math.abs(speed.mm - placeMm) ? best : speed),
-        undefined,
-    );
 }
 
 const metres = (mm: number) => quantity(mm / 1000, "meter", mm < 100_000 ? 1 : 0);
