@@ -42,7 +42,7 @@ function rust() {
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
-/** Compresses a file into a file; src/unpack.ts decompresses it. */
+/** Compresses a file into a file; src/core.ts decompresses it. */
 function packed(/** @type {string} */ path) {
     const to = join("build", `${basename(path)}.deflated`);
     writeFileSync(to, deflateRawSync(readFileSync(path), { level: 9 }));
@@ -97,8 +97,6 @@ async function english() {
     };
 }
 
-const hex = firmware();
-
 /** @type {import("esbuild").BuildOptions} */
 const common = {
     bundle: true,
@@ -108,13 +106,12 @@ const common = {
     // time.
     mainFields: ["module", "main"],
     alias: {
-        "weeder.hex": resolve(hex),
-        "packed.hex": packed(hex),
+        "packed.hex": packed(firmware()),
         "page.wasm": packed(rust()),
         "log-worker.js": await logWorker(),
         "faults.json": resolve(faults()),
     },
-    loader: { ".hex": "text", ".txt": "text", ".deflated": "binary" },
+    loader: { ".txt": "text", ".deflated": "binary" },
 };
 
 await build({

@@ -2,8 +2,8 @@
 // Uno; only its connection differs.
 
 import { makeInstallable } from "./app/install.ts";
+import { hex } from "./core.ts";
 import { Parts } from "./dom.ts";
-import { hex } from "./firmware.ts";
 import { Flasher } from "./flasher/flasher.ts";
 import { keepFocus } from "./focus.ts";
 import { isServed } from "./link/served.ts";

@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
-import hex from "weeder.hex";
+import { hex } from "../src/core.ts";
 import { isEvent, read } from "../src/link/grammar.ts";
 import { LineReader } from "../src/link/lines.ts";
 import { inWords } from "../src/try/outcome.ts";

@@ -35,7 +35,7 @@ export const SRAM_BYTES = 2048;
 export const EEPROM_BYTES = 1024;
 
 /** Reset causes, as their bits in MCUSR (data sheet, 11.9.1). */
-export const RESET_CAUSES = { "power-on": 1, external: 2, "brown-out": 4, watchdog: 8 } as const;
+const RESET_CAUSES = { "power-on": 1, external: 2, "brown-out": 4, watchdog: 8 } as const;
 export type ResetCause = keyof typeof RESET_CAUSES;
 
 /** MCUSR's and UCSR0A's addresses in the data space (data sheet, register summary). */

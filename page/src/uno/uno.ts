@@ -12,11 +12,10 @@ import { type EEPROMBackend, PinState } from "avr8js";
 import { Chip, CYCLES_PER_SECOND, EEPROM_BYTES, FLASH_BYTES, type ResetCause, SRAM_BYTES } from "./chip.ts";
 import { readHex } from "./hex.ts";
 
-export { CYCLES_PER_SECOND, EEPROM_BYTES, type ResetCause } from "./chip.ts";
-export { HexError } from "./hex.ts";
+export { CYCLES_PER_SECOND, type ResetCause } from "./chip.ts";
 
 /** Cycles of a byte that a terminal sends at 115200 baud: a start bit, eight data bits and a stop bit. */
-export const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
+const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
 
 /**
  * Content of SRAM at power-up. A real chip's content is random; a byte other than zero reveals code that expects zeros.
@@ -25,12 +24,6 @@ const SRAM_AT_POWER_UP = 0xc5;
 
 /** Cycles after which a byte that could not be taken is offered again: the shortest instruction. */
 const NEXT_INSTRUCTION = 1;
-
-/** Called when the level that the firmware drives on a pin has changed. An undriven pin counts as low. */
-export type OnLevel = (pin: number, high: boolean, cycle: number) => void;
-
-/** The firmware has handed a byte to its transmitter. */
-export type OnByte = (byte: number, cycle: number) => void;
 
 /** A reset after the first power-up. */
 export interface Reset {
@@ -48,8 +41,10 @@ const PORTS: readonly { readonly port: Port; readonly first: number; readonly pi
 ];
 
 export class Uno {
-    onLevel: OnLevel = () => {};
-    onByte: OnByte = () => {};
+    /** Called when the level that the firmware drives on a pin has changed. An undriven pin counts as low. */
+    onLevel: (pin: number, high: boolean, cycle: number) => void = () => {};
+    /** The firmware has handed a byte to its transmitter. */
+    onByte: (byte: number) => void = () => {};
     /** Resets since the first power-up, oldest first. */
     readonly resets: Reset[] = [];
     /** The content of the EEPROM. */
@@ -65,13 +60,10 @@ export class Uno {
     #chip: Chip;
 
     /**
-     * Powers up an Uno with a firmware. `eeprom` has the first bytes of the EEPROM, and the others are erased. Throws a
-     * HexError if `hex` is no firmware for this chip.
+     * Powers up an Uno with a firmware. `eeprom` has the first bytes of the EEPROM, and the others are erased.
      */
     constructor(hex: string, eeprom: Uint8Array = new Uint8Array()) {
         this.#program = new Uint16Array(readHex(hex, FLASH_BYTES).buffer);
-        if (eeprom.length > EEPROM_BYTES)
-            throw new RangeError(`${eeprom.length} bytes were given for the EEPROM, which holds ${EEPROM_BYTES}`);
         const memory = new Uint8Array(EEPROM_BYTES).fill(0xff);
         memory.set(eeprom);
         this.eeprom = memory;
@@ -118,11 +110,6 @@ export class Uno {
         if (was === 0 && this.#toSend.length > 0) this.#sendNext(this.#chip);
     }
 
-    /** Whether all typed text has arrived. */
-    get hasSentAll(): boolean {
-        return this.#toSend.length === 0;
-    }
-
     /** Resets the chip. SRAM loses its content only after a power failure. */
     reset(cause: Exclude<ResetCause, "watchdog">): void {
         this.#restart(
@@ -149,7 +136,7 @@ export class Uno {
                     this.#drives(first + bit, io.pinState(bit) === PinState.High, chip.cycle);
             });
         }
-        chip.usart.onByteTransmit = (byte) => this.onByte(byte, chip.cycle);
+        chip.usart.onByteTransmit = (byte) => this.onByte(byte);
         for (const [pin, high] of this.#inputs) this.#setOn(chip, pin, high);
         return chip;
     }
