@@ -21,10 +21,10 @@ import { Trial } from "./try/trial.ts";
 import { CYCLES_PER_SECOND } from "./uno/uno.ts";
 import {
     type Code,
+    inLanguage,
     LANGUAGES,
     language,
     number,
-    onLanguage,
     quantity,
     say,
     show,
@@ -57,11 +57,9 @@ function write(id: string, text: string): void {
 }
 
 translate(document.body);
-const nameLanguage = () => {
+inLanguage(() => {
     document.documentElement.lang = language();
-};
-nameLanguage();
-onLanguage(nameLanguage);
+});
 const languages = find("language", HTMLSelectElement);
 for (const [code, { name }] of Object.entries(LANGUAGES)) {
     const option = new Option(name, code);
@@ -180,8 +178,7 @@ function showSound(): void {
     sound.classList.toggle("waiting", isWaiting());
     sound.ariaLabel = say(isWaiting() ? "soundWaits" : "sound");
 }
-showSound();
-onLanguage(showSound);
+inLanguage(showSound);
 wakeOnTouch(showSound);
 sound.addEventListener("click", () => {
     turn(!isOn());
@@ -196,8 +193,7 @@ function slider(id: string, shown: (value: number) => string, use: (value: numbe
         use(input.valueAsNumber);
     };
     input.addEventListener("input", apply);
-    onLanguage(apply);
-    apply();
+    inLanguage(apply);
 }
 
 function toggle(id: string, use: (on: boolean) => void): void {

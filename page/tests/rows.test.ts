@@ -2,8 +2,7 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
-import { Machine } from "../src/row/machine.ts";
-import { span, type Thing } from "../src/row/row.ts";
+import { Machine, span, type Thing } from "../src/row/machine.ts";
 import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
 import { chance } from "./chance.ts";
 import { type Operator, wokenUp } from "./operator.ts";

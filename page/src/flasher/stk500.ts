@@ -56,15 +56,14 @@ const RESETS = 2;
 const TRIES = 3;
 
 export class Bootloader {
-    readonly #line: SerialLine;
-    readonly #board: Board;
     #received: number[] = [];
     #gone: PortError | undefined;
     #arrived = () => {};
 
-    constructor(line: SerialLine, board: Board) {
-        this.#line = line;
-        this.#board = board;
+    constructor(
+        private readonly line: SerialLine,
+        private readonly board: Board,
+    ) {
         line.onBytes = (bytes) => {
             // Another device may send without end: limits the buffer.
             if (this.#received.length < 4096) this.#received.push(...bytes);
@@ -112,7 +111,7 @@ export class Bootloader {
         const heard: number[] = [];
         for (let reset = 0; reset < RESETS; reset++) {
             this.#received = [];
-            await this.#line.reset();
+            await this.line.reset();
             for (let call = 0; call < CALLS; call++) {
                 heard.push(...this.#received);
                 if ((await this.#hears(heard)) && (await this.#isQuiet()) && (await this.#hears(heard))) return;
@@ -124,7 +123,7 @@ export class Bootloader {
     /** Whether the bootloader answers a sync command. Other input is added to `heard`. */
     async #hears(heard: number[]): Promise<boolean> {
         this.#received = [];
-        await this.#line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
+        await this.line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
         const answer = await this.#take(2, CALL_MS);
         if (answer?.[0] === INSYNC && answer[1] === OK) return true;
         heard.push(...(answer ?? []));
@@ -156,7 +155,7 @@ export class Bootloader {
 
     /** Why no bootloader answered, and what to do. */
     #whoIsThere(heard: string): string {
-        const { baud, isOld } = this.#board;
+        const { baud, isOld } = this.board;
         const other = english(isOld ? "otherIsUno" : "otherIsOld");
         const text = heard.replaceAll(/[^ -~]+/g, " ").trim();
         if (text.includes("weeder ")) return english("firmwareAnswers", { other });
@@ -180,7 +179,7 @@ export class Bootloader {
     /** Sends a command and returns the data of its answer. */
     async #command(bytes: number[], answerBytes: number): Promise<number[]> {
         this.#received = [];
-        await this.#line.write(Uint8Array.of(...bytes, CRC_EOP));
+        await this.line.write(Uint8Array.of(...bytes, CRC_EOP));
         const answer = await this.#take(answerBytes + 2, ANSWER_MS);
         if (answer?.[0] === INSYNC && answer.at(-1) === OK) return answer.slice(1, -1);
         throw new FlashError(

@@ -3,7 +3,7 @@
 
 import { make } from "../dom.ts";
 import { Served } from "../link/served.ts";
-import { onLanguage, say } from "../words/words.ts";
+import { inLanguage, say } from "../words/words.ts";
 import { Overview } from "./overview.ts";
 import { Panel } from "./panel.ts";
 
@@ -14,11 +14,9 @@ const TURN_MS = 20;
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
     const all = make("section", "overview");
-    const label = () => {
+    inLanguage(() => {
         all.ariaLabel = say("allRows");
-    };
-    label();
-    onLanguage(label);
+    });
     const names = served.machines.map(({ name }) => name);
     const overview = names.length > 1 ? new Overview(all, names, () => served.holdAll()) : undefined;
     if (overview) into.append(all);
@@ -30,11 +28,9 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         into.append(section);
         const panel = new Panel(element, `served-${number}`, served.allowed, overview ? name : "");
         // Read out, they say whose parts they are.
-        const label = () => {
+        inLanguage(() => {
             for (const part of element.querySelectorAll("section")) part.ariaLabel = `${name}: ${part.ariaLabel}`;
-        };
-        label();
-        onLanguage(label);
+        });
         panel.connect(machine, performance.now());
         machine.onAbsent = (why) => {
             panel.machine.lost = why;

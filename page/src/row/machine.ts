@@ -8,10 +8,21 @@
 import { module } from "../core.ts";
 import { Rust } from "../rust.ts";
 import type { Uno } from "../uno/uno.ts";
-import type { Thing } from "./row.ts";
 
 /** The Uno's pins that the page uses itself (README, wiring). */
 export const PIN = { workSwitch: 4, endSwitch: 5, servo: 9, lamp: 13 } as const;
+
+/** A crop plant or a tall weed: its centre along the row, and its width at the beam's height. */
+export interface Thing {
+    readonly kind: "plant" | "weed";
+    readonly placeMm: number;
+    readonly widthMm: number;
+}
+
+/** The stretch of ground below a thing. */
+export function span({ placeMm, widthMm }: Thing): { startMm: number; endMm: number } {
+    return { startMm: placeMm - widthMm / 2, endMm: placeMm + widthMm / 2 };
+}
 
 /** The differences from the machine from the box. */
 export interface MachineKind {

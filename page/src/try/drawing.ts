@@ -4,8 +4,7 @@
 // are drawn once and moved with it, and removed when they have left the picture.
 
 import { draw, set } from "../dom.ts";
-import type { Verdict } from "../row/machine.ts";
-import { span, type Thing } from "../row/row.ts";
+import { span, type Thing, type Verdict } from "../row/machine.ts";
 import type { Trial } from "./trial.ts";
 
 /** The picture's width across the row, from its line: to the side of the tool's swing, and to the other side. */

@@ -4,10 +4,14 @@
 // host/field/src/budget.rs without guarded ground, and add up to the whole stretch. The firmware's output decides: its
 // state, its reason, and its keep-out zones.
 
-import type { Machine } from "../row/machine.ts";
-import { span, type Thing } from "../row/row.ts";
+import { type Machine, span, type Thing } from "../row/machine.ts";
 import { quantity, say, type Word } from "../words/words.ts";
-import type { Zone } from "./zone.ts";
+
+/** A keep-out zone along the row. */
+export interface Zone {
+    readonly startMm: number;
+    readonly endMm: number;
+}
 
 /** The parts of the ground, with the text of each. */
 const PARTS = {

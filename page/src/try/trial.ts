@@ -7,9 +7,8 @@ import type { Line } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { Machine, type MachineKind, PIN } from "../row/machine.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
-import { groundInWords, Losses, whyInWords } from "./losses.ts";
+import { groundInWords, Losses, whyInWords, type Zone } from "./losses.ts";
 import { Outcome } from "./outcome.ts";
-import type { Zone } from "./zone.ts";
 
 /** The first parameters of the row, and the first plant's position, ahead of the beam. */
 const SOWING = { spacingMm: 550, weedShare: 0.25, firstMm: 800 };
