@@ -121,7 +121,7 @@ export class Machine {
         uno.onLevel = (pin, high, cycle) => {
             if (pin !== PIN.servo) return;
             if (high) this.#pulseRise = cycle;
-            else this.#rust.hear(this.#pulseRise, cycle);
+            else this.#rust.exports.hear(this.#pulseRise, cycle);
         };
     }
 
@@ -133,7 +133,7 @@ export class Machine {
     /** Rolls on until a future cycle, and lets the Uno's clock run until then. */
     runUntil(cycle: number): void {
         const { uno } = this;
-        this.#rust.roll(cycle);
+        this.#rust.exports.roll(cycle);
         // A copy: the servo's pulses call the core, which changes its memory.
         const changes = this.#rust.table(TABLE.changes).slice();
         for (let at = 0; at < changes.length; at += 3) {
