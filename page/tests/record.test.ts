@@ -71,7 +71,7 @@ test("a log of the page is drawn with what was seen, kept free and worked, led t
         .waitFor();
     assert((await place()) > 0);
     // There may be a warning beside it.
-    const alarmsDrawn = await drawn(".log-alarm, .log-warning");
+    const alarmsDrawn = await drawn(".flag");
     assert(alarmsDrawn >= 1 && alarmsDrawn <= Number(alarms), `${alarmsDrawn} of ${alarms} alarms`);
     while (!/no alarm behind/.test((await inView(page, "log-alarm").textContent()) ?? ""))
         await inView(page, "alarm-next").click();

@@ -19,19 +19,27 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
     const [left, length] = [-BEHIND * beamMm, (1 + 2 * BEHIND) * beamMm];
     const height = HEIGHT * length;
     const position = machine.positionAt(nowMs);
-    const bar = (kind: string, fromMm: number, toMm: number, share: number) => {
+    const bar = (kind: { class?: string; fill?: string }, fromMm: number, toMm: number, share: number) => {
         const [from, to] = [Math.max(fromMm, left), Math.min(toMm, left + length)];
         if (from >= to) return [];
         const [y, tall] = [height * (0.62 - share), height * share];
-        return [draw("rect", { class: kind, x: from, width: to - from, y, height: tall })];
+        return [draw("rect", { ...kind, x: from, width: to - from, y, height: tall })];
     };
     const marginMm = machine.setting("margin_mm");
     const zones = machine.zones.flatMap((seen) => {
         const fromMm = (seen.position + seen.delay - position) * machine.tickMm;
         const toMm = fromMm + seen.hold * machine.tickMm;
         if (seen.class === "weed")
-            return bar("weed", fromMm + marginMm, Math.max(toMm - marginMm, fromMm + marginMm + length / 100), 0.3);
-        return [...bar("window", fromMm, toMm, 0.4), ...bar("canopy", fromMm + marginMm, toMm - marginMm, 0.4)];
+            return bar(
+                { class: "weed" },
+                fromMm + marginMm,
+                Math.max(toMm - marginMm, fromMm + marginMm + length / 100),
+                0.3,
+            );
+        return [
+            ...bar({ class: "window" }, fromMm, toMm, 0.4),
+            ...bar({ class: "canopy" }, fromMm + marginMm, toMm - marginMm, 0.4),
+        ];
     });
     const unseenMm = machine.status?.unseenMm ?? 0;
     const text = (words: string, x: number) => {
@@ -41,11 +49,11 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
     const toolY = machine.toolOut ? height * 0.1 : height * 0.4;
     svg.setAttribute("viewBox", `${left} 0 ${length} ${height}`);
     svg.replaceChildren(
-        draw("rect", { class: "iron", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
-        ...(machine.version === undefined || unseenMm <= 0 ? [] : bar("not-seen", left, unseenMm, 0.12)),
+        draw("rect", { fill: "var(--frame)", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
+        ...(machine.version === undefined || unseenMm <= 0 ? [] : bar({ fill: "var(--rule)" }, left, unseenMm, 0.12)),
         ...(machine.version === undefined ? [] : zones),
         draw("line", {
-            class: "beam outline",
+            stroke: "var(--beam)",
             x1: beamMm,
             x2: beamMm,
             y1: 0,
@@ -53,7 +61,8 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
             "stroke-width": length / 150,
         }),
         draw("path", {
-            class: machine.toolOut ? "tool out" : "tool",
+            fill: machine.toolOut ? "none" : "var(--steel)",
+            stroke: "var(--steel)",
             d: `M${-length * 0.025} ${toolY}h${length * 0.05}l${-length * 0.025} ${height * 0.26}z`,
             "stroke-width": length / 200,
         }),

@@ -266,11 +266,13 @@ export class RecordView {
             ),
             ...shown.worked.near(fromMm, toMm).map(({ startMm, endMm }) => bar("worked", startMm, endMm, AT.track, 10)),
             draw("path", {
-                class: "fast outline",
+                fill: "none",
+                stroke: "var(--steel)",
+                "stroke-width": 1.5,
                 d: speedLine(shown.speeds.near(fromMm - BESIDE_MM, toMm + BESIDE_MM), shown.fastestMmS, x),
             }),
             draw("line", {
-                class: "not-seen outline",
+                stroke: "var(--rule)",
                 x1: x(this.#middleMm),
                 x2: x(this.#middleMm),
                 y1: 0,
@@ -278,12 +280,11 @@ export class RecordView {
             }),
             ...shown.alarms
                 .filter(({ mm }) => mm >= fromMm && mm <= toMm)
-                .map(({ mm, isWarning }) =>
-                    draw("path", {
-                        class: isWarning ? "log-warning" : "log-alarm",
-                        d: `M${x(mm)} ${AT.alarm}l14 9l-14 9V${AT.speedEnd}`,
-                    }),
-                ),
+                .map(({ mm, isWarning }) => {
+                    const colour = isWarning ? "var(--hold)" : "var(--alarm)";
+                    const d = `M${x(mm)} ${AT.alarm}l14 9l-14 9V${AT.speedEnd}`;
+                    return draw("path", { class: "flag", fill: colour, stroke: colour, d });
+                }),
             ...marks(fromMm, toMm, x),
         );
         const { timeMs, mmS } = shown.speeds.nearest(this.#middleMm);
@@ -306,7 +307,9 @@ function marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElem
     const marks: SVGElement[] = [];
     for (let mm = Math.ceil(Math.max(fromMm, 0) / apart) * apart; mm <= toMm; mm += apart) {
         const text = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
-        marks.push(draw("text", { class: "note", x: x(mm), y: AT.note, "text-anchor": "middle" }, text));
+        marks.push(
+            draw("text", { class: "note", x: x(mm), y: AT.note, "font-size": 12, "text-anchor": "middle" }, text),
+        );
     }
     return marks;
 }

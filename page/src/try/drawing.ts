@@ -39,6 +39,7 @@ function thingShape(thing: Thing): SVGElement {
         shape.append(
             draw("ellipse", {
                 class: isPlant ? "canopy" : "weed",
+                ...(isPlant && { stroke: "var(--vein)" }),
                 cx: radius / 2,
                 rx: radius / 2,
                 ry: isPlant ? radius / 3.2 : Math.max(radius / 3, 4),
@@ -73,14 +74,14 @@ export class Drawing {
     readonly #svg: SVGSVGElement;
     readonly #ground = draw("g", {});
     readonly #specks = new Shapes();
-    readonly #track = draw("path", { class: "worked outline" });
+    readonly #track = draw("path", { fill: "none", stroke: "var(--worked)" });
     readonly #zones = draw("g", {});
     readonly #things = new Shapes();
-    readonly #soil = draw("rect", { class: "soil" });
-    readonly #beam = draw("line", { class: "beam outline", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
-    readonly #arm = draw("line", { class: "tool outline arm" });
-    readonly #blade = draw("rect", { class: "tool", rx: 6 });
-    readonly #angle = draw("text", { class: "angle", "text-anchor": "middle" });
+    readonly #soil = draw("rect", { fill: "var(--soil)" });
+    readonly #beam = draw("line", { stroke: "var(--beam)", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
+    readonly #arm = draw("line", { stroke: "var(--steel)", "stroke-width": 11, "stroke-linecap": "round" });
+    readonly #blade = draw("rect", { fill: "var(--steel)", rx: 6 });
+    readonly #angle = draw("text", { fill: "var(--ink)", "font-size": 30, "text-anchor": "middle" });
 
     constructor(svg: SVGSVGElement, { machine }: Trial) {
         this.#svg = svg;
@@ -88,18 +89,22 @@ export class Drawing {
         set(this.#track, { "stroke-width": toolWidthMm });
         this.#ground.append(this.#specks.group, this.#track, this.#zones, this.#things.group);
         set(this.#beam, { x1: beamToToolMm, x2: beamToToolMm });
-        const wheel = { class: "iron", width: 190, height: 34, rx: 10, x: armMm - 150 };
+        const wheel = { fill: "var(--frame)", width: 190, height: 34, rx: 10, x: armMm - 150 };
         const frameMm = { left: -ACROSS_MM.out + 30, right: ACROSS_MM.other - 10 };
         svg.append(
             this.#soil,
             this.#ground,
-            draw("path", { class: "iron outline frame", d: `M${armMm} ${frameMm.left}V${frameMm.right}` }),
+            draw("path", {
+                stroke: "var(--frame)",
+                "stroke-width": 9,
+                d: `M${armMm} ${frameMm.left}V${frameMm.right}`,
+            }),
             draw("rect", { ...wheel, y: frameMm.left - 17 }),
             draw("rect", { ...wheel, y: frameMm.right - 17 }),
             this.#beam,
             this.#arm,
             this.#blade,
-            draw("circle", { class: "tool", cx: armMm, r: 15 }),
+            draw("circle", { fill: "var(--steel)", cx: armMm, r: 15 }),
             this.#angle,
         );
     }
@@ -143,7 +148,8 @@ export class Drawing {
 
         const { armMm, toolWidthMm } = machine.dimensions;
         const tool = { x: trial.tool.alongMm - toolMm, y: -trial.tool.acrossMm };
-        this.#beam.classList.toggle("broken", machine.isBroken);
+        const broken = machine.isBroken;
+        set(this.#beam, { "stroke-width": broken ? 9 : 4, "stroke-dasharray": broken ? "none" : "12 7" });
         set(this.#arm, { x1: armMm, y1: 0, x2: tool.x, y2: tool.y });
         set(this.#blade, { x: tool.x - 16, y: tool.y - toolWidthMm / 2, width: 32, height: toolWidthMm });
         set(this.#angle, { x: tool.x - 70, y: tool.y - 25 });
@@ -160,6 +166,9 @@ export class Drawing {
             const way = SIGNS[verdict];
             const sign = draw("path", {
                 class: "verdict",
+                fill: "none",
+                stroke: verdict === "damaged" ? "var(--beam)" : "var(--ink)",
+                "stroke-width": verdict === "damaged" ? 11 : 7,
                 d: way,
                 transform: `translate(0 ${thing.widthMm / 2 + 32})`,
             });
@@ -174,7 +183,7 @@ export class Drawing {
         this.#specks.show(seen, (number) => {
             const across = (2 * spread(number) - 1) * SPECK_ACROSS_MM;
             return draw("circle", {
-                class: "speck",
+                fill: "var(--speck)",
                 cx: number * SPECK_SPACING_MM,
                 cy: across * Math.abs(spread(number + 0.5)),
                 r: 3 + 4 * spread(number + 0.25),
