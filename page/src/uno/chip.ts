@@ -8,6 +8,7 @@ import {
     AVRClock,
     AVREEPROM,
     AVRIOPort,
+    type AVRPortConfig,
     AVRTimer,
     AVRUSART,
     AVRWatchdog,
@@ -68,7 +69,8 @@ export interface Start {
 
 /** A running chip. */
 export class Chip {
-    readonly ports: { readonly B: AVRIOPort; readonly C: AVRIOPort; readonly D: AVRIOPort };
+    /** The board's pins, each a bit of a port: D0 to D13, then A0 to A5. */
+    readonly pins: readonly { readonly port: AVRIOPort; readonly bit: number }[];
     readonly usart: AVRUSART;
     /** Whether the watchdog has run out: the chip stands still until it is replaced. */
     watchdogRanOut = false;
@@ -81,11 +83,11 @@ export class Chip {
         cpu.cycles = cycle;
         cpu.data.set(sram, SRAM_START);
         cpu.data[MCUSR] = RESET_CAUSES[cause];
-        this.ports = {
-            B: new AVRIOPort(cpu, portBConfig),
-            C: new AVRIOPort(cpu, portCConfig),
-            D: new AVRIOPort(cpu, portDConfig),
+        const bits = (config: AVRPortConfig, count: number) => {
+            const port = new AVRIOPort(cpu, config);
+            return Array.from({ length: count }, (_, bit) => ({ port, bit }));
         };
+        this.pins = [...bits(portDConfig, 8), ...bits(portBConfig, 6), ...bits(portCConfig, 6)];
         for (const config of [timer0Config, timer1Config, timer2Config]) new AVRTimer(cpu, config);
         this.usart = new AVRUSART(cpu, usart0Config, CYCLES_PER_SECOND);
         new AVREEPROM(cpu, eeprom, {
@@ -99,6 +101,12 @@ export class Chip {
             this.watchdogRanOut = true;
             this.#until = 0;
         };
+    }
+
+    /** Sets the external level of a pin. */
+    set(pin: number, high: boolean): void {
+        const found = this.pins[pin];
+        found?.port.setPin(found.bit, high);
     }
 
     get cycle(): number {

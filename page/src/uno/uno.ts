@@ -31,15 +31,6 @@ export interface Reset {
     readonly cause: ResetCause;
 }
 
-type Port = "B" | "C" | "D";
-
-/** The ports, with the pin number of bit 0, and the number of the board's pins. */
-const PORTS: readonly { readonly port: Port; readonly first: number; readonly pins: number }[] = [
-    { port: "D", first: 0, pins: 8 },
-    { port: "B", first: 8, pins: 6 },
-    { port: "C", first: 14, pins: 6 },
-];
-
 export class Uno {
     /** Called when the level that the firmware drives on a pin has changed. An undriven pin counts as low. */
     onLevel: (pin: number, high: boolean, cycle: number) => void = () => {};
@@ -95,7 +86,7 @@ export class Uno {
     /** Sets the external level of a pin. It stays over resets. */
     set(pin: number, high: boolean): void {
         this.#inputs.set(pin, high);
-        this.#setOn(this.#chip, pin, high);
+        this.#chip.set(pin, high);
     }
 
     /** Whether the firmware drives a pin high. */
@@ -129,22 +120,11 @@ export class Uno {
 
     #start(cause: ResetCause, cycle: number, sram: Uint8Array): Chip {
         const chip = new Chip({ program: this.#program, sram, eeprom: this.#backend, cause, cycle });
-        for (const { port, first, pins } of PORTS) {
-            const io = chip.ports[port];
-            io.addListener(() => {
-                for (let bit = 0; bit < pins; bit++)
-                    this.#drives(first + bit, io.pinState(bit) === PinState.High, chip.cycle);
-            });
-        }
+        for (const [pin, { port, bit }] of chip.pins.entries())
+            port.addListener(() => this.#drives(pin, port.pinState(bit) === PinState.High, chip.cycle));
         chip.usart.onByteTransmit = (byte) => this.onByte(byte);
-        for (const [pin, high] of this.#inputs) this.#setOn(chip, pin, high);
+        for (const [pin, high] of this.#inputs) chip.set(pin, high);
         return chip;
-    }
-
-    #setOn(chip: Chip, pin: number, high: boolean): void {
-        const place = PORTS.find(({ first, pins }) => pin >= first && pin < first + pins);
-        if (!place) throw new RangeError(`an Uno has no pin ${pin}: it has 0 to 19`);
-        chip.ports[place.port].setPin(pin - place.first, high);
     }
 
     #drives(pin: number, high: boolean, cycle: number): void {
