@@ -71,7 +71,7 @@ pub fn answer(question: &[u8]) -> String {
             Question::Read(line) => Ok(console::read(&line)),
             Question::Steps(change) => Ok(change.steps()),
             Question::SetUp(heard) => Ok(heard.advice()),
-            Question::Begin(begun) => begun.begin(),
+            Question::Begin(begun) => Ok(begun.begin()),
             Question::Change(different) => different.take(),
             Question::Judge(kept) => kept.judge(),
             Question::Log(is_whole) => Ok(record::begin(is_whole)),

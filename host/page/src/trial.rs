@@ -32,24 +32,14 @@ const CLEAR_WITHIN_DEGREES: f64 = 0.09;
 pub struct Begun {
     /// The Uno's cycle at this moment, with the beam at 0 mm.
     cycle: u64,
-    /// The things in the row.
-    things: Vec<Standing>,
-    /// The parameters of the row's continuation. Without them the row ends.
-    sowing: Option<Sown>,
+    sowing: Sown,
     tool_width_mm: Option<f64>,
     second_beam_mm: Option<f64>,
     servo_in_us: Option<f64>,
     servo_out_us: Option<f64>,
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Standing {
-    kind: Kind,
-    place_mm: f64,
-    width_mm: f64,
-}
-
+/// The parameters of an endless row.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Sown {
@@ -100,7 +90,7 @@ enum Fate {
 /// The machine with its row and its verdicts.
 struct Trial {
     rolling: Rolling,
-    sowing: Option<Sowing>,
+    sowing: Sowing,
     faults: Faults,
     /// The first thing without a verdict, or to be judged again.
     next: usize,
@@ -124,14 +114,15 @@ thread_local! {
     static TRIAL: RefCell<Option<Trial>> = const { RefCell::new(None) };
 }
 
-/// Runs `act` on the trial, if there is one.
-fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Option<Answer> {
-    TRIAL.with_borrow_mut(|trial| trial.as_mut().map(act))
+/// Runs `act` on the trial. Fails if there is none.
+fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Result<Answer, String> {
+    let missing = || "no machine was put in front of a row".to_owned();
+    TRIAL.with_borrow_mut(|trial| trial.as_mut().map(act).ok_or_else(missing))
 }
 
 impl Begun {
     /// Begins a trial, and replaces an earlier one. Returns the machine's dimensions, and the levels of its pins.
-    pub fn begin(self) -> Result<Value, String> {
+    pub fn begin(self) -> Value {
         let servo = Servo::default();
         let servo = Servo {
             in_us: self.servo_in_us.unwrap_or(servo.in_us),
@@ -146,18 +137,11 @@ impl Begun {
             servo,
             ..machine
         };
-        let mut row: Vec<Thing> =
-            self.things.iter().map(|thing| Thing::new(thing.place_mm, thing.width_mm, thing.kind)).collect();
-        if !row.is_empty() {
-            row = Row::new(row).map_err(|problem| problem.to_string())?.things().to_vec();
-        }
-        let mut sowing = self.sowing.map(|sown| {
-            let planting = Planting { spacing_mm: sown.spacing_mm, ..Planting::default() };
-            Sowing::new(planting, sown.weed_share, sown.first_mm, sown.seed)
-        });
-        if let Some(sowing) = &mut sowing {
-            sowing.sow(&mut row, SOWN_AHEAD_MM);
-        }
+        let Sown { seed, spacing_mm, weed_share, first_mm } = self.sowing;
+        let planting = Planting { spacing_mm, ..Planting::default() };
+        let mut sowing = Sowing::new(planting, weed_share, first_mm, seed);
+        let mut row = Vec::new();
+        sowing.sow(&mut row, SOWN_AHEAD_MM);
         let mut trial = Trial {
             rolling: Rolling::new(machine, row, 0.0, self.cycle),
             sowing,
@@ -175,7 +159,7 @@ impl Begun {
         });
         let answer = json!({ "dimensions": dimensions, "levels": trial.levels() });
         TRIAL.set(Some(trial));
-        Ok(answer)
+        answer
     }
 }
 
@@ -184,45 +168,37 @@ impl Different {
     pub fn take(self) -> Result<Value, String> {
         with(|trial| {
             let Trial { rolling, sowing, faults, .. } = trial;
-            match (self, sowing) {
-                (Self::SpeedKmH(speed_km_h), _) => rolling.roll_at(mm_s(speed_km_h)),
-                (Self::Slip(share), _) => rolling.slip_by(share),
-                (Self::BeamWireTorn(is_torn), _) => faults.beam_wire_torn = is_torn,
-                (Self::EncoderDead(is_dead), _) => faults.encoder_dead = is_dead,
-                (Self::SpacingMm(spacing_mm), Some(sowing)) => sowing.planting.spacing_mm = spacing_mm,
-                (Self::WeedShare(share), Some(sowing)) => sowing.weed_share = share,
-                (Self::SpacingMm(_) | Self::WeedShare(_), None) => {}
+            match self {
+                Self::SpeedKmH(speed_km_h) => rolling.roll_at(mm_s(speed_km_h)),
+                Self::Slip(share) => rolling.slip_by(share),
+                Self::BeamWireTorn(is_torn) => faults.beam_wire_torn = is_torn,
+                Self::EncoderDead(is_dead) => faults.encoder_dead = is_dead,
+                Self::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
+                Self::WeedShare(share) => sowing.weed_share = share,
             }
             rolling.have_faults(*faults);
             trial.levels()
         })
-        .ok_or_else(not_begun)
     }
 }
 
 impl Kept {
     /// Judges the things behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
     pub fn judge(&self) -> Result<Value, String> {
-        with(|trial| json!(trial.judge(self))).ok_or_else(not_begun)
+        with(|trial| json!(trial.judge(self)))
     }
-}
-
-fn not_begun() -> String {
-    "no machine was put in front of a row".to_owned()
 }
 
 /// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it.
 pub fn roll(cycle: f64) {
-    with(|trial| {
+    let _ = with(|trial| {
         let changes = trial.rolling.roll_until(cycle as u64);
         let numbers = |change: &uno::PinChange| {
             [change.cycle as f64, f64::from(change.pin.number()), f64::from(u8::from(change.high))]
         };
         trial.tables[CHANGES] = changes.iter().flat_map(numbers).collect();
-        if let Some(sowing) = &mut trial.sowing {
-            let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
-            sowing.sow(&mut trial.rolling.row, until_mm);
-        }
+        let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
+        trial.sowing.sow(&mut trial.rolling.row, until_mm);
         trial.tell_now();
         trial.tell_sown();
     });
@@ -230,7 +206,7 @@ pub fn roll(cycle: f64) {
 
 /// The Uno has sent its servo a pulse, by the cycles of its edges.
 pub fn hear(rise: f64, fall: f64) {
-    with(|trial| {
+    let _ = with(|trial| {
         trial.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 });
         trial.tell_now();
     });

@@ -34,19 +34,14 @@ export interface MachineKind {
     readonly servoOutUs?: number;
 }
 
-/** The row in front of the machine. */
-export interface Ground {
-    /** In order of position, without overlaps. */
-    readonly things?: readonly Thing[];
-    /** The random continuation of the row, while the machine rolls. */
-    readonly sowing?: {
-        readonly seed: number;
-        readonly spacingMm: number;
-        /** Share of the gaps between plants with a tall weed. */
-        readonly weedShare: number;
-        /** The first plant's position. */
-        readonly firstMm: number;
-    };
+/** The random row in front of the machine, which continues while the machine rolls. */
+export interface Sowing {
+    readonly seed: number;
+    readonly spacingMm: number;
+    /** Share of the gaps between plants with a tall weed. */
+    readonly weedShare: number;
+    /** The first plant's position. */
+    readonly firstMm: number;
 }
 
 export interface Dimensions {
@@ -108,10 +103,10 @@ export class Machine {
     #pulseRise = 0;
 
     /** Places a standing machine in front of a row, at the Uno's cycle. */
-    constructor(uno: Uno, { things = [], sowing }: Ground, kind: MachineKind = {}) {
+    constructor(uno: Uno, sowing: Sowing, kind: MachineKind = {}) {
         this.uno = uno;
         const { dimensions, levels } = this.#rust.ask<{ dimensions: Dimensions; levels: Levels }>({
-            begin: { cycle: uno.cycle, things, sowing, ...kind },
+            begin: { cycle: uno.cycle, sowing, ...kind },
         });
         this.dimensions = dimensions;
         this.#set(levels);

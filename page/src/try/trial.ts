@@ -39,7 +39,7 @@ export class Trial {
     /** A trial with a machine from the box, with the differences in `kind`. */
     constructor(hex: string, seed: number, kind: MachineKind = {}) {
         this.uno = new Uno(hex);
-        this.machine = new Machine(this.uno, { sowing: { ...SOWING, seed } }, kind);
+        this.machine = new Machine(this.uno, { ...SOWING, seed }, kind);
         this.losses = new Losses(this.machine.toolMm);
         this.uno.onByte = (byte) => this.onText(String.fromCharCode(byte));
         this.#mark();
