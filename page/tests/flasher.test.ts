@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import { hex } from "../src/core.ts";
-import { BOARDS } from "../src/flasher/boards.ts";
+import { BOARDS } from "../src/flasher/stk500.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
 import { readHex, usedBytes } from "../src/uno/hex.ts";
 import { close, inspect, launch, open, PHONE, served } from "./browser.ts";

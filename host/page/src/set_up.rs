@@ -45,19 +45,3 @@ fn task(task: &Task) -> String {
         Task::SetMargin => "margin_mm".to_owned(),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_page_is_told_the_margin_once_all_was_measured() {
-        let timed = "calibrated lead_out_ms=158 lead_in_ms=40 set=yes";
-        let stretch = ["> calibrate 10000", "ticks_per_m=2010"];
-        let all = [&[timed, timed][..], &stretch, &stretch, &stretch].concat();
-        let lines = all.into_iter().map(str::to_owned).collect();
-        let advice = Heard { lines, settings: [("ticks_per_m".to_owned(), 2010)].into() }.advice();
-        // 3 % of 400 mm, 15 ms at 2.5 km/h and the firmware's 5 mm.
-        assert_eq!(advice["marginMm"], 28);
-    }
-}

@@ -7,8 +7,7 @@ import { chosen, keep } from "../preferences.ts";
 import { FLASH_BYTES } from "../uno/chip.ts";
 import { readHex, usedBytes } from "../uno/hex.ts";
 import { english, quantity, say, show, told } from "../words/words.ts";
-import { BOARDS, type Board } from "./boards.ts";
-import { Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
+import { BOARDS, type Board, Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
 
 export class Flasher {
     /** Called before a port is opened for flashing. The owner of the port must close it. */

@@ -4,8 +4,25 @@
 // two after a reset. Addresses are in words. Optiboot and its predecessor erase each page before they write it.
 
 import { type PortError, type SerialLine, wait } from "../link/serial.ts";
-import { english } from "../words/words.ts";
-import type { Board } from "./boards.ts";
+import { english, type Plain } from "../words/words.ts";
+
+/** A board that can be flashed. The boards differ in their bootloader alone. */
+export interface Board {
+    readonly id: string;
+    /** Its common name, or the key of a text. */
+    readonly name: string | { readonly text: Plain };
+    /** The bootloader's rate in bits a second, and the flash that remains for the firmware, of 32 KiB. */
+    readonly baud: number;
+    readonly roomBytes: number;
+    /** Whether its bootloader is the one before optiboot. */
+    readonly isOld: boolean;
+}
+
+export const BOARDS: readonly Board[] = [
+    { id: "uno", name: "Arduino Uno", baud: 115_200, roomBytes: 32_256, isOld: false },
+    { id: "nano", name: "Arduino Nano", baud: 115_200, roomBytes: 32_256, isOld: false },
+    { id: "old", name: { text: "oldBoard" }, baud: 57_600, roomBytes: 30_720, isOld: true },
+];
 
 /** An error of flashing, and what to do. */
 export class FlashError extends Error {}

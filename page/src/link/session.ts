@@ -108,7 +108,9 @@ export class Session implements Link {
         this.#wire = wire;
         [this.#now, this.#turnedAt] = [now, now];
         this.#greetingBy = resets ? now + BOOT_MS : now;
-        wire.onText = (text) => this.#hear(text);
+        wire.onText = (text) => {
+            for (const line of this.#lines.take(text)) this.#take(line);
+        };
         wire.onEnd = (why) => this.#end(why);
     }
 
@@ -242,15 +244,13 @@ export class Session implements Link {
         return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
     }
 
-    #hear(text: string): void {
-        for (const line of this.#lines.take(text)) this.#take(line);
-    }
-
     #take(line: string): void {
         if (this.#ended) return;
         const said = read(line);
         if (said.is === "greeting") {
-            this.#restart(line);
+            // Pending commands will not be answered.
+            this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
+            this.onHappening({ is: "started", line });
             return;
         }
         if (isEvent(said)) {
@@ -273,12 +273,6 @@ export class Session implements Link {
             question.done(question.answer);
             if (question.isTyped) this.#follow(question.command).catch(() => {});
         }
-    }
-
-    /** The Uno has started: pending commands will not be answered. */
-    #restart(greeting: string): void {
-        this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
-        this.onHappening({ is: "started", line: greeting });
     }
 
     /** Drops all questions, and asks for version, settings and examples. */

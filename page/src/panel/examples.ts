@@ -56,7 +56,7 @@ export class Examples {
                 forget.addEventListener("click", () => void this.#forget(String(number)));
                 return make(
                     "li",
-                    "",
+                    "across",
                     make("span", "", `${number}: ${label === "plant" || label === "weed" ? say(label) : label}`),
                     forget,
                 );

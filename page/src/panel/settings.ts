@@ -97,8 +97,8 @@ export class SettingsForm {
             "label",
             "",
             make("span", "setting-name", name),
-            make("span", "setting-field", input, make("span", "unit", unit)),
-            make("span", "setting-help", help, ` (${told(range(setting))}${isSaved})`),
+            make("span", "setting-field across", input, make("span", "unit", unit)),
+            make("span", "setting-help aside", help, ` (${told(range(setting))}${isSaved})`),
         );
         const row = make("li", this.#wanted.has(name) ? "changed" : "", label);
         const problem = this.#problems.get(name);

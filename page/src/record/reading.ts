@@ -5,7 +5,7 @@ import code from "log-worker.js";
 import { module } from "../core.ts";
 import type { Asked, Told } from "./worker.ts";
 
-export interface Answer<Said> {
+interface Answer<Said> {
     readonly said: Said;
     readonly tables: readonly Float64Array[];
 }

@@ -5,12 +5,6 @@ import type { Machine, Verdict } from "../row/machine.ts";
 import { say } from "../words/words.ts";
 import { type NotKept, whyNotKept, type Zone } from "./losses.ts";
 
-/** How many plants there were of each verdict, and tall weeds, cut and passed. */
-export interface Totals {
-    readonly plants: Readonly<Record<Verdict, number>>;
-    readonly weeds: { readonly cut: number; readonly passed: number };
-}
-
 export class Outcome {
     /** The verdicts on plants, and whether weeds were cut, by number in the row. */
     readonly plants = new Map<number, Verdict>();
@@ -37,8 +31,8 @@ export class Outcome {
         }
     }
 
-    /** The totals so far. */
-    get totals(): Totals {
+    /** How many plants there were of each verdict, and tall weeds, cut and passed. */
+    get totals() {
         const plants = { kept: 0, marginCut: 0, damaged: 0 };
         for (const verdict of this.plants.values()) plants[verdict] += 1;
         const cut = [...this.weeds.values()].filter((cut) => cut).length;
@@ -47,7 +41,7 @@ export class Outcome {
 }
 
 /** The totals in words. */
-export function inWords({ plants, weeds }: Totals): string {
+export function inWords({ plants, weeds }: Outcome["totals"]): string {
     const passed = plants.kept + plants.marginCut + plants.damaged;
     if (passed === 0) return say("noPlantYet");
     const words = [plants.kept === passed ? say("allKept") : say("someKept", { kept: plants.kept })];

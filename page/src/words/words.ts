@@ -99,31 +99,19 @@ function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
 
 /** A number with this number of decimal places. */
 export function number(value: number, digits = 0): string {
-    // Rounding a small negative number gives no negative 0.
-    return format({ minimumFractionDigits: digits, maximumFractionDigits: digits, signDisplay: "negative" }).format(
-        value,
-    );
+    return format(digitsOf(digits)).format(value);
 }
 
-export type Unit =
-    | "kilometer-per-hour"
-    | "meter"
-    | "millimeter"
-    | "millisecond"
-    | "second"
-    | "minute"
-    | "hour"
-    | "percent";
+/** These decimal places. Rounding a small negative number gives no negative 0. */
+const digitsOf = (digits: number): Intl.NumberFormatOptions => ({
+    minimumFractionDigits: digits,
+    maximumFractionDigits: digits,
+    signDisplay: "negative",
+});
 
-/** A number with its unit. */
-export function quantity(value: number, unit: Unit, digits = 0): string {
-    return format({
-        style: "unit",
-        unit,
-        minimumFractionDigits: digits,
-        maximumFractionDigits: digits,
-        signDisplay: "negative",
-    }).format(value);
+/** A number with its unit, by the unit's name in `Intl.NumberFormat`. */
+export function quantity(value: number, unit: string, digits = 0): string {
+    return format({ style: "unit", unit, ...digitsOf(digits) }).format(value);
 }
 
 /** A text with its holes filled, in the form for `count`. */
