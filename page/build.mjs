@@ -59,19 +59,11 @@ async function logWorker() {
     return outfile;
 }
 
-/** The manual's alarms and warnings, as a file: the advice from its table, and the causes from its lists. */
+/** The manual's table of alarms and warnings, as a file. */
 function faults() {
     const manual = readFileSync("../docs/faults.md", "utf8");
-    const causes = new Map(
-        [...manual.matchAll(/^- `(?:\d-\d )?(\w+)`[^:\n]*: (.*?)\.\s/gms)].map(([, name, cause]) => [
-            name,
-            (cause ?? "").replaceAll(/\s+/g, " "),
-        ]),
-    );
     const rows = manual.matchAll(/^\| `((?:\d-\d )?(\w+))`[^|]*\| ([^|]*) \|$/gm);
-    const faults = [...rows].map(([, title, name, advice]) => ({ name, title, cause: causes.get(name), advice }));
-    const silent = faults.filter(({ cause }) => cause === undefined).map(({ title }) => title);
-    if (silent.length > 0) throw new Error(`docs/faults.md has no cause of ${silent.join(", ")}`);
+    const faults = [...rows].map(([, title, name, advice]) => ({ name, title, advice }));
     mkdirSync("build", { recursive: true });
     writeFileSync("build/faults.json", JSON.stringify(faults));
     return "build/faults.json";

@@ -16,6 +16,6 @@ declare module "page.wasm" {
 }
 
 declare module "faults.json" {
-    const faults: { name: string; title: string; cause: string; advice: string }[];
+    const faults: { name: string; title: string; advice: string }[];
     export default faults;
 }

@@ -94,11 +94,11 @@ trialPanel.onHappening = (happening) => {
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
-new RecordView(find("view-record", HTMLElement));
+new RecordView(new Parts(find("view-record", HTMLElement)));
 
 /** The panels of real machines. */
 let workPanels: Panel[] = [];
-const flasher = new Flasher(find("view-flash", HTMLElement), hex);
+const flasher = new Flasher(new Parts(find("view-flash", HTMLElement)), hex);
 if (isServed()) void workServed();
 else workHere();
 

@@ -84,6 +84,13 @@ for (const code of OTHERS)
         );
     });
 
+test("the manual has a cause of each alarm and warning", () => {
+    const manual = readFileSync("../docs/faults.md", "utf8");
+    const causes = [...manual.matchAll(/^- `(?:\d-\d )?(\w+)`[^:\n]*: .*?\.\s/gms)].map(([, name]) => name);
+    assert(faults.length > 10);
+    for (const { name } of faults) assert(causes.includes(name), name);
+});
+
 test("no two texts of the page are the same in English, so that each is found in the HTML", () => {
     const texts = Object.values(en.words);
     assert.deepEqual(

@@ -1,6 +1,8 @@
-//! The console for the page: the meaning of lines, and the order of changed settings.
+//! The console for the page: the meaning of lines, the order of changed settings, and the next step of setting up a
+//! machine.
 
-use link::settings::{Setting, Settings, explain, name, steps};
+use link::set_up::{self, SetUp, Step, Task};
+use link::settings::{Setting, Settings, explain, name, steps, unit};
 use link::{ConsoleLine, Field, Values};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -87,7 +89,7 @@ impl Change {
 }
 
 /// Settings with some values set, and the values that could not be.
-pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Settings, Vec<(String, u16)>) {
+fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Settings, Vec<(String, u16)>) {
     let mut unknown = Vec::new();
     for (name, &value) in values {
         let is_set = Setting::find(name.as_bytes()).is_some_and(|setting| settings.set(setting, value).is_ok());
@@ -96,6 +98,45 @@ pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Sett
         }
     }
     (settings, unknown)
+}
+
+/// The typed lines and the output of a session, and the present settings by name.
+#[derive(Deserialize)]
+pub struct Heard {
+    lines: Vec<String>,
+    settings: BTreeMap<String, u16>,
+}
+
+impl Heard {
+    /// The steps, and the results of the session, in the form of `page/src/panel/set_up.ts`.
+    pub fn advice(&self) -> Value {
+        let set_up = SetUp::of_lines(self.lines.iter().map(String::as_str));
+        let (settings, _) = settings(Settings::new(), &self.settings);
+        let manual = set_up::steps().into_iter().map(|step| {
+            let tasks: Vec<String> = step.tasks.iter().map(task).collect();
+            json!({ "title": step.title, "how": step.how, "tasks": tasks })
+        });
+        let margin = set_up.margin(&settings);
+        let missing = margin.as_ref().err().map_or(&[][..], Vec::as_slice);
+        json!({
+            "steps": manual.collect::<Vec<_>>(),
+            "next": set_up.next(&settings).map(|step| step.to_string()),
+            "missing": missing.iter().map(Step::to_string).collect::<Vec<_>>(),
+            "marginMm": margin.as_ref().ok().map(|margin| margin.least_mm()),
+            "warning": set_up.warning(&settings),
+        })
+    }
+}
+
+/// The simulated machine's value for a task; empty for a measurement.
+fn task(task: &Task) -> String {
+    match task {
+        Task::Fit(part, value) => format!("{part} = {value}"),
+        Task::Set(setting, value) => format!("{} = {value} {}", name(*setting), unit(*setting)),
+        Task::TimeServo => "calibrate servo".to_owned(),
+        Task::MeasureWheel(length_mm) => format!("calibrate {length_mm}"),
+        Task::SetMargin => "margin_mm".to_owned(),
+    }
 }
 
 #[cfg(test)]

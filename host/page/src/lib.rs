@@ -10,7 +10,6 @@ mod console;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod record;
-mod set_up;
 mod trial;
 
 #[cfg(target_arch = "wasm32")]
@@ -20,6 +19,7 @@ pub use trial::{hear, roll};
 
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::cell::RefCell;
 
 /// A question, as an object with one key.
 #[derive(Deserialize)]
@@ -30,7 +30,7 @@ enum Question {
     /// Which values change these settings to those?
     Steps(console::Change),
     /// What is the next step of setting up this machine?
-    SetUp(set_up::Heard),
+    SetUp(console::Heard),
     /// Put this machine in front of this row.
     Begin(trial::Begun),
     /// Change this on the way.
@@ -55,13 +55,19 @@ enum Question {
 #[cfg(not(target_arch = "wasm32"))]
 fn progress(_share: f64) {}
 
-/// A table, by its number: those of the log's picture, and from [`record::TABLES`] on those of the rolling machine. Empty
-/// if there is no such table.
+thread_local! {
+    /// What the log's picture shows, or what the rolling machine does, by the numbers in `record` and `trial`.
+    static TABLES: RefCell<[Vec<f64>; 3]> = const { RefCell::new([const { Vec::new() }; 3]) };
+}
+
+/// A table, valid until it is replaced. Empty if there is no such table.
 pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
-    match number.checked_sub(record::TABLES) {
-        None => record::table(number, read),
-        Some(number) => trial::table(number, read),
-    }
+    TABLES.with_borrow(|tables| read(tables.get(number).map_or(&[], Vec::as_slice)))
+}
+
+/// Replaces a table.
+fn put(number: usize, table: Vec<f64>) {
+    TABLES.with_borrow_mut(|tables| tables[number] = table);
 }
 
 /// Answers a question: `{"answer": ...}`, or `{"error": "..."}` if the question is invalid.

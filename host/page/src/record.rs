@@ -72,13 +72,12 @@ struct Picture {
     changes: Vec<(f64, bool)>,
     has_places: bool,
     alarms: Vec<Value>,
-    tables: [Vec<f64>; TABLES],
+    tables: [Vec<f64>; 3],
 }
 
 /// The tables of a picture. For each detection: its class (0 plant, 1 weed, 2 unknown), its canopy's ends and its
 /// zone's ends in mm. For each speed: its position in mm, time in ms, and mm/s. The ends of each stretch with the tool
 /// in the row, in mm.
-pub const TABLES: usize = 3;
 const OBJECTS: usize = 0;
 const SPEEDS: usize = 1;
 const WORKED: usize = 2;
@@ -270,17 +269,12 @@ fn ended(answer: impl FnOnce(&mut Log) -> Result<Value, String>) -> Value {
 pub fn picture() -> Value {
     ended(|log| {
         log.picture.worked();
-        let Picture { ground, time_ms, swings, has_places, alarms, .. } = &mut log.picture;
-        let alarms = std::mem::take(alarms);
+        let Picture { ground, time_ms, swings, has_places, alarms, tables, .. } = std::mem::take(&mut log.picture);
+        tables.into_iter().enumerate().for_each(|(number, table)| crate::put(number, table));
         Ok(json!({
             "lengthMm": ground.end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
         }))
     })
-}
-
-/// A table of the picture, valid until another log begins.
-pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
-    LOG.with_borrow(|log| read(log.picture.tables.get(number).map_or(&[], Vec::as_slice)))
 }
 
 /// The replay of the log by the decisions of these sources: how much agrees, and the first difference.
@@ -317,6 +311,7 @@ pub fn map(words: &Words) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table;
 
     const LOG: &str = "time_ms,kind,line
 0,connected,0.2.0

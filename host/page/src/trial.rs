@@ -2,8 +2,9 @@
 //! [`field::verdict`] on the ground behind the tool.
 //!
 //! There is one trial, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are
-//! direct calls and no questions. Their results are in tables of numbers ([`table`]).
+//! direct calls and no questions. Their results are in tables of numbers ([`crate::table`]).
 
+use crate::put;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
 use field::rolling::{Faults, Rolling};
@@ -99,7 +100,6 @@ struct Trial {
     fates: Vec<Option<Fate>>,
     /// Start time of the recorded motion.
     from_s: f64,
-    tables: [Vec<f64>; 3],
     /// Number of things that were passed to the page.
     told: usize,
 }
@@ -149,7 +149,6 @@ impl Begun {
             next: 0,
             fates: Vec::new(),
             from_s: 0.0,
-            tables: Default::default(),
             told: 0,
         };
         trial.tell_now();
@@ -196,7 +195,7 @@ pub fn roll(cycle: f64) {
         let numbers = |change: &uno::PinChange| {
             [change.cycle as f64, f64::from(change.pin.number()), f64::from(u8::from(change.high))]
         };
-        trial.tables[CHANGES] = changes.iter().flat_map(numbers).collect();
+        put(CHANGES, changes.iter().flat_map(numbers).collect());
         let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
         trial.sowing.sow(&mut trial.rolling.row, until_mm);
         trial.tell_now();
@@ -212,22 +211,15 @@ pub fn hear(rise: f64, fall: f64) {
     });
 }
 
-/// A table, by its number.
-pub fn table<Answer>(number: usize, use_it: impl FnOnce(&[f64]) -> Answer) -> Answer {
-    TRIAL.with_borrow(|trial| {
-        use_it(trial.as_ref().and_then(|trial| trial.tables.get(number)).map_or(&[], Vec::as_slice))
-    })
-}
-
 impl Trial {
     /// Writes the machine's state into its table.
-    fn tell_now(&mut self) {
-        let Self { rolling, tables, .. } = self;
+    fn tell_now(&self) {
+        let Self { rolling, .. } = self;
         let machine = &rolling.machine;
         let degrees = rolling.degrees();
         let across_mm = machine.across_mm(degrees);
         let is_clear = degrees >= machine.servo.stroke_degrees() - machine.clear_within_degrees;
-        tables[NOW] = vec![
+        let now = vec![
             rolling.place_mm(),
             rolling.tool_mm(),
             rolling.speed_mm_s(),
@@ -240,16 +232,18 @@ impl Trial {
             rolling.ground_mm_a_tick(),
             rolling.commands as f64,
         ];
+        put(NOW, now);
     }
 
     /// Writes the newly sown things into their table.
     fn tell_sown(&mut self) {
-        let Self { rolling, tables, told, .. } = self;
+        let Self { rolling, told, .. } = self;
         let kind = |kind: Kind| if kind == Kind::Plant { 0.0 } else { 1.0 };
-        tables[SOWN] = rolling.row[*told..]
+        let sown = rolling.row[*told..]
             .iter()
             .flat_map(|thing| [kind(thing.kind), thing.position_mm, thing.width_mm])
             .collect();
+        put(SOWN, sown);
         *told = rolling.row.len();
     }
 

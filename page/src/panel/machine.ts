@@ -8,20 +8,13 @@ import { advice, english, type Plain, quantity, say, told } from "../words/words
 /** Objects that are remembered. */
 const OBJECTS = 50;
 
-/** The manual's entry for an alarm or a warning. */
-export interface Fault {
-    readonly name: string;
-    /** Its common name: for an alarm, the digits that the lamp blinks and the word, as in "3-1 too_fast". */
-    readonly title: string;
-    readonly cause: string;
-    readonly advice: string;
-}
-
-/** The manual's entry for an alarm or a warning. An unknown one refers to the manual. */
-export function fault(name: string): Fault {
-    const unknown = { name, title: name, cause: "", advice: say("lookItUp") };
-    const found = faults.find((fault) => fault.name === name) ?? unknown;
-    return { ...found, advice: advice(name) ?? found.advice };
+/**
+ * The manual's entry for an alarm or a warning. Its title is its common name: for an alarm, the digits that the lamp
+ * blinks and the word, as in "3-1 too_fast". An unknown one refers to the manual.
+ */
+export function fault(name: string): { title: string; advice: string } {
+    const found = faults.find((fault) => fault.name === name) ?? { title: name, advice: say("lookItUp") };
+    return { title: found.title, advice: advice(name) ?? found.advice };
 }
 
 /** Why the tool is out at work, in words for the operator. */

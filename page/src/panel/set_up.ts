@@ -1,5 +1,5 @@
 // Setting up the machine: the steps of the manual, the next measurement, and the least margin. The project's Rust has
-// the steps and calculates the margin (host/page/src/set_up.rs). This module stores the session's lines for it.
+// the steps and calculates the margin (host/page/src/console.rs). This module stores the session's lines for it.
 
 import { ask as askRust } from "../core.ts";
 import { make, type Parts } from "../dom.ts";

@@ -1,7 +1,12 @@
-// The content of a log, read by the project's Rust (host/page/src/record.rs). Distances are the tool's travel since the
-// log began, in mm. A day has a million of these values: they stay in tables, and only the visible ones are used.
+// The content of a log, read by the project's Rust (host/page/src/record.rs) in a worker. The worker's code is inside
+// the page, because a page on the disk can start no other.
+//
+// Distances are the tool's travel since the log began, in mm. A day has a million of these values: they stay in tables,
+// and only the visible ones are used.
 
-import { read, type Work } from "./reading.ts";
+import code from "log-worker.js";
+import { module } from "../core.ts";
+import type { Asked, Told } from "./worker.ts";
 
 /** A detection: its canopy's ends, and its keep-out zone. */
 export interface Found {
@@ -108,6 +113,43 @@ export interface Picture extends Head {
 
 const CLASSES = ["plant", "weed", "unknown"] as const;
 const SPEED_COLUMNS = 3;
+
+interface Answer<Said> {
+    readonly said: Said;
+    readonly tables: readonly Float64Array[];
+}
+
+/** The question was cancelled. */
+export class Cancelled extends Error {}
+
+/** How work goes on: `progress` gets its share that is done, from 0 to 1, and `cancel` ends it. */
+export interface Work {
+    readonly progress: (share: number) => void;
+    readonly cancel: AbortSignal;
+}
+
+let address: string | undefined;
+
+/** Asks a question. The worker ends with its answer, or when the work is cancelled. */
+export function read<Said>(
+    logs: readonly File[],
+    wants: Asked["wants"],
+    { progress, cancel }: Work,
+): Promise<Answer<Said>> {
+    address ??= URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
+    const worker = new Worker(address);
+    const answer = new Promise<Answer<Said>>((resolve, reject) => {
+        cancel.addEventListener("abort", () => reject(new Cancelled()), { once: true });
+        worker.addEventListener("error", ({ message }) => reject(new Error(message)));
+        worker.addEventListener("message", ({ data }: MessageEvent<Told>) => {
+            if ("share" in data) progress(data.share);
+            else if ("why" in data) reject(new Error(data.why));
+            else resolve({ said: data.answer as Said, tables: data.tables });
+        });
+    });
+    worker.postMessage({ module, logs, wants } satisfies Asked);
+    return answer.finally(() => worker.terminate());
+}
 
 export async function picture(log: File, work: Work): Promise<Picture | Problem> {
     const { said, tables } = await read<Head | Problem>([log], "picture", work);

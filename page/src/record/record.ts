@@ -3,11 +3,20 @@
 //
 // Only the visible part of a log is drawn. Reading and replay run beside the page, which can be used meanwhile.
 
-import { draw, make, Parts } from "../dom.ts";
+import { draw, make, type Parts } from "../dom.ts";
 import { fault, sentence } from "../panel/machine.ts";
 import { onLanguage, quantity, reason, say } from "../words/words.ts";
-import { type GroundMap, type Picture, type Problem, picture, type Replayed, type Speed } from "./picture.ts";
-import { Cancelled, read, type Work } from "./reading.ts";
+import {
+    Cancelled,
+    type GroundMap,
+    type Picture,
+    type Problem,
+    picture,
+    type Replayed,
+    read,
+    type Speed,
+    type Work,
+} from "./picture.ts";
 
 /** Ground in the window: at first, the least and the most. */
 const WINDOW_MM = { first: 8000, least: 1000, most: 200_000 };
@@ -36,7 +45,6 @@ interface Row {
 }
 
 export class RecordView {
-    readonly #parts: Parts;
     readonly #place: HTMLInputElement;
     readonly #resized = new ResizeObserver(() => this.#draw());
     #rows: readonly Row[] = [];
@@ -46,9 +54,7 @@ export class RecordView {
     #isToBeDrawn = false;
     #work = new AbortController();
 
-    constructor(root: HTMLElement) {
-        const parts = new Parts(root);
-        this.#parts = parts;
+    constructor(private readonly parts: Parts) {
         this.#place = parts.get("log-place", HTMLInputElement);
         const file = parts.get("log-file", HTMLInputElement);
         parts.button("log-open", () => file.click());
@@ -88,7 +94,7 @@ export class RecordView {
         input.value = "";
         if (files.length === 0) return;
         this.#show([]);
-        for (const name of ["log-replayed", "log-alarm", "log-mapped"]) this.#parts.write(name, "");
+        for (const name of ["log-replayed", "log-alarm", "log-mapped"]) this.parts.write(name, "");
         const texts: (() => string)[] = [];
         const rows: Row[] = [];
         const isWhole = await this.#eachOf(files, "log-said", async (file, work) => {
@@ -96,12 +102,13 @@ export class RecordView {
             if ("problem" in found) texts.push(() => say("noLog", { file: file.name, why: found.problem }));
             else if (found.speeds.length === 0) texts.push(() => say("emptyLog", { file: file.name }));
             else {
-                rows.push(row(file, found));
+                const drawing = draw("svg", { class: "log-row", role: "img", "data-part": "log-drawing" });
+                rows.push({ file, picture: found, drawing, at: make("p", "log-at") });
                 texts.push(() => inWords(file, found));
             }
         });
         if (!isWhole) return;
-        this.#parts.say("log-said", () => texts.map((text) => text()).join(" "));
+        this.parts.say("log-said", () => texts.map((text) => text()).join(" "));
         this.#show(rows);
     }
 
@@ -117,11 +124,11 @@ export class RecordView {
         this.#work.abort();
         const work = new AbortController();
         this.#work = work;
-        const bar = this.#parts.get("log-progress", HTMLProgressElement);
-        const busy = this.#parts.html("log-busy");
+        const bar = this.parts.get("log-progress", HTMLProgressElement);
+        const busy = this.parts.html("log-busy");
         bar.value = 0;
         busy.hidden = false;
-        this.#parts.write(said, "");
+        this.parts.write(said, "");
         let at = "";
         try {
             for (const [done, file] of files.entries()) {
@@ -135,7 +142,7 @@ export class RecordView {
         } catch (error) {
             if (this.#work !== work) return false;
             const why = () => say("notRead", { file: at, why: reason(error) });
-            this.#parts.say(said, () => (error instanceof Cancelled ? say("cancelled") : why()));
+            this.parts.say(said, () => (error instanceof Cancelled ? say("cancelled") : why()));
             return false;
         } finally {
             if (this.#work === work) busy.hidden = true;
@@ -145,10 +152,10 @@ export class RecordView {
     #show(rows: readonly Row[]): void {
         this.#rows = rows;
         this.#resized.disconnect();
-        this.#parts.html("log-body").hidden = rows.length === 0;
-        this.#parts.html("log-places").hidden = !rows.some(({ picture }) => picture.hasPlaces);
+        this.parts.html("log-body").hidden = rows.length === 0;
+        this.parts.html("log-places").hidden = !rows.some(({ picture }) => picture.hasPlaces);
         this.#showMap(null);
-        this.#parts.html("log-rows").replaceChildren(...rows.map(({ drawing, at }) => make("div", "", drawing, at)));
+        this.parts.html("log-rows").replaceChildren(...rows.map(({ drawing, at }) => make("div", "", drawing, at)));
         for (const { drawing } of rows) this.#resized.observe(drawing);
         this.#place.max = String(Math.ceil(this.#endMm));
         this.#windowMm = WINDOW_MM.first;
@@ -177,7 +184,7 @@ export class RecordView {
         const ahead = alarms.filter(({ mm }) => way * (mm - this.#middleMm) > 0.5);
         const next = ahead.sort((one, other) => way * (one.mm - other.mm))[0];
         if (next) this.#go(next.mm);
-        this.#parts.say("log-alarm", () => {
+        this.parts.say("log-alarm", () => {
             if (!next) return say(way > 0 ? "noAlarmNext" : "noAlarmBefore");
             const { title, advice } = fault(next.name);
             return this.#of(next.file, `${say(next.isWarning ? "warning" : "alarm", { title })}: ${sentence(advice)}`);
@@ -196,7 +203,7 @@ export class RecordView {
             const { said: result } = await read<Replayed | Problem>([file], "replay", work);
             results.push(() => this.#of(file, "problem" in result ? sentence(result.problem) : agreement(result)));
         });
-        if (isWhole) this.#parts.say("log-replayed", () => results.map((result) => result()).join(" "));
+        if (isWhole) this.parts.say("log-replayed", () => results.map((result) => result()).join(" "));
     }
 
     /** Draws the map of all logs. */
@@ -217,13 +224,13 @@ export class RecordView {
         };
         await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, work) => {
             const { svg, placed } = (await read<GroundMap>(files, { map: words }, work)).said;
-            this.#parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
+            this.parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
             this.#showMap(svg);
         });
     }
 
     #showMap(svg: string | null): void {
-        const drawn = this.#parts.get("log-map-drawn", HTMLImageElement);
+        const drawn = this.parts.get("log-map-drawn", HTMLImageElement);
         URL.revokeObjectURL(drawn.src);
         drawn.hidden = svg === null;
         if (svg) drawn.src = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
@@ -312,13 +319,6 @@ function marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElem
         );
     }
     return marks;
-}
-
-/** A log as a row. */
-function row(file: File, picture: Picture): Row {
-    const drawing = draw("svg", { class: "log-row", role: "img", "data-part": "log-drawing" });
-    const at = make("p", "log-at");
-    return { file, picture, drawing, at };
 }
 
 const inWords = (file: File, { lengthMm, timeMs, objects, swings, alarms }: Picture) =>
