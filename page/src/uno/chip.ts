@@ -58,16 +58,6 @@ const INTERRUPT_ENTRY_CYCLES = 2;
 const RETI = 0x9518;
 const SEI = 0x9478;
 
-/** The state at a chip's start. */
-export interface Start {
-    program: Uint16Array;
-    sram: Uint8Array;
-    eeprom: EEPROMBackend;
-    cause: ResetCause;
-    cycle: number;
-}
-
-/** A running chip. */
 export class Chip {
     /** The board's pins, each a bit of a port: D0 to D13, then A0 to A5. */
     readonly pins: readonly { readonly port: AVRIOPort; readonly bit: number }[];
@@ -77,7 +67,8 @@ export class Chip {
     readonly #cpu: CPU;
     #until = 0;
 
-    constructor({ program, sram, eeprom, cause, cycle }: Start) {
+    /** Starts with these memories, after this cause, at this cycle. */
+    constructor(program: Uint16Array, sram: Uint8Array, eeprom: EEPROMBackend, cause: ResetCause, cycle: number) {
         const cpu = new CPU(program, SRAM_BYTES);
         this.#cpu = cpu;
         cpu.cycles = cycle;

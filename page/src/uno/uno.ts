@@ -20,7 +20,7 @@ const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
 /**
  * Content of SRAM at power-up. A real chip's content is random; a byte other than zero reveals code that expects zeros.
  */
-const SRAM_AT_POWER_UP = 0xc5;
+const sramAtPowerUp = () => new Uint8Array(SRAM_BYTES).fill(0xc5);
 
 /** Cycles after which a byte that could not be taken is offered again: the shortest instruction. */
 const NEXT_INSTRUCTION = 1;
@@ -67,7 +67,7 @@ export class Uno {
                 memory[address % EEPROM_BYTES] = 0xff;
             },
         };
-        this.#chip = this.#start("power-on", 0, new Uint8Array(SRAM_BYTES).fill(SRAM_AT_POWER_UP));
+        this.#chip = this.#start("power-on", 0, sramAtPowerUp());
     }
 
     /** Cycles since the first power-up. */
@@ -103,10 +103,7 @@ export class Uno {
 
     /** Resets the chip. SRAM loses its content only after a power failure. */
     reset(cause: Exclude<ResetCause, "watchdog">): void {
-        this.#restart(
-            cause,
-            cause === "power-on" ? new Uint8Array(SRAM_BYTES).fill(SRAM_AT_POWER_UP) : this.#chip.sram,
-        );
+        this.#restart(cause, cause === "power-on" ? sramAtPowerUp() : this.#chip.sram);
     }
 
     #restart(cause: ResetCause, sram: Uint8Array): void {
@@ -119,7 +116,7 @@ export class Uno {
     }
 
     #start(cause: ResetCause, cycle: number, sram: Uint8Array): Chip {
-        const chip = new Chip({ program: this.#program, sram, eeprom: this.#backend, cause, cycle });
+        const chip = new Chip(this.#program, sram, this.#backend, cause, cycle);
         for (const [pin, { port, bit }] of chip.pins.entries())
             port.addListener(() => this.#drives(pin, port.pinState(bit) === PinState.High, chip.cycle));
         chip.usart.onByteTransmit = (byte) => this.onByte(byte);
