@@ -42,7 +42,7 @@ function rust() {
     return join(target, "wasm32-unknown-unknown/page/page.wasm");
 }
 
-/** Compresses a file into a file; src/unpack.ts decompresses it. */
+/** Compresses a file into a file; src/core.ts decompresses it. */
 function packed(/** @type {string} */ path) {
     const to = join("build", `${basename(path)}.deflated`);
     writeFileSync(to, deflateRawSync(readFileSync(path), { level: 9 }));
@@ -59,19 +59,11 @@ async function logWorker() {
     return outfile;
 }
 
-/** The manual's alarms and warnings, as a file: the advice from its table, and the causes from its lists. */
+/** The manual's table of alarms and warnings, as a file. */
 function faults() {
     const manual = readFileSync("../docs/faults.md", "utf8");
-    const causes = new Map(
-        [...manual.matchAll(/^- `(?:\d-\d )?(\w+)`[^:\n]*: (.*?)\.\s/gms)].map(([, name, cause]) => [
-            name,
-            (cause ?? "").replaceAll(/\s+/g, " "),
-        ]),
-    );
     const rows = manual.matchAll(/^\| `((?:\d-\d )?(\w+))`[^|]*\| ([^|]*) \|$/gm);
-    const faults = [...rows].map(([, title, name, advice]) => ({ name, title, cause: causes.get(name), advice }));
-    const silent = faults.filter(({ cause }) => cause === undefined).map(({ title }) => title);
-    if (silent.length > 0) throw new Error(`docs/faults.md has no cause of ${silent.join(", ")}`);
+    const faults = [...rows].map(([, title, name, advice]) => ({ name, title, advice }));
     mkdirSync("build", { recursive: true });
     writeFileSync("build/faults.json", JSON.stringify(faults));
     return "build/faults.json";
@@ -97,8 +89,6 @@ async function english() {
     };
 }
 
-const hex = firmware();
-
 /** @type {import("esbuild").BuildOptions} */
 const common = {
     bundle: true,
@@ -108,13 +98,12 @@ const common = {
     // time.
     mainFields: ["module", "main"],
     alias: {
-        "weeder.hex": resolve(hex),
-        "packed.hex": packed(hex),
+        "packed.hex": packed(firmware()),
         "page.wasm": packed(rust()),
         "log-worker.js": await logWorker(),
         "faults.json": resolve(faults()),
     },
-    loader: { ".hex": "text", ".txt": "text", ".deflated": "binary" },
+    loader: { ".txt": "text", ".deflated": "binary" },
 };
 
 await build({

@@ -1,10 +1,5 @@
-// The files that build.mjs includes: the firmware, plain and compressed, the project's Rust, compressed, the worker
-// that reads logs, and the manual's alarms and warnings.
-declare module "weeder.hex" {
-    const hex: string;
-    export default hex;
-}
-
+// The files that build.mjs includes: the firmware and the project's Rust, compressed, the worker that reads logs, and
+// the manual's alarms and warnings.
 declare module "packed.hex" {
     const packed: Uint8Array<ArrayBuffer>;
     export default packed;
@@ -21,6 +16,6 @@ declare module "page.wasm" {
 }
 
 declare module "faults.json" {
-    const faults: { name: string; title: string; cause: string; advice: string }[];
+    const faults: { name: string; title: string; advice: string }[];
     export default faults;
 }

@@ -1,22 +1,26 @@
-// The project's own Rust in the page. It is compressed inside the page, and start.ts decompresses it before the first
-// question.
+// The compressed parts of the page: the project's own Rust, and the firmware. start.ts waits for them. The page is
+// smaller this way: the Base64 of compressed data is shorter than the data.
 
-import packed from "page.wasm";
+import packedHex from "packed.hex";
+import packedRust from "page.wasm";
 import { Rust } from "./rust.ts";
-import { unpack } from "./unpack.ts";
 
-/** The module, for workers. */
+/** The Rust's module: for workers, and for further instances with their own state. */
 export let module: WebAssembly.Module;
+/** The firmware as a HEX file. */
+export let hex = "";
 let rust: Rust;
 
-/** Resolves when questions can be asked. */
-export const ready: Promise<void> = unpack(packed).then((bytes) => {
-    module = new WebAssembly.Module(bytes);
-    rust = new Rust(module);
-});
+function unpack(packed: Uint8Array<ArrayBuffer>): Response {
+    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw")));
+}
 
-/** Another instance, with its own state. */
-export const another = (): Rust => new Rust(module);
+/** Resolves when they are decompressed. */
+export const ready = (async () => {
+    hex = await unpack(packedHex).text();
+    module = new WebAssembly.Module(await unpack(packedRust).arrayBuffer());
+    rust = new Rust(module);
+})();
 
 /** Asks a question. Throws if it is invalid: the page and its Rust are then of different versions. */
 export const ask = <Answer>(question: unknown): Answer => rust.ask(question);

@@ -1,13 +1,9 @@
 // The page's elements, by their names in `data-part` in index.html, each checked for its type.
 
-import { show } from "./words/words.ts";
+import { show, told } from "./words/words.ts";
 
 export class Parts {
-    readonly root: HTMLElement;
-
-    constructor(root: HTMLElement) {
-        this.root = root;
-    }
+    constructor(readonly root: HTMLElement) {}
 
     get<Kind extends Element>(name: string, kind: new () => Kind): Kind {
         const element = this.root.querySelector(`[data-part="${name}"]`);
@@ -36,6 +32,18 @@ export class Parts {
     say(name: string, text: () => string): void {
         show(this.html(name), text);
     }
+
+    /** Waits for work, and shows that it is done, or its error. Returns whether it is done. */
+    async attempt(name: string, work: Promise<unknown>, done?: () => string): Promise<boolean> {
+        try {
+            await work;
+            if (done) this.say(name, done);
+            return true;
+        } catch (error) {
+            this.say(name, () => told(error));
+            return false;
+        }
+    }
 }
 
 /** A new element with a class and children. */
@@ -46,6 +54,23 @@ export function make<Name extends keyof HTMLElementTagNameMap>(
 ): HTMLElementTagNameMap[Name] {
     const element = document.createElement(name);
     if (className !== "") element.className = className;
+    element.append(...children);
+    return element;
+}
+
+/** Sets attributes of an element. */
+export function set(element: Element, attributes: Readonly<Record<string, string | number>>): void {
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+}
+
+/** A new element of a picture with attributes and children. */
+export function draw<Name extends keyof SVGElementTagNameMap>(
+    name: Name,
+    attributes: Readonly<Record<string, string | number>>,
+    ...children: (Node | string)[]
+): SVGElementTagNameMap[Name] {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+    set(element, attributes);
     element.append(...children);
     return element;
 }

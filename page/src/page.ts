@@ -2,8 +2,8 @@
 // Uno; only its connection differs.
 
 import { makeInstallable } from "./app/install.ts";
+import { hex } from "./core.ts";
 import { Parts } from "./dom.ts";
-import { hex } from "./firmware.ts";
 import { Flasher } from "./flasher/flasher.ts";
 import { keepFocus } from "./focus.ts";
 import { isServed } from "./link/served.ts";
@@ -21,10 +21,10 @@ import { Trial } from "./try/trial.ts";
 import { CYCLES_PER_SECOND } from "./uno/uno.ts";
 import {
     type Code,
+    inLanguage,
     LANGUAGES,
     language,
     number,
-    onLanguage,
     quantity,
     say,
     show,
@@ -57,11 +57,9 @@ function write(id: string, text: string): void {
 }
 
 translate(document.body);
-const nameLanguage = () => {
+inLanguage(() => {
     document.documentElement.lang = language();
-};
-nameLanguage();
-onLanguage(nameLanguage);
+});
 const languages = find("language", HTMLSelectElement);
 for (const [code, { name }] of Object.entries(LANGUAGES)) {
     const option = new Option(name, code);
@@ -96,11 +94,11 @@ trialPanel.onHappening = (happening) => {
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
-new RecordView(find("view-record", HTMLElement));
+new RecordView(new Parts(find("view-record", HTMLElement)));
 
 /** The panels of real machines. */
 let workPanels: Panel[] = [];
-const flasher = new Flasher(find("view-flash", HTMLElement), hex);
+const flasher = new Flasher(new Parts(find("view-flash", HTMLElement)), hex);
 if (isServed()) void workServed();
 else workHere();
 
@@ -127,9 +125,8 @@ async function workServed(): Promise<void> {
     try {
         workPanels = await showServed(served);
     } catch (error) {
-        const why = error instanceof Error ? error.message : String(error);
         const said = document.createElement("p");
-        show(said, () => say("noMachinesList", { why: told(why) }));
+        show(said, () => say("noMachinesList", { why: told(error) }));
         served.append(said);
     }
 }
@@ -181,8 +178,7 @@ function showSound(): void {
     sound.classList.toggle("waiting", isWaiting());
     sound.ariaLabel = say(isWaiting() ? "soundWaits" : "sound");
 }
-showSound();
-onLanguage(showSound);
+inLanguage(showSound);
 wakeOnTouch(showSound);
 sound.addEventListener("click", () => {
     turn(!isOn());
@@ -197,8 +193,7 @@ function slider(id: string, shown: (value: number) => string, use: (value: numbe
         use(input.valueAsNumber);
     };
     input.addEventListener("input", apply);
-    onLanguage(apply);
-    apply();
+    inLanguage(apply);
 }
 
 function toggle(id: string, use: (on: boolean) => void): void {

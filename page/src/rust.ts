@@ -9,28 +9,27 @@ interface Exports {
     readonly length: () => number;
     readonly read: () => void;
     readonly table: (number: number) => number;
-    readonly table_length: (number: number) => number;
+    /** Rolls the machine until a cycle. */
     readonly roll: (cycle: number) => void;
+    /** Passes a pulse to the machine's servo, by the cycles of its edges. */
     readonly hear: (rise: number, fall: number) => void;
-    readonly trial_table: (number: number) => number;
-    readonly trial_table_length: (number: number) => number;
 }
 
 const [encoder, decoder] = [new TextEncoder(), new TextDecoder()];
 
 export class Rust {
-    readonly #exports: Exports;
+    readonly exports: Exports;
 
     /** `progress` takes how far a long answer is, from 0 to 1. */
     constructor(module: WebAssembly.Module, progress: (share: number) => void = () => {}) {
         const { exports } = new WebAssembly.Instance(module, { page: { progress_is: progress } });
-        this.#exports = exports as unknown as Exports;
+        this.exports = exports as unknown as Exports;
     }
 
     /** Asks a question. Throws if it is invalid: the page and its Rust are then of different versions. */
     ask<Answer>(question: unknown): Answer {
         this.#put(encoder.encode(JSON.stringify(question)));
-        const { memory, answer, length } = this.#exports;
+        const { memory, answer, length } = this.exports;
         const at = answer();
         const text = decoder.decode(new Uint8Array(memory.buffer, at, length()));
         const said = JSON.parse(text) as { answer: Answer } | { error: string };
@@ -41,39 +40,19 @@ export class Rust {
     /** Passes the next bytes of a log. */
     read(bytes: Uint8Array): void {
         this.#put(bytes);
-        this.#exports.read();
+        this.exports.read();
     }
 
-    /** A copy of a table of the log's picture. */
+    /** A table of the log's picture or of the rolling machine, valid until the next call. */
     table(number: number): Float64Array<ArrayBuffer> {
-        const { memory, table, table_length } = this.#exports;
-        return new Float64Array(
-            memory.buffer,
-            table(number),
-            table_length(number),
-        ).slice() as Float64Array<ArrayBuffer>;
-    }
-
-    /** Rolls the machine until a cycle. */
-    roll(cycle: number): void {
-        this.#exports.roll(cycle);
-    }
-
-    /** Passes a pulse to the machine's servo, by the cycles of its edges. */
-    hear(rise: number, fall: number): void {
-        this.#exports.hear(rise, fall);
-    }
-
-    /** A table of the rolling machine, valid until the next call. */
-    trialTable(number: number): Float64Array {
-        const { memory, trial_table, trial_table_length } = this.#exports;
-        const at = trial_table(number);
-        return new Float64Array(memory.buffer, at, trial_table_length(number));
+        const { memory, table, length } = this.exports;
+        const at = table(number);
+        return new Float64Array(memory.buffer as ArrayBuffer, at, length());
     }
 
     #put(bytes: Uint8Array): void {
-        const room = this.#exports.room(bytes.length);
+        const room = this.exports.room(bytes.length);
         // The memory may move when it grows.
-        new Uint8Array(this.#exports.memory.buffer, room, bytes.length).set(bytes);
+        new Uint8Array(this.exports.memory.buffer, room, bytes.length).set(bytes);
     }
 }

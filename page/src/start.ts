@@ -1,6 +1,5 @@
 // Starts the page after its compressed parts are decompressed.
 
-import { ready as rust } from "./core.ts";
-import { ready as firmware } from "./firmware.ts";
+import { ready } from "./core.ts";
 
-void Promise.all([rust, firmware]).then(() => import("./page.ts"));
+void ready.then(() => import("./page.ts"));

@@ -4,10 +4,10 @@
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
-import hex from "weeder.hex";
-import { BOARDS } from "../src/flasher/boards.ts";
+import { hex } from "../src/core.ts";
+import { BOARDS } from "../src/flasher/stk500.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
-import { readHex } from "../src/uno/hex.ts";
+import { readHex, usedBytes } from "../src/uno/hex.ts";
 import { close, inspect, launch, open, PHONE, served } from "./browser.ts";
 import { type Device, Foreign, VirtualUno } from "./ports.ts";
 
@@ -62,7 +62,7 @@ test("an old bootloader is flashed at its own rate and its fault is told, or tha
     const board = BOARDS.find(({ isOld }) => isOld);
     assert(board);
     await opened.page.getByLabel("Board").selectOption(board.id);
-    const fits = readHex(hex, FLASH_BYTES).findLastIndex((byte) => byte !== 0xff) < board.roomBytes;
+    const fits = usedBytes(readHex(hex, FLASH_BYTES)) <= board.roomBytes;
     assert.match(
         await flash(opened.page),
         fits

@@ -1,6 +1,6 @@
 // Shared code of the tests: a started Uno, and a patient operator at its console.
 
-import hex from "weeder.hex";
+import { hex } from "../src/core.ts";
 import { CYCLES_PER_SECOND, Uno } from "../src/uno/uno.ts";
 
 /** Timeout of an answer, and of the firmware's first line. */

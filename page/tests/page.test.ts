@@ -40,7 +40,7 @@ test("the page weeds a row with the real firmware, no plant is damaged, and it s
         ).length,
         shapes: document.querySelectorAll("#drawing [data-kind=plant]").length,
     }));
-    assert.deepEqual(plants, { kept: passed, "margin cut": 0, damaged: 0 });
+    assert.deepEqual(plants, { kept: passed, marginCut: 0, damaged: 0 });
     assert(passed >= 5, `${passed} plants were passed`);
     assert(worked >= passed, "the tool was in the row between the plants");
     assert(free >= 4, `${free} zones lie round their plants`);

@@ -58,11 +58,11 @@ test("a log of the page is drawn with what was seen, kept free and worked, led t
         await page.evaluate(() => new Promise(requestAnimationFrame));
         return inView(page, "log-drawing").locator(selector).count();
     };
-    assert((await drawn(".strip-canopy")) >= 5 && (await drawn(".strip-margin")) >= 5);
-    assert((await drawn(".log-worked")) >= 4);
-    const all = await drawn(".strip-canopy");
+    assert((await drawn(".canopy")) >= 5 && (await drawn(".window")) >= 5);
+    assert((await drawn(".worked")) >= 4);
+    const all = await drawn(".canopy");
     for (let presses = 0; presses < 3; presses++) await inView(page, "log-closer").click();
-    assert((await drawn(".strip-canopy")) < all, "closer there is less");
+    assert((await drawn(".canopy")) < all, "closer there is less");
     const place = async () => Number(await inView(page, "log-place").inputValue());
     await inView(page, "log-place").fill("0");
     await inView(page, "alarm-next").click();
@@ -71,7 +71,7 @@ test("a log of the page is drawn with what was seen, kept free and worked, led t
         .waitFor();
     assert((await place()) > 0);
     // There may be a warning beside it.
-    const alarmsDrawn = await drawn(".log-alarm, .log-warning");
+    const alarmsDrawn = await drawn(".flag");
     assert(alarmsDrawn >= 1 && alarmsDrawn <= Number(alarms), `${alarmsDrawn} of ${alarms} alarms`);
     while (!/no alarm behind/.test((await inView(page, "log-alarm").textContent()) ?? ""))
         await inView(page, "alarm-next").click();
@@ -176,8 +176,8 @@ test("logs of several rows are moved together, and their map is that of weeder",
         .filter({ hasText: /^At 20\.0 m, after (39\.[89]|40\.[0-2]) / })
         .nth(1)
         .waitFor();
-    const marks = () => rows.locator(".strip-note").allTextContents();
-    await rows.nth(1).locator(".strip-note", { hasText: "20.0" }).waitFor();
+    const marks = () => rows.locator(".note").allTextContents();
+    await rows.nth(1).locator(".note", { hasText: "20.0" }).waitFor();
     const [left, right] = [
         (await marks()).slice(0, (await marks()).length / 2),
         (await marks()).slice(-((await marks()).length / 2)),

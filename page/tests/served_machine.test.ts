@@ -94,7 +94,8 @@ test("a lost answer is an error, and neither that of HOLD nor another ends the p
     }
     assert(!happened.some(({ is }) => is === "lost"));
     machine.tell({ is: "event", said: "state is=work" });
-    assert.deepEqual(happened.at(-1), { is: "event", event: { is: "state", mode: "work" }, line: "state is=work" });
+    const event = { is: "state", isEvent: true, mode: "work" };
+    assert.deepEqual(happened.at(-1), { is: "event", event, line: "state is=work" });
     const answer = machine.ask("start");
     await goOn();
     sent.pop()?.answer("ok\n");

@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
-import hex from "weeder.hex";
+import { hex } from "../src/core.ts";
 import { isEvent, read } from "../src/link/grammar.ts";
 import { LineReader } from "../src/link/lines.ts";
 import { inWords } from "../src/try/outcome.ts";
@@ -69,7 +69,7 @@ test("a row that the real firmware weeds has no plant damaged and no margin cut,
     tried.roll(2, 6000);
     const { plants, weeds } = tried.trial.outcome.totals;
     assert(plants.kept >= 8, `${plants.kept} plants were passed`);
-    assert.deepEqual([plants["margin cut"], plants.damaged], [0, 0]);
+    assert.deepEqual([plants.marginCut, plants.damaged], [0, 0]);
     // The others stand on ground that the plants' margins and the servo's time take.
     assert(weeds.passed >= 6 && weeds.cut >= 2, `${weeds.cut} of ${weeds.passed} weeds`);
     assert.match(
@@ -126,7 +126,7 @@ test("a wheel that slips has each window come late, until the margin is cut", ()
     tried.roll(2, 4000);
     const { plants } = tried.trial.outcome.totals;
     // A fifth of the distance from beam to tool is 80 mm, more than a margin of 50 mm.
-    assert(plants["margin cut"] + plants.damaged >= 4, inWords(tried.trial.outcome.totals));
+    assert(plants.marginCut + plants.damaged >= 4, inWords(tried.trial.outcome.totals));
     assert.deepEqual(tried.notKept, ["off"]);
 });
 

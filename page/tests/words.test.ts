@@ -84,6 +84,13 @@ for (const code of OTHERS)
         );
     });
 
+test("the manual has a cause of each alarm and warning", () => {
+    const manual = readFileSync("../docs/faults.md", "utf8");
+    const causes = [...manual.matchAll(/^- `(?:\d-\d )?(\w+)`[^:\n]*: .*?\.\s/gms)].map(([, name]) => name);
+    assert(faults.length > 10);
+    for (const { name } of faults) assert(causes.includes(name), name);
+});
+
 test("no two texts of the page are the same in English, so that each is found in the HTML", () => {
     const texts = Object.values(en.words);
     assert.deepEqual(
@@ -138,10 +145,11 @@ test("what the session, weeder serve and the project's Rust say in English is kn
     const measured = [...timed, ...stretch, ...stretch, ...stretch];
     const settings = { lead_out_ms: 158, lead_in_ms: 52, ticks_per_m: 1910, margin_mm: 50 };
     const advice = (lines: string[], changed: Record<string, number> = {}) =>
-        ask<{ next: string | null; missing: string[]; warning: string | null }>({
+        ask<{ next: string | null; missing: string[]; marginMm: number | null; warning: string | null }>({
             setUp: { lines, settings: { ...settings, ...changed } },
         });
     const least = Number(/set margin_mm (\d+)/.exec(advice(measured).next ?? "")?.[1]);
+    assert.deepEqual([advice(timed).marginMm, advice(measured).marginMm], [null, least]);
     const steps = [
         advice([]).missing,
         advice(timed, { lead_out_ms: 100 }).missing,

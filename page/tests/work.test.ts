@@ -85,7 +85,7 @@ test("a new board shows its alarm with what to do, works, and holds, and all of 
         .filter({ hasText: /plant, 1\d\d mm wide, \d vote/ })
         .waitFor();
     await part(page, "why").filter({ hasText: "A plant is at the tool" }).waitFor();
-    assert((await page.locator("#work-panel .strip-canopy").count()) > 0, "a window is drawn");
+    assert((await page.locator("#work-panel .canopy").count()) > 0, "a window is drawn");
     assert.match((await part(page, "speed").textContent()) ?? "", /^2\.[3-7]$/);
     await page.evaluate(() => globalThis.scrollTo(0, 0));
     await inspect(page, "phone-work");

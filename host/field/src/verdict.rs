@@ -17,6 +17,7 @@ use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
 use crate::row::{Row, Thing};
 use crate::servo::{Command, Stroke};
+use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 use uno::Pulse;
@@ -64,8 +65,9 @@ impl Timing {
     }
 }
 
-/// The result for a plant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The result for a plant, from good to bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "camelCase")]
 pub enum Verdict {
     /// The tool kept away from it by the margin.
     Kept,

@@ -1,12 +1,15 @@
-//! The console for the page: the meaning of lines, and the order of changed settings.
+//! The console for the page: the meaning of lines, the order of changed settings, and the next step of setting up a
+//! machine.
 
-use link::settings::{Setting, Settings, explain, name, steps};
+use link::set_up::{self, SetUp, Step, Task};
+use link::settings::{Setting, Settings, explain, name, steps, unit};
 use link::{ConsoleLine, Field, Values};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// The meaning of a line, in the form of `page/src/link/console_line.ts`: its name, and its fields.
+/// The meaning of a line, in the form of `page/src/link/console_line.ts`: its name, its fields, and `isEvent` if it is
+/// an event.
 pub fn read(line: &str) -> Value {
     let said = ConsoleLine::parse(line);
     let (name, fields) = said.fields();
@@ -22,6 +25,9 @@ pub fn read(line: &str) -> Value {
     });
     let mut meaning: Map<String, Value> =
         [("is".to_owned(), camel_case(name).into())].into_iter().chain(fields).collect();
+    if let ConsoleLine::Event(_) = said {
+        meaning.insert("isEvent".to_owned(), true.into());
+    }
     // A newer firmware's alarm has its name too.
     if let (ConsoleLine::Status(_), Some(alarm)) = (said, Values(line).text("name")) {
         meaning.insert("alarm".to_owned(), alarm.into());
@@ -83,7 +89,7 @@ impl Change {
 }
 
 /// Settings with some values set, and the values that could not be.
-pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Settings, Vec<(String, u16)>) {
+fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Settings, Vec<(String, u16)>) {
     let mut unknown = Vec::new();
     for (name, &value) in values {
         let is_set = Setting::find(name.as_bytes()).is_some_and(|setting| settings.set(setting, value).is_ok());
@@ -94,133 +100,119 @@ pub fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Sett
     (settings, unknown)
 }
 
+/// The typed lines and the output of a session, and the present settings by name.
+#[derive(Deserialize)]
+pub struct Heard {
+    lines: Vec<String>,
+    settings: BTreeMap<String, u16>,
+}
+
+impl Heard {
+    /// The steps, and the results of the session, in the form of `page/src/panel/set_up.ts`.
+    pub fn advice(&self) -> Value {
+        let set_up = SetUp::of_lines(self.lines.iter().map(String::as_str));
+        let (settings, _) = settings(Settings::new(), &self.settings);
+        let manual = set_up::steps().into_iter().map(|step| {
+            let tasks: Vec<String> = step.tasks.iter().map(task).collect();
+            json!({ "title": step.title, "how": step.how, "tasks": tasks })
+        });
+        let margin = set_up.margin(&settings);
+        let missing = margin.as_ref().err().map_or(&[][..], Vec::as_slice);
+        json!({
+            "steps": manual.collect::<Vec<_>>(),
+            "next": set_up.next(&settings).map(|step| step.to_string()),
+            "missing": missing.iter().map(Step::to_string).collect::<Vec<_>>(),
+            "marginMm": margin.as_ref().ok().map(|margin| margin.least_mm()),
+            "warning": set_up.warning(&settings),
+        })
+    }
+}
+
+/// The simulated machine's value for a task; empty for a measurement.
+fn task(task: &Task) -> String {
+    match task {
+        Task::Fit(part, value) => format!("{part} = {value}"),
+        Task::Set(setting, value) => format!("{} = {value} {}", name(*setting), unit(*setting)),
+        Task::TimeServo => "calibrate servo".to_owned(),
+        Task::MeasureWheel(length_mm) => format!("calibrate {length_mm}"),
+        Task::SetMargin => "margin_mm".to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use expect_test::expect_file;
     use link::{ANSWERS, EVENTS, LineDescription, Mode, STATUS, ValueDescription};
 
-    /// A comment.
-    fn comment(indent: &str, meaning: &str) -> String {
-        let mut letters = meaning.trim().trim_end_matches('.').chars();
-        let first = letters.next().map_or(String::new(), |first| first.to_uppercase().to_string());
-        format!("{indent}/** {first}{}. */\n", letters.as_str())
-    }
-
-    /// The TypeScript type of a field in the result of [`read`].
-    fn type_of(rust: &str) -> &str {
-        match rust {
+    /// A field with its TypeScript type, in the result of [`read`].
+    fn field(value: &ValueDescription) -> Option<String> {
+        let (name, rust) = value.field?;
+        let (name, rust) = (camel_case(name), rust.replace(' ', ""));
+        let optional = rust.strip_prefix("Option<").and_then(|rust| rust.strip_suffix('>'));
+        let kind = match optional.unwrap_or(&rust) {
             "i32" | "u32" | "u16" | "u8" => "number",
             "[u8;COUNT]" => "readonly number[]",
             "bool" => "boolean",
-            "Mode" => "Mode",
-            "Class" => "\"plant\" | \"weed\" | \"unknown\"",
+            known @ ("Mode" | "Class") => known,
             "Alarm" | "Warning" | "String" => "string",
-            _ => panic!("say what {rust} is in TypeScript"),
-        }
+            other => panic!("say what {other} is in TypeScript"),
+        };
+        Some(format!("{name}{}: {kind}", if optional.is_some() { "?" } else { "" }))
     }
 
-    fn field(value: &ValueDescription) -> Option<String> {
-        let (name, rust) = value.field?;
-        let (about, name, rust) = (comment("    ", value.meaning), camel_case(name), rust.replace(' ', ""));
-        let optional = rust.strip_prefix("Option<").and_then(|rust| rust.strip_suffix('>'));
-        let (name, rust) = optional.map_or((name.clone(), &*rust), |rust| (name + "?", rust));
-        Some(format!("{about}    readonly {name}: {};\n", type_of(rust)))
+    /// A line with its fields, as Biome formats it.
+    fn shape(line: &LineDescription) -> String {
+        let fields: Vec<String> = line.values.iter().filter_map(field).collect();
+        let name = camel_case(line.name);
+        let in_a_line = format!("    {name}: {{ {} }};\n", fields.join("; "));
+        match in_a_line.trim_end().len() {
+            _ if fields.is_empty() => format!("    {name}: object;\n"),
+            ..=120 => in_a_line,
+            _ => format!("    {name}: {{\n        {};\n    }};\n", fields.join(";\n        ")),
+        }
     }
 
     #[test]
     fn the_page_s_types_of_lines_are_the_tables_of_lines() {
-        let shape = |line: &LineDescription| {
-            let fields: String = line.values.iter().filter_map(field).collect();
-            let (about, is) = (comment("", line.meaning), camel_case(line.name));
-            format!("{about}export interface {} {{\n    readonly is: \"{is}\";\n{fields}}}\n\n", line.name)
-        };
-        let plot =
-            LineDescription { name: "Plot", meaning: "points of a plotter's curves", beginning: "", values: &[] };
-        let other = LineDescription { name: "Other", meaning: "something else", ..plot };
-        let events = [EVENTS, &[plot]].concat();
-        let answers = [STATUS, ANSWERS, &[other]].concat();
-        let shapes: String = events.iter().chain(&answers).map(shape).collect();
-        let list =
-            |lines: &[LineDescription], between| lines.iter().map(|line| line.name).collect::<Vec<_>>().join(between);
-        let names: String = events.iter().map(|event| format!("    \"{}\",\n", camel_case(event.name))).collect();
+        let plot = LineDescription { name: "Plot", meaning: "", beginning: "", values: &[] };
+        let other = LineDescription { name: "Other", ..plot };
+        let shapes = |lines: Vec<LineDescription>| lines.iter().map(shape).collect::<String>();
         let modes = [Mode::Hold, Mode::Work, Mode::Alarm].map(|mode| format!("\"{}\"", mode.name())).join(" | ");
         expect_file!["../../../page/src/link/console_line.ts"].assert_eq(&format!(
-            "// What a line of the machine says: the tables of control/src/say/line_tables.rs and host/link/src/console_line.rs, as types.\n\
+            "// What a line of the machine says. The tables of control/src/say/line_tables.rs and\n\
+             // host/link/src/console_line.rs have the meaning and the unit of each field.\n\
              // `UPDATE_EXPECT=1 cargo test -p page lines` writes this file.\n\n\
-             /** What the machine is doing. */\n\
-             export type Mode = {modes};\n\n\
-             {shapes}/** What the machine tells by itself. */\n\
-             export type EventLine =\n    | {};\n\n\
-             /** The events' names. */\n\
-             export const EVENT_NAMES: readonly EventLine[\"is\"][] = [\n{names}];\n\n\
-             /** What a line says. */\n\
-             export type ConsoleLine = EventLine | {};\n",
-            list(&events, "\n    | "),
-            list(&answers, " | "),
+             export type Mode = {modes};\n\
+             type Class = \"plant\" | \"weed\" | \"unknown\";\n\n\
+             interface Events {{\n{}}}\n\n\
+             interface Answers {{\n{}}}\n\n\
+             type Named<Lines> = {{ [Name in keyof Lines]: {{ readonly is: Name }} & Readonly<Lines[Name]> }}[keyof Lines];\n\n\
+             /** What the machine tells by itself. */\n\
+             export type EventLine = Named<Events> & {{ readonly isEvent: true }};\n\
+             export type ConsoleLine = EventLine | Named<Answers>;\n\
+             export type Line<Name extends ConsoleLine[\"is\"]> = Extract<ConsoleLine, {{ readonly is: Name }}>;\n\
+             export type Setting = Line<\"setting\">;\n",
+            shapes([EVENTS, &[plot]].concat()),
+            shapes([STATUS, ANSWERS, &[other]].concat()),
         ));
     }
 
     #[test]
-    fn a_line_is_told_to_the_page_with_all_that_is_in_it() {
-        for (line, said) in [
-            ("ok", json!({ "is": "end" })),
-            ("error: no", json!({ "is": "end", "error": "no" })),
-            ("alarm code=3-1 name=too_fast pos=7", json!({ "is": "alarm", "alarm": "too_fast", "position": 7 })),
-            (
-                "state=alarm code=9-9 name=boredom tool=out pos=1 speed_mm_s=-2 windows=3 unseen_mm=4",
-                json!({
-                    "is": "status", "mode": "alarm", "alarm": "boredom", "toolOut": true, "position": 1, "speedMmS": -2,
-                    "zones": 3, "unseenMm": 4,
-                }),
-            ),
-            (
-                "plant pos=-7 votes=3 spacing=1 delay=2 hold=3 actuation=5",
-                json!({
-                    "is": "detection", "class": "plant", "position": -7, "votes": 3, "spacing": 1, "delay": 2, "hold": 3,
-                    "actuation": 5,
-                }),
-            ),
-            (
-                "end_switch=off on or off, default off, not saved",
-                json!({
-                    "is": "setting", "name": "end_switch", "value": 0, "unit": "", "least": 0, "greatest": 1,
-                    "isSwitched": true, "default": 0,
-                }),
-            ),
-            ("calibrated by=eye, set them", json!({ "is": "calibratedByEye" })),
-            (
-                "calibrated lead_out_ms=150 lead_in_ms=40 set=yes",
-                json!({ "is": "calibratedBySwitch", "outMs": 150, "inMs": 40, "isSet": true }),
-            ),
-        ] {
-            assert_eq!(read(line), said, "{line}");
-        }
-    }
-
-    /// The answer to a change from the defaults.
-    fn steps_to(to: &[(&str, u16)]) -> Value {
-        let from = Setting::all().map(|setting| (name(setting), setting.description().default)).collect();
-        Change { from, to: to.iter().map(|&(name, value)| (name.to_owned(), value)).collect() }.steps()
-    }
-
-    #[test]
-    fn settings_go_in_an_order_that_the_firmware_takes() {
-        let swapped = steps_to(&[("beam_to_tool_mm", 2000), ("lead_out_ms", 500), ("margin_mm", 200)]);
-        assert_eq!(swapped["steps"][0], json!(["beam_to_tool_mm", 2000]), "{swapped}");
-        assert_eq!(swapped["steps"].as_array().map(Vec::len), Some(3), "{swapped}");
-    }
-
-    #[test]
-    fn a_contradiction_is_said_before_anything_is_sent() {
-        let answer = steps_to(&[("beam_to_tool_mm", 100)]);
-        assert!(answer["contradiction"].as_str().is_some_and(|why| why.contains("raise it")), "{answer}");
-        assert_eq!(answer["steps"], json!([]));
+    fn an_alarm_of_a_newer_firmware_has_its_name() {
+        let line = "state=alarm code=9-9 name=boredom tool=out pos=1 speed_mm_s=-2 windows=3 unseen_mm=4";
+        let status = json!({
+            "is": "status", "mode": "alarm", "alarm": "boredom", "toolOut": true, "position": 1, "speedMmS": -2, "zones": 3,
+            "unseenMm": 4,
+        });
+        assert_eq!(read(line), status);
     }
 
     #[test]
     fn what_a_newer_firmware_may_know_is_sent_last() {
-        let answer = steps_to(&[("a_new_one", 3), ("margin_mm", 60)]);
+        let from = Setting::all().map(|setting| (name(setting), setting.description().default)).collect();
+        let to = [("a_new_one".to_owned(), 3), ("margin_mm".to_owned(), 60)].into();
+        let answer = Change { from, to }.steps();
         assert_eq!(answer["steps"], json!([["margin_mm", 60], ["a_new_one", 3]]));
     }
 }

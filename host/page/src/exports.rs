@@ -1,15 +1,16 @@
 //! The interface of the WebAssembly module: one buffer for questions and answers.
 //!
 //! `room` makes room for a question and returns its address. `answer` answers the question in the buffer and returns
-//! the answer's address, and `length` returns its length. `read` takes the buffer as the next bytes of a log instead.
-//! `table` and `table_length` return a table of the log's picture. `roll` and `hear` call the rolling machine, and
-//! `trial_table` and `trial_table_length` return its tables. Each address is valid until the next call. During a long
-//! answer the module calls `progress`, which the page provides. No binding generator is used.
+//! the answer's address. `read` takes the buffer as the next bytes of a log instead. `roll` and `hear` call the rolling
+//! machine. `table` returns the address of a table. `length` returns the length of the last answer or table. Each
+//! address is valid until the next call. During a long answer the module calls `progress`, which the page provides. No
+//! binding generator is used.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 thread_local! {
     static BUFFER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+    static LENGTH: Cell<usize> = const { Cell::new(0) };
 }
 
 #[link(wasm_import_module = "page")]
@@ -39,13 +40,16 @@ extern "C" fn room(length: usize) -> *mut u8 {
 extern "C" fn answer() -> *const u8 {
     let question = BUFFER.take();
     BUFFER.replace(crate::answer(&question).into_bytes());
-    BUFFER.with_borrow(Vec::as_ptr)
+    BUFFER.with_borrow(|answer| {
+        LENGTH.set(answer.len());
+        answer.as_ptr()
+    })
 }
 
 // SAFETY: as above.
 #[unsafe(no_mangle)]
 extern "C" fn length() -> usize {
-    BUFFER.with_borrow(Vec::len)
+    LENGTH.get()
 }
 
 // SAFETY: as above.
@@ -57,13 +61,10 @@ extern "C" fn read() {
 // SAFETY: as above.
 #[unsafe(no_mangle)]
 extern "C" fn table(number: usize) -> *const f64 {
-    crate::record::table(number, <[f64]>::as_ptr)
-}
-
-// SAFETY: as above.
-#[unsafe(no_mangle)]
-extern "C" fn table_length(number: usize) -> usize {
-    crate::record::table(number, <[f64]>::len)
+    crate::table(number, |values| {
+        LENGTH.set(values.len());
+        values.as_ptr()
+    })
 }
 
 // SAFETY: as above.
@@ -76,16 +77,4 @@ extern "C" fn roll(cycle: f64) {
 #[unsafe(no_mangle)]
 extern "C" fn hear(rise: f64, fall: f64) {
     crate::hear(rise, fall);
-}
-
-// SAFETY: as above.
-#[unsafe(no_mangle)]
-extern "C" fn trial_table(number: usize) -> *const f64 {
-    crate::trial_table(number, <[f64]>::as_ptr)
-}
-
-// SAFETY: as above.
-#[unsafe(no_mangle)]
-extern "C" fn trial_table_length(number: usize) -> usize {
-    crate::trial_table(number, <[f64]>::len)
 }

@@ -10,16 +10,16 @@ mod console;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod record;
-mod set_up;
 mod trial;
 
 #[cfg(target_arch = "wasm32")]
 use exports::progress;
-pub use record::{table, take};
-pub use trial::{hear, roll, table as trial_table};
+pub use record::take;
+pub use trial::{hear, roll};
 
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::cell::RefCell;
 
 /// A question, as an object with one key.
 #[derive(Deserialize)]
@@ -30,7 +30,7 @@ enum Question {
     /// Which values change these settings to those?
     Steps(console::Change),
     /// What is the next step of setting up this machine?
-    SetUp(set_up::Heard),
+    SetUp(console::Heard),
     /// Put this machine in front of this row.
     Begin(trial::Begun),
     /// Change this on the way.
@@ -55,6 +55,21 @@ enum Question {
 #[cfg(not(target_arch = "wasm32"))]
 fn progress(_share: f64) {}
 
+thread_local! {
+    /// What the log's picture shows, or what the rolling machine does, by the numbers in `record` and `trial`.
+    static TABLES: RefCell<[Vec<f64>; 3]> = const { RefCell::new([const { Vec::new() }; 3]) };
+}
+
+/// A table, valid until it is replaced. Empty if there is no such table.
+pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
+    TABLES.with_borrow(|tables| read(tables.get(number).map_or(&[], Vec::as_slice)))
+}
+
+/// Replaces a table.
+fn put(number: usize, table: Vec<f64>) {
+    TABLES.with_borrow_mut(|tables| tables[number] = table);
+}
+
 /// Answers a question: `{"answer": ...}`, or `{"error": "..."}` if the question is invalid.
 pub fn answer(question: &[u8]) -> String {
     let answer =
@@ -62,7 +77,7 @@ pub fn answer(question: &[u8]) -> String {
             Question::Read(line) => Ok(console::read(&line)),
             Question::Steps(change) => Ok(change.steps()),
             Question::SetUp(heard) => Ok(heard.advice()),
-            Question::Begin(begun) => begun.begin(),
+            Question::Begin(begun) => Ok(begun.begin()),
             Question::Change(different) => different.take(),
             Question::Judge(kept) => kept.judge(),
             Question::Log(is_whole) => Ok(record::begin(is_whole)),

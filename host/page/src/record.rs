@@ -26,6 +26,7 @@ const SPEED_MS: u64 = 300;
 const APART_MM: f64 = 1000.0;
 
 /// How a machine's count becomes ground.
+#[derive(Default)]
 struct Ground {
     settings: Settings,
     /// The tool's position at the encoder's 0. `None` before the first position of a stretch.
@@ -56,53 +57,32 @@ impl Ground {
     }
 }
 
-/// An event on the ground that changes the tool.
-struct Change {
-    mm: f64,
-    out: bool,
-}
-
 /// The picture of a log, in the form of `page/src/record/picture.ts`.
+#[derive(Default)]
 struct Picture {
     ground: Ground,
     /// Changes of settings that are not answered yet, and other commands.
     unanswered: VecDeque<Option<(Setting, u16)>>,
     here_mm: f64,
-    shown_mm: f64,
-    last_mode: Option<Mode>,
+    /// Position and state of the last stored speed.
+    shown: Option<(f64, Mode)>,
     time_ms: u64,
     swings: usize,
-    changes: Vec<Change>,
+    /// The tool's positions, each with whether it is out from there on.
+    changes: Vec<(f64, bool)>,
     has_places: bool,
     alarms: Vec<Value>,
-    tables: [Vec<f64>; TABLES],
+    tables: [Vec<f64>; 3],
 }
 
 /// The tables of a picture. For each detection: its class (0 plant, 1 weed, 2 unknown), its canopy's ends and its
 /// zone's ends in mm. For each speed: its position in mm, time in ms, and mm/s. The ends of each stretch with the tool
 /// in the row, in mm.
-const TABLES: usize = 3;
 const OBJECTS: usize = 0;
 const SPEEDS: usize = 1;
 const WORKED: usize = 2;
 
 impl Picture {
-    fn new() -> Self {
-        Self {
-            ground: Ground { settings: Settings::new(), zero_mm: None, end_mm: 0.0 },
-            unanswered: VecDeque::new(),
-            here_mm: 0.0,
-            shown_mm: f64::NEG_INFINITY,
-            last_mode: None,
-            time_ms: 0,
-            swings: 0,
-            changes: Vec::new(),
-            has_places: false,
-            alarms: Vec::new(),
-            tables: Default::default(),
-        }
-    }
-
     fn take(&mut self, entry: &Entry) {
         self.time_ms = entry.time_ms;
         match entry.kind {
@@ -121,12 +101,13 @@ impl Picture {
             Kind::Status => {
                 let Some(status) = Status::parse(&entry.text) else { return };
                 self.here_mm = self.ground.tool_mm(status.position);
-                if (self.here_mm - self.shown_mm).abs() < SPEED_MM && self.last_mode == Some(status.mode) {
+                let is_near = |(mm, mode): (f64, Mode)| (self.here_mm - mm).abs() < SPEED_MM && mode == status.mode;
+                if self.shown.is_some_and(is_near) {
                     return;
                 }
-                (self.shown_mm, self.last_mode) = (self.here_mm, Some(status.mode));
+                self.shown = Some((self.here_mm, status.mode));
                 if self.tables[SPEEDS].is_empty() {
-                    self.changes.insert(0, Change { mm: self.here_mm, out: status.tool_out });
+                    self.changes.insert(0, (self.here_mm, status.tool_out));
                 }
                 self.tables[SPEEDS].extend([self.here_mm, entry.time_ms as f64, f64::from(status.speed_mm_s)]);
             }
@@ -174,12 +155,12 @@ impl Picture {
             }
             EventLine::Swing { out, position } => {
                 self.swings += 1;
-                self.changes.push(Change { mm: ground.tool_mm(position), out });
+                self.changes.push((ground.tool_mm(position), out));
             }
             EventLine::Alarm { position, .. } => {
                 let (name, mm) = (Values(line).text("name").unwrap_or_default(), ground.tool_mm(position));
                 self.alarms.push(trouble(name, mm, false));
-                self.changes.push(Change { mm, out: true });
+                self.changes.push((mm, true));
             }
             EventLine::Warning { .. } => {
                 self.alarms.push(trouble(Values(line).text("name").unwrap_or_default(), self.here_mm, true));
@@ -191,9 +172,9 @@ impl Picture {
 
     /// Adds the ground on which the tool was in the row: from a swing in to the next swing out, or to an alarm.
     fn worked(&mut self) {
-        self.changes.sort_by(|one, other| one.mm.total_cmp(&other.mm));
+        self.changes.sort_by(|(one, _), (other, _)| one.total_cmp(other));
         let mut start_mm = None;
-        for &Change { mm, out } in &self.changes {
+        for (mm, out) in self.changes.drain(..) {
             if let (true, Some(start_mm)) = (out, start_mm.take_if(|_| out)) {
                 self.tables[WORKED].extend([start_mm, mm]);
             } else if !out {
@@ -203,7 +184,6 @@ impl Picture {
         if let Some(start_mm) = start_mm {
             self.tables[WORKED].extend([start_mm, self.ground.end_mm]);
         }
-        self.changes.clear();
     }
 }
 
@@ -228,7 +208,7 @@ thread_local! {
 impl Log {
     fn new(is_whole: bool) -> Self {
         let pieces = Pieces::new(Path::new("log"));
-        Self { pieces, problem: None, is_whole, kept_ms: None, entries: Vec::new(), picture: Picture::new() }
+        Self { pieces, problem: None, is_whole, kept_ms: None, entries: Vec::new(), picture: Picture::default() }
     }
 
     /// Takes the next bytes. `None` ends the log.
@@ -276,58 +256,47 @@ pub fn take(bytes: &[u8]) {
     LOG.with_borrow_mut(|log| log.take(Some(bytes)));
 }
 
-/// The picture without its tables, or the error: `{"problem": "..."}`.
-pub fn picture() -> Value {
+/// Ends the log. Returns the answer from it, or its error: `{"problem": "..."}`.
+fn ended(answer: impl FnOnce(&mut Log) -> Result<Value, String>) -> Value {
     LOG.with_borrow_mut(|log| {
         log.take(None);
-        if let Some(problem) = &log.problem {
-            return json!({ "problem": problem });
-        }
-        log.picture.worked();
-        let Picture { ground, time_ms, swings, has_places, alarms, .. } = &mut log.picture;
-        let alarms = std::mem::take(alarms);
-        json!({
-            "lengthMm": ground.end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
-        })
+        let answer = log.problem.clone().map_or_else(|| answer(log), Err);
+        answer.unwrap_or_else(|problem| json!({ "problem": problem }))
     })
 }
 
-/// A table of the picture, valid until another log begins. Empty if there is no such table.
-pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
-    LOG.with_borrow(|log| read(log.picture.tables.get(number).map_or(&[], Vec::as_slice)))
+/// The picture without its tables, or the error.
+pub fn picture() -> Value {
+    ended(|log| {
+        log.picture.worked();
+        let Picture { ground, time_ms, swings, has_places, alarms, tables, .. } = std::mem::take(&mut log.picture);
+        tables.into_iter().enumerate().for_each(|(number, table)| crate::put(number, table));
+        Ok(json!({
+            "lengthMm": ground.end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
+        }))
+    })
 }
 
 /// The replay of the log by the decisions of these sources: how much agrees, and the first difference.
 pub fn replayed(progress: impl FnMut(f64)) -> Value {
-    let replayed = LOG.with_borrow_mut(|log| {
-        log.take(None);
-        match &log.problem {
-            Some(problem) => Err(problem.clone()),
-            None => replay::replay_with(&log.entries, progress).map_err(|error| error.to_string()),
-        }
-    });
-    match replayed {
-        Ok(replayed) => json!({
+    ended(|log| {
+        let replayed = replay::replay_with(&log.entries, progress).map_err(|error| error.to_string())?;
+        Ok(json!({
             "objects": replayed.objects,
             "swings": replayed.swings,
             "alarms": replayed.alarms,
             "difference": replayed.difference.as_ref().map(ToString::to_string),
             "notes": replayed.notes,
-        }),
-        Err(problem) => json!({ "problem": problem }),
-    }
+        }))
+    })
 }
 
-/// Adds the log to the map, or returns the error: `{"problem": "..."}`.
+/// Adds the log to the map, or returns the error.
 pub fn job() -> Value {
-    LOG.with_borrow_mut(|log| {
-        log.take(None);
-        if let Some(problem) = &log.problem {
-            return json!({ "problem": problem });
-        }
+    ended(|log| {
         let job = Job::read(&std::mem::take(&mut log.entries), &Wanted::default());
         JOBS.with_borrow_mut(|jobs| jobs.push(job));
-        json!({})
+        Ok(json!({}))
     })
 }
 
@@ -342,6 +311,7 @@ pub fn map(words: &Words) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table;
 
     const LOG: &str = "time_ms,kind,line
 0,connected,0.2.0
@@ -421,23 +391,5 @@ mod tests {
         assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 50.0]);
         let wrong = shown(&format!("{log}1,gossip,hello\n"), 100);
         assert!(wrong["problem"].as_str().is_some_and(|problem| problem.contains("line 15")), "{wrong}");
-    }
-
-    #[test]
-    fn what_is_no_log_is_told() {
-        let problem = shown("a,b\n1,2\n", 3)["problem"].as_str().map(str::to_owned);
-        assert!(problem.is_some_and(|problem| problem.contains("time_ms")));
-        begin(true);
-        take(b"time_ms,kind,line\n0,lost,gone\n");
-        assert!(replayed(|_| {})["problem"].is_string());
-    }
-
-    #[test]
-    fn a_replay_tells_how_far_it_is() {
-        begin(true);
-        take(LOG.as_bytes());
-        let mut shares = Vec::new();
-        assert!(replayed(|share| shares.push(share))["problem"].is_null());
-        assert!(shares.is_sorted() && shares.len() > 10 && shares.iter().all(|share| (0.0..=1.0).contains(share)));
     }
 }

@@ -2,8 +2,9 @@
 //! [`field::verdict`] on the ground behind the tool.
 //!
 //! There is one trial, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are
-//! direct calls and no questions. Their results are in tables of numbers ([`table`]).
+//! direct calls and no questions. Their results are in tables of numbers ([`crate::table`]).
 
+use crate::put;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
 use field::rolling::{Faults, Rolling};
@@ -32,24 +33,14 @@ const CLEAR_WITHIN_DEGREES: f64 = 0.09;
 pub struct Begun {
     /// The Uno's cycle at this moment, with the beam at 0 mm.
     cycle: u64,
-    /// The things in the row.
-    things: Vec<Standing>,
-    /// The parameters of the row's continuation. Without them the row ends.
-    sowing: Option<Sown>,
+    sowing: Sown,
     tool_width_mm: Option<f64>,
     second_beam_mm: Option<f64>,
     servo_in_us: Option<f64>,
     servo_out_us: Option<f64>,
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Standing {
-    kind: Kind,
-    place_mm: f64,
-    width_mm: f64,
-}
-
+/// The parameters of an endless row.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Sown {
@@ -89,39 +80,18 @@ pub struct Kept {
     stem_zone_mm: u32,
 }
 
-/// How a plant fared, or whether a weed was cut.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// The verdict on a plant, or whether a weed was cut.
+#[derive(Clone, Copy, Serialize)]
 #[serde(untagged)]
 enum Fate {
-    Plant(Fared),
+    Plant(Verdict),
     Weed(bool),
-}
-
-/// From good to bad.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-enum Fared {
-    #[serde(rename = "kept")]
-    Kept,
-    #[serde(rename = "margin cut")]
-    MarginCut,
-    #[serde(rename = "damaged")]
-    Damaged,
-}
-
-impl From<Verdict> for Fared {
-    fn from(verdict: Verdict) -> Self {
-        match verdict {
-            Verdict::Kept => Fared::Kept,
-            Verdict::MarginCut => Fared::MarginCut,
-            Verdict::Damaged => Fared::Damaged,
-        }
-    }
 }
 
 /// The machine with its row and its verdicts.
 struct Trial {
     rolling: Rolling,
-    sowing: Option<Sowing>,
+    sowing: Sowing,
     faults: Faults,
     /// The first thing without a verdict, or to be judged again.
     next: usize,
@@ -130,7 +100,6 @@ struct Trial {
     fates: Vec<Option<Fate>>,
     /// Start time of the recorded motion.
     from_s: f64,
-    tables: [Vec<f64>; 3],
     /// Number of things that were passed to the page.
     told: usize,
 }
@@ -145,14 +114,15 @@ thread_local! {
     static TRIAL: RefCell<Option<Trial>> = const { RefCell::new(None) };
 }
 
-/// Runs `act` on the trial, if there is one.
-fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Option<Answer> {
-    TRIAL.with_borrow_mut(|trial| trial.as_mut().map(act))
+/// Runs `act` on the trial. Fails if there is none.
+fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Result<Answer, String> {
+    let missing = || "no machine was put in front of a row".to_owned();
+    TRIAL.with_borrow_mut(|trial| trial.as_mut().map(act).ok_or_else(missing))
 }
 
 impl Begun {
     /// Begins a trial, and replaces an earlier one. Returns the machine's dimensions, and the levels of its pins.
-    pub fn begin(self) -> Result<Value, String> {
+    pub fn begin(self) -> Value {
         let servo = Servo::default();
         let servo = Servo {
             in_us: self.servo_in_us.unwrap_or(servo.in_us),
@@ -167,18 +137,11 @@ impl Begun {
             servo,
             ..machine
         };
-        let mut row: Vec<Thing> =
-            self.things.iter().map(|thing| Thing::new(thing.place_mm, thing.width_mm, thing.kind)).collect();
-        if !row.is_empty() {
-            row = Row::new(row).map_err(|problem| problem.to_string())?.things().to_vec();
-        }
-        let mut sowing = self.sowing.map(|sown| {
-            let planting = Planting { spacing_mm: sown.spacing_mm, ..Planting::default() };
-            Sowing::new(planting, sown.weed_share, sown.first_mm, sown.seed)
-        });
-        if let Some(sowing) = &mut sowing {
-            sowing.sow(&mut row, SOWN_AHEAD_MM);
-        }
+        let Sown { seed, spacing_mm, weed_share, first_mm } = self.sowing;
+        let planting = Planting { spacing_mm, ..Planting::default() };
+        let mut sowing = Sowing::new(planting, weed_share, first_mm, seed);
+        let mut row = Vec::new();
+        sowing.sow(&mut row, SOWN_AHEAD_MM);
         let mut trial = Trial {
             rolling: Rolling::new(machine, row, 0.0, self.cycle),
             sowing,
@@ -186,7 +149,6 @@ impl Begun {
             next: 0,
             fates: Vec::new(),
             from_s: 0.0,
-            tables: Default::default(),
             told: 0,
         };
         trial.tell_now();
@@ -196,7 +158,7 @@ impl Begun {
         });
         let answer = json!({ "dimensions": dimensions, "levels": trial.levels() });
         TRIAL.set(Some(trial));
-        Ok(answer)
+        answer
     }
 }
 
@@ -205,45 +167,37 @@ impl Different {
     pub fn take(self) -> Result<Value, String> {
         with(|trial| {
             let Trial { rolling, sowing, faults, .. } = trial;
-            match (self, sowing) {
-                (Self::SpeedKmH(speed_km_h), _) => rolling.roll_at(mm_s(speed_km_h)),
-                (Self::Slip(share), _) => rolling.slip_by(share),
-                (Self::BeamWireTorn(is_torn), _) => faults.beam_wire_torn = is_torn,
-                (Self::EncoderDead(is_dead), _) => faults.encoder_dead = is_dead,
-                (Self::SpacingMm(spacing_mm), Some(sowing)) => sowing.planting.spacing_mm = spacing_mm,
-                (Self::WeedShare(share), Some(sowing)) => sowing.weed_share = share,
-                (Self::SpacingMm(_) | Self::WeedShare(_), None) => {}
+            match self {
+                Self::SpeedKmH(speed_km_h) => rolling.roll_at(mm_s(speed_km_h)),
+                Self::Slip(share) => rolling.slip_by(share),
+                Self::BeamWireTorn(is_torn) => faults.beam_wire_torn = is_torn,
+                Self::EncoderDead(is_dead) => faults.encoder_dead = is_dead,
+                Self::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
+                Self::WeedShare(share) => sowing.weed_share = share,
             }
             rolling.have_faults(*faults);
             trial.levels()
         })
-        .ok_or_else(not_begun)
     }
 }
 
 impl Kept {
     /// Judges the things behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
     pub fn judge(&self) -> Result<Value, String> {
-        with(|trial| json!(trial.judge(self))).ok_or_else(not_begun)
+        with(|trial| json!(trial.judge(self)))
     }
-}
-
-fn not_begun() -> String {
-    "no machine was put in front of a row".to_owned()
 }
 
 /// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it.
 pub fn roll(cycle: f64) {
-    with(|trial| {
+    let _ = with(|trial| {
         let changes = trial.rolling.roll_until(cycle as u64);
         let numbers = |change: &uno::PinChange| {
             [change.cycle as f64, f64::from(change.pin.number()), f64::from(u8::from(change.high))]
         };
-        trial.tables[CHANGES] = changes.iter().flat_map(numbers).collect();
-        if let Some(sowing) = &mut trial.sowing {
-            let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
-            sowing.sow(&mut trial.rolling.row, until_mm);
-        }
+        put(CHANGES, changes.iter().flat_map(numbers).collect());
+        let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
+        trial.sowing.sow(&mut trial.rolling.row, until_mm);
         trial.tell_now();
         trial.tell_sown();
     });
@@ -251,28 +205,21 @@ pub fn roll(cycle: f64) {
 
 /// The Uno has sent its servo a pulse, by the cycles of its edges.
 pub fn hear(rise: f64, fall: f64) {
-    with(|trial| {
+    let _ = with(|trial| {
         trial.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 });
         trial.tell_now();
     });
 }
 
-/// A table, by its number.
-pub fn table<Answer>(number: usize, use_it: impl FnOnce(&[f64]) -> Answer) -> Answer {
-    TRIAL.with_borrow(|trial| {
-        use_it(trial.as_ref().and_then(|trial| trial.tables.get(number)).map_or(&[], Vec::as_slice))
-    })
-}
-
 impl Trial {
     /// Writes the machine's state into its table.
-    fn tell_now(&mut self) {
-        let Self { rolling, tables, .. } = self;
+    fn tell_now(&self) {
+        let Self { rolling, .. } = self;
         let machine = &rolling.machine;
         let degrees = rolling.degrees();
         let across_mm = machine.across_mm(degrees);
         let is_clear = degrees >= machine.servo.stroke_degrees() - machine.clear_within_degrees;
-        tables[NOW] = vec![
+        let now = vec![
             rolling.place_mm(),
             rolling.tool_mm(),
             rolling.speed_mm_s(),
@@ -285,16 +232,18 @@ impl Trial {
             rolling.ground_mm_a_tick(),
             rolling.commands as f64,
         ];
+        put(NOW, now);
     }
 
     /// Writes the newly sown things into their table.
     fn tell_sown(&mut self) {
-        let Self { rolling, tables, told, .. } = self;
+        let Self { rolling, told, .. } = self;
         let kind = |kind: Kind| if kind == Kind::Plant { 0.0 } else { 1.0 };
-        tables[SOWN] = rolling.row[*told..]
+        let sown = rolling.row[*told..]
             .iter()
             .flat_map(|thing| [kind(thing.kind), thing.position_mm, thing.width_mm])
             .collect();
+        put(SOWN, sown);
         *told = rolling.row.len();
     }
 
@@ -317,7 +266,7 @@ impl Trial {
         let timing = Timing { margin_mm: kept.margin_mm, stem_zone_mm: kept.stem_zone_mm, ..Timing::default() };
         let (motion, pulses, start_cycle) = self.rolling.since(self.from_s);
         let judgement = judge(&row, &self.rolling.machine, &motion, timing, pulses, start_cycle);
-        let mut plants = judgement.plants.iter().map(|plant| Fared::from(plant.verdict));
+        let mut plants = judgement.plants.iter().map(|plant| plant.verdict);
         let mut weeds = judgement.weeds.iter().map(|weed| weed.cut);
         self.fates.resize(self.fates.len().max(behind), None);
         let mut judged = Vec::with_capacity(things.len());
@@ -347,62 +296,5 @@ impl Trial {
             self.from_s = near_s;
             self.rolling.forget(near_s);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The verdicts for a tool that swings at these positions of the beam, at half a metre a second, with a plant at
-    /// 1000 and a weed at 1400 mm.
-    fn judged(swings_mm: &[f64]) -> Value {
-        let begun = json!({
-            "cycle": 1_000_000,
-            "things": [
-                { "kind": "plant", "placeMm": 1000, "widthMm": 150 },
-                { "kind": "weed", "placeMm": 1400.5, "widthMm": 15 },
-            ],
-        });
-        serde_json::from_value::<Begun>(begun).unwrap().begin().unwrap();
-        Different::SpeedKmH(1.8).take().unwrap();
-        let mut swings = std::iter::once(0.0).chain(swings_mm.iter().copied()).enumerate().peekable();
-        let mut said = Vec::new();
-        for cycle in (1_000_000..90_000_000).step_by(32_000) {
-            roll(f64::from(cycle));
-            let place_mm = table(NOW, |now| now[0]);
-            if let Some((index, _)) = swings.next_if(|(_, swing_mm)| *swing_mm <= place_mm) {
-                let width_us = if index % 2 == 0 { 2000.0 } else { 1500.0 };
-                hear(f64::from(cycle) - 16.0 * width_us, cycle.into());
-            }
-            let kept = Kept { margin_mm: 50, stem_zone_mm: 0 };
-            said.extend(kept.judge().unwrap().as_array().unwrap().iter().cloned());
-        }
-        Value::from(said)
-    }
-
-    #[test]
-    fn a_plant_is_kept_cut_or_damaged_by_where_the_tool_went_out() {
-        for (out_mm, verdict) in [(1185.0, "kept"), (1215.0, "margin cut"), (1300.0, "damaged")] {
-            assert_eq!(judged(&[600.0, out_mm, 1520.0]), json!([[0, verdict], [1, true]]), "{out_mm}");
-        }
-        assert_eq!(judged(&[]), json!([[0, "kept"], [1, false]]));
-    }
-
-    #[test]
-    fn a_row_is_sown_ahead_as_it_is_asked_for() {
-        let sowing = json!({ "seed": 7, "spacingMm": 500, "weedShare": 1, "firstMm": 800 });
-        let begun = json!({ "cycle": 0, "things": [], "sowing": sowing });
-        serde_json::from_value::<Begun>(begun).unwrap().begin().unwrap();
-        let sown = || table(SOWN, <[f64]>::to_vec);
-        assert_eq!(sown()[..2], [0.0, 800.0]);
-        Different::SpeedKmH(2.5).take().unwrap();
-        Different::SpacingMm(300.0).take().unwrap();
-        Different::WeedShare(0.0).take().unwrap();
-        roll(16e6 * 5.0);
-        let places_mm: Vec<f64> = sown().chunks(3).map(|thing| thing[1]).collect();
-        assert!(places_mm.len() > 8 && places_mm.windows(2).all(|pair| (200.0..400.0).contains(&(pair[1] - pair[0]))));
-        roll(16e6 * 5.001);
-        assert_eq!(sown(), [0.0; 0]);
     }
 }

@@ -1,28 +1,27 @@
 // Flashing, for the operator: a board, a button, the progress, and the result.
 
-import { download, Parts } from "../dom.ts";
+import { download, type Parts } from "../dom.ts";
 import { choosePort, PortError, SerialLine, whyNoSerial } from "../link/serial.ts";
 import { sentence } from "../panel/machine.ts";
 import { chosen, keep } from "../preferences.ts";
 import { FLASH_BYTES } from "../uno/chip.ts";
 import { readHex, usedBytes } from "../uno/hex.ts";
 import { english, quantity, say, show, told } from "../words/words.ts";
-import { BOARDS, type Board } from "./boards.ts";
-import { Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
+import { BOARDS, type Board, Bootloader, FlashError, PAGE_BYTES, type Progress } from "./stk500.ts";
 
 export class Flasher {
     /** Called before a port is opened for flashing. The owner of the port must close it. */
     onBegin: (port: SerialPort) => Promise<void> = async () => {};
     /** The operator wants to work with the board that was just flashed. */
     onWork: (port: SerialPort) => void = () => {};
-    readonly #parts: Parts;
     readonly #image: Uint8Array;
     #flashed: SerialPort | undefined;
     #isBusy = false;
 
-    constructor(root: HTMLElement, hex: string) {
-        const parts = new Parts(root);
-        this.#parts = parts;
+    constructor(
+        private readonly parts: Parts,
+        hex: string,
+    ) {
         const flash = readHex(hex, FLASH_BYTES);
         // Whole pages: the rest of the last one is erased.
         this.#image = flash.subarray(0, Math.ceil(usedBytes(flash) / PAGE_BYTES) * PAGE_BYTES);
@@ -52,10 +51,10 @@ export class Flasher {
         const board = BOARDS.find((board) => board.id === id);
         if (!board || this.#isBusy) return;
         this.#isBusy = true;
-        const flash = this.#parts.get("flash", HTMLButtonElement);
+        const flash = this.parts.get("flash", HTMLButtonElement);
         // It keeps the focus.
         flash.ariaDisabled = "true";
-        this.#parts.html("to-work").hidden = true;
+        this.parts.html("to-work").hidden = true;
         this.#say("", () => "");
         try {
             const port = await choosePort();
@@ -72,15 +71,14 @@ export class Flasher {
                 const done = say("flashed", { count: this.#image.length, time: quantity(seconds, "second", 1) });
                 return board.isOld ? `${done} ${say("oldBootloader")}` : done;
             });
-            this.#parts.html("to-work").hidden = false;
+            this.parts.html("to-work").hidden = false;
         } catch (error) {
-            const why = error instanceof Error ? error.message : String(error);
-            this.#say("failed", () => say("notFlashed", { why: told(why) }));
+            this.#say("failed", () => say("notFlashed", { why: told(error) }));
             if (!(error instanceof PortError || error instanceof FlashError)) throw error;
         } finally {
             this.#isBusy = false;
             flash.ariaDisabled = null;
-            this.#parts.html("progress").hidden = true;
+            this.parts.html("progress").hidden = true;
         }
     }
 
@@ -104,12 +102,12 @@ export class Flasher {
     }
 
     #show({ phase, share }: Progress): void {
-        const bar = this.#parts.get("bar", HTMLProgressElement);
-        this.#parts.html("progress").hidden = false;
+        const bar = this.parts.get("bar", HTMLProgressElement);
+        this.parts.html("progress").hidden = false;
         if (phase === "waiting") bar.removeAttribute("value");
         else bar.value = share;
         const percent = { share: quantity(share * 100, "percent") };
-        this.#parts.write(
+        this.parts.write(
             "phase",
             phase === "waiting"
                 ? say("phaseWaiting")
@@ -118,7 +116,7 @@ export class Flasher {
     }
 
     #say(kind: "done" | "failed" | "", text: () => string): void {
-        const said = this.#parts.html("flash-said");
+        const said = this.parts.html("flash-said");
         said.className = kind;
         // Commands are printed between backticks.
         show(said, () => {

@@ -4,8 +4,25 @@
 // two after a reset. Addresses are in words. Optiboot and its predecessor erase each page before they write it.
 
 import { type PortError, type SerialLine, wait } from "../link/serial.ts";
-import { english } from "../words/words.ts";
-import type { Board } from "./boards.ts";
+import { english, type Plain } from "../words/words.ts";
+
+/** A board that can be flashed. The boards differ in their bootloader alone. */
+export interface Board {
+    readonly id: string;
+    /** Its common name, or the key of a text. */
+    readonly name: string | { readonly text: Plain };
+    /** The bootloader's rate in bits a second, and the flash that remains for the firmware, of 32 KiB. */
+    readonly baud: number;
+    readonly roomBytes: number;
+    /** Whether its bootloader is the one before optiboot. */
+    readonly isOld: boolean;
+}
+
+export const BOARDS: readonly Board[] = [
+    { id: "uno", name: "Arduino Uno", baud: 115_200, roomBytes: 32_256, isOld: false },
+    { id: "nano", name: "Arduino Nano", baud: 115_200, roomBytes: 32_256, isOld: false },
+    { id: "old", name: { text: "oldBoard" }, baud: 57_600, roomBytes: 30_720, isOld: true },
+];
 
 /** An error of flashing, and what to do. */
 export class FlashError extends Error {}
@@ -56,15 +73,14 @@ const RESETS = 2;
 const TRIES = 3;
 
 export class Bootloader {
-    readonly #line: SerialLine;
-    readonly #board: Board;
     #received: number[] = [];
     #gone: PortError | undefined;
     #arrived = () => {};
 
-    constructor(line: SerialLine, board: Board) {
-        this.#line = line;
-        this.#board = board;
+    constructor(
+        private readonly line: SerialLine,
+        private readonly board: Board,
+    ) {
         line.onBytes = (bytes) => {
             // Another device may send without end: limits the buffer.
             if (this.#received.length < 4096) this.#received.push(...bytes);
@@ -112,7 +128,7 @@ export class Bootloader {
         const heard: number[] = [];
         for (let reset = 0; reset < RESETS; reset++) {
             this.#received = [];
-            await this.#line.reset();
+            await this.line.reset();
             for (let call = 0; call < CALLS; call++) {
                 heard.push(...this.#received);
                 if ((await this.#hears(heard)) && (await this.#isQuiet()) && (await this.#hears(heard))) return;
@@ -124,7 +140,7 @@ export class Bootloader {
     /** Whether the bootloader answers a sync command. Other input is added to `heard`. */
     async #hears(heard: number[]): Promise<boolean> {
         this.#received = [];
-        await this.#line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
+        await this.line.write(Uint8Array.of(GET_SYNC, CRC_EOP));
         const answer = await this.#take(2, CALL_MS);
         if (answer?.[0] === INSYNC && answer[1] === OK) return true;
         heard.push(...(answer ?? []));
@@ -156,7 +172,7 @@ export class Bootloader {
 
     /** Why no bootloader answered, and what to do. */
     #whoIsThere(heard: string): string {
-        const { baud, isOld } = this.#board;
+        const { baud, isOld } = this.board;
         const other = english(isOld ? "otherIsUno" : "otherIsOld");
         const text = heard.replaceAll(/[^ -~]+/g, " ").trim();
         if (text.includes("weeder ")) return english("firmwareAnswers", { other });
@@ -180,7 +196,7 @@ export class Bootloader {
     /** Sends a command and returns the data of its answer. */
     async #command(bytes: number[], answerBytes: number): Promise<number[]> {
         this.#received = [];
-        await this.#line.write(Uint8Array.of(...bytes, CRC_EOP));
+        await this.line.write(Uint8Array.of(...bytes, CRC_EOP));
         const answer = await this.#take(answerBytes + 2, ANSWER_MS);
         if (answer?.[0] === INSYNC && answer.at(-1) === OK) return answer.slice(1, -1);
         throw new FlashError(

@@ -4,11 +4,11 @@
 // Commands are composed where they are typed. Their words are in the firmware's help.
 
 import { ask } from "../core.ts";
-import { type ConsoleLine, EVENT_NAMES, type EventLine, type Setting } from "./console_line.ts";
+import type { ConsoleLine, EventLine, Setting } from "./console_line.ts";
 
 /** Whether it is an event, and not a part of an answer. */
 export function isEvent(said: ConsoleLine): said is EventLine {
-    return EVENT_NAMES.some((is) => is === said.is);
+    return "isEvent" in said;
 }
 
 /** Reads a line. */

@@ -21,25 +21,12 @@ export class Log {
         this.#from ??= nowMs;
         const write = (kind: string, line: string) =>
             this.#write(Math.round(nowMs - (this.#from ?? nowMs)), kind, line);
-        switch (happening.is) {
-            case "connected":
-                write("connected", happening.version);
-                for (const { name, value } of happening.settings) write("setting", `${name}=${value}`);
-                for (const example of happening.examples) write("example", example);
-                break;
-            case "lost":
-                write("lost", happening.why);
-                break;
-            case "event":
-                write("event", happening.line);
-                break;
-            case "status":
-            case "command":
-            case "answer":
-                write(happening.is, happening.line);
-                break;
-            default:
-        }
+        if (happening.is === "connected") {
+            write("connected", happening.version);
+            for (const { name, value } of happening.settings) write("setting", `${name}=${value}`);
+            for (const example of happening.examples) write("example", example);
+        } else if (happening.is === "lost") write("lost", happening.why);
+        else if ("line" in happening && happening.is !== "started") write(happening.is, happening.line);
     }
 
     /** The file. */

@@ -54,21 +54,23 @@ type Message = (About & { machine: number }) | { is: "beat" | "dropped" };
 
 export class Served {
     readonly machines: readonly ServedMachine[];
-    readonly allowed: Allowed;
     #events: EventSource | undefined;
     #heardMs = 0;
 
     /** Asks the computer for its machines. */
     static async open(): Promise<Served> {
         const answer = await fetch("/machines");
-        if (!answer.ok) throw new Error(await answer.text());
-        const { machines, ...allowed } = (await answer.json()) as Allowed & { machines: string[] };
-        return new Served(machines, allowed);
+        const text = await answer.text();
+        if (!answer.ok) throw new Error(text);
+        return new Served(text, JSON.parse(text));
     }
 
-    private constructor(names: readonly string[], allowed: Allowed) {
-        this.machines = names.map((name, number) => new ServedMachine(number, name));
-        this.allowed = allowed;
+    /** `text` is the computer's answer. */
+    private constructor(
+        private readonly text: string,
+        readonly allowed: Allowed & { machines: string[] },
+    ) {
+        this.machines = allowed.machines.map((name, number) => new ServedMachine(number, name));
     }
 
     /** Starts to receive the events. */
@@ -113,19 +115,9 @@ export class Served {
     async #again(): Promise<void> {
         const answer = await fetch("/machines").catch(() => undefined);
         // A new start of `weeder serve` has another code, so it answers with the form. It may have other machines.
-        if (answer?.status === 401 || (answer?.ok && !this.#isSame(await answer.text()))) location.reload();
+        if (answer?.status === 401 || (answer?.ok && (await answer.text()) !== this.text)) location.reload();
         else if (answer?.ok) this.listen();
         else setTimeout(() => void this.#again(), RETRY_MS);
-    }
-
-    #isSame(text: string): boolean {
-        const { machines, mayStart, mayChange } = JSON.parse(text) as Allowed & { machines: string[] };
-        const { allowed } = this;
-        return (
-            mayStart === allowed.mayStart &&
-            mayChange === allowed.mayChange &&
-            machines.join("\n") === this.machines.map(({ name }) => name).join("\n")
-        );
     }
 }
 
@@ -134,17 +126,16 @@ export class ServedMachine implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Gets the reason if the machine was absent and still is. */
     onAbsent: (why: string) => void = () => {};
-    readonly name: string;
-    readonly #number: number;
     /** While it is connected: ends pending requests, with the reason. */
     #there: AbortController | undefined;
     /** Resolves when earlier commands are answered. A browser has few connections, and HOLD needs one at once. */
     #answered: Promise<unknown> = Promise.resolve();
     #holds = 0;
 
-    constructor(number: number, name: string) {
-        [this.#number, this.name] = [number, name];
-    }
+    constructor(
+        private readonly number: number,
+        readonly name: string,
+    ) {}
 
     ask(command: string): Promise<string[]> {
         const holds = this.#holds;
@@ -203,7 +194,7 @@ export class ServedMachine implements Link {
         if (!signal) throw new NoMachine(english("servedNotThere"));
         this.onHappening({ is: "command", line });
         const request = { method: "POST", body: line, signal };
-        const answer = await fetch(`/machines/${this.#number}/command`, request)
+        const answer = await fetch(`/machines/${this.number}/command`, request)
             .then((response) => response.text())
             .catch((error) => {
                 throw error instanceof NoMachine ? error : new NoMachine(SILENT);

@@ -5,7 +5,8 @@
 // After every start of the Uno it asks for version, settings and examples, and turns the events on. `hold` does not wait. A
 // session ends with its wire.
 
-import type { EventLine, Setting, Status } from "./console_line.ts";
+import { reason } from "../words/words.ts";
+import type { EventLine, Line, Setting } from "./console_line.ts";
 import { isEvent, read, settingsOf } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
@@ -41,7 +42,7 @@ export type Happening =
     | { is: "connected"; version: string; settings: readonly Setting[]; examples: readonly string[] }
     /** The machine is lost: for good, as the operator wanted or not, or until it has restarted. */
     | { is: "lost"; why: string; forGood: boolean; isWanted: boolean }
-    | { is: "status"; status: Status; line: string }
+    | { is: "status"; status: Line<"status">; line: string }
     /** The machine sent an event line. */
     | { is: "event"; event: EventLine; line: string }
     | { is: "command"; line: string }
@@ -107,7 +108,9 @@ export class Session implements Link {
         this.#wire = wire;
         [this.#now, this.#turnedAt] = [now, now];
         this.#greetingBy = resets ? now + BOOT_MS : now;
-        wire.onText = (text) => this.#hear(text);
+        wire.onText = (text) => {
+            for (const line of this.#lines.take(text)) this.#take(line);
+        };
         wire.onEnd = (why) => this.#end(why);
     }
 
@@ -177,7 +180,7 @@ export class Session implements Link {
             } catch (error) {
                 if (this.#ended || beginning !== this.#beginnings) return;
                 if (tries === TRIES) {
-                    this.#end(error instanceof Error ? error.message : String(error));
+                    this.#end(reason(error));
                     return;
                 }
             }
@@ -241,15 +244,13 @@ export class Session implements Link {
         return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
     }
 
-    #hear(text: string): void {
-        for (const line of this.#lines.take(text)) this.#take(line);
-    }
-
     #take(line: string): void {
         if (this.#ended) return;
         const said = read(line);
         if (said.is === "greeting") {
-            this.#restart(line);
+            // Pending commands will not be answered.
+            this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
+            this.onHappening({ is: "started", line });
             return;
         }
         if (isEvent(said)) {
@@ -272,12 +273,6 @@ export class Session implements Link {
             question.done(question.answer);
             if (question.isTyped) this.#follow(question.command).catch(() => {});
         }
-    }
-
-    /** The Uno has started: pending commands will not be answered. */
-    #restart(greeting: string): void {
-        this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
-        this.onHappening({ is: "started", line: greeting });
     }
 
     /** Drops all questions, and asks for version, settings and examples. */

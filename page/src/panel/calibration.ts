@@ -11,14 +11,14 @@ import type { Machine } from "./machine.ts";
 type Place = "in" | "out";
 
 export class Calibration {
-    readonly #parts: Parts;
-    readonly #machine: Machine;
-    readonly #ask: Ask;
     /** The position at the stretch's beginning. */
     #from: number | undefined;
 
-    constructor(parts: Parts, machine: Machine, ask: Ask) {
-        [this.#parts, this.#machine, this.#ask] = [parts, machine, ask];
+    constructor(
+        private readonly parts: Parts,
+        private readonly machine: Machine,
+        private readonly ask: Ask,
+    ) {
         parts.button("wheel-begin", () => void this.#begin());
         parts.button("wheel-end", () => void this.#end(""));
         parts.button("wheel-force", () => void this.#end(" force"));
@@ -41,17 +41,17 @@ export class Calibration {
                 void this.#byHand(pulse.value);
             });
         pulse.addEventListener("change", () => void this.#byHand(pulse.value));
-        parts.button("servo-time", () => void this.#time());
+        parts.button("servo-time", () => void this.#do("servo-said", "calibrate servo", () => say("swingsSix")));
         parts.button("servo-leads", () => void this.#leads());
         parts.button("servo-save", () => void this.#do("servo-said", "save", () => say("isSavedNow")));
     }
 
     /** Shows the values that change while the machine rolls. */
     show(): void {
-        const { status, tickMm } = this.#machine;
+        const { status, tickMm } = this.machine;
         const isOn = this.#from !== undefined && status !== undefined;
         const rolledMm = isOn ? (status.position - (this.#from ?? 0)) * tickMm : 0;
-        this.#parts.write(
+        this.parts.write(
             "wheel-rolled",
             isOn ? say("rolled", { distance: quantity(rolledMm / 1000, "meter", 2) }) : say("notBegun"),
         );
@@ -59,10 +59,10 @@ export class Calibration {
 
     /** The settings have changed. */
     showSettings(): void {
-        this.#parts.get("servo-pulse", HTMLInputElement).value ||= String(this.#machine.setting("servo_out_us"));
+        this.parts.get("servo-pulse", HTMLInputElement).value ||= String(this.machine.setting("servo_out_us"));
         for (const name of ["lead_out_ms", "lead_in_ms"]) {
-            const input = this.#parts.get(name, HTMLInputElement);
-            if (document.activeElement !== input) input.value = String(this.#machine.setting(name));
+            const input = this.parts.get(name, HTMLInputElement);
+            if (document.activeElement !== input) input.value = String(this.machine.setting(name));
         }
     }
 
@@ -73,32 +73,32 @@ export class Calibration {
         else if (event.is === "calibratedByEye") text = "timedByEye";
         else if (event.is === "notCalibrated") text = "notTimed";
         else return;
-        this.#parts.say("servo-said", () => say(text));
+        this.parts.say("servo-said", () => say(text));
     }
 
     async #begin(): Promise<void> {
         if (!(await this.#do("wheel-said", "calibrate start", () => say("rollOn")))) return;
-        this.#from = this.#machine.status?.position;
+        this.#from = this.machine.status?.position;
     }
 
     async #end(force: string): Promise<void> {
-        const force_ = this.#parts.get("wheel-force", HTMLButtonElement);
+        const force_ = this.parts.get("wheel-force", HTMLButtonElement);
         force_.hidden = true;
-        const distance = this.#parts.get("wheel-mm", HTMLInputElement).value;
+        const distance = this.parts.get("wheel-mm", HTMLInputElement).value;
         try {
-            const said = (await this.#ask(`calibrate ${distance}${force}`)).map(read);
+            const said = (await this.ask(`calibrate ${distance}${force}`)).map(read);
             const measured = said.find((said) => said.is === "setting");
             const counts = () => (measured ? `${say("countsPerMetre", { count: measured.value })} ` : "");
-            this.#parts.say("wheel-said", () => `${counts()}${say("notSavedYet")}`);
+            this.parts.say("wheel-said", () => `${counts()}${say("notSavedYet")}`);
         } catch (error) {
-            this.#parts.say("wheel-said", () => told(error instanceof Error ? error.message : String(error)));
+            this.parts.say("wheel-said", () => told(error));
             force_.hidden = !(error instanceof Refused && error.message.includes("force"));
         }
     }
 
     async #move(place: Place): Promise<void> {
-        const pulse = this.#machine.setting(`servo_${place}_us`);
-        this.#parts.get("servo-pulse", HTMLInputElement).value = String(pulse);
+        const pulse = this.machine.setting(`servo_${place}_us`);
+        this.parts.get("servo-pulse", HTMLInputElement).value = String(pulse);
         await this.#do("servo-said", `servo ${place}`, () => say("toolHas", { pulse: String(pulse) }));
     }
 
@@ -106,26 +106,15 @@ export class Calibration {
         await this.#do("servo-said", `servo ${pulse}`, () => say("toolHas", { pulse }));
     }
 
-    async #time(): Promise<void> {
-        await this.#do("servo-said", "calibrate servo", () => say("swingsSix"));
-    }
-
     async #leads(): Promise<void> {
         for (const name of ["lead_out_ms", "lead_in_ms"]) {
-            const { value } = this.#parts.get(name, HTMLInputElement);
+            const { value } = this.parts.get(name, HTMLInputElement);
             if (!(await this.#do("servo-said", `set ${name} ${value}`, () => say("bothSet")))) return;
         }
     }
 
     /** Types a command and shows its result. Returns whether it succeeded. */
-    async #do(said: string, command: string, done: () => string): Promise<boolean> {
-        try {
-            await this.#ask(command);
-            this.#parts.say(said, done);
-            return true;
-        } catch (error) {
-            this.#parts.say(said, () => told(error instanceof Error ? error.message : String(error)));
-            return false;
-        }
+    #do(said: string, command: string, done: () => string): Promise<boolean> {
+        return this.parts.attempt(said, this.ask(command), done);
     }
 }

@@ -16,8 +16,6 @@ const TURN_MS = 20;
 export class Connection {
     /** Called after the port was closed, so that the operator can flash the machine. */
     onFlash: () => void = () => {};
-    readonly #parts: Parts;
-    readonly #panel: Panel;
     #port: SerialPort | undefined;
     /** Whether the port is open. */
     #isOpen = false;
@@ -25,9 +23,11 @@ export class Connection {
     /** Keeps a phone's screen on while a machine is connected. */
     #light: WakeLockSentinel | undefined;
 
-    constructor(parts: Parts, panel: Panel) {
-        [this.#parts, this.#panel] = [parts, panel];
-        parts.button("connect", () => void this.#choose());
+    constructor(
+        private readonly parts: Parts,
+        private readonly panel: Panel,
+    ) {
+        parts.button("connect", () => void this.#attempt(() => this.#choose()));
         parts.button("disconnect", () => void this.disconnect());
         const why = whyNoSerial();
         parts.html("no-serial").hidden = why === undefined;
@@ -56,29 +56,20 @@ export class Connection {
         this.#show();
     }
 
-    /** Whether a machine may be connected. */
-    get isOpen(): boolean {
-        return this.#isOpen;
-    }
-
     /** Opens a port and talks to its machine. */
     async connect(port: SerialPort): Promise<void> {
         if (this.#isBusy) return;
         this.#isBusy = true;
-        try {
+        await this.#attempt(async () => {
             await this.disconnect();
             const line = await SerialLine.open(port, BAUD);
             [this.#port, this.#isOpen] = [port, true];
             const now = performance.now();
-            this.#panel.connect(new Session(wireOf(line), now, true), now);
+            this.panel.connect(new Session(wireOf(line), now, true), now);
             this.#say(() => say("waitingForAnswer"));
-        } catch (error) {
-            if (!(error instanceof PortError)) throw error;
-            this.#say(() => say("notConnected", { why: told(error.message) }));
-        } finally {
-            this.#isBusy = false;
-            this.#show();
-        }
+        });
+        this.#isBusy = false;
+        this.#show();
     }
 
     /** Closes the port. */
@@ -86,7 +77,7 @@ export class Connection {
         this.#port = undefined;
         if (!this.#isOpen) return;
         this.#isOpen = false;
-        await this.#panel.disconnect();
+        await this.panel.disconnect();
         this.#show();
     }
 
@@ -102,25 +93,28 @@ export class Connection {
     }
 
     async #choose(): Promise<void> {
-        try {
-            const port = await choosePort();
-            if (port) await this.connect(port);
-            else this.#say(() => told(english("noPort")));
-        } catch (error) {
+        const port = await choosePort();
+        if (port) await this.connect(port);
+        else this.#say(() => told(english("noPort")));
+    }
+
+    /** Does something with a port, and shows the port's error. */
+    async #attempt(work: () => Promise<void>): Promise<void> {
+        await work().catch((error) => {
             if (!(error instanceof PortError)) throw error;
-            this.#say(() => say("notConnected", { why: told(error.message) }));
-        }
+            this.#say(() => say("notConnected", { why: told(error) }));
+        });
     }
 
     #say(text: () => string): void {
-        this.#parts.say("connection-said", () => text().replaceAll("`", ""));
+        this.parts.say("connection-said", () => text().replaceAll("`", ""));
     }
 
     #show(): void {
         void this.#stayLit();
-        this.#parts.html("connect").hidden = this.#isOpen;
-        this.#parts.html("connect-hint").hidden = this.#isOpen;
-        this.#parts.html("disconnect").hidden = !this.#isOpen;
+        this.parts.html("connect").hidden = this.#isOpen;
+        this.parts.html("connect-hint").hidden = this.#isOpen;
+        this.parts.html("disconnect").hidden = !this.#isOpen;
     }
 }
 

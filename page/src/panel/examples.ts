@@ -12,14 +12,14 @@ const PLACES = 32;
 type Label = "plant" | "weed";
 
 export class Examples {
-    readonly #parts: Parts;
-    readonly #machine: Machine;
-    readonly #ask: Ask;
     /** The label that was refused, and can be insisted on. */
     #refused: Label | undefined;
 
-    constructor(parts: Parts, machine: Machine, ask: Ask) {
-        [this.#parts, this.#machine, this.#ask] = [parts, machine, ask];
+    constructor(
+        private readonly parts: Parts,
+        private readonly machine: Machine,
+        private readonly ask: Ask,
+    ) {
         parts.button("teach-plant", () => void this.#teach("plant", ""));
         parts.button("teach-weed", () => void this.#teach("weed", ""));
         parts.button("teach-force", () => this.#refused && void this.#teach(this.#refused, " force"));
@@ -29,13 +29,13 @@ export class Examples {
 
     /** Shows the last object. */
     show(): void {
-        const [last] = this.#machine.objects;
-        this.#parts.write(
+        const [last] = this.machine.objects;
+        this.parts.write(
             "last-object",
             last
                 ? say("lastObject", {
                       class: say(last.class),
-                      width: quantity(this.#machine.widthMm(last), "millimeter"),
+                      width: quantity(this.machine.widthMm(last), "millimeter"),
                       count: last.votes,
                   })
                 : say("nothingSeen"),
@@ -44,11 +44,11 @@ export class Examples {
 
     /** Shows the examples as they are known. */
     showExamples(): void {
-        const field = this.#machine.examples
+        const field = this.machine.examples
             .map(read)
             .flatMap((said) => (said.is === "example" && said.fromField ? [said] : []));
-        this.#parts.write("examples-count", say("places", { count: field.length, all: PLACES }));
-        this.#parts.html("examples-list").replaceChildren(
+        this.parts.write("examples-count", say("places", { count: field.length, all: PLACES }));
+        this.parts.html("examples-list").replaceChildren(
             ...field.map(({ number, label }) => {
                 const forget = make("button", "needs-change", say("forget"));
                 forget.type = "button";
@@ -56,43 +56,35 @@ export class Examples {
                 forget.addEventListener("click", () => void this.#forget(String(number)));
                 return make(
                     "li",
-                    "",
+                    "across",
                     make("span", "", `${number}: ${label === "plant" || label === "weed" ? say(label) : label}`),
                     forget,
                 );
             }),
         );
-        this.#parts.get("examples-forget", HTMLButtonElement).disabled = field.length === 0;
+        this.parts.get("examples-forget", HTMLButtonElement).disabled = field.length === 0;
     }
 
     async #teach(label: Label, force: string): Promise<void> {
         this.#refused = undefined;
         try {
-            await this.#ask(`label ${label}${force}`);
-            this.#say(() => say(label === "plant" ? "taughtPlant" : "taughtWeed"));
+            await this.ask(`label ${label}${force}`);
+            this.parts.say("teach-said", () => say(label === "plant" ? "taughtPlant" : "taughtWeed"));
         } catch (error) {
-            this.#say(() => told(error instanceof Error ? error.message : String(error)));
+            this.parts.say("teach-said", () => told(error));
             if (error instanceof Refused && error.message.includes("force")) this.#refused = label;
         }
-        const insist = this.#parts.get("teach-force", HTMLButtonElement);
+        const insist = this.parts.get("teach-force", HTMLButtonElement);
         insist.hidden = this.#refused === undefined;
         show(insist, () => say((this.#refused ?? label) === "plant" ? "isPlant" : "isWeed"));
     }
 
-    async #forget(which: string): Promise<void> {
-        try {
-            await this.#ask(`forget ${which}`);
-        } catch (error) {
-            this.#say(() => told(error instanceof Error ? error.message : String(error)));
-        }
+    #forget(which: string): Promise<boolean> {
+        return this.parts.attempt("teach-said", this.ask(`forget ${which}`));
     }
 
     async #read(): Promise<void> {
-        this.#machine.examples = await this.#ask("examples");
+        this.machine.examples = await this.ask("examples");
         this.showExamples();
-    }
-
-    #say(text: () => string): void {
-        this.#parts.say("teach-said", text);
     }
 }

@@ -1,27 +1,20 @@
 // The state of the machine at the other end of the wire, updated by events, with its texts for the operator.
 
 import faults from "faults.json";
-import type { Detection, EventLine, Mode, Setting, Status } from "../link/console_line.ts";
+import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
 /** Objects that are remembered. */
 const OBJECTS = 50;
 
-/** The manual's entry for an alarm or a warning. */
-export interface Fault {
-    readonly name: string;
-    /** Its common name: for an alarm, the digits that the lamp blinks and the word, as in "3-1 too_fast". */
-    readonly title: string;
-    readonly cause: string;
-    readonly advice: string;
-}
-
-/** The manual's entry for an alarm or a warning. An unknown one refers to the manual. */
-export function fault(name: string): Fault {
-    const unknown = { name, title: name, cause: "", advice: say("lookItUp") };
-    const found = faults.find((fault) => fault.name === name) ?? unknown;
-    return { ...found, advice: advice(name) ?? found.advice };
+/**
+ * The manual's entry for an alarm or a warning. Its title is its common name: for an alarm, the digits that the lamp
+ * blinks and the word, as in "3-1 too_fast". An unknown one refers to the manual.
+ */
+export function fault(name: string): { title: string; advice: string } {
+    const found = faults.find((fault) => fault.name === name) ?? { title: name, advice: say("lookItUp") };
+    return { title: found.title, advice: advice(name) ?? found.advice };
 }
 
 /** Why the tool is out at work, in words for the operator. */
@@ -48,15 +41,15 @@ export class Machine {
     alarm: string | undefined;
     /** The last warning's name. */
     warning: string | undefined;
-    status: Status | undefined;
+    status: Line<"status"> | undefined;
     /** When the status came. */
     statusMs = 0;
     settings: readonly Setting[] = [];
     help: ReadonlyMap<string, string> = new Map();
     examples: readonly string[] = [];
     /** The last detections, the newest first, and those with a zone that the machine still stores. */
-    objects: Detection[] = [];
-    zones: Detection[] = [];
+    objects: Line<"detection">[] = [];
+    zones: Line<"detection">[] = [];
 
     /** Takes an event at a time. */
     take(happening: Happening, nowMs: number): void {
@@ -144,7 +137,7 @@ export class Machine {
     }
 
     /** How wide an object was. */
-    widthMm({ hold }: Detection): number {
+    widthMm({ hold }: Line<"detection">): number {
         return hold * this.tickMm - 2 * this.setting("margin_mm");
     }
 

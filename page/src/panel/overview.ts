@@ -7,36 +7,30 @@ import { quantity, say, show, told } from "../words/words.ts";
 import { fault } from "./machine.ts";
 import type { Panel } from "./panel.ts";
 
-export class Overview {
-    readonly #states: HTMLElement[];
-
-    /** Fills an element. A row's name leads to its panel. */
-    constructor(into: HTMLElement, names: readonly string[], holdAll: () => Promise<HeldAll>) {
-        this.#states = names.map(() => make("span", "overview-state"));
-        const rows = this.#states.map((state, row) => {
-            const link = make("button", "", names[row] ?? "");
-            link.type = "button";
-            link.addEventListener("click", () => into.parentElement?.children[row + 1]?.scrollIntoView());
-            return make("li", "", link, state);
-        });
-        const hold = make("button", "hold-all");
-        hold.type = "button";
-        show(hold, () => say("holdAll"));
-        const said = make("p", "overview-said");
-        said.role = "status";
-        hold.addEventListener("click", () => {
-            show(said, () => say("waitingForAll"));
-            holdAll().then(
-                (held) => show(said, () => inWords(held)),
-                (error: Error) => show(said, () => say("holdFailed", { why: told(error.message) })),
-            );
-        });
-        into.append(make("ul", "", ...rows), make("div", "hold-bar", said, hold));
-    }
-
-    /** Shows the changes. */
-    show(panels: readonly Panel[]): void {
-        for (const [row, state] of this.#states.entries()) {
+/** Fills an element. A row's name leads to its panel. Returns a function that shows the changes. */
+export function overview(into: HTMLElement, names: readonly string[], holdAll: () => Promise<HeldAll>) {
+    const states = names.map(() => make("span", "overview-state"));
+    const rows = states.map((state, row) => {
+        const link = make("button", "", names[row] ?? "");
+        link.type = "button";
+        link.addEventListener("click", () => into.parentElement?.children[row + 1]?.scrollIntoView());
+        return make("li", "", link, state);
+    });
+    const hold = make("button", "hold-all");
+    hold.type = "button";
+    show(hold, () => say("holdAll"));
+    const said = make("p", "overview-said");
+    said.role = "status";
+    hold.addEventListener("click", () => {
+        show(said, () => say("waitingForAll"));
+        holdAll().then(
+            (held) => show(said, () => inWords(held)),
+            (error) => show(said, () => say("holdFailed", { why: told(error) })),
+        );
+    });
+    into.append(make("ul", "", ...rows), make("div", "hold-bar", said, hold));
+    return (panels: readonly Panel[]) => {
+        for (const [row, state] of states.entries()) {
             const machine = panels[row]?.machine;
             if (!machine) continue;
             const { alarm, stateWord: word } = machine;
@@ -44,7 +38,7 @@ export class Overview {
             if (state.textContent !== text) state.textContent = text;
             if (state.dataset.state !== machine.state) state.dataset.state = machine.state;
         }
-    }
+    };
 }
 
 /** The result of a HOLD to all. Machines that have not obeyed come first. */

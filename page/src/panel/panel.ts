@@ -177,44 +177,18 @@ export class Panel {
         this.#signal(happening, this.machine.alarm !== alarm);
         this.#log.add(happening, this.#now);
         this.#setUp.take(happening);
-        switch (happening.is) {
-            case "started":
-                this.#console.add(happening.line, "happened");
-                break;
-            case "connected":
-                this.#console.add(`connected to weeder ${happening.version}`, "happened");
-                this.#parts.write("drive-said", "");
-                this.#showConnected();
-                this.#settings.show();
-                this.#calibration.showSettings();
-                this.#examples.showExamples();
-                break;
-            case "lost":
-                this.#console.add(happening.why, "happened");
-                this.#showConnected();
-                break;
-            case "examples":
-                this.#examples.showExamples();
-                break;
-            case "settings":
-            case "help":
-                this.#settings.show();
-                this.#calibration.showSettings();
-                break;
-            case "event":
-                if (happening.event.is === "plot") break;
-                this.#calibration.take(happening.event);
-                if (happening.event.is === "state") this.#parts.write("drive-said", "");
-                this.#console.add(happening.line, happening.event.is === "alarm" ? "error" : "");
-                break;
-            case "command":
-                this.#console.add(`> ${happening.line}`, "typed");
-                break;
-            case "answer":
-                this.#console.add(happening.line, happening.line.startsWith("error:") ? "error" : "");
-                break;
-            default:
+        const { is } = happening;
+        if (is === "connected" || (is === "event" && happening.event.is === "state"))
+            this.#parts.write("drive-said", "");
+        if (is === "event") this.#calibration.take(happening.event);
+        if (is === "connected" || is === "lost") this.#showConnected();
+        if (is === "connected" || is === "settings" || is === "help") {
+            this.#settings.show();
+            this.#calibration.showSettings();
         }
+        if (is === "connected" || is === "examples") this.#examples.showExamples();
+        const said = inConsole(happening);
+        if (said) this.#console.add(...said);
         this.onHappening(happening);
     }
 
@@ -260,7 +234,7 @@ export class Panel {
     }
 
     #say(error: unknown): void {
-        this.#parts.say("drive-said", () => sentence(told(error instanceof Error ? error.message : String(error))));
+        this.#parts.say("drive-said", () => sentence(told(error)));
     }
 
     #wireTabs(name: string, tabs: readonly (typeof TABS)[number][]): void {
@@ -290,6 +264,27 @@ export class Panel {
             });
         }
         choose("console");
+    }
+}
+
+/** The line of the console about an event, and its kind. */
+function inConsole(happening: Happening): Parameters<Console["add"]> | undefined {
+    switch (happening.is) {
+        case "started":
+            return [happening.line, "happened"];
+        case "connected":
+            return [`connected to weeder ${happening.version}`, "happened"];
+        case "lost":
+            return [happening.why, "happened"];
+        case "event":
+            if (happening.event.is === "plot") return undefined;
+            return [happening.line, happening.event.is === "alarm" ? "error" : ""];
+        case "command":
+            return [`> ${happening.line}`, "typed"];
+        case "answer":
+            return [happening.line, happening.line.startsWith("error:") ? "error" : ""];
+        default:
+            return undefined;
     }
 }
 

@@ -3,8 +3,8 @@
 
 import { make } from "../dom.ts";
 import { Served } from "../link/served.ts";
-import { onLanguage, say } from "../words/words.ts";
-import { Overview } from "./overview.ts";
+import { inLanguage, say } from "../words/words.ts";
+import { overview } from "./overview.ts";
 import { Panel } from "./panel.ts";
 
 /** Time between two turns. */
@@ -14,27 +14,23 @@ const TURN_MS = 20;
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
     const all = make("section", "overview");
-    const label = () => {
+    inLanguage(() => {
         all.ariaLabel = say("allRows");
-    };
-    label();
-    onLanguage(label);
+    });
     const names = served.machines.map(({ name }) => name);
-    const overview = names.length > 1 ? new Overview(all, names, () => served.holdAll()) : undefined;
-    if (overview) into.append(all);
+    const showAll = names.length > 1 ? overview(all, names, () => served.holdAll()) : undefined;
+    if (showAll) into.append(all);
     const panels = served.machines.map((machine, number) => {
         const { name } = machine;
-        const element = make("div", overview ? "panel" : "panel alone");
-        const section = make("section", "served", make("h2", "", name), element);
+        const element = make("div", showAll ? "panel stack" : "panel stack alone");
+        const section = make("section", "served stack", make("h2", "", name), element);
         section.ariaLabel = name;
         into.append(section);
-        const panel = new Panel(element, `served-${number}`, served.allowed, overview ? name : "");
+        const panel = new Panel(element, `served-${number}`, served.allowed, showAll ? name : "");
         // Read out, they say whose parts they are.
-        const label = () => {
+        inLanguage(() => {
             for (const part of element.querySelectorAll("section")) part.ariaLabel = `${name}: ${part.ariaLabel}`;
-        };
-        label();
-        onLanguage(label);
+        });
         panel.connect(machine, performance.now());
         machine.onAbsent = (why) => {
             panel.machine.lost = why;
@@ -44,7 +40,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     setInterval(() => {
         served.watch();
         for (const panel of panels) panel.turn(performance.now());
-        overview?.show(panels);
+        showAll?.(panels);
     }, TURN_MS);
     served.listen();
     return panels;

@@ -1,5 +1,5 @@
 // Setting up the machine: the steps of the manual, the next measurement, and the least margin. The project's Rust has
-// the steps and calculates the margin (host/page/src/set_up.rs). This module stores the session's lines for it.
+// the steps and calculates the margin (host/page/src/console.rs). This module stores the session's lines for it.
 
 import { ask as askRust } from "../core.ts";
 import { make, type Parts } from "../dom.ts";
@@ -24,21 +24,16 @@ const LINES = 200;
 const PLANTS = 12;
 
 export class SetUp {
-    readonly #parts: Parts;
-    readonly #machine: Machine;
     #lines: string[] = [];
 
-    constructor(parts: Parts, machine: Machine, ask: Ask) {
-        [this.#parts, this.#machine] = [parts, machine];
-        parts.button("margin-set", async () => {
-            const { marginMm } = this.#advice();
-            if (marginMm === null) return;
-            try {
-                await ask(`set margin_mm ${marginMm}`);
-                await ask("save");
-            } catch (error) {
-                parts.say("margin-said", () => told(error instanceof Error ? error.message : String(error)));
-            }
+    constructor(
+        private readonly parts: Parts,
+        private readonly machine: Machine,
+        ask: Ask,
+    ) {
+        parts.button("margin-set", () => {
+            const set = ask(`set margin_mm ${this.#advice().marginMm}`).then(() => ask("save"));
+            void parts.attempt("margin-said", set);
         });
     }
 
@@ -46,7 +41,7 @@ export class SetUp {
     take(happening: Happening): void {
         const { is } = happening;
         if (is === "connected" || is === "settings")
-            for (const name of ["servo_in_us", "servo_out_us"]) this.#keep(`${name}=${this.#machine.setting(name)}`);
+            for (const name of ["servo_in_us", "servo_out_us"]) this.#keep(`${name}=${this.machine.setting(name)}`);
         else if (is === "command" && /^(calibrate|set margin_mm) /.test(happening.line))
             this.#keep(`> ${happening.line}`);
         else if (is === "answer" && read(happening.line).is === "setting") this.#keep(happening.line);
@@ -59,7 +54,7 @@ export class SetUp {
     /** Shows the steps and their state. */
     show(): void {
         const advice = this.#advice();
-        const list = this.#parts.html("set-up-steps");
+        const list = this.parts.html("set-up-steps");
         list.replaceChildren(
             ...advice.steps.map((manual) => {
                 const [title, how] = step(manual.title, manual.how);
@@ -69,13 +64,13 @@ export class SetUp {
         );
         const steps = advice.missing.map((step) => `${told(step)}.`).join(" ");
         const { next, warning } = advice;
-        this.#parts.write(
+        this.parts.write(
             "margin-said",
             next === null ? say("beforeMargin", { steps }) : say("next", { step: told(next) }),
         );
-        this.#parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
-        const button = this.#parts.get("margin-set", HTMLButtonElement);
-        button.hidden = advice.marginMm === null || advice.marginMm === this.#machine.setting("margin_mm");
+        this.parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
+        const button = this.parts.get("margin-set", HTMLButtonElement);
+        button.hidden = advice.marginMm === null || advice.marginMm === this.machine.setting("margin_mm");
         if (advice.marginMm !== null)
             button.textContent = say("setMargin", { margin: quantity(advice.marginMm, "millimeter") });
     }
@@ -90,7 +85,7 @@ export class SetUp {
     }
 
     #advice(): Advice {
-        const settings = Object.fromEntries(this.#machine.settings.map(({ name, value }) => [name, value]));
+        const settings = Object.fromEntries(this.machine.settings.map(({ name, value }) => [name, value]));
         return askRust<Advice>({ setUp: { lines: this.#lines, settings } });
     }
 }

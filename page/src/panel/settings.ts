@@ -6,25 +6,28 @@ import type { Setting } from "../link/console_line.ts";
 import { steps as order } from "../link/grammar.ts";
 import type { Ask } from "../link/session.ts";
 import { parse, range, SettingsFileError, write } from "../link/settings_file.ts";
-import { type Plain, say, settingHelp, told } from "../words/words.ts";
+import { type Plain, reason, say, settingHelp, told } from "../words/words.ts";
 import { type Machine, sentence } from "./machine.ts";
 
 export class SettingsForm {
-    readonly #parts: Parts;
-    readonly #machine: Machine;
-    readonly #ask: Ask;
     readonly #list: HTMLElement;
-    readonly #mayChange: boolean;
     /** The operator's values that the machine does not have yet, by name. */
     readonly #wanted = new Map<string, number>();
     readonly #problems = new Map<string, string>();
 
-    constructor(parts: Parts, machine: Machine, ask: Ask, mayChange: boolean) {
-        [this.#parts, this.#machine, this.#ask, this.#mayChange] = [parts, machine, ask, mayChange];
+    constructor(
+        private readonly parts: Parts,
+        private readonly machine: Machine,
+        private readonly ask: Ask,
+        private readonly mayChange: boolean,
+    ) {
         this.#list = parts.html("settings-list");
         parts.button("settings-send", () => void this.#send());
-        parts.button("settings-undo", () => this.#undo());
-        parts.button("settings-read", () => void this.#read());
+        parts.button("settings-undo", () => {
+            parts.write("settings-said", "");
+            this.#undo();
+        });
+        parts.button("settings-read", () => void this.#take("get", "areMachines"));
         parts.button("settings-defaults", () => void this.#take("defaults", "defaultsInUse"));
         parts.button("settings-revert", () => void this.#take("revert", "savedInUse"));
         parts.button("settings-save-file", () =>
@@ -37,12 +40,12 @@ export class SettingsForm {
 
     /** Shows the present values. The operator's changes stay. */
     show(): void {
-        for (const { name, value } of this.#machine.settings)
+        for (const { name, value } of this.machine.settings)
             if (this.#wanted.get(name) === value) this.#wanted.delete(name);
         // A field that is being edited keeps its cursor.
         const focused =
             document.activeElement instanceof HTMLElement ? document.activeElement.dataset.setting : undefined;
-        this.#list.replaceChildren(...this.#machine.settings.map((setting) => this.#row(setting)));
+        this.#list.replaceChildren(...this.machine.settings.map((setting) => this.#row(setting)));
         if (focused) this.#list.querySelector<HTMLElement>(`[data-setting="${focused}"]`)?.focus();
         this.#count();
     }
@@ -58,7 +61,7 @@ export class SettingsForm {
         const { name, unit, isSwitched, value, saved, least, greatest } = setting;
         const input = make("input", "");
         input.dataset.setting = name;
-        input.disabled = !this.#mayChange;
+        input.disabled = !this.mayChange;
         const wanted = this.#wanted.get(name) ?? value;
         const change = (value: number) => {
             this.#problems.delete(name);
@@ -87,15 +90,15 @@ export class SettingsForm {
                 ? ""
                 : `; ${saved === undefined ? say("notSaved") : say("isSaved", { value: shown(setting, saved) })}`;
         const inOwnWords = settingHelp(name);
-        const help = make("span", "", inOwnWords ?? this.#machine.help.get(name) ?? "");
+        const help = make("span", "", inOwnWords ?? this.machine.help.get(name) ?? "");
         // The machine speaks English.
         if (inOwnWords === undefined) help.lang = "en";
         const label = make(
             "label",
             "",
             make("span", "setting-name", name),
-            make("span", "setting-field", input, make("span", "unit", unit)),
-            make("span", "setting-help", help, ` (${told(range(setting))}${isSaved})`),
+            make("span", "setting-field across", input, make("span", "unit", unit)),
+            make("span", "setting-help aside", help, ` (${told(range(setting))}${isSaved})`),
         );
         const row = make("li", this.#wanted.has(name) ? "changed" : "", label);
         const problem = this.#problems.get(name);
@@ -105,38 +108,27 @@ export class SettingsForm {
 
     #count(): void {
         const { size } = this.#wanted;
-        this.#parts.get("settings-send", HTMLButtonElement).disabled = size === 0 && !this.#isUnsaved;
-        this.#parts.get("settings-undo", HTMLButtonElement).disabled = size === 0;
-        this.#parts.write("settings-send", size === 0 ? say("save") : say("sendAndSave", { count: size }));
+        this.parts.get("settings-send", HTMLButtonElement).disabled = size === 0 && !this.#isUnsaved;
+        this.parts.get("settings-undo", HTMLButtonElement).disabled = size === 0;
+        this.parts.write("settings-send", size === 0 ? say("save") : say("sendAndSave", { count: size }));
     }
 
     get #isUnsaved(): boolean {
-        return this.#machine.settings.some(({ value, saved }) => value !== saved);
+        return this.machine.settings.some(({ value, saved }) => value !== saved);
     }
 
-    #say(text?: () => string): void {
-        this.#parts.say("settings-said", text ?? (() => ""));
+    #say(text: () => string): void {
+        this.parts.say("settings-said", text);
     }
 
     #undo(): void {
         this.#wanted.clear();
         this.#problems.clear();
-        this.#say();
         this.show();
     }
 
-    async #read(): Promise<void> {
-        await this.#take("get", "areMachines");
-    }
-
     async #take(command: string, done: Plain): Promise<void> {
-        try {
-            await this.#ask(command);
-            this.#undo();
-            this.#say(() => say(done));
-        } catch (error) {
-            this.#say(() => told(String(error instanceof Error ? error.message : error)));
-        }
+        if (await this.parts.attempt("settings-said", this.ask(command), () => say(done))) this.#undo();
     }
 
     /**
@@ -145,7 +137,7 @@ export class SettingsForm {
      */
     async #send(): Promise<boolean> {
         this.#problems.clear();
-        const { settings } = this.#machine;
+        const { settings } = this.machine;
         const { contradiction, steps } = order(settings, this.#wanted);
         if (contradiction) {
             this.#say(() => say("nothingSent", { why: sentence(told(contradiction)) }));
@@ -154,21 +146,20 @@ export class SettingsForm {
         for (const [name, value] of steps)
             try {
                 const setting = settings.find((setting) => setting.name === name);
-                await this.#ask(`set ${name} ${setting?.isSwitched ? (value === 1 ? "on" : "off") : value}`);
+                await this.ask(`set ${name} ${setting?.isSwitched ? (value === 1 ? "on" : "off") : value}`);
             } catch (error) {
-                this.#problems.set(name, error instanceof Error ? error.message : String(error));
+                this.#problems.set(name, reason(error));
             }
         let isSaved = false;
         const { size } = this.#problems;
         if (size > 0) this.#say(() => say("refused", { count: size, all: steps.length }));
         else
             try {
-                await this.#ask("save");
+                await this.ask("save");
                 isSaved = true;
                 this.#say(() => say("savedForGood"));
             } catch (error) {
-                const why = error instanceof Error ? error.message : String(error);
-                this.#say(() => say("notSavedWhy", { why: told(why) }));
+                this.#say(() => say("notSavedWhy", { why: told(error) }));
             }
         this.show();
         return isSaved;
@@ -179,7 +170,7 @@ export class SettingsForm {
         file.value = "";
         if (!chosen) return;
         try {
-            const values = parse(await chosen.text(), this.#machine.settings);
+            const values = parse(await chosen.text(), this.machine.settings);
             for (const [name, value] of values) this.#wanted.set(name, value);
             this.show();
             const { size: count } = this.#wanted;
@@ -187,7 +178,7 @@ export class SettingsForm {
             this.#say(() => (count === 0 ? say("fileSame", { file }) : say("fileDiffers", { file, count })));
         } catch (error) {
             if (!(error instanceof SettingsFileError)) throw error;
-            this.#say(() => `${chosen.name}, ${told(error.message)}`);
+            this.#say(() => `${chosen.name}, ${told(error)}`);
         }
     }
 }

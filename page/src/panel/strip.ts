@@ -2,10 +2,10 @@
 //
 // One unit is a millimetre along the row. The tool is at 0, and the beam ahead of it on the right.
 
+import { draw } from "../dom.ts";
 import { say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
-const SVG = "http://www.w3.org/2000/svg";
 /**
  * Shown ground behind the tool, as a share of the distance from beam to tool, and the picture's height as a share of
  * its length.
@@ -13,31 +13,17 @@ const SVG = "http://www.w3.org/2000/svg";
 const BEHIND = 0.25;
 const HEIGHT = 0.22;
 
-function make(name: string, attributes: Record<string, string | number>): SVGElement {
-    const element = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-    return element;
-}
-
 /** Draws the state at a time. */
 export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): void {
     const beamMm = machine.setting("beam_to_tool_mm") || 400;
     const [left, length] = [-BEHIND * beamMm, (1 + 2 * BEHIND) * beamMm];
     const height = HEIGHT * length;
     const position = machine.positionAt(nowMs);
-    const bar = (kind: string, fromMm: number, toMm: number, share: number) => {
+    const bar = (kind: { class?: string; fill?: string }, fromMm: number, toMm: number, share: number) => {
         const [from, to] = [Math.max(fromMm, left), Math.min(toMm, left + length)];
-        return from >= to
-            ? []
-            : [
-                  make("rect", {
-                      class: kind,
-                      x: from,
-                      width: to - from,
-                      y: height * (0.62 - share),
-                      height: height * share,
-                  }),
-              ];
+        if (from >= to) return [];
+        const [y, tall] = [height * (0.62 - share), height * share];
+        return [draw("rect", { ...kind, x: from, width: to - from, y, height: tall })];
     };
     const marginMm = machine.setting("margin_mm");
     const zones = machine.zones.flatMap((seen) => {
@@ -45,48 +31,42 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
         const toMm = fromMm + seen.hold * machine.tickMm;
         if (seen.class === "weed")
             return bar(
-                "strip-weed",
+                { class: "weed" },
                 fromMm + marginMm,
                 Math.max(toMm - marginMm, fromMm + marginMm + length / 100),
                 0.3,
             );
         return [
-            ...bar("strip-margin", fromMm, toMm, 0.4),
-            ...bar("strip-canopy", fromMm + marginMm, toMm - marginMm, 0.4),
+            ...bar({ class: "window" }, fromMm, toMm, 0.4),
+            ...bar({ class: "canopy" }, fromMm + marginMm, toMm - marginMm, 0.4),
         ];
     });
     const unseenMm = machine.status?.unseenMm ?? 0;
-    const text = (words: string, x: number, anchor: string) => {
-        const note = make("text", {
-            class: "strip-note",
-            x,
-            y: height * 0.95,
-            "font-size": height * 0.2,
-            "text-anchor": anchor,
-        });
-        note.textContent = words;
-        return note;
+    const text = (words: string, x: number) => {
+        const size = height * 0.2;
+        return draw("text", { class: "note", x, y: height * 0.95, "font-size": size, "text-anchor": "middle" }, words);
     };
     const toolY = machine.toolOut ? height * 0.1 : height * 0.4;
     svg.setAttribute("viewBox", `${left} 0 ${length} ${height}`);
     svg.replaceChildren(
-        make("rect", { class: "strip-ground", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
-        ...(machine.version === undefined || unseenMm <= 0 ? [] : bar("strip-unseen", left, unseenMm, 0.12)),
+        draw("rect", { fill: "var(--frame)", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
+        ...(machine.version === undefined || unseenMm <= 0 ? [] : bar({ fill: "var(--rule)" }, left, unseenMm, 0.12)),
         ...(machine.version === undefined ? [] : zones),
-        make("line", {
-            class: "strip-beam",
+        draw("line", {
+            stroke: "var(--beam)",
             x1: beamMm,
             x2: beamMm,
             y1: 0,
             y2: height * 0.68,
             "stroke-width": length / 150,
         }),
-        make("path", {
-            class: machine.toolOut ? "strip-tool out" : "strip-tool",
+        draw("path", {
+            fill: machine.toolOut ? "none" : "var(--steel)",
+            stroke: "var(--steel)",
             d: `M${-length * 0.025} ${toolY}h${length * 0.05}l${-length * 0.025} ${height * 0.26}z`,
             "stroke-width": length / 200,
         }),
-        text(say(machine.toolOut ? "toolDrawnOut" : "toolDrawnIn"), 0, "middle"),
-        text(say("beam"), beamMm, "middle"),
+        text(say(machine.toolOut ? "toolDrawnOut" : "toolDrawnIn"), 0),
+        text(say("beam"), beamMm),
     );
 }

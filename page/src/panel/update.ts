@@ -6,7 +6,7 @@ import { download, type Parts } from "../dom.ts";
 import type { Happening } from "../link/session.ts";
 import { write } from "../link/settings_file.ts";
 import { chosen, keep } from "../preferences.ts";
-import { say, told } from "../words/words.ts";
+import { say } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
 
 /** The firmware of this page. */
@@ -19,20 +19,21 @@ interface Firmware {
 const KEPT = "settings";
 
 export class Update {
-    readonly #parts: Parts;
-    readonly #panel: Panel;
     readonly #own = askRust<Firmware>("firmware");
 
     /** `flash` opens the view for flashing. */
-    constructor(parts: Parts, panel: Panel, flash: () => Promise<void>) {
-        [this.#parts, this.#panel] = [parts, panel];
+    constructor(
+        private readonly parts: Parts,
+        private readonly panel: Panel,
+        flash: () => Promise<void>,
+    ) {
         parts.button("update-go", () => {
             const { settings, help } = panel.machine;
             download("machine.toml", write(settings, help), "application/toml");
             keep(KEPT, JSON.stringify(settings.map(({ name, value }) => [name, value])));
             void flash();
         });
-        parts.button("restore-go", () => void this.#putBack());
+        parts.button("restore-go", () => void parts.attempt("restore-said", this.#putBack()));
         parts.button("restore-drop", () => {
             keep(KEPT, "");
             this.#show();
@@ -42,13 +43,13 @@ export class Update {
     /** Takes an event of the machine. */
     take({ is }: Happening): void {
         if (is === "connected" && this.#isOwn && !this.#isLost()) keep(KEPT, "");
-        if (is === "connected") this.#parts.write("restore-said", "");
+        if (is === "connected") this.parts.write("restore-said", "");
         if (["connected", "lost", "settings", "event"].includes(is)) this.#show();
     }
 
     /** Settings that only the machine has, and settings that only this page's firmware has. */
     #changes(): { gone: string[]; added: string[] } {
-        const names = this.#panel.machine.settings.map(({ name }) => name);
+        const names = this.panel.machine.settings.map(({ name }) => name);
         const { settings } = this.#own;
         return {
             gone: names.filter((name) => !settings.includes(name)),
@@ -58,12 +59,12 @@ export class Update {
 
     get #isOwn(): boolean {
         const { gone, added } = this.#changes();
-        return this.#panel.machine.version === this.#own.version && gone.length + added.length === 0;
+        return this.panel.machine.version === this.#own.version && gone.length + added.length === 0;
     }
 
     /** Whether the machine has no saved settings: its firmware has another table, or none were ever saved. */
     #isLost(): boolean {
-        return this.#panel.machine.settings.every(({ saved }) => saved === undefined);
+        return this.panel.machine.settings.every(({ saved }) => saved === undefined);
     }
 
     /** The stored settings that differ from the machine's. */
@@ -72,9 +73,9 @@ export class Update {
     }
 
     #show(): void {
-        const { version } = this.#panel.machine;
+        const { version } = this.panel.machine;
         const isOther = version !== undefined && !this.#isOwn;
-        this.#parts.html("update").hidden = !isOther;
+        this.parts.html("update").hidden = !isOther;
         if (isOther) {
             const { gone, added } = this.#changes();
             const tables = () => [
@@ -83,34 +84,26 @@ export class Update {
                 ...(gone.length + added.length > 0 ? [say("settingsLost")] : []),
             ];
             const versions = { theirs: version, ours: this.#own.version };
-            this.#parts.say("update-said", () =>
+            this.parts.say("update-said", () =>
                 [say("otherFirmware", versions), ...tables(), say("settingsToFile")].join(" "),
             );
         }
         const kept = this.#kept();
-        this.#parts.html("restore").hidden = version === undefined || isOther || kept.length === 0;
+        this.parts.html("restore").hidden = version === undefined || isOther || kept.length === 0;
     }
 
     async #putBack(): Promise<void> {
         const values = new Map(this.#kept());
         const unknown = [...values.keys()].filter((name) => !this.#own.settings.includes(name));
         for (const name of unknown) values.delete(name);
-        try {
-            const isSaved = await this.#panel.putBack(values);
-            if (!isSaved) {
-                this.#say(() => say("notAllPutBack"));
-                return;
-            }
-            keep(KEPT, "");
-            const names = unknown.join(", ");
-            this.#say(() => `${say("areBack")}${names === "" ? "" : ` ${say("hasNoSuch", { names })}`}`);
-            this.#show();
-        } catch (error) {
-            this.#say(() => told(error instanceof Error ? error.message : String(error)));
+        if (!(await this.panel.putBack(values))) {
+            this.parts.say("restore-said", () => say("notAllPutBack"));
+            return;
         }
-    }
-
-    #say(text: () => string): void {
-        this.#parts.say("restore-said", text);
+        keep(KEPT, "");
+        const names = unknown.join(", ");
+        const also = () => (names === "" ? "" : ` ${say("hasNoSuch", { names })}`);
+        this.parts.say("restore-said", () => say("areBack") + also());
+        this.#show();
     }
 }

@@ -1,8 +1,12 @@
-// The content of a log, read by the project's Rust (host/page/src/record.rs). Distances are the tool's travel since the
-// log began, in mm. A day has a million of these values: they stay in tables, and only the visible ones are used.
+// The content of a log, read by the project's Rust (host/page/src/record.rs) in a worker. The worker's code is inside
+// the page, because a page on the disk can start no other.
+//
+// Distances are the tool's travel since the log began, in mm. A day has a million of these values: they stay in tables,
+// and only the visible ones are used.
 
-import { read } from "./reading.ts";
-import type { MapWords } from "./worker.ts";
+import code from "log-worker.js";
+import { module } from "../core.ts";
+import type { Asked, Told } from "./worker.ts";
 
 /** A detection: its canopy's ends, and its keep-out zone. */
 export interface Found {
@@ -57,64 +61,46 @@ interface Head {
     readonly hasPlaces: boolean;
 }
 
-/** Number of rows in a block of a table. A block is found by its ground. */
-const BLOCK = 256;
-
-/** Rows of numbers in the log's order, and the ground of each block of rows. */
+/** Rows of numbers in the log's order. */
 export class Table<Row> {
-    readonly length: number;
-    readonly #values: Float64Array;
-    readonly #columns: number;
-    readonly #make: (values: Float64Array) => Row;
-    /** The first and the last mm of each block. */
-    readonly #blocks: (readonly [number, number])[] = [];
-
     /** The columns from `first` to before `end` are the positions of a row, in mm. */
     constructor(
-        values: Float64Array,
-        columns: number,
-        first: number,
-        end: number,
-        make: (values: Float64Array) => Row,
-    ) {
-        this.#values = values;
-        this.#columns = columns;
-        this.#make = make;
-        this.length = values.length / columns;
-        for (let at = 0; at < this.length; at += BLOCK) {
-            let [least, most] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
-            for (let row = at; row < Math.min(at + BLOCK, this.length); row++)
-                for (let column = first; column < end; column++) {
-                    const mm = values[row * columns + column] ?? 0;
-                    least = Math.min(least, mm);
-                    most = Math.max(most, mm);
-                }
-            this.#blocks.push([least, most]);
-        }
+        private readonly values: Float64Array,
+        private readonly columns: number,
+        private readonly first: number,
+        private readonly end: number,
+        private readonly make: (values: Float64Array) => Row,
+    ) {}
+
+    get length(): number {
+        return this.values.length / this.columns;
     }
 
-    /** The rows of all blocks that overlap this ground: all rows on it, and some beside it. */
+    /** The rows on this ground. */
     near(fromMm: number, toMm: number): Row[] {
-        return this.#blocks.flatMap(([least, most], block) =>
-            most >= fromMm && least <= toMm ? this.#rows(block) : [],
-        );
-    }
-
-    /** The rows of the block that is nearest to a position. */
-    nearest(placeMm: number): Row[] {
-        const away = ([least, most]: readonly [number, number]) => Math.max(least - placeMm, placeMm - most, 0);
-        const best = this.#blocks.reduce(
-            (best, block, at) => (away(block) < away(this.#blocks[best] ?? block) ? at : best),
-            0,
-        );
-        return this.#rows(best);
-    }
-
-    #rows(block: number): Row[] {
         const rows: Row[] = [];
-        for (let row = block * BLOCK; row < Math.min((block + 1) * BLOCK, this.length); row++)
-            rows.push(this.#make(this.#values.subarray(row * this.#columns, (row + 1) * this.#columns)));
+        for (let row = 0; row < this.values.length; row += this.columns) {
+            let [isBefore, isBehind] = [true, true];
+            for (let at = row + this.first; at < row + this.end; at++) {
+                const mm = this.values[at] ?? 0;
+                isBefore &&= mm < fromMm;
+                isBehind &&= mm > toMm;
+            }
+            if (!isBefore && !isBehind) rows.push(this.#row(row));
+        }
         return rows;
+    }
+
+    /** The row that begins nearest to a position. */
+    nearest(placeMm: number): Row {
+        const awayMm = (row: number) => Math.abs((this.values[row + this.first] ?? 0) - placeMm);
+        let best = 0;
+        for (let row = 0; row < this.values.length; row += this.columns) if (awayMm(row) < awayMm(best)) best = row;
+        return this.#row(best);
+    }
+
+    #row(at: number): Row {
+        return this.make(this.values.subarray(at, at + this.columns));
     }
 }
 
@@ -128,12 +114,45 @@ export interface Picture extends Head {
 const CLASSES = ["plant", "weed", "unknown"] as const;
 const SPEED_COLUMNS = 3;
 
-export async function picture(
-    log: File,
-    progress: (share: number) => void,
-    cancel: AbortSignal,
-): Promise<Picture | Problem> {
-    const { said, tables } = await read<Head | Problem>([log], "picture", progress, cancel);
+interface Answer<Said> {
+    readonly said: Said;
+    readonly tables: readonly Float64Array[];
+}
+
+/** The question was cancelled. */
+export class Cancelled extends Error {}
+
+/** How work goes on: `progress` gets its share that is done, from 0 to 1, and `cancel` ends it. */
+export interface Work {
+    readonly progress: (share: number) => void;
+    readonly cancel: AbortSignal;
+}
+
+let address: string | undefined;
+
+/** Asks a question. The worker ends with its answer, or when the work is cancelled. */
+export function read<Said>(
+    logs: readonly File[],
+    wants: Asked["wants"],
+    { progress, cancel }: Work,
+): Promise<Answer<Said>> {
+    address ??= URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
+    const worker = new Worker(address);
+    const answer = new Promise<Answer<Said>>((resolve, reject) => {
+        cancel.addEventListener("abort", () => reject(new Cancelled()), { once: true });
+        worker.addEventListener("error", ({ message }) => reject(new Error(message)));
+        worker.addEventListener("message", ({ data }: MessageEvent<Told>) => {
+            if ("share" in data) progress(data.share);
+            else if ("why" in data) reject(new Error(data.why));
+            else resolve({ said: data.answer as Said, tables: data.tables });
+        });
+    });
+    worker.postMessage({ module, logs, wants } satisfies Asked);
+    return answer.finally(() => worker.terminate());
+}
+
+export async function picture(log: File, work: Work): Promise<Picture | Problem> {
+    const { said, tables } = await read<Head | Problem>([log], "picture", work);
     const [objects, speeds, worked] = tables;
     if ("problem" in said || !objects || !speeds || !worked) return said as Problem;
     let fastestMmS = 1;
@@ -154,27 +173,10 @@ export async function picture(
     };
 }
 
-export async function replay(
-    log: File,
-    progress: (share: number) => void,
-    cancel: AbortSignal,
-): Promise<Replayed | Problem> {
-    return (await read<Replayed | Problem>([log], "replay", progress, cancel)).said;
-}
-
 /** The map of some logs. */
 export interface GroundMap {
     /** Null if nothing has a position. */
     readonly svg: string | null;
     /** How many objects have one. */
     readonly placed: number;
-}
-
-export async function map(
-    logs: readonly File[],
-    words: MapWords,
-    progress: (share: number) => void,
-    cancel: AbortSignal,
-): Promise<GroundMap> {
-    return (await read<GroundMap>(logs, { map: words }, progress, cancel)).said;
 }

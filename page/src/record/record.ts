@@ -3,13 +3,21 @@
 //
 // Only the visible part of a log is drawn. Reading and replay run beside the page, which can be used meanwhile.
 
-import { make as element, Parts } from "../dom.ts";
+import { draw, make, type Parts } from "../dom.ts";
 import { fault, sentence } from "../panel/machine.ts";
-import { onLanguage, quantity, say } from "../words/words.ts";
-import { map, type Picture, picture, type Replayed, replay, type Speed } from "./picture.ts";
-import { Cancelled } from "./reading.ts";
+import { onLanguage, quantity, reason, say } from "../words/words.ts";
+import {
+    Cancelled,
+    type GroundMap,
+    type Picture,
+    type Problem,
+    picture,
+    type Replayed,
+    read,
+    type Speed,
+    type Work,
+} from "./picture.ts";
 
-const SVG = "http://www.w3.org/2000/svg";
 /** Ground in the window: at first, the least and the most. */
 const WINDOW_MM = { first: 8000, least: 1000, most: 200_000 };
 /** The zoom of a press, and the share of the window that it moves. */
@@ -21,6 +29,8 @@ const AT = { alarm: 0, row: 24, rowEnd: 84, track: 100, speed: 120, speedEnd: 18
 /** The possible distances between two marks. The first with few enough marks in the window is used. */
 const MARKS_MM = [200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000];
 const MARKS = 8;
+/** Ground beside the window from which the line of the speed comes. Speeds are nearer to each other. */
+const BESIDE_MM = 1500;
 /** From here on a duration is shown in minutes, and in hours. */
 const MINUTE_S = 120;
 const HOUR_S = 7200;
@@ -35,7 +45,6 @@ interface Row {
 }
 
 export class RecordView {
-    readonly #parts: Parts;
     readonly #place: HTMLInputElement;
     readonly #resized = new ResizeObserver(() => this.#draw());
     #rows: readonly Row[] = [];
@@ -45,9 +54,7 @@ export class RecordView {
     #isToBeDrawn = false;
     #work = new AbortController();
 
-    constructor(root: HTMLElement) {
-        const parts = new Parts(root);
-        this.#parts = parts;
+    constructor(private readonly parts: Parts) {
         this.#place = parts.get("log-place", HTMLInputElement);
         const file = parts.get("log-file", HTMLInputElement);
         parts.button("log-open", () => file.click());
@@ -87,20 +94,21 @@ export class RecordView {
         input.value = "";
         if (files.length === 0) return;
         this.#show([]);
-        for (const name of ["log-replayed", "log-alarm", "log-mapped"]) this.#parts.write(name, "");
+        for (const name of ["log-replayed", "log-alarm", "log-mapped"]) this.parts.write(name, "");
         const texts: (() => string)[] = [];
         const rows: Row[] = [];
-        const isWhole = await this.#eachOf(files, "log-said", async (file, progress, cancel) => {
-            const found = await picture(file, progress, cancel);
+        const isWhole = await this.#eachOf(files, "log-said", async (file, work) => {
+            const found = await picture(file, work);
             if ("problem" in found) texts.push(() => say("noLog", { file: file.name, why: found.problem }));
             else if (found.speeds.length === 0) texts.push(() => say("emptyLog", { file: file.name }));
             else {
-                rows.push(row(file, found));
+                const drawing = draw("svg", { class: "log-row", role: "img", "data-part": "log-drawing" });
+                rows.push({ file, picture: found, drawing, at: make("p", "log-at") });
                 texts.push(() => inWords(file, found));
             }
         });
         if (!isWhole) return;
-        this.#parts.say("log-said", () => texts.map((text) => text()).join(" "));
+        this.parts.say("log-said", () => texts.map((text) => text()).join(" "));
         this.#show(rows);
     }
 
@@ -111,35 +119,30 @@ export class RecordView {
     async #eachOf(
         files: readonly File[],
         said: string,
-        use: (file: File, progress: (share: number) => void, cancel: AbortSignal) => Promise<void>,
+        use: (file: File, work: Work) => Promise<void>,
     ): Promise<boolean> {
         this.#work.abort();
         const work = new AbortController();
         this.#work = work;
-        const bar = this.#parts.get("log-progress", HTMLProgressElement);
-        const busy = this.#parts.html("log-busy");
+        const bar = this.parts.get("log-progress", HTMLProgressElement);
+        const busy = this.parts.html("log-busy");
         bar.value = 0;
         busy.hidden = false;
-        this.#parts.write(said, "");
+        this.parts.write(said, "");
         let at = "";
         try {
             for (const [done, file] of files.entries()) {
                 at = file.name;
-                await use(
-                    file,
-                    (share) => {
-                        bar.value = (done + share) / files.length;
-                    },
-                    work.signal,
-                );
+                const progress = (share: number) => {
+                    bar.value = (done + share) / files.length;
+                };
+                await use(file, { progress, cancel: work.signal });
             }
             return true;
         } catch (error) {
             if (this.#work !== work) return false;
-            const why = error instanceof Error ? error.message : String(error);
-            this.#parts.say(said, () =>
-                error instanceof Cancelled ? say("cancelled") : say("notRead", { file: at, why }),
-            );
+            const why = () => say("notRead", { file: at, why: reason(error) });
+            this.parts.say(said, () => (error instanceof Cancelled ? say("cancelled") : why()));
             return false;
         } finally {
             if (this.#work === work) busy.hidden = true;
@@ -149,10 +152,10 @@ export class RecordView {
     #show(rows: readonly Row[]): void {
         this.#rows = rows;
         this.#resized.disconnect();
-        this.#parts.html("log-body").hidden = rows.length === 0;
-        this.#parts.html("log-places").hidden = !rows.some(({ picture }) => picture.hasPlaces);
+        this.parts.html("log-body").hidden = rows.length === 0;
+        this.parts.html("log-places").hidden = !rows.some(({ picture }) => picture.hasPlaces);
         this.#showMap(null);
-        this.#parts.html("log-rows").replaceChildren(...rows.map(({ drawing, at }) => element("div", "", drawing, at)));
+        this.parts.html("log-rows").replaceChildren(...rows.map(({ drawing, at }) => make("div", "", drawing, at)));
         for (const { drawing } of rows) this.#resized.observe(drawing);
         this.#place.max = String(Math.ceil(this.#endMm));
         this.#windowMm = WINDOW_MM.first;
@@ -181,7 +184,7 @@ export class RecordView {
         const ahead = alarms.filter(({ mm }) => way * (mm - this.#middleMm) > 0.5);
         const next = ahead.sort((one, other) => way * (one.mm - other.mm))[0];
         if (next) this.#go(next.mm);
-        this.#parts.say("log-alarm", () => {
+        this.parts.say("log-alarm", () => {
             if (!next) return say(way > 0 ? "noAlarmNext" : "noAlarmBefore");
             const { title, advice } = fault(next.name);
             return this.#of(next.file, `${say(next.isWarning ? "warning" : "alarm", { title })}: ${sentence(advice)}`);
@@ -196,11 +199,11 @@ export class RecordView {
     async #replay(): Promise<void> {
         const files = this.#rows.map(({ file }) => file);
         const results: (() => string)[] = [];
-        const isWhole = await this.#eachOf(files, "log-replayed", async (file, progress, cancel) => {
-            const result = await replay(file, progress, cancel);
+        const isWhole = await this.#eachOf(files, "log-replayed", async (file, work) => {
+            const { said: result } = await read<Replayed | Problem>([file], "replay", work);
             results.push(() => this.#of(file, "problem" in result ? sentence(result.problem) : agreement(result)));
         });
-        if (isWhole) this.#parts.say("log-replayed", () => results.map((result) => result()).join(" "));
+        if (isWhole) this.parts.say("log-replayed", () => results.map((result) => result()).join(" "));
     }
 
     /** Draws the map of all logs. */
@@ -219,15 +222,15 @@ export class RecordView {
             withoutPlace: say("mapMissing"),
             north: say("north"),
         };
-        await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, progress, cancel) => {
-            const { svg, placed } = await map(files, words, progress, cancel);
-            this.#parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
+        await this.#eachOf(files.slice(0, 1), "log-mapped", async (_, work) => {
+            const { svg, placed } = (await read<GroundMap>(files, { map: words }, work)).said;
+            this.parts.say("log-mapped", () => (svg ? say("mapped", { count: placed }) : say("noMap")));
             this.#showMap(svg);
         });
     }
 
     #showMap(svg: string | null): void {
-        const drawn = this.#parts.get("log-map-drawn", HTMLImageElement);
+        const drawn = this.parts.get("log-map-drawn", HTMLImageElement);
         URL.revokeObjectURL(drawn.src);
         drawn.hidden = svg === null;
         if (svg) drawn.src = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
@@ -249,85 +252,73 @@ export class RecordView {
         const fromMm = this.#middleMm - this.#windowMm / 2;
         const toMm = fromMm + this.#windowMm;
         const x = (mm: number) => ((mm - fromMm) / this.#windowMm) * clientWidth;
-        const isSeen = (one: number, other: number) => Math.max(one, other) >= fromMm && Math.min(one, other) <= toMm;
         const bar = (className: string, one: number, other: number, top: number, height: number) =>
-            make("rect", { class: className, x: x(one), width: Math.max(x(other) - x(one), 1), y: top, height });
-        const objects = shown.objects
-            .near(fromMm, toMm)
-            .filter(({ zoneMm, zoneEndMm, toMm }) => isSeen(zoneMm, Math.max(zoneEndMm, toMm)));
+            draw("rect", { class: className, x: x(one), width: Math.max(x(other) - x(one), 1), y: top, height });
+        const objects = shown.objects.near(fromMm, toMm);
         const row = AT.rowEnd - AT.row;
         drawing.ariaLabel = `${file.name}: ${say("logDrawing")}`;
         drawing.setAttribute("viewBox", `0 0 ${clientWidth} ${HEIGHT}`);
         drawing.replaceChildren(
             ...objects
                 .filter((object) => object.class !== "weed")
-                .map(({ zoneMm, zoneEndMm }) => bar("strip-margin", zoneMm, zoneEndMm, AT.row, row)),
+                .map(({ zoneMm, zoneEndMm }) => bar("window", zoneMm, zoneEndMm, AT.row, row)),
             ...objects.map((object) =>
                 bar(
-                    object.class === "weed" ? "strip-weed" : `strip-canopy ${object.class}`,
+                    object.class === "weed" ? "weed" : `canopy ${object.class}`,
                     object.fromMm,
                     object.toMm,
                     AT.row + row / 4,
                     row / 2,
                 ),
             ),
-            ...shown.worked
-                .near(fromMm, toMm)
-                .filter(({ startMm, endMm }) => isSeen(startMm, endMm))
-                .map(({ startMm, endMm }) => bar("log-worked", startMm, endMm, AT.track, 10)),
-            make("path", {
-                class: "log-speed",
-                d: this.#speedLine(shown.speeds.near(fromMm, toMm), shown.fastestMmS, x, isSeen),
+            ...shown.worked.near(fromMm, toMm).map(({ startMm, endMm }) => bar("worked", startMm, endMm, AT.track, 10)),
+            draw("path", {
+                fill: "none",
+                stroke: "var(--steel)",
+                "stroke-width": 1.5,
+                d: speedLine(shown.speeds.near(fromMm - BESIDE_MM, toMm + BESIDE_MM), shown.fastestMmS, x),
             }),
-            make("line", { class: "log-middle", x1: x(this.#middleMm), x2: x(this.#middleMm), y1: 0, y2: AT.speedEnd }),
+            draw("line", {
+                stroke: "var(--rule)",
+                x1: x(this.#middleMm),
+                x2: x(this.#middleMm),
+                y1: 0,
+                y2: AT.speedEnd,
+            }),
             ...shown.alarms
-                .filter(({ mm }) => isSeen(mm, mm))
-                .map(({ mm, isWarning }) =>
-                    make("path", {
-                        class: isWarning ? "log-warning" : "log-alarm",
-                        d: `M${x(mm)} ${AT.alarm}l14 9l-14 9V${AT.speedEnd}`,
-                    }),
-                ),
-            ...this.#marks(fromMm, toMm, x),
+                .filter(({ mm }) => mm >= fromMm && mm <= toMm)
+                .map(({ mm, isWarning }) => {
+                    const colour = isWarning ? "var(--hold)" : "var(--alarm)";
+                    const d = `M${x(mm)} ${AT.alarm}l14 9l-14 9V${AT.speedEnd}`;
+                    return draw("path", { class: "flag", fill: colour, stroke: colour, d });
+                }),
+            ...marks(fromMm, toMm, x),
         );
-        const here = nearest(shown.speeds.nearest(this.#middleMm), this.#middleMm);
-        if (here)
-            at.textContent = say("atPlace", {
-                distance: metres(this.#middleMm),
-                time: duration(here.timeMs),
-                speed: quantity(here.mmS * 0.0036, "kilometer-per-hour", 1),
-            });
-    }
-
-    #speedLine(
-        speeds: readonly Speed[],
-        fastestMmS: number,
-        x: (mm: number) => number,
-        isSeen: (one: number, other: number) => boolean,
-    ): string {
-        const y = (mmS: number) => AT.speedEnd - (Math.abs(mmS) / fastestMmS) * (AT.speedEnd - AT.speed);
-        const seen = speeds.filter(({ mm }, at) => isSeen(speeds[at - 1]?.mm ?? mm, speeds[at + 1]?.mm ?? mm));
-        const points = seen.map(({ mm, mmS }) => `${x(mm).toFixed(1)} ${y(mmS).toFixed(1)}`);
-        return points.length > 0 ? `M${points.join("L")}` : "";
-    }
-
-    #marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElement[] {
-        const apart = MARKS_MM.find((apart) => (toMm - fromMm) / apart <= MARKS) ?? (toMm - fromMm) / MARKS;
-        const marks: SVGElement[] = [];
-        for (let mm = Math.ceil(Math.max(fromMm, 0) / apart) * apart; mm <= toMm; mm += apart) {
-            const note = make("text", { class: "strip-note", x: x(mm), y: AT.note, "text-anchor": "middle" });
-            note.textContent = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
-            marks.push(note);
-        }
-        return marks;
+        const { timeMs, mmS } = shown.speeds.nearest(this.#middleMm);
+        at.textContent = say("atPlace", {
+            distance: metres(this.#middleMm),
+            time: duration(timeMs),
+            speed: quantity(mmS * 0.0036, "kilometer-per-hour", 1),
+        });
     }
 }
 
-/** A log as a row. */
-function row(file: File, picture: Picture): Row {
-    const drawing = make("svg", { class: "log-row", role: "img", "data-part": "log-drawing" }) as SVGSVGElement;
-    const at = element("p", "log-at");
-    return { file, picture, drawing, at };
+function speedLine(speeds: readonly Speed[], fastestMmS: number, x: (mm: number) => number): string {
+    const y = (mmS: number) => AT.speedEnd - (Math.abs(mmS) / fastestMmS) * (AT.speedEnd - AT.speed);
+    const points = speeds.map(({ mm, mmS }) => `${x(mm).toFixed(1)} ${y(mmS).toFixed(1)}`);
+    return points.length > 0 ? `M${points.join("L")}` : "";
+}
+
+function marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElement[] {
+    const apart = MARKS_MM.find((apart) => (toMm - fromMm) / apart <= MARKS) ?? (toMm - fromMm) / MARKS;
+    const marks: SVGElement[] = [];
+    for (let mm = Math.ceil(Math.max(fromMm, 0) / apart) * apart; mm <= toMm; mm += apart) {
+        const text = quantity(mm / 1000, "meter", apart < 1000 ? 1 : 0);
+        marks.push(
+            draw("text", { class: "note", x: x(mm), y: AT.note, "font-size": 12, "text-anchor": "middle" }, text),
+        );
+    }
+    return marks;
 }
 
 const inWords = (file: File, { lengthMm, timeMs, objects, swings, alarms }: Picture) =>
@@ -348,24 +339,10 @@ function agreement({ objects, alarms, swings, difference, notes }: Replayed): st
     ].join(" ");
 }
 
-/** The speed nearest to a position. */
-function nearest(speeds: readonly Speed[], placeMm: number): Speed | undefined {
-    return speeds.reduce<Speed | undefined>(
-        (best, speed) => (best && Math.abs(best.mm - placeMm) <= Math.abs(speed.mm - placeMm) ? best : speed),
-        undefined,
-    );
-}
-
 const metres = (mm: number) => quantity(mm / 1000, "meter", mm < 100_000 ? 1 : 0);
 
 function duration(ms: number): string {
     const seconds = ms / 1000;
     if (seconds < MINUTE_S) return quantity(seconds, "second", 1);
     return seconds < HOUR_S ? quantity(seconds / 60, "minute", 1) : quantity(seconds / 3600, "hour", 1);
-}
-
-function make(name: string, attributes: Readonly<{ [name: string]: string | number }>): SVGElement {
-    const element = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-    return element;
 }

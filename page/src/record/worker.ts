@@ -52,7 +52,7 @@ async function answer({ module, logs, wants }: Asked): Promise<void> {
         if (put.problem) throw new Error(put.problem);
     }
     const answer = rust.ask(wants);
-    const tables = isWhole ? [] : TABLES.map((number) => rust.table(number));
+    const tables = isWhole ? [] : TABLES.map((number) => rust.table(number).slice());
     tell(
         { answer, tables },
         tables.map(({ buffer }) => buffer),

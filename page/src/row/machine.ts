@@ -5,12 +5,24 @@
 // Uno's clock run: encoder and beams change their pins at their exact cycles, and the servo receives each pulse. Speed,
 // slip, faults and the parameters of the sowing may change between two calls.
 
-import { another } from "../core.ts";
+import { module } from "../core.ts";
+import { Rust } from "../rust.ts";
 import type { Uno } from "../uno/uno.ts";
-import type { Thing } from "./row.ts";
 
 /** The Uno's pins that the page uses itself (README, wiring). */
 export const PIN = { workSwitch: 4, endSwitch: 5, servo: 9, lamp: 13 } as const;
+
+/** A crop plant or a tall weed: its centre along the row, and its width at the beam's height. */
+export interface Thing {
+    readonly kind: "plant" | "weed";
+    readonly placeMm: number;
+    readonly widthMm: number;
+}
+
+/** The stretch of ground below a thing. */
+export function span({ placeMm, widthMm }: Thing): { startMm: number; endMm: number } {
+    return { startMm: placeMm - widthMm / 2, endMm: placeMm + widthMm / 2 };
+}
 
 /** The differences from the machine from the box. */
 export interface MachineKind {
@@ -22,19 +34,14 @@ export interface MachineKind {
     readonly servoOutUs?: number;
 }
 
-/** The row in front of the machine. */
-export interface Ground {
-    /** In order of position, without overlaps. */
-    readonly things?: readonly Thing[];
-    /** The random continuation of the row, while the machine rolls. */
-    readonly sowing?: {
-        readonly seed: number;
-        readonly spacingMm: number;
-        /** Share of the gaps between plants with a tall weed. */
-        readonly weedShare: number;
-        /** The first plant's position. */
-        readonly firstMm: number;
-    };
+/** The random row in front of the machine, which continues while the machine rolls. */
+export interface Sowing {
+    readonly seed: number;
+    readonly spacingMm: number;
+    /** Share of the gaps between plants with a tall weed. */
+    readonly weedShare: number;
+    /** The first plant's position. */
+    readonly firstMm: number;
 }
 
 export interface Dimensions {
@@ -45,7 +52,7 @@ export interface Dimensions {
 }
 
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
-export type Verdict = "kept" | "margin cut" | "damaged";
+export type Verdict = "kept" | "marginCut" | "damaged";
 
 /** A pin change within a turn. */
 export type Change =
@@ -92,14 +99,14 @@ export class Machine {
     groundMmATick = 0;
     /** Changes of the tool's command so far. The first is not a swing. */
     commands = 0;
-    readonly #rust = another();
+    readonly #rust = new Rust(module);
     #pulseRise = 0;
 
     /** Places a standing machine in front of a row, at the Uno's cycle. */
-    constructor(uno: Uno, { things = [], sowing }: Ground, kind: MachineKind = {}) {
+    constructor(uno: Uno, sowing: Sowing, kind: MachineKind = {}) {
         this.uno = uno;
         const { dimensions, levels } = this.#rust.ask<{ dimensions: Dimensions; levels: Levels }>({
-            begin: { cycle: uno.cycle, things, sowing, ...kind },
+            begin: { cycle: uno.cycle, sowing, ...kind },
         });
         this.dimensions = dimensions;
         this.#set(levels);
@@ -109,7 +116,7 @@ export class Machine {
         uno.onLevel = (pin, high, cycle) => {
             if (pin !== PIN.servo) return;
             if (high) this.#pulseRise = cycle;
-            else this.#rust.hear(this.#pulseRise, cycle);
+            else this.#rust.exports.hear(this.#pulseRise, cycle);
         };
     }
 
@@ -121,9 +128,9 @@ export class Machine {
     /** Rolls on until a future cycle, and lets the Uno's clock run until then. */
     runUntil(cycle: number): void {
         const { uno } = this;
-        this.#rust.roll(cycle);
+        this.#rust.exports.roll(cycle);
         // A copy: the servo's pulses call the core, which changes its memory.
-        const changes = this.#rust.trialTable(TABLE.changes).slice();
+        const changes = this.#rust.table(TABLE.changes).slice();
         for (let at = 0; at < changes.length; at += 3) {
             uno.runUntil(changes[at] ?? 0);
             uno.set(changes[at + 1] ?? 0, changes[at + 2] === 1);
@@ -146,12 +153,12 @@ export class Machine {
 
     /** Reads the machine's state and the newly sown things. */
     #look(): void {
-        const now = this.#rust.trialTable(TABLE.now);
+        const now = this.#rust.table(TABLE.now);
         const [placeMm = 0, toolMm = 0, speedMmS = 0, degrees = 0, acrossMm = 0] = now;
         const [isClear, isWeeding, isBroken, ticks = 0, groundMmATick = 0, commands = 0] = now.subarray(5);
         const numbers = { placeMm, toolMm, speedMmS, degrees, acrossMm, ticks, groundMmATick, commands };
         Object.assign(this, numbers, { isClear: isClear === 1, isWeeding: isWeeding === 1, isBroken: isBroken === 1 });
-        const sown = this.#rust.trialTable(TABLE.sown);
+        const sown = this.#rust.table(TABLE.sown);
         for (let at = 0; at < sown.length; at += 3) {
             const [kind, placeMm = 0, widthMm = 0] = sown.subarray(at, at + 3);
             this.things.push({ kind: kind === 0 ? "plant" : "weed", placeMm, widthMm });

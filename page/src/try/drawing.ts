@@ -3,11 +3,9 @@
 // One unit is a millimetre on the ground. The machine rolls to the right; up is left of the row. Things on the ground
 // are drawn once and moved with it, and removed when they have left the picture.
 
-import type { Verdict } from "../row/machine.ts";
-import { span, type Thing } from "../row/row.ts";
+import { draw, set } from "../dom.ts";
+import { span, type Thing, type Verdict } from "../row/machine.ts";
 import type { Trial } from "./trial.ts";
-
-const SVG = "http://www.w3.org/2000/svg";
 
 /** The picture's width across the row, from its line: to the side of the tool's swing, and to the other side. */
 const ACROSS_MM = { out: 330, other: 170 };
@@ -20,20 +18,9 @@ const SPECK_ACROSS_MM = 150;
 /** A tick for a kept plant, a bar for a cut margin, and a cross for a damaged plant. */
 const SIGNS: Readonly<Record<Verdict, string>> = {
     kept: "M-16 0L-5 12L17 -13",
-    "margin cut": "M-16 0H16",
+    marginCut: "M-16 0H16",
     damaged: "M-14 -14L14 14M-14 14L14 -14",
 };
-
-function make<Name extends keyof SVGElementTagNameMap>(
-    name: Name,
-    attributes: Record<string, string | number>,
-    ...children: SVGElement[]
-): SVGElementTagNameMap[Name] {
-    const element = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-    element.append(...children);
-    return element;
-}
 
 /** A pseudo-random number from 0 to 1, from a whole number. */
 function spread(number: number): number {
@@ -47,11 +34,12 @@ function thingShape(thing: Thing): SVGElement {
     const leaves = isPlant ? 7 : 5;
     const radius = thing.widthMm / 2;
     const turn = spread(thing.placeMm) * 360;
-    const shape = make("g", { transform: `translate(${thing.placeMm} 0)`, "data-kind": thing.kind });
+    const shape = draw("g", { transform: `translate(${thing.placeMm} 0)`, "data-kind": thing.kind });
     for (let leaf = 0; leaf < leaves; leaf++)
         shape.append(
-            make("ellipse", {
-                class: isPlant ? "leaf" : "tall-leaf",
+            draw("ellipse", {
+                class: isPlant ? "canopy" : "weed",
+                ...(isPlant && { stroke: "var(--vein)" }),
                 cx: radius / 2,
                 rx: radius / 2,
                 ry: isPlant ? radius / 3.2 : Math.max(radius / 3, 4),
@@ -61,39 +49,62 @@ function thingShape(thing: Thing): SVGElement {
     return shape;
 }
 
+/** A group of shapes on the ground, by number. */
+class Shapes {
+    readonly group = draw("g", {});
+    readonly shown = new Map<number, SVGElement>();
+
+    /** Removes the shapes that are not seen, and makes those that are seen now. */
+    show(seen: readonly number[], make: (number: number) => SVGElement): void {
+        for (const [number, shape] of this.shown) {
+            if (seen.includes(number)) continue;
+            shape.remove();
+            this.shown.delete(number);
+        }
+        for (const number of seen) {
+            if (this.shown.has(number)) continue;
+            const shape = make(number);
+            this.shown.set(number, shape);
+            this.group.append(shape);
+        }
+    }
+}
+
 export class Drawing {
     readonly #svg: SVGSVGElement;
-    readonly #ground = make("g", {});
-    readonly #specks = make("g", { class: "specks" });
-    readonly #track = make("path", { class: "worked-ground" });
-    readonly #zones = make("g", { class: "zones" });
-    readonly #things = make("g", { class: "things" });
-    readonly #soil = make("rect", { class: "ground" });
-    readonly #beam = make("line", { class: "beam-line", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
-    readonly #arm = make("line", { class: "arm" });
-    readonly #blade = make("rect", { class: "blade", rx: 6 });
-    readonly #angle = make("text", { class: "drawn-note", "text-anchor": "middle" });
-    readonly #shapes = new Map<number, SVGElement>();
-    readonly #specksShown = new Map<number, SVGElement>();
+    readonly #ground = draw("g", {});
+    readonly #specks = new Shapes();
+    readonly #track = draw("path", { fill: "none", stroke: "var(--worked)" });
+    readonly #zones = draw("g", {});
+    readonly #things = new Shapes();
+    readonly #soil = draw("rect", { fill: "var(--soil)" });
+    readonly #beam = draw("line", { stroke: "var(--beam)", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
+    readonly #arm = draw("line", { stroke: "var(--steel)", "stroke-width": 11, "stroke-linecap": "round" });
+    readonly #blade = draw("rect", { fill: "var(--steel)", rx: 6 });
+    readonly #angle = draw("text", { fill: "var(--ink)", "font-size": 30, "text-anchor": "middle" });
 
     constructor(svg: SVGSVGElement, { machine }: Trial) {
         this.#svg = svg;
         const { beamToToolMm, armMm, toolWidthMm } = machine.dimensions;
-        this.#track.setAttribute("stroke-width", String(toolWidthMm));
-        this.#ground.append(this.#specks, this.#track, this.#zones, this.#things);
-        for (const end of ["x1", "x2"]) this.#beam.setAttribute(end, String(beamToToolMm));
-        const wheel = { class: "wheel", width: 190, height: 34, rx: 10, x: armMm - 150 };
+        set(this.#track, { "stroke-width": toolWidthMm });
+        this.#ground.append(this.#specks.group, this.#track, this.#zones, this.#things.group);
+        set(this.#beam, { x1: beamToToolMm, x2: beamToToolMm });
+        const wheel = { fill: "var(--frame)", width: 190, height: 34, rx: 10, x: armMm - 150 };
         const frameMm = { left: -ACROSS_MM.out + 30, right: ACROSS_MM.other - 10 };
         svg.append(
             this.#soil,
             this.#ground,
-            make("path", { class: "frame", d: `M${armMm} ${frameMm.left}V${frameMm.right}` }),
-            make("rect", { ...wheel, y: frameMm.left - 17 }),
-            make("rect", { ...wheel, y: frameMm.right - 17 }),
+            draw("path", {
+                stroke: "var(--frame)",
+                "stroke-width": 9,
+                d: `M${armMm} ${frameMm.left}V${frameMm.right}`,
+            }),
+            draw("rect", { ...wheel, y: frameMm.left - 17 }),
+            draw("rect", { ...wheel, y: frameMm.right - 17 }),
             this.#beam,
             this.#arm,
             this.#blade,
-            make("circle", { class: "blade", cx: armMm, r: 15 }),
+            draw("circle", { fill: "var(--steel)", cx: armMm, r: 15 }),
             this.#angle,
         );
     }
@@ -107,11 +118,14 @@ export class Drawing {
         const behindMm = Math.min(lengthMm * BEHIND.share, BEHIND.mostMm);
         const picture = { x: -behindMm, y: -ACROSS_MM.out, width: lengthMm, height: heightMm };
         this.#svg.setAttribute("viewBox", Object.values(picture).join(" "));
-        for (const [key, value] of Object.entries(picture)) this.#soil.setAttribute(key, String(value));
+        set(this.#soil, picture);
 
         this.#ground.setAttribute("transform", `translate(${-toolMm} 0)`);
         const [fromMm, toMm] = [toolMm - behindMm, toolMm - behindMm + lengthMm];
-        this.#drawThings(machine.things, fromMm, toMm);
+        const { things } = machine;
+        const isSeen = (thing: Thing) => span(thing).endMm > fromMm && span(thing).startMm < toMm;
+        const seen = things.flatMap((thing, number) => (isSeen(thing) ? [number] : []));
+        this.#things.show(seen, (number) => thingShape(things[number] as Thing));
         this.#drawVerdicts(trial);
         this.#drawSpecks(fromMm, toMm);
         const way = trial.track.map(({ alongMm, acrossMm }) => `${alongMm.toFixed(1)} ${(-acrossMm).toFixed(1)}`);
@@ -120,8 +134,9 @@ export class Drawing {
             ...zones
                 .filter(({ startMm, endMm }) => endMm > fromMm && startMm < toMm)
                 .map(({ startMm, endMm }) =>
-                    make("rect", {
-                        class: "zone-ground",
+                    draw("rect", {
+                        class: "window",
+                        "stroke-width": 2,
                         x: startMm,
                         width: endMm - startMm,
                         y: -105,
@@ -133,43 +148,27 @@ export class Drawing {
 
         const { armMm, toolWidthMm } = machine.dimensions;
         const tool = { x: trial.tool.alongMm - toolMm, y: -trial.tool.acrossMm };
-        this.#beam.classList.toggle("broken", machine.isBroken);
-        const arm = { x1: armMm, y1: 0, x2: tool.x, y2: tool.y };
-        for (const [key, value] of Object.entries(arm)) this.#arm.setAttribute(key, String(value));
-        const blade = { x: tool.x - 16, y: tool.y - toolWidthMm / 2, width: 32, height: toolWidthMm };
-        for (const [key, value] of Object.entries(blade)) this.#blade.setAttribute(key, String(value));
-        this.#angle.setAttribute("x", String(tool.x - 70));
-        this.#angle.setAttribute("y", String(tool.y - 25));
+        const broken = machine.isBroken;
+        set(this.#beam, { "stroke-width": broken ? 9 : 4, "stroke-dasharray": broken ? "none" : "12 7" });
+        set(this.#arm, { x1: armMm, y1: 0, x2: tool.x, y2: tool.y });
+        set(this.#blade, { x: tool.x - 16, y: tool.y - toolWidthMm / 2, width: 32, height: toolWidthMm });
+        set(this.#angle, { x: tool.x - 70, y: tool.y - 25 });
         // Added to 0, a negative 0 loses its sign.
         this.#angle.textContent = `${Math.round(degrees) + 0}\u00b0`;
     }
 
-    #drawThings(things: readonly Thing[], fromMm: number, toMm: number): void {
-        const seen = (thing: Thing | undefined) => thing && span(thing).endMm > fromMm && span(thing).startMm < toMm;
-        for (const [index, shape] of this.#shapes) {
-            if (seen(things[index])) continue;
-            shape.remove();
-            this.#shapes.delete(index);
-        }
-        for (let index = things.length - 1; index >= 0; index--) {
-            const thing = things[index];
-            if (!thing || span(thing).endMm <= fromMm) break;
-            if (!seen(thing) || this.#shapes.has(index)) continue;
-            const shape = thingShape(thing);
-            this.#shapes.set(index, shape);
-            this.#things.append(shape);
-        }
-    }
-
     /** Draws a sign at each judged plant. */
     #drawVerdicts({ machine, outcome }: Trial): void {
-        for (const [index, shape] of this.#shapes) {
+        for (const [index, shape] of this.#things.shown) {
             const [thing, verdict] = [machine.things[index], outcome.plants.get(index)];
             if (!thing || !verdict || shape.dataset.verdict === verdict) continue;
             shape.dataset.verdict = verdict;
             const way = SIGNS[verdict];
-            const sign = make("path", {
+            const sign = draw("path", {
                 class: "verdict",
+                fill: "none",
+                stroke: verdict === "damaged" ? "var(--beam)" : "var(--ink)",
+                "stroke-width": verdict === "damaged" ? 11 : 7,
                 d: way,
                 transform: `translate(0 ${thing.widthMm / 2 + 32})`,
             });
@@ -180,22 +179,15 @@ export class Drawing {
 
     #drawSpecks(fromMm: number, toMm: number): void {
         const [first, last] = [Math.ceil(fromMm / SPECK_SPACING_MM), Math.floor(toMm / SPECK_SPACING_MM)];
-        for (const [number, speck] of this.#specksShown) {
-            if (number >= first && number <= last) continue;
-            speck.remove();
-            this.#specksShown.delete(number);
-        }
-        for (let number = first; number <= last; number++) {
-            if (this.#specksShown.has(number)) continue;
+        const seen = Array.from({ length: last - first + 1 }, (_, index) => first + index);
+        this.#specks.show(seen, (number) => {
             const across = (2 * spread(number) - 1) * SPECK_ACROSS_MM;
-            const speck = make("circle", {
-                class: "speck",
+            return draw("circle", {
+                fill: "var(--speck)",
                 cx: number * SPECK_SPACING_MM,
                 cy: across * Math.abs(spread(number + 0.5)),
                 r: 3 + 4 * spread(number + 0.25),
             });
-            this.#specksShown.set(number, speck);
-            this.#specks.append(speck);
-        }
+        });
     }
 }

@@ -4,10 +4,14 @@
 // host/field/src/budget.rs without guarded ground, and add up to the whole stretch. The firmware's output decides: its
 // state, its reason, and its keep-out zones.
 
-import type { Machine } from "../row/machine.ts";
-import { span, type Thing } from "../row/row.ts";
+import { type Machine, span, type Thing } from "../row/machine.ts";
 import { quantity, say, type Word } from "../words/words.ts";
-import type { Zone } from "./zone.ts";
+
+/** A keep-out zone along the row. */
+export interface Zone {
+    readonly startMm: number;
+    readonly endMm: number;
+}
 
 /** The parts of the ground, with the text of each. */
 const PARTS = {
@@ -58,20 +62,18 @@ export class Losses {
     /** The machine's state, and why its tool is out, from its last output. */
     isAtWork = false;
     reason: string | undefined;
-    #passedMm: number;
     #next = 0;
 
-    constructor(toolMm: number) {
-        this.#passedMm = toolMm;
-    }
+    /** The position of the tool, which is passed until there. */
+    constructor(private passedMm: number) {}
 
     /** Takes the ground that the tool has passed since the last call, with the firmware's zones. */
     pass(machine: Machine, zones: readonly Zone[], marginMm: number): void {
         const { toolMm, things } = machine;
-        if (toolMm <= this.#passedMm) return;
+        if (toolMm <= this.passedMm) return;
         const part = this.#part(machine, zones, marginMm);
-        this.groundMm[part] += toolMm - this.#passedMm;
-        this.#passedMm = toolMm;
+        this.groundMm[part] += toolMm - this.passedMm;
+        this.passedMm = toolMm;
         for (let thing = things[this.#next]; thing && thing.placeMm <= toolMm; thing = things[this.#next]) {
             if (thing.kind === "weed") this.below.set(this.#next, part);
             this.#next += 1;

@@ -3,14 +3,7 @@
 
 import type { Machine, Verdict } from "../row/machine.ts";
 import { say } from "../words/words.ts";
-import { type NotKept, whyNotKept } from "./losses.ts";
-import type { Zone } from "./zone.ts";
-
-/** How many plants there were of each verdict, and tall weeds, cut and passed. */
-export interface Totals {
-    readonly plants: Readonly<Record<Verdict, number>>;
-    readonly weeds: { readonly cut: number; readonly passed: number };
-}
+import { type NotKept, whyNotKept, type Zone } from "./losses.ts";
 
 export class Outcome {
     /** The verdicts on plants, and whether weeds were cut, by number in the row. */
@@ -18,8 +11,6 @@ export class Outcome {
     readonly weeds = new Map<number, boolean>();
     /** Why plants were not kept. */
     readonly notKept = new Map<number, NotKept>();
-    /** The totals so far. */
-    totals: Totals = { plants: { kept: 0, "margin cut": 0, damaged: 0 }, weeds: { cut: 0, passed: 0 } };
     /** The firmware's margin on both sides of a canopy. */
     marginMm = 50;
     /** The firmware's zone of a single plant; 0 for its whole canopy. */
@@ -27,9 +18,7 @@ export class Outcome {
 
     /** Judges the things behind the tool, with the firmware's zones. */
     judge(machine: Machine, zones: readonly Zone[]): void {
-        const judged = machine.judge(this.marginMm, this.stemZoneMm);
-        if (judged.length === 0) return;
-        for (const [number, fate] of judged) {
+        for (const [number, fate] of machine.judge(this.marginMm, this.stemZoneMm)) {
             if (typeof fate === "boolean") {
                 this.weeds.set(number, fate);
                 continue;
@@ -40,23 +29,23 @@ export class Outcome {
             const widthMm = this.stemZoneMm || plant.widthMm;
             this.notKept.set(number, whyNotKept(plant, widthMm, zones, this.marginMm));
         }
-        this.#count();
     }
 
-    #count(): void {
-        const plants = { kept: 0, "margin cut": 0, damaged: 0 };
+    /** How many plants there were of each verdict, and tall weeds, cut and passed. */
+    get totals() {
+        const plants = { kept: 0, marginCut: 0, damaged: 0 };
         for (const verdict of this.plants.values()) plants[verdict] += 1;
         const cut = [...this.weeds.values()].filter((cut) => cut).length;
-        this.totals = { plants, weeds: { cut, passed: this.weeds.size } };
+        return { plants, weeds: { cut, passed: this.weeds.size } };
     }
 }
 
 /** The totals in words. */
-export function inWords({ plants, weeds }: Totals): string {
-    const passed = plants.kept + plants["margin cut"] + plants.damaged;
+export function inWords({ plants, weeds }: Outcome["totals"]): string {
+    const passed = plants.kept + plants.marginCut + plants.damaged;
     if (passed === 0) return say("noPlantYet");
     const words = [plants.kept === passed ? say("allKept") : say("someKept", { kept: plants.kept })];
-    if (plants["margin cut"] > 0) words.push(say("someCut", { cut: plants["margin cut"] }));
+    if (plants.marginCut > 0) words.push(say("someCut", { cut: plants.marginCut }));
     if (plants.damaged > 0) words.push(say("damaged", { count: plants.damaged }));
     const sentences = [say("passed", { count: passed, rest: words.join("; ") })];
     if (weeds.passed > 0) sentences.push(say("weedsCut", { count: weeds.passed, cut: weeds.cut }));

@@ -1,6 +1,6 @@
 // The machine that is set up by the manual: its differences from the machine from the box, and its firmware's settings.
 //
-// The values come from the manual's steps, which the project's Rust has (host/page/src/set_up.rs).
+// The values come from the manual's steps, which the project's Rust has (host/page/src/console.rs).
 
 import { ask } from "../core.ts";
 import type { MachineKind } from "../row/machine.ts";

@@ -3,13 +3,12 @@
 // `advance` lets time pass. The operator may change the machine or the row between two calls. `outcome` has the result
 // for each plant behind the tool.
 
-import type { Detection } from "../link/console_line.ts";
+import type { Line } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { Machine, type MachineKind, PIN } from "../row/machine.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
-import { groundInWords, Losses, whyInWords } from "./losses.ts";
+import { groundInWords, Losses, whyInWords, type Zone } from "./losses.ts";
 import { Outcome } from "./outcome.ts";
-import type { Zone } from "./zone.ts";
 
 /** The first parameters of the row, and the first plant's position, ahead of the beam. */
 const SOWING = { spacingMm: 550, weedShare: 0.25, firstMm: 800 };
@@ -40,7 +39,7 @@ export class Trial {
     /** A trial with a machine from the box, with the differences in `kind`. */
     constructor(hex: string, seed: number, kind: MachineKind = {}) {
         this.uno = new Uno(hex);
-        this.machine = new Machine(this.uno, { sowing: { ...SOWING, seed } }, kind);
+        this.machine = new Machine(this.uno, { ...SOWING, seed }, kind);
         this.losses = new Losses(this.machine.toolMm);
         this.uno.onByte = (byte) => this.onText(String.fromCharCode(byte));
         this.#mark();
@@ -115,7 +114,7 @@ export class Trial {
      * The ground of a zone. The paper's delay and hold count from the moment when the leading edge is in the beam and
      * the tool is beamToToolMm behind it. Counts are converted to ground by the present slip.
      */
-    #zone({ position, delay, hold }: Detection): Zone {
+    #zone({ position, delay, hold }: Line<"detection">): Zone {
         const { placeMm, ticks, groundMmATick, dimensions } = this.machine;
         const startMm = placeMm + (position + delay + this.#zero - ticks) * groundMmATick - dimensions.beamToToolMm;
         return { startMm, endMm: startMm + hold * groundMmATick };

@@ -8,6 +8,7 @@ import {
     AVRClock,
     AVREEPROM,
     AVRIOPort,
+    type AVRPortConfig,
     AVRTimer,
     AVRUSART,
     AVRWatchdog,
@@ -35,7 +36,7 @@ export const SRAM_BYTES = 2048;
 export const EEPROM_BYTES = 1024;
 
 /** Reset causes, as their bits in MCUSR (data sheet, 11.9.1). */
-export const RESET_CAUSES = { "power-on": 1, external: 2, "brown-out": 4, watchdog: 8 } as const;
+const RESET_CAUSES = { "power-on": 1, external: 2, "brown-out": 4, watchdog: 8 } as const;
 export type ResetCause = keyof typeof RESET_CAUSES;
 
 /** MCUSR's and UCSR0A's addresses in the data space (data sheet, register summary). */
@@ -57,35 +58,27 @@ const INTERRUPT_ENTRY_CYCLES = 2;
 const RETI = 0x9518;
 const SEI = 0x9478;
 
-/** The state at a chip's start. */
-export interface Start {
-    program: Uint16Array;
-    sram: Uint8Array;
-    eeprom: EEPROMBackend;
-    cause: ResetCause;
-    cycle: number;
-}
-
-/** A running chip. */
 export class Chip {
-    readonly ports: { readonly B: AVRIOPort; readonly C: AVRIOPort; readonly D: AVRIOPort };
+    /** The board's pins, each a bit of a port: D0 to D13, then A0 to A5. */
+    readonly pins: readonly { readonly port: AVRIOPort; readonly bit: number }[];
     readonly usart: AVRUSART;
     /** Whether the watchdog has run out: the chip stands still until it is replaced. */
     watchdogRanOut = false;
     readonly #cpu: CPU;
     #until = 0;
 
-    constructor({ program, sram, eeprom, cause, cycle }: Start) {
+    /** Starts with these memories, after this cause, at this cycle. */
+    constructor(program: Uint16Array, sram: Uint8Array, eeprom: EEPROMBackend, cause: ResetCause, cycle: number) {
         const cpu = new CPU(program, SRAM_BYTES);
         this.#cpu = cpu;
         cpu.cycles = cycle;
         cpu.data.set(sram, SRAM_START);
         cpu.data[MCUSR] = RESET_CAUSES[cause];
-        this.ports = {
-            B: new AVRIOPort(cpu, portBConfig),
-            C: new AVRIOPort(cpu, portCConfig),
-            D: new AVRIOPort(cpu, portDConfig),
+        const bits = (config: AVRPortConfig, count: number) => {
+            const port = new AVRIOPort(cpu, config);
+            return Array.from({ length: count }, (_, bit) => ({ port, bit }));
         };
+        this.pins = [...bits(portDConfig, 8), ...bits(portBConfig, 6), ...bits(portCConfig, 6)];
         for (const config of [timer0Config, timer1Config, timer2Config]) new AVRTimer(cpu, config);
         this.usart = new AVRUSART(cpu, usart0Config, CYCLES_PER_SECOND);
         new AVREEPROM(cpu, eeprom, {
@@ -99,6 +92,12 @@ export class Chip {
             this.watchdogRanOut = true;
             this.#until = 0;
         };
+    }
+
+    /** Sets the external level of a pin. */
+    set(pin: number, high: boolean): void {
+        const found = this.pins[pin];
+        found?.port.setPin(found.bit, high);
     }
 
     get cycle(): number {

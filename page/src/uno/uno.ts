@@ -12,25 +12,18 @@ import { type EEPROMBackend, PinState } from "avr8js";
 import { Chip, CYCLES_PER_SECOND, EEPROM_BYTES, FLASH_BYTES, type ResetCause, SRAM_BYTES } from "./chip.ts";
 import { readHex } from "./hex.ts";
 
-export { CYCLES_PER_SECOND, EEPROM_BYTES, type ResetCause } from "./chip.ts";
-export { HexError } from "./hex.ts";
+export { CYCLES_PER_SECOND, type ResetCause } from "./chip.ts";
 
 /** Cycles of a byte that a terminal sends at 115200 baud: a start bit, eight data bits and a stop bit. */
-export const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
+const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
 
 /**
  * Content of SRAM at power-up. A real chip's content is random; a byte other than zero reveals code that expects zeros.
  */
-const SRAM_AT_POWER_UP = 0xc5;
+const sramAtPowerUp = () => new Uint8Array(SRAM_BYTES).fill(0xc5);
 
 /** Cycles after which a byte that could not be taken is offered again: the shortest instruction. */
 const NEXT_INSTRUCTION = 1;
-
-/** Called when the level that the firmware drives on a pin has changed. An undriven pin counts as low. */
-export type OnLevel = (pin: number, high: boolean, cycle: number) => void;
-
-/** The firmware has handed a byte to its transmitter. */
-export type OnByte = (byte: number, cycle: number) => void;
 
 /** A reset after the first power-up. */
 export interface Reset {
@@ -38,18 +31,11 @@ export interface Reset {
     readonly cause: ResetCause;
 }
 
-type Port = "B" | "C" | "D";
-
-/** The ports, with the pin number of bit 0, and the number of the board's pins. */
-const PORTS: readonly { readonly port: Port; readonly first: number; readonly pins: number }[] = [
-    { port: "D", first: 0, pins: 8 },
-    { port: "B", first: 8, pins: 6 },
-    { port: "C", first: 14, pins: 6 },
-];
-
 export class Uno {
-    onLevel: OnLevel = () => {};
-    onByte: OnByte = () => {};
+    /** Called when the level that the firmware drives on a pin has changed. An undriven pin counts as low. */
+    onLevel: (pin: number, high: boolean, cycle: number) => void = () => {};
+    /** The firmware has handed a byte to its transmitter. */
+    onByte: (byte: number) => void = () => {};
     /** Resets since the first power-up, oldest first. */
     readonly resets: Reset[] = [];
     /** The content of the EEPROM. */
@@ -65,13 +51,10 @@ export class Uno {
     #chip: Chip;
 
     /**
-     * Powers up an Uno with a firmware. `eeprom` has the first bytes of the EEPROM, and the others are erased. Throws a
-     * HexError if `hex` is no firmware for this chip.
+     * Powers up an Uno with a firmware. `eeprom` has the first bytes of the EEPROM, and the others are erased.
      */
     constructor(hex: string, eeprom: Uint8Array = new Uint8Array()) {
         this.#program = new Uint16Array(readHex(hex, FLASH_BYTES).buffer);
-        if (eeprom.length > EEPROM_BYTES)
-            throw new RangeError(`${eeprom.length} bytes were given for the EEPROM, which holds ${EEPROM_BYTES}`);
         const memory = new Uint8Array(EEPROM_BYTES).fill(0xff);
         memory.set(eeprom);
         this.eeprom = memory;
@@ -84,7 +67,7 @@ export class Uno {
                 memory[address % EEPROM_BYTES] = 0xff;
             },
         };
-        this.#chip = this.#start("power-on", 0, new Uint8Array(SRAM_BYTES).fill(SRAM_AT_POWER_UP));
+        this.#chip = this.#start("power-on", 0, sramAtPowerUp());
     }
 
     /** Cycles since the first power-up. */
@@ -103,7 +86,7 @@ export class Uno {
     /** Sets the external level of a pin. It stays over resets. */
     set(pin: number, high: boolean): void {
         this.#inputs.set(pin, high);
-        this.#setOn(this.#chip, pin, high);
+        this.#chip.set(pin, high);
     }
 
     /** Whether the firmware drives a pin high. */
@@ -118,17 +101,9 @@ export class Uno {
         if (was === 0 && this.#toSend.length > 0) this.#sendNext(this.#chip);
     }
 
-    /** Whether all typed text has arrived. */
-    get hasSentAll(): boolean {
-        return this.#toSend.length === 0;
-    }
-
     /** Resets the chip. SRAM loses its content only after a power failure. */
     reset(cause: Exclude<ResetCause, "watchdog">): void {
-        this.#restart(
-            cause,
-            cause === "power-on" ? new Uint8Array(SRAM_BYTES).fill(SRAM_AT_POWER_UP) : this.#chip.sram,
-        );
+        this.#restart(cause, cause === "power-on" ? sramAtPowerUp() : this.#chip.sram);
     }
 
     #restart(cause: ResetCause, sram: Uint8Array): void {
@@ -141,23 +116,12 @@ export class Uno {
     }
 
     #start(cause: ResetCause, cycle: number, sram: Uint8Array): Chip {
-        const chip = new Chip({ program: this.#program, sram, eeprom: this.#backend, cause, cycle });
-        for (const { port, first, pins } of PORTS) {
-            const io = chip.ports[port];
-            io.addListener(() => {
-                for (let bit = 0; bit < pins; bit++)
-                    this.#drives(first + bit, io.pinState(bit) === PinState.High, chip.cycle);
-            });
-        }
-        chip.usart.onByteTransmit = (byte) => this.onByte(byte, chip.cycle);
-        for (const [pin, high] of this.#inputs) this.#setOn(chip, pin, high);
+        const chip = new Chip(this.#program, sram, this.#backend, cause, cycle);
+        for (const [pin, { port, bit }] of chip.pins.entries())
+            port.addListener(() => this.#drives(pin, port.pinState(bit) === PinState.High, chip.cycle));
+        chip.usart.onByteTransmit = (byte) => this.onByte(byte);
+        for (const [pin, high] of this.#inputs) chip.set(pin, high);
         return chip;
-    }
-
-    #setOn(chip: Chip, pin: number, high: boolean): void {
-        const place = PORTS.find(({ first, pins }) => pin >= first && pin < first + pins);
-        if (!place) throw new RangeError(`an Uno has no pin ${pin}: it has 0 to 19`);
-        chip.ports[place.port].setPin(pin - place.first, high);
     }
 
     #drives(pin: number, high: boolean, cycle: number): void {

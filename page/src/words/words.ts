@@ -9,9 +9,28 @@ import { en } from "./en.ts";
 import { es } from "./es.ts";
 import { fr } from "./fr.ts";
 import { hi } from "./hi.ts";
-import type { HeardWord, Holes, Language, Word } from "./language.ts";
 
-export type { Language, Plain, Word } from "./language.ts";
+export type Word = keyof typeof en.words;
+/** The keys of texts without placeholders. */
+export type Plain = { [Key in Word]: [Holes<(typeof en.words)[Key]>] extends [never] ? Key : never }[Word];
+type HeardWord = keyof typeof en.heard;
+
+/** A language's table. */
+export interface Language {
+    /** The texts of the page. */
+    readonly words: Readonly<Record<Word, string>>;
+    /** Texts that stay English until they are shown. */
+    readonly heard: Readonly<Record<HeardWord, string>>;
+    /** The advice for an alarm or a warning, by its name. In English it comes from the manual. */
+    readonly advice: Readonly<Record<string, string>>;
+    /** The description of each setting, by its name. In English it comes from the machine. */
+    readonly settings: Readonly<Record<string, string>>;
+    /** The steps of setting a machine up, by their titles in the manual: the title, and how. */
+    readonly steps: Readonly<Record<string, readonly [title: string, how: string]>>;
+}
+
+/** The names of the holes in a text. */
+type Holes<Text extends string> = Text extends `${string}{${infer Hole}}${infer Rest}` ? Hole | Holes<Rest> : never;
 
 /** The languages, each with its own name for itself. */
 export const LANGUAGES = {
@@ -59,6 +78,12 @@ export function onLanguage(change: () => void): void {
     changes.push(change);
 }
 
+/** Calls `write` now, and after a change of language. */
+export function inLanguage(write: () => void): void {
+    write();
+    onLanguage(write);
+}
+
 /** The number format for the language, and for the browser's country if it names one. */
 function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
     const key = JSON.stringify(options);
@@ -74,31 +99,19 @@ function format(options: Intl.NumberFormatOptions): Intl.NumberFormat {
 
 /** A number with this number of decimal places. */
 export function number(value: number, digits = 0): string {
-    // Rounding a small negative number gives no negative 0.
-    return format({ minimumFractionDigits: digits, maximumFractionDigits: digits, signDisplay: "negative" }).format(
-        value,
-    );
+    return format(digitsOf(digits)).format(value);
 }
 
-export type Unit =
-    | "kilometer-per-hour"
-    | "meter"
-    | "millimeter"
-    | "millisecond"
-    | "second"
-    | "minute"
-    | "hour"
-    | "percent";
+/** These decimal places. Rounding a small negative number gives no negative 0. */
+const digitsOf = (digits: number): Intl.NumberFormatOptions => ({
+    minimumFractionDigits: digits,
+    maximumFractionDigits: digits,
+    signDisplay: "negative",
+});
 
-/** A number with its unit. */
-export function quantity(value: number, unit: Unit, digits = 0): string {
-    return format({
-        style: "unit",
-        unit,
-        minimumFractionDigits: digits,
-        maximumFractionDigits: digits,
-        signDisplay: "negative",
-    }).format(value);
+/** A number with its unit, by the unit's name in `Intl.NumberFormat`. */
+export function quantity(value: number, unit: string, digits = 0): string {
+    return format({ style: "unit", unit, ...digitsOf(digits) }).format(value);
 }
 
 /** A text with its holes filled, in the form for `count`. */
@@ -132,8 +145,12 @@ const heard = Object.entries(en.heard)
         return { word: word as HeardWord, holes, pattern: new RegExp(`^${parts.join("(.*)")}$`, "s") };
     });
 
-/** Translates such a text, with its values. Unknown text stays: the machine itself speaks English. */
-export function told(text: string): string {
+/** The text of an error. */
+export const reason = (error: unknown): string => (error instanceof Error ? error.message : String(error));
+
+/** Translates such a text or an error's, with its values. Unknown text stays: the machine itself speaks English. */
+export function told(english: unknown): string {
+    const text = reason(english);
     if (code === "en") return text;
     // The same text as a sentence or within one.
     const bare = `${text.charAt(0).toLowerCase()}${text.slice(1).replace(/\.$/, "")}`;
@@ -195,9 +212,7 @@ export function translate(root: Element | DocumentFragment): void {
     for (const name of ["aria-label", "title", "label", "alt"])
         for (const element of root.querySelectorAll(`[${name}]`))
             take(element.getAttribute(name) ?? "", (value) => element.setAttribute(name, value));
-    const write = () => {
+    inLanguage(() => {
         for (const node of nodes) node();
-    };
-    onLanguage(write);
-    if (code !== "en") write();
+    });
 }
