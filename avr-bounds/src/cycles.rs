@@ -11,7 +11,7 @@
 
 use crate::counted;
 use crate::flow::{Code, Edge, Node, Routine};
-use crate::paths::{circles, is_circle, reaching};
+use crate::paths::{circles, loops, reaching, runs_once};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -301,9 +301,7 @@ impl<'a> Timer<'a> {
         // For a loop that is never left: its inner loops.
         let mut sets = vec![(0..nodes.len()).collect::<BTreeSet<usize>>()];
         while let Some(set) = sets.pop() {
-            let edges =
-                |node: usize| nodes[node].edges.iter().map(|edge| edge.to).filter(|to| set.contains(to)).collect();
-            for circle in circles(&set, &edges).into_iter().filter(|circle| is_circle(circle, &edges)) {
+            for circle in loops(&set, &|node| nodes[node].edges.iter().map(|edge| edge.to).collect()) {
                 let is_left = circle.iter().any(|&node| {
                     nodes[node].returns.is_some() || nodes[node].edges.iter().any(|edge| !circle.contains(&edge.to))
                 });
@@ -461,23 +459,9 @@ impl Paths<'_> {
     /// The loop bound that a place states, if the place is in no inner loop and every turn passes it.
     fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
         let saying = |node: usize| self.passes.stated.get(&self.address(node)).map(|passes| (node, *passes));
-        let within = |node: usize, set: &BTreeSet<usize>| -> Vec<usize> {
-            self.edges[node].iter().map(|(to, _)| *to).filter(|to| set.contains(to)).collect()
-        };
-        let without_head: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != head).collect();
-        let inner = circles(&without_head, &|node| within(node, &without_head));
-        let is_inner = |node: usize| {
-            inner.iter().any(|inner| inner.contains(&node) && (inner.len() > 1 || within(node, inner).contains(&node)))
-        };
-        let goes_round = |saying: usize| {
-            let others: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != saying).collect();
-            let rest = circles(&others, &|node| within(node, &others));
-            saying != head
-                && rest
-                    .iter()
-                    .any(|rest| rest.contains(&head) && (rest.len() > 1 || within(head, rest).contains(&head)))
-        };
+        let edges = |node: usize| -> Vec<usize> { self.edges[node].iter().map(|(to, _)| *to).collect() };
+        let runs_once = runs_once(circle, head, &edges);
         let stated = circle.iter().filter_map(|&node| saying(node));
-        stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, passes)| passes).min()
+        stated.filter(|&(node, _)| runs_once(node)).map(|(_, passes)| passes).min()
     }
 }
