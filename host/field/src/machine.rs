@@ -101,6 +101,12 @@ impl Machine {
         position_mm - self.beam_to_tool_mm
     }
 
+    /// The stretch of ground that the tool rolls over during a time.
+    pub fn worked_mm(&self, motion: &Motion, times_s: &Range<f64>) -> Range<f64> {
+        let stretch = motion.stretch_mm(times_s);
+        self.tool_mm(stretch.start)..self.tool_mm(stretch.end)
+    }
+
     /// Net counts of a clean encoder, from the beginning of a motion to a time.
     pub fn ticks(&self, motion: &Motion, time_s: f64) -> i64 {
         marks(motion.wheel_mm(time_s) - motion.start_mm(), self.tick_mm())
