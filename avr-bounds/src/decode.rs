@@ -368,24 +368,4 @@ mod tests {
         // `ld` and `st` without a displacement are in the table once.
         assert_eq!(all, FORM_OF_WORD.iter().flatten().count());
     }
-
-    #[test]
-    fn operands_and_targets_are_put_together() {
-        let at_0x100 = |word: u16, second: u16| {
-            let mut flash = vec![0; 0x100];
-            flash.extend([word.to_le_bytes(), second.to_le_bytes()].concat());
-            Instruction::at(&flash, 0x100).expect("an instruction")
-        };
-        // sbiw r28, 0x28; movw r30, r18; in r25, 0x3f; lds r24, 0x01FC; call 0x2e28; rjmp .-504; brne .+4
-        let sbiw = at_0x100(0x97A8, 0);
-        assert_eq!((sbiw.destination(), sbiw.constant()), (28, 0x28));
-        let movw = at_0x100(0x01F9, 0);
-        assert_eq!((movw.destination(), movw.source()), (30, 18));
-        let input = at_0x100(0xB79F, 0);
-        assert_eq!((input.destination(), input.data_address()), (25, Some(0x5F)));
-        assert_eq!(at_0x100(0x9180, 0x01FC).data_address(), Some(0x01FC));
-        assert_eq!(at_0x100(0x940E, 0x1714).target(0x8000), Some(0x2E28));
-        assert_eq!(at_0x100(0xCF04, 0).target(0x8000), Some(0x7F0A));
-        assert_eq!(at_0x100(0xF411, 0).target(0x8000), Some(0x106));
-    }
 }
