@@ -23,7 +23,6 @@ use model_test::{cases, is_thorough};
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 use trial::firmware::workspace_root;
 use uno::elf::Image;
 use uno::{CYCLES_PER_SECOND, Uno};

@@ -149,8 +149,10 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     }
 
     let [first, second] = seen(rng, &trial);
-    let mut beams = vec![machine.beam_before(&first, motion)];
-    beams.extend(machine.second_beam_before(&second, motion));
+    let is_of_second = |change: &PinChange| change.pin == wiring::SECOND_BEAM;
+    let with_one_beam = Machine { second_beam_mm: 0.0, ..machine };
+    let mut beams = with_one_beam.beams_before(&first, motion);
+    beams.extend(machine.beams_before(&second, motion).into_iter().filter(is_of_second));
     let mut uno = boot(elf, &beams).map_err(TrialError::from)?;
     set_up(&trial, &mut uno).map_err(TrialError::from)?;
     if fault == Some(Fault::SpoiledEeprom) {
@@ -165,8 +167,8 @@ fn work(rng: &mut ChaCha8Rng, plan: Plan, elf: &Path, tally: &mut Tally) -> Resu
     let start_cycle = uno.cycle();
     let fails_at_s = rng.random_range(0.2..0.9) * motion.duration_s();
     let fails_at = cycle_at(start_cycle, fails_at_s);
-    let mut changes = Machine { second_beam_mm: 0.0, ..machine }.pin_changes(&first, motion, start_cycle);
-    changes.extend(machine.second_beam_changes(&second, motion, start_cycle));
+    let mut changes = with_one_beam.pin_changes(&first, motion, start_cycle);
+    changes.extend(machine.beam_changes(&second, motion, start_cycle).into_iter().filter(is_of_second));
     changes.sort_by_key(|change| change.cycle);
     match fault {
         Some(Fault::Dust) => {

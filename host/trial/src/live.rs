@@ -28,8 +28,6 @@ use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::thread;
-use std::time::{Duration, Instant};
 use uno::Uno;
 use uno::elf::EEPROM_BYTES;
 use uno::hex::Bootloader;
@@ -78,10 +76,6 @@ const SLICE_MS: u64 = 1;
 
 /// Slices between two checks of the EEPROM.
 const EEPROM_SLICES: u64 = 100;
-
-/// Longest delay of the PC that is made up for. A longer delay is dropped: otherwise the chip would run too fast
-/// afterwards.
-const LATE_BY: Duration = Duration::from_millis(50);
 
 /// Greatest number of bytes on their way to the chip. Others stay in the terminal, so that the program waits.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
@@ -183,14 +177,14 @@ impl Receiver {
         Ok(Self { simulated: SimulatedReceiver::new(setup), pty: terminal(Some(&link))?, unread: VecDeque::new() })
     }
 
-    /// Passes on its output so far.
-    fn serve(&mut self, time_s: f64, way: &Way) -> Result<()> {
+    /// Passes on its output until a cycle.
+    fn serve(&mut self, cycle: u64, way: &Way) -> Result<()> {
         // It sends without a request, and takes no commands.
         if self.pty.was_opened()? {
             self.unread.clear();
         }
         self.pty.read(&mut [0; MOST_BYTES_ON_THEIR_WAY])?;
-        self.unread.extend(self.simulated.bytes_until(time_s, |time_s| way.rolled_m(time_s)));
+        self.unread.extend(self.simulated.bytes_until(time_at_s(0, cycle), |time_s| way.rolled_m(time_s)));
         give(&mut self.pty, &mut self.unread)
     }
 }
@@ -314,8 +308,7 @@ impl LiveUno {
 
     /// Runs for a slice.
     fn slice(&mut self) -> Result<()> {
-        self.serve_terminal()?;
-        self.serve_receiver()?;
+        self.serve()?;
         self.roll();
         self.slices += 1;
         // Counts from the start. The last instruction of each slice runs over its end, and these errors must not add
@@ -333,8 +326,7 @@ impl LiveUno {
 
     /// Passes on the remaining output.
     fn end(&mut self) -> Result<()> {
-        self.serve_terminal()?;
-        self.serve_receiver()?;
+        self.serve()?;
         self.keep_eeprom()
     }
 
@@ -346,8 +338,11 @@ impl LiveUno {
         Ok(())
     }
 
-    /// Resets the chip where a program has opened the port, and passes bytes both ways.
-    fn serve_terminal(&mut self) -> Result<()> {
+    /// Passes on the receiver's output, resets the chip if a program has opened the port, and passes bytes both ways.
+    fn serve(&mut self) -> Result<()> {
+        if let Some(receiver) = &mut self.receiver {
+            receiver.serve(self.uno.cycle(), &self.way)?;
+        }
         let Some(pty) = &mut self.pty else {
             // Discards the output: no program is connected.
             self.uno.received_bytes();
@@ -367,14 +362,6 @@ impl LiveUno {
 
         self.unread.extend(self.uno.received_bytes().iter().map(|received| received.byte));
         give(pty, &mut self.unread)
-    }
-
-    /// Passes on the satellite receiver's output so far.
-    fn serve_receiver(&mut self) -> Result<()> {
-        match &mut self.receiver {
-            Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),
-            None => Ok(()),
-        }
     }
 
     /// Starts a run when the machine has stood for long enough.
@@ -407,28 +394,6 @@ fn terminal(link: Option<&Path>) -> Result<Pty> {
         pty.link(link)?;
     }
     Ok(pty)
-}
-
-/// Keeps slices in step with the PC's clock.
-struct Pace {
-    due: Instant,
-}
-
-impl Pace {
-    fn new() -> Self {
-        Self { due: Instant::now() }
-    }
-
-    /// Waits until this number of slices has passed since the last call.
-    fn wait(&mut self, slices: u64) {
-        self.due += Duration::from_millis(slices * SLICE_MS);
-        let now = Instant::now();
-        match self.due.checked_duration_since(now) {
-            Some(wait) => thread::sleep(wait),
-            None if now - self.due > LATE_BY => self.due = now,
-            None => {}
-        }
-    }
 }
 
 /// The file with the EEPROM's content.

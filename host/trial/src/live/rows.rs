@@ -7,7 +7,7 @@
 //!
 //! The cable itself is not simulated: it loses and delays no edge.
 
-use super::{LiveUno, Pace, SLICE_MS, Setup};
+use super::{LiveUno, SLICE_MS, Setup};
 use anyhow::{Error, Result};
 use rustix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
@@ -24,6 +24,10 @@ const ROWS_OF_A_THREAD: usize = 3;
 
 /// Slices after which the threads wait for each other: rare enough for a busy PC, and too short for a person to notice.
 const SLICES_IN_STEP: u64 = 5;
+
+/// Longest delay of the PC that is made up for. A longer delay is dropped: otherwise the chip would run too fast
+/// afterwards.
+const LATE_BY: Duration = Duration::from_millis(50);
 
 /// A fault of one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,8 +108,7 @@ impl LiveRows {
         let each = self.rows.len().div_ceil(threads).max(1);
         let most_slices = time.map_or(u64::MAX, |time| time.as_millis() as u64 / SLICE_MS);
         let (began, worked) = (Instant::now(), worked());
-        let mut pace = (!self.fast).then(Pace::new);
-        let mut slices = 0;
+        let (mut due, mut slices) = (began, 0);
         while !stop.load(Ordering::Relaxed) && slices < most_slices {
             for (row, mishap) in mishaps.try_iter() {
                 self.rows[row].suffer(mishap);
@@ -122,8 +125,12 @@ impl LiveRows {
                 own.map(step);
             });
             slices += SLICES_IN_STEP;
-            if let Some(pace) = &mut pace {
-                pace.wait(SLICES_IN_STEP);
+            if !self.fast {
+                due += Duration::from_millis(SLICES_IN_STEP * SLICE_MS);
+                thread::sleep(due.saturating_duration_since(Instant::now()));
+                if due.elapsed() > LATE_BY {
+                    due = Instant::now();
+                }
             }
         }
         self.rows.iter_mut().for_each(|row| row.run(LiveUno::end));
