@@ -9,6 +9,8 @@
 
 use super::{LiveUno, SLICE_MS, Setup};
 use anyhow::{Error, Result};
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
 use rustix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -107,6 +109,7 @@ impl LiveRows {
         let threads = cores.min(self.rows.len() / ROWS_OF_A_THREAD).max(1);
         let each = self.rows.len().div_ceil(threads).max(1);
         let most_slices = time.map_or(u64::MAX, |time| time.as_millis() as u64 / SLICE_MS);
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| (0, error.into()))?;
         let (began, worked) = (Instant::now(), worked());
         let (mut due, mut slices) = (began, 0);
         while !stop.load(Ordering::Relaxed) && slices < most_slices {
@@ -116,14 +119,7 @@ impl LiveRows {
             let step = |rows: &mut [Row]| {
                 (0..SLICES_IN_STEP).for_each(|_| rows.iter_mut().for_each(|row| row.run(LiveUno::slice)));
             };
-            thread::scope(|scope| {
-                let mut parts = self.rows.chunks_mut(each);
-                let own = parts.next();
-                parts.for_each(|rows| {
-                    scope.spawn(move || step(rows));
-                });
-                own.map(step);
-            });
+            pool.install(|| self.rows.par_chunks_mut(each).for_each(step));
             slices += SLICES_IN_STEP;
             if !self.fast {
                 due += Duration::from_millis(SLICES_IN_STEP * SLICE_MS);
