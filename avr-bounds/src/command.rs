@@ -11,20 +11,8 @@ use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// The arguments.
-#[derive(Args, Clone, Debug)]
-#[command(after_help = AFTER_HELP)]
-pub struct Arguments {
-    /// The program.
-    #[arg(value_name = "FILE.elf")]
-    pub elf: PathBuf,
-    /// How it is to be looked at.
-    #[command(flatten)]
-    pub options: Options,
-}
-
 /// The exit statuses, for the help.
-pub const AFTER_HELP: &str = "\
+const AFTER_HELP: &str = "\
 Examples:
   avr-bounds blink.elf
   avr-bounds blink.elf --function loop
@@ -74,10 +62,13 @@ pub struct Report {
 
 /// Proves how much stack and time an AVR program can need at most, from its ELF.
 #[derive(Parser)]
-#[command(version, name = "avr-bounds")]
-struct Command {
+#[command(version, name = "avr-bounds", after_help = AFTER_HELP)]
+struct Arguments {
+    /// The program.
+    #[arg(value_name = "FILE.elf")]
+    elf: PathBuf,
     #[command(flatten)]
-    arguments: Arguments,
+    options: Options,
 }
 
 /// Runs the command with its arguments. Returns its exit status.
@@ -85,7 +76,7 @@ pub fn main() -> ExitCode {
     // Cargo hands its own name for the command on.
     let is_cargo = |(place, argument): &(usize, String)| *place == 1 && argument == "avr-bounds";
     let arguments = std::env::args().enumerate().filter(|argument| !is_cargo(argument)).map(|(_, argument)| argument);
-    match run(&Command::parse_from(arguments).arguments) {
+    match run(&Arguments::parse_from(arguments)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
@@ -96,10 +87,7 @@ pub fn main() -> ExitCode {
 }
 
 /// Proves the bounds and prints them. Returns whether every bound keeps to its budget.
-///
-/// # Errors
-/// If the program cannot be read or followed, or the budgets cannot be read.
-pub fn run(arguments: &Arguments) -> Result<bool> {
+fn run(arguments: &Arguments) -> Result<bool> {
     let Report { text, keeps } = report(&arguments.elf, &arguments.options)?;
     let mut output = io::stdout().lock();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {

@@ -10,7 +10,7 @@ use crate::decode::Operation::*;
 use crate::decode::{Instruction, Operation};
 use crate::effects::Registers;
 use crate::flow::{Code, Node};
-use crate::paths::{circles, is_circle};
+use crate::paths::{circles, loops, runs_once};
 use crate::values::Constants;
 use std::collections::BTreeSet;
 
@@ -19,43 +19,22 @@ const MOST_TURNS: u64 = 1 << 22;
 
 /// The most returns to `head` for each entry to its loop. `circle` is a strongly connected part of a routine.
 pub(crate) fn turns(code: &Code, nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
-    let within = |set: &BTreeSet<usize>, node: usize| -> Vec<usize> {
-        nodes[node].edges.iter().map(|edge| edge.to).filter(|to| set.contains(to)).collect()
-    };
+    let edges = |node: usize| -> Vec<usize> { nodes[node].edges.iter().map(|edge| edge.to).collect() };
     // Where it is entered.
-    let mut entries: Vec<(usize, Constants)> = Vec::new();
-    for (_, node) in nodes.iter().enumerate().filter(|(number, _)| !circle.contains(number)) {
-        entries
-            .extend(node.edges.iter().filter(|edge| circle.contains(&edge.to)).map(|edge| (edge.to, edge.constants)));
-    }
+    let outside = nodes.iter().enumerate().filter(|(number, _)| !circle.contains(number));
+    let entering = outside.flat_map(|(_, node)| &node.edges).filter(|edge| circle.contains(&edge.to));
+    let entries: Vec<(usize, Constants)> = entering.map(|edge| (edge.to, edge.constants)).collect();
     let first = entries.first()?.0;
     if circle.contains(&0) || entries.iter().any(|(to, _)| *to != first) {
         return None;
     }
-    // Instructions that run exactly once a turn: they are in no inner loop, and every turn passes them.
-    let without_first: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != first).collect();
-    let inner: BTreeSet<usize> = circles(&without_first, &|node| within(&without_first, node))
-        .into_iter()
-        .filter(|inner| is_circle(inner, &|node| within(inner, node)))
-        .flatten()
-        .collect();
-    let runs_once = |once: usize| {
-        let others: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != once).collect();
-        let goes_round = || {
-            let rest = circles(&others, &|node| within(&others, node));
-            rest.iter().any(|rest| rest.contains(&first) && is_circle(rest, &|node| within(rest, node)))
-        };
-        !inner.contains(&once) && (once == first || !goes_round())
-    };
-    if head != first && inner.contains(&head) {
+    let runs_once = runs_once(circle, first, &edges);
+    let without_first = circle.iter().copied().filter(|&node| node != first).collect();
+    if head != first && loops(&without_first, &edges).iter().any(|inner| inner.contains(&head)) {
         return None;
     }
-    let ordered: Vec<usize> = {
-        let mut order = vec![first];
-        let rest = circles(&without_first, &|node| within(&without_first, node));
-        order.extend(rest.iter().flat_map(|part| part.iter().copied()));
-        order
-    };
+    let rest = circles(&without_first, &edges);
+    let ordered: Vec<usize> = [first].into_iter().chain(rest.into_iter().flatten()).collect();
     let only_before = |node: usize| {
         let mut before = circle.iter().copied().filter(|&other| nodes[other].edges.iter().any(|edge| edge.to == node));
         let only = before.next()?;
@@ -124,7 +103,8 @@ impl Loop<'_> {
             for &node in self.circle {
                 let instruction = self.instruction(node)?;
                 let effects = instruction.effects();
-                if self.nodes[node].edges.iter().any(|edge| clobbers(edge.through.as_deref(), needed)) {
+                let called = self.nodes[node].edges.iter().filter_map(|edge| edge.through.as_ref());
+                if { called }.any(|called| !(needed - called.keeps).is_empty()) {
                     return None;
                 }
                 if !(effects.changes & needed).is_empty() && slice.insert(node) {
@@ -155,11 +135,6 @@ impl Loop<'_> {
         }
         Some(most)
     }
-}
-
-/// Whether a call changes a needed register.
-fn clobbers(called: Option<&crate::flow::Routine>, needed: Registers) -> bool {
-    called.is_some_and(|called| needed.iter().any(|register| !called.keeps[register]))
 }
 
 /// Carries the steps of a turn out until the branch leaves; how many turns went on.

@@ -11,7 +11,7 @@
 
 use crate::counted;
 use crate::flow::{Code, Edge, Node, Routine};
-use crate::paths::{circles, is_circle, reaching};
+use crate::paths::{circles, loops, reaching, runs_once};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -79,6 +79,17 @@ pub(crate) enum Stretch {
     Closed,
 }
 
+/// What counts of the time of a path.
+#[derive(Clone, Copy)]
+enum Count {
+    /// All of it, with the called functions.
+    Whole,
+    /// The part in one stretch, with the called functions.
+    Stretch(Stretch),
+    /// All of it, without the called functions.
+    Own,
+}
+
 /// The stretches of a routine.
 #[derive(Clone, Debug, Default)]
 struct Stretches {
@@ -111,7 +122,7 @@ impl<'a> Timer<'a> {
             return known.clone();
         }
         let returning = reaching(&routine.nodes, |node| routine.nodes[node].returns.is_some());
-        let times = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], None);
+        let times = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], Count::Whole);
         let time = ends(&routine.nodes, &times);
         self.longest.insert(routine, time.clone());
         time
@@ -121,7 +132,7 @@ impl<'a> Timer<'a> {
     /// return.
     pub(crate) fn around(&mut self, routine: &Routine, is_place: impl Fn(&Node) -> bool) -> Option<(Time, Time)> {
         let returning = reaching(&routine.nodes, |node| routine.nodes[node].returns.is_some());
-        let before = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], None);
+        let before = self.times(&routine.nodes, &|node| returning[node], vec![(0, Time::default())], Count::Whole);
         let places: Vec<usize> = (0..routine.nodes.len()).filter(|&node| is_place(&routine.nodes[node])).collect();
         let (mut to, mut behind) = (None, Vec::new());
         for &place in &places {
@@ -130,14 +141,14 @@ impl<'a> Timer<'a> {
                 behind.push((edge.to, Time::default()));
             }
         }
-        let after = self.times(&routine.nodes, &|node| returning[node], behind, None);
+        let after = self.times(&routine.nodes, &|node| returning[node], behind, Count::Whole);
         let is_passed_again = places.iter().any(|&place| after[place].is_some());
         // Every path must pass one of the places.
         let others = self.times(
             &routine.nodes,
             &|node| returning[node] && !places.contains(&node),
             vec![(0, Time::default())],
-            None,
+            Count::Whole,
         );
         let is_passed_by = ends(&routine.nodes, &others).is_some() && !places.contains(&0);
         if is_passed_again || is_passed_by {
@@ -233,7 +244,7 @@ impl<'a> Timer<'a> {
         let leading = reaching(nodes, |node| {
             is_inside(&nodes[node]) && (nodes[node].returns.is_some() || ending[node].is_some())
         });
-        let times = self.times(nodes, &|node| is_inside(&nodes[node]) && leading[node], begins, Some(kind));
+        let times = self.times(nodes, &|node| is_inside(&nodes[node]) && leading[node], begins, Count::Stretch(kind));
         let (mut to_return, mut to_open) = (None, longest);
         for ((node, time), end) in nodes.iter().zip(&times).zip(&ending) {
             let Some(time) = time else { continue };
@@ -257,28 +268,29 @@ impl<'a> Timer<'a> {
         for fed in (0..nodes.len()).filter(|&node| is_fed(&nodes[node])) {
             let circle = reaching(nodes, |node| node == fed);
             let begins = nodes[fed].edges.iter().map(|edge| (edge.to, Time::of(edge.cycles.into()))).collect();
-            let times = self.times(nodes, &|node| node != fed && circle[node], begins, None);
+            let times = self.times(nodes, &|node| node != fed && circle[node], begins, Count::Whole);
             for (node, time) in nodes.iter().zip(&times) {
                 let Some(time) = time else { continue };
                 for edge in node.edges.iter().filter(|edge| edge.to == fed) {
-                    turn = longer(turn, self.time_of(node, edge, None).map(|own| time.and(&own)));
+                    turn = longer(turn, self.time_of(node, edge, Count::Whole).map(|own| time.and(&own)));
                 }
             }
         }
         turn
     }
 
-    /// The time of an edge, with the called functions: the whole time, or the part in one stretch.
-    fn time_of(&mut self, node: &Node, edge: &Edge, stretch: Option<Stretch>) -> Option<Time> {
-        let called = match (&edge.through, stretch) {
+    /// The time of an edge.
+    fn time_of(&mut self, node: &Node, edge: &Edge, count: Count) -> Option<Time> {
+        let called = match (&edge.through, count) {
+            (_, Count::Own) => return Some(Time::of(edge.cycles.into())),
             (None, _) => Time::default(),
-            (Some(called), None) => match edge.length {
+            (Some(called), Count::Whole) => match edge.length {
                 Some(length) if self.passes.by_length.contains(&called.entry.address) => {
                     self.of_length(called, length)?
                 }
                 _ => self.longest(called)?,
             },
-            (Some(called), Some(kind)) => self.stretches(called, kind).through?,
+            (Some(called), Count::Stretch(kind)) => self.stretches(called, kind).through?,
         };
         let mut time = called.and_cycles(edge.cycles);
         if node.waits {
@@ -301,9 +313,7 @@ impl<'a> Timer<'a> {
         // For a loop that is never left: its inner loops.
         let mut sets = vec![(0..nodes.len()).collect::<BTreeSet<usize>>()];
         while let Some(set) = sets.pop() {
-            let edges =
-                |node: usize| nodes[node].edges.iter().map(|edge| edge.to).filter(|to| set.contains(to)).collect();
-            for circle in circles(&set, &edges).into_iter().filter(|circle| is_circle(circle, &edges)) {
+            for circle in loops(&set, &|node| nodes[node].edges.iter().map(|edge| edge.to).collect()) {
                 let is_left = circle.iter().any(|&node| {
                     nodes[node].returns.is_some() || nodes[node].edges.iter().any(|edge| !circle.contains(&edge.to))
                 });
@@ -316,7 +326,8 @@ impl<'a> Timer<'a> {
                 let heads = if heads.is_empty() { circle.iter().copied().take(1).collect() } else { heads };
                 if is_left {
                     let begins = heads.iter().map(|&head| (head, Time::default())).collect();
-                    for time in self.times_of_own(nodes, &|node| circle.contains(&node), begins).iter().flatten() {
+                    let times = self.times(nodes, &|node| circle.contains(&node), begins, Count::Own);
+                    for time in times.iter().flatten() {
                         found.extend(&time.unbounded);
                     }
                 } else {
@@ -327,24 +338,6 @@ impl<'a> Timer<'a> {
         found
     }
 
-    /// The same as `times`, without the time of called functions.
-    fn times_of_own(
-        &self,
-        nodes: &[Node],
-        within: &dyn Fn(usize) -> bool,
-        begins: Vec<(usize, Time)>,
-    ) -> Vec<Option<Time>> {
-        let own = |node: &Node| -> Vec<(usize, Time)> {
-            node.edges
-                .iter()
-                .filter(|edge| within(edge.to))
-                .map(|edge| (edge.to, Time::of(edge.cycles.into())))
-                .collect()
-        };
-        let edges = nodes.iter().enumerate().map(|(number, node)| if within(number) { own(node) } else { Vec::new() });
-        self.fill(nodes, &edges.collect::<Vec<_>>(), within, begins)
-    }
-
     /// The longest time to the beginning of each place that can be reached from the starting places, over places that
     /// are `within`.
     fn times(
@@ -352,32 +345,27 @@ impl<'a> Timer<'a> {
         nodes: &[Node],
         within: &dyn Fn(usize) -> bool,
         begins: Vec<(usize, Time)>,
-        stretch: Option<Stretch>,
+        count: Count,
     ) -> Vec<Option<Time>> {
         let mut edges: Vec<Vec<(usize, Time)>> = Vec::with_capacity(nodes.len());
         for (number, node) in nodes.iter().enumerate() {
             let mut leading = Vec::new();
             for edge in node.edges.iter().filter(|edge| within(number) && within(edge.to)) {
-                leading.extend(self.time_of(node, edge, stretch).map(|time| (edge.to, time)));
+                leading.extend(self.time_of(node, edge, count).map(|time| (edge.to, time)));
             }
             edges.push(leading);
         }
-        self.fill(nodes, &edges, within, begins)
-    }
-
-    fn fill(
-        &self,
-        nodes: &[Node],
-        edges: &[Vec<(usize, Time)>],
-        within: &dyn Fn(usize) -> bool,
-        begins: Vec<(usize, Time)>,
-    ) -> Vec<Option<Time>> {
         let mut times = vec![None; nodes.len()];
         for (node, time) in begins.into_iter().filter(|(node, _)| within(*node)) {
             times[node] = longer(times[node].take(), Some(time));
         }
         let all = (0..nodes.len()).filter(|&node| within(node)).collect();
-        Paths { code: self.code, nodes, edges, passes: &self.passes }.fill(all, &BTreeSet::new(), 0, &mut times);
+        Paths { code: self.code, nodes, edges: &edges, passes: &self.passes }.fill(
+            all,
+            &BTreeSet::new(),
+            0,
+            &mut times,
+        );
         times
     }
 }
@@ -461,23 +449,9 @@ impl Paths<'_> {
     /// The loop bound that a place states, if the place is in no inner loop and every turn passes it.
     fn stated(&self, circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
         let saying = |node: usize| self.passes.stated.get(&self.address(node)).map(|passes| (node, *passes));
-        let within = |node: usize, set: &BTreeSet<usize>| -> Vec<usize> {
-            self.edges[node].iter().map(|(to, _)| *to).filter(|to| set.contains(to)).collect()
-        };
-        let without_head: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != head).collect();
-        let inner = circles(&without_head, &|node| within(node, &without_head));
-        let is_inner = |node: usize| {
-            inner.iter().any(|inner| inner.contains(&node) && (inner.len() > 1 || within(node, inner).contains(&node)))
-        };
-        let goes_round = |saying: usize| {
-            let others: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != saying).collect();
-            let rest = circles(&others, &|node| within(node, &others));
-            saying != head
-                && rest
-                    .iter()
-                    .any(|rest| rest.contains(&head) && (rest.len() > 1 || within(head, rest).contains(&head)))
-        };
+        let edges = |node: usize| -> Vec<usize> { self.edges[node].iter().map(|(to, _)| *to).collect() };
+        let runs_once = runs_once(circle, head, &edges);
         let stated = circle.iter().filter_map(|&node| saying(node));
-        stated.filter(|&(node, _)| !is_inner(node) && !goes_round(node)).map(|(_, passes)| passes).min()
+        stated.filter(|&(node, _)| runs_once(node)).map(|(_, passes)| passes).min()
     }
 }

@@ -322,22 +322,6 @@ mod tests {
     use super::*;
     use std::process::Command;
 
-    /// The instructions that avr-objdump finds in these bytes of flash: address, length and name. It calls data
-    /// `.word`.
-    fn by_objdump(arguments: &[&str], file: &std::path::Path) -> Vec<(u32, u32, String)> {
-        let output =
-            Command::new("avr-objdump").args(arguments).arg(file).output().expect("./setup.sh brings avr-objdump");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let text = String::from_utf8(output.stdout).expect("it is text");
-        let line = |line: &str| {
-            let mut columns = line.split('\t');
-            let address = u32::from_str_radix(columns.next()?.trim().strip_suffix(':')?, 16).ok()?;
-            let length = columns.next()?.split_whitespace().count() as u32;
-            Some((address, length, columns.next()?.trim().to_owned()))
-        };
-        text.lines().filter_map(line).collect()
-    }
-
     /// Instructions of the XMEGA only, and words that are no instruction.
     const LACKING: [&str; 6] = [".word", "des", "xch", "las", "lac", "lat"];
     const SPM_WITH_INCREMENT: u32 = 0x95F8;
@@ -348,9 +332,18 @@ mod tests {
         // A second word behind each, for those that have one; 0 is `nop`.
         let words: Vec<u8> = (0..=u16::MAX).flat_map(|word| [word.to_le_bytes(), [0, 0]].concat()).collect();
         std::fs::write(file.path(), &words).expect("it can be written");
-        let listed = by_objdump(&["-D", "-z", "-b", "binary", "-m", "avr:6"], file.path());
+        let mut objdump = Command::new("avr-objdump");
+        let output = objdump.args(["-D", "-z", "-b", "binary", "-m", "avr:6"]).arg(file.path()).output();
+        let text = String::from_utf8(output.expect("./setup.sh brings avr-objdump").stdout).expect("it is text");
+        // Address, length and name of each instruction; data is called `.word`.
+        let line = |line: &str| {
+            let mut columns = line.split('\t');
+            let address = u32::from_str_radix(columns.next()?.trim().strip_suffix(':')?, 16).ok()?;
+            let length = columns.next()?.split_whitespace().count() as u32;
+            Some((address, length, columns.next()?.trim().to_owned()))
+        };
         let mut seen = 0;
-        for (address, length, name) in listed.into_iter().filter(|(address, ..)| address % 4 == 0) {
+        for (address, length, name) in text.lines().filter_map(line).filter(|(address, ..)| address % 4 == 0) {
             let found = Instruction::at(&words, address).map(|found| (found.bytes(), found.mnemonic()));
             let word = address / 4;
             let expected = Some((length, name))
@@ -367,25 +360,5 @@ mod tests {
         let all: usize = sizes.sum();
         // `ld` and `st` without a displacement are in the table once.
         assert_eq!(all, FORM_OF_WORD.iter().flatten().count());
-    }
-
-    #[test]
-    fn operands_and_targets_are_put_together() {
-        let at_0x100 = |word: u16, second: u16| {
-            let mut flash = vec![0; 0x100];
-            flash.extend([word.to_le_bytes(), second.to_le_bytes()].concat());
-            Instruction::at(&flash, 0x100).expect("an instruction")
-        };
-        // sbiw r28, 0x28; movw r30, r18; in r25, 0x3f; lds r24, 0x01FC; call 0x2e28; rjmp .-504; brne .+4
-        let sbiw = at_0x100(0x97A8, 0);
-        assert_eq!((sbiw.destination(), sbiw.constant()), (28, 0x28));
-        let movw = at_0x100(0x01F9, 0);
-        assert_eq!((movw.destination(), movw.source()), (30, 18));
-        let input = at_0x100(0xB79F, 0);
-        assert_eq!((input.destination(), input.data_address()), (25, Some(0x5F)));
-        assert_eq!(at_0x100(0x9180, 0x01FC).data_address(), Some(0x01FC));
-        assert_eq!(at_0x100(0x940E, 0x1714).target(0x8000), Some(0x2E28));
-        assert_eq!(at_0x100(0xCF04, 0).target(0x8000), Some(0x7F0A));
-        assert_eq!(at_0x100(0xF411, 0).target(0x8000), Some(0x106));
     }
 }

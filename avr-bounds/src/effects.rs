@@ -8,8 +8,6 @@ use crate::decode::Operation::*;
 use std::fmt;
 use std::ops::{self, RangeInclusive};
 
-const SREG: u16 = 0x5F;
-
 /// A set of registers and flags: registers by their number, then flags by their bit in SREG.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Registers(u64);
@@ -177,11 +175,6 @@ impl Instruction {
             | Sbis | Sleep | Spm | Wdr => (R::NONE, R::NONE, true),
         };
         Effects { reads, changes, acts }
-    }
-
-    /// Whether it puts a whole byte into the status register, or takes it from there.
-    pub(crate) fn is_of_status(&self) -> bool {
-        matches!(self.operation, In | Out | Lds | Sts) && self.data_address() == Some(SREG)
     }
 }
 

@@ -2,14 +2,16 @@
 //! loop bounds.
 
 use crate::chip::Chip;
-use crate::lines::Lines;
 use crate::loops;
+use addr2line::Loader;
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, RelocationFlags, RelocationTarget, SectionKind,
     SymbolKind, elf,
 };
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -222,6 +224,32 @@ impl Program {
         let (&first, symbol) = self.functions.range(..=address).next_back()?;
         let next = self.functions.range(address + 1..).next().map_or(self.flash.len() as u32, |(&next, _)| next);
         Some((first, if symbol.bytes > 0 { (first + symbol.bytes).max(address + 2) } else { next }))
+    }
+}
+
+/// The lines of an ELF, which are read when the first is asked for.
+struct Lines {
+    path: PathBuf,
+    loader: OnceCell<Option<Loader>>,
+}
+
+impl Lines {
+    fn of(path: &Path) -> Lines {
+        Lines { path: path.into(), loader: OnceCell::new() }
+    }
+
+    /// File and line of an address.
+    fn at(&self, address: u32) -> Option<String> {
+        let loader = self.loader.get_or_init(|| Loader::new(&self.path).ok()).as_ref()?;
+        let location = loader.find_location(address.into()).ok()??;
+        let file = Path::new(location.file?).file_name()?.to_string_lossy().into_owned();
+        Some(format!("{file}:{}", location.line?))
+    }
+}
+
+impl fmt::Debug for Lines {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        write!(to, "lines of {}", self.path.display())
     }
 }
 

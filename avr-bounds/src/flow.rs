@@ -19,11 +19,12 @@
 use crate::budget::Budgets;
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
+use crate::effects::Registers;
 use crate::elf;
 use crate::error::{BoundsError, Problem};
 use crate::proved::{self, Frame};
 use crate::targets::{Targets, Where};
-use crate::values::{Constants, DEEPEST, Doubt, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
+use crate::values::{Constants, DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
@@ -94,6 +95,8 @@ pub(crate) struct Node {
     pub(crate) ends_in: Vec<(u32, Rc<Routine>)>,
     /// Whether the instruction waits for an unknown time.
     pub(crate) waits: bool,
+    /// Whether R1 is zero before the instruction.
+    pub(crate) has_zero: bool,
 }
 
 /// A routine with all its paths.
@@ -103,8 +106,8 @@ pub(crate) struct Routine {
     pub(crate) nodes: Vec<Node>,
     /// States of the interrupts after its returns: off, on.
     pub(crate) returns: BTreeSet<Interrupts>,
-    /// Registers with the same value at every return as at the entry.
-    pub(crate) keeps: [bool; 32],
+    /// Registers and flags with the same value at every return as at the entry.
+    pub(crate) keeps: Registers,
     /// Whether R1 is zero at every return.
     pub(crate) leaves_zero: bool,
     /// The deepest stack, and the deepest stack with interrupts on: the bytes of each function, from the entry on.
@@ -248,7 +251,7 @@ struct Follower<'p, 'a> {
     entry: Entry,
     known: HashMap<Place, Known>,
     returns: BTreeSet<Interrupts>,
-    keeps: [bool; 32],
+    keeps: Registers,
     leaves_zero: bool,
     enables: Option<u32>,
 }
@@ -260,7 +263,7 @@ impl<'p, 'a> Follower<'p, 'a> {
             entry,
             known: HashMap::new(),
             returns: BTreeSet::new(),
-            keeps: [true; 32],
+            keeps: Registers::ALL,
             leaves_zero: true,
             enables: None,
         }
@@ -306,6 +309,7 @@ impl<'p, 'a> Follower<'p, 'a> {
                 returns: *returns,
                 ends_in: ends_in.clone(),
                 waits: *waits,
+                has_zero: self.known[place].constant(1) == Some(0),
             }
         };
         let nodes: Vec<Node> = places.iter().map(node).collect();
@@ -384,9 +388,7 @@ impl<'p, 'a> Follower<'p, 'a> {
             Rjmp | Jmp | Rcall | Call if target.is_some_and(|target| self.program.targets.is_table_jump(target)) => {
                 let targets = self.program.targets.of_table(self.program.elf, at, &known);
                 let (targets, table_cycles) = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
-                for register in [0, 30, 31] {
-                    known.registers[register] = Value::Unknown;
-                }
+                known.after(Registers::range(1..=29));
                 self.lead(&mut step, targets, place, known, interrupts, cycles + table_cycles)?;
             }
             Icall | Eicall | Ijmp | Eijmp => {
@@ -415,7 +417,7 @@ impl<'p, 'a> Follower<'p, 'a> {
             Cpse | Sbrc | Sbrs | Sbic | Sbis => {
                 let skipped = self.program.instruction(instruction.next())?;
                 let bit = match (instruction.operation, known.registers[instruction.source()]) {
-                    (Sbrc | Sbrs, Value::Status(on)) if instruction.operand('b') == INTERRUPT_FLAG => Some(on),
+                    (Sbrc | Sbrs, Value::Status(on, _)) if instruction.operand('b') == INTERRUPT_FLAG => Some(on),
                     _ => None,
                 };
                 let skips_if_set = instruction.operation == Sbrs;
@@ -447,9 +449,8 @@ impl<'p, 'a> Follower<'p, 'a> {
                     return Err(self.program.refuse(at, Problem::WrongReturn));
                 }
                 self.returns.insert(interrupts);
-                for (register, keeps) in self.keeps.iter_mut().enumerate() {
-                    *keeps &= known.registers[register] == Value::AtEntry(register);
-                }
+                let holds = |register: usize| known.registers[register] == Value::AtEntry(register);
+                self.keeps = self.keeps & (Registers::which(holds) | known.unchanged);
                 self.leaves_zero &= known.constant(1) == Some(0);
                 step.returns = Some(cycles);
             }
@@ -457,21 +458,14 @@ impl<'p, 'a> Follower<'p, 'a> {
                 let before = interrupts;
                 let is_start_up = self.entry.kind == Kind::Reset;
                 let done = known.carry_out(&instruction, &chip, place.interrupts, &mut interrupts, is_start_up);
-                let problem = match done {
+                match done {
                     // The value is unknown, so interrupts can be on or off.
-                    Err(Doubt::Status) if self.entry.kind != Kind::Handler => {
+                    Err(Problem::UnknownStatus) if self.entry.kind != Kind::Handler => {
                         self.go(&mut step, instruction.next(), known.clone(), Interrupts::Off, cycles, None);
                         turn(&mut interrupts, true);
-                        None
                     }
-                    Ok(()) => None,
-                    Err(Doubt::TakesTooMuch) => Some(Problem::TakesTooMuch),
-                    Err(Doubt::Stack) => Some(Problem::UnknownStack),
-                    Err(Doubt::Status) => Some(Problem::UnknownStatus),
-                    Err(Doubt::LongIndirect) => Some(Problem::LongIndirect),
-                };
-                if let Some(problem) = problem {
-                    return Err(self.program.refuse(at, problem));
+                    Ok(()) => {}
+                    Err(problem) => return Err(self.program.refuse(at, problem)),
                 }
                 if before == Interrupts::Off
                     && interrupts != Interrupts::Off
@@ -548,9 +542,10 @@ impl<'p, 'a> Follower<'p, 'a> {
         if self.enables.is_none() && self.entry.interrupts == Interrupts::Off {
             self.enables = called.enables.filter(|_| interrupts == Interrupts::Off);
         }
-        known.after_call(&called.keeps);
+        known.after(called.keeps);
+        known.kept = [Value::Unknown; 3];
         // The calling convention, which is checked at the function's return.
-        if called.leaves_zero && !called.keeps[1] {
+        if called.leaves_zero && !called.keeps.contains(1) {
             known.registers[1] = Value::Constant(0);
         }
         let next = self.program.instruction(place.address)?.next();

@@ -52,7 +52,6 @@ mod effects;
 mod elf;
 mod error;
 mod flow;
-mod lines;
 mod loops;
 mod order;
 mod paths;
@@ -64,7 +63,7 @@ mod values;
 pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Depth, Held, RegisterRule};
 pub use self::chip::{CHIPS, Chip};
 use self::cycles::{Passes, Stretch, Time, Timer};
-use self::decode::{Instruction, Operation};
+use self::decode::Operation;
 pub use self::elf::{ElfError, Program, Symbol};
 pub use self::error::{BoundsError, Clobbered, Problem};
 use self::flow::{Code, Entry, Kind, Node, Routine, bytes};
@@ -84,12 +83,6 @@ const WAKE_UP_CYCLES: u64 = 4;
 /// The most cycles from an edge at a pin to its interrupt request. An edge that comes up to this time before a read may
 /// also be missed by that read (data sheet, pin change interrupt timing, and reading the pin value).
 const SYNCHRONISER_CYCLES: u64 = 3;
-
-/// The instruction at an address of flash, as the proof decodes it: its length in bytes and its disassembled name.
-/// `None` without an instruction.
-pub fn instruction_at(flash: &[u8], address: u32) -> Option<(u32, String)> {
-    Instruction::at(flash, address).map(|found| (found.bytes(), found.mnemonic()))
-}
 
 /// Proves what a program needs at most, and how fast the edges of an input may come, if the budgets name one. The facts of the budgets are
 /// used: how often loops turn, where calls lead, how deep recursion goes. Their limits are not ([`Budgets::hold`]).

@@ -3,14 +3,20 @@
 use crate::flow::Node;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The nodes from which a node with `is_end` can be reached, itself included.
-pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bool> {
+/// The predecessors of each place.
+pub(crate) fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
     let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
     for (number, node) in nodes.iter().enumerate() {
         for edge in &node.edges {
             from[edge.to].push(number);
         }
     }
+    from
+}
+
+/// The nodes from which a node with `is_end` can be reached, itself included.
+pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bool> {
+    let from = leading_to(nodes);
     let mut reaches = vec![false; nodes.len()];
     let mut to_do: Vec<usize> = (0..nodes.len()).filter(|&node| is_end(node)).collect();
     while let Some(node) = to_do.pop() {
@@ -21,62 +27,55 @@ pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bo
     reaches
 }
 
-/// Whether a strongly connected part is a loop: several places, or one that leads to itself.
-pub(crate) fn is_circle(part: &BTreeSet<usize>, edges: &dyn Fn(usize) -> Vec<usize>) -> bool {
-    part.len() > 1 || part.iter().any(|&node| edges(node).contains(&node))
+/// The edges of a graph: the successors of a node.
+pub(crate) type Edges<'a> = &'a dyn Fn(usize) -> Vec<usize>;
+
+/// The strongly connected parts of a set, each before the parts that it leads to (Kosaraju's algorithm, without
+/// recursion).
+pub(crate) fn circles(set: &BTreeSet<usize>, edges: Edges) -> Vec<BTreeSet<usize>> {
+    let edges = |node: usize| edges(node).into_iter().filter(|to| set.contains(to)).collect::<Vec<_>>();
+    let mut from: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    let (mut seen, mut left) = (BTreeSet::new(), Vec::new());
+    for &node in set {
+        search(node, &edges, &mut seen, &mut left);
+        edges(node).into_iter().for_each(|to| from.entry(to).or_default().push(node));
+    }
+    seen.clear();
+    let part = |&node: &usize| {
+        let mut part = Vec::new();
+        search(node, &|node| from.get(&node).cloned().unwrap_or_default(), &mut seen, &mut part);
+        BTreeSet::from_iter(part)
+    };
+    left.iter().rev().map(part).filter(|part| !part.is_empty()).collect()
 }
 
-/// The strongly connected parts of a set, each before the parts that it leads to (Tarjan's algorithm, without
-/// recursion).
-pub(crate) fn circles(set: &BTreeSet<usize>, edges: &dyn Fn(usize) -> Vec<usize>) -> Vec<BTreeSet<usize>> {
-    #[derive(Clone, Copy)]
-    struct Mark {
-        number: usize,
-        lowest: usize,
-        is_open: bool,
-    }
-    let mut marks: BTreeMap<usize, Mark> = BTreeMap::new();
-    let mut open = Vec::new();
-    let mut found = Vec::new();
-    for &start in set {
-        if marks.contains_key(&start) {
-            continue;
-        }
-        let begin = |node: usize, marks: &mut BTreeMap<usize, Mark>, open: &mut Vec<usize>| {
-            let number = marks.len();
-            marks.insert(node, Mark { number, lowest: number, is_open: true });
-            open.push(node);
-            (node, edges(node).into_iter())
-        };
-        let mut path = vec![begin(start, &mut marks, &mut open)];
-        while let Some((node, rest)) = path.last_mut() {
-            let node = *node;
-            if let Some(to) = rest.next() {
-                match marks.get(&to).copied() {
-                    None => path.push(begin(to, &mut marks, &mut open)),
-                    Some(mark) if mark.is_open => {
-                        marks.entry(node).and_modify(|own| own.lowest = own.lowest.min(mark.number));
-                    }
-                    Some(_) => {}
-                }
-                continue;
-            }
-            path.pop();
-            let own = marks[&node];
-            if let Some((above, _)) = path.last() {
-                marks.entry(*above).and_modify(|above| above.lowest = above.lowest.min(own.lowest));
-            }
-            if own.lowest == own.number {
-                let from = open.iter().position(|&other| other == node).unwrap_or_default();
-                let circle: BTreeSet<usize> = open.drain(from..).collect();
-                for member in &circle {
-                    marks.entry(*member).and_modify(|mark| mark.is_open = false);
-                }
-                found.push(circle);
+/// Visits all nodes that can be reached from one and were not seen. Appends each after those that it leads to.
+fn search(start: usize, edges: Edges, seen: &mut BTreeSet<usize>, left: &mut Vec<usize>) {
+    let mut path: Vec<_> = seen.insert(start).then(|| (start, edges(start).into_iter())).into_iter().collect();
+    while let Some((node, rest)) = path.last_mut() {
+        match rest.find(|to| seen.insert(*to)) {
+            Some(to) => path.push((to, edges(to).into_iter())),
+            None => {
+                left.push(*node);
+                path.pop();
             }
         }
     }
-    // Tarjan's algorithm finds a part after those that it leads to.
-    found.reverse();
-    found
+}
+
+/// The loops of a set: strongly connected parts of several places, or of one that leads to itself.
+pub(crate) fn loops(set: &BTreeSet<usize>, edges: Edges) -> Vec<BTreeSet<usize>> {
+    let is_loop = |part: &BTreeSet<usize>| part.len() > 1 || part.iter().any(|&node| edges(node).contains(&node));
+    circles(set, edges).into_iter().filter(is_loop).collect()
+}
+
+/// Whether a place of a loop runs exactly once a turn: it is in no inner loop, and every turn from `head` to `head`
+/// passes it.
+pub(crate) fn runs_once<'a>(circle: &'a BTreeSet<usize>, head: usize, edges: Edges<'a>) -> impl Fn(usize) -> bool + 'a {
+    let loops_without = move |left_out: usize| {
+        let others = circle.iter().copied().filter(|&node| node != left_out).collect();
+        loops(&others, edges).into_iter().flatten().collect::<BTreeSet<usize>>()
+    };
+    let inner = loops_without(head);
+    move |node| !inner.contains(&node) && (node == head || !loops_without(node).contains(&head))
 }

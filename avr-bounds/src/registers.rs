@@ -7,7 +7,7 @@
 //! register that none of its callers needs. The ELF does not list those registers, but the analysis can derive them:
 //!
 //! - **preserved**: at each return of the function the register holds its value at the entry. It was not changed, or it
-//!   was saved and restored ([`Preserved`]);
+//!   was saved and restored ([`Routine::keeps`]);
 //! - **live** after a call: the register is read later before it is changed. The reader is the caller, a function that
 //!   the caller calls, or code behind the caller's own return ([`LiveIn`]). Saving and restoring a register does not
 //!   count as a read;
@@ -44,11 +44,11 @@
 
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
-use crate::effects::Registers;
+use crate::effects::{Effects, Registers};
 use crate::error::{BoundsError, Clobbered};
 use crate::flow::{Code, Kind, Node, Place, Routine};
+use crate::paths::leading_to;
 use crate::proved::Lasting;
-use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::rc::Rc;
@@ -64,123 +64,8 @@ const RESULTS: Registers = Registers::range(18..=25);
 const LIBRARY: [(&str, RangeInclusive<usize>); 3] =
     [("__udivmodqi4", 24..=25), ("__udivmodhi4", 22..=25), ("__udivmodsi4", 18..=25)];
 
-/// The general purpose I/O registers and the stack pointer's lower byte, by their addresses in the data space.
-const GPIOR: [u16; 3] = [0x3E, 0x4A, 0x4B];
+/// The stack pointer's lower byte, by its address in the data space.
 const SPL: u16 = 0x5D;
-
-/// A register's content, as far as it matters here.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Content {
-    Unknown,
-    Zero,
-    /// The value of this register at the entry.
-    Register(usize),
-    /// The flags as they were at the entry.
-    Flags,
-}
-
-/// The contents of registers and stack at a place.
-#[derive(Clone, Debug, PartialEq)]
-struct Preserved {
-    registers: [Content; 32],
-    /// The flags that still have their values from the entry.
-    flags: Registers,
-    /// The register that was just decremented, while the flag shows whether it is zero.
-    counted: Option<usize>,
-    /// The general purpose I/O registers, in which some handlers keep the flags.
-    gpior: [Content; 3],
-    stack: Vec<Content>,
-}
-
-impl Preserved {
-    fn at_entry(kind: Kind) -> Preserved {
-        let mut registers = std::array::from_fn(Content::Register);
-        if kind == Kind::Function {
-            registers[ZERO] = Content::Zero;
-        }
-        Preserved { registers, flags: Registers::FLAGS, counted: None, gpior: [Content::Unknown; 3], stack: Vec::new() }
-    }
-
-    /// Keeps the facts that both have. Returns whether this has removed any.
-    fn meet(&mut self, other: &Preserved) -> bool {
-        let mut is_less =
-            self.flags & other.flags != self.flags || self.counted.is_some() && self.counted != other.counted;
-        self.flags = self.flags & other.flags;
-        self.counted = self.counted.filter(|counted| Some(*counted) == other.counted);
-        let pairs = (self.registers.iter_mut().zip(&other.registers))
-            .chain(self.gpior.iter_mut().zip(&other.gpior))
-            .chain(self.stack.iter_mut().zip(&other.stack));
-        for (mine, theirs) in pairs {
-            if mine != theirs && *mine != Content::Unknown {
-                *mine = Content::Unknown;
-                is_less = true;
-            }
-        }
-        is_less
-    }
-
-    /// Executes an instruction that is no call.
-    fn carry_out(&mut self, instruction: &Instruction) {
-        let (d, r) = (instruction.destination(), instruction.source());
-        let gpior = instruction.data_address().and_then(|address| GPIOR.iter().position(|gpior| *gpior == address));
-        let value = match instruction.operation {
-            Push => {
-                self.stack.push(self.registers[r]);
-                return;
-            }
-            Pop => self.stack.pop().unwrap_or(Content::Unknown),
-            Mov => self.registers[r],
-            Movw => {
-                self.registers[d + 1] = self.registers[r + 1];
-                self.registers[d] = self.registers[r];
-                return;
-            }
-            Ldi if instruction.constant() == 0 => Content::Zero,
-            Eor | Sub if d == r => Content::Zero,
-            In | Lds if instruction.is_of_status() => {
-                if self.flags == Registers::FLAGS {
-                    Content::Flags
-                } else {
-                    Content::Unknown
-                }
-            }
-            In | Lds => gpior.map_or(Content::Unknown, |gpior| self.gpior[gpior]),
-            Out | Sts if instruction.is_of_status() => {
-                self.flags = if self.registers[r] == Content::Flags { Registers::FLAGS } else { Registers::NONE };
-                self.counted = None;
-                return;
-            }
-            Out | Sts | Sbi | Cbi => {
-                if let Some(gpior) = gpior {
-                    let is_whole = matches!(instruction.operation, Out | Sts);
-                    self.gpior[gpior] = if is_whole { self.registers[r] } else { Content::Unknown };
-                }
-                return;
-            }
-            _ => Content::Unknown,
-        };
-        let changes = instruction.effects().changes;
-        self.clobber(changes);
-        if changes.contains(d) {
-            self.registers[d] = value;
-        }
-        if instruction.operation == Dec {
-            self.counted = Some(d);
-        }
-    }
-
-    /// Marks these registers as changed.
-    fn clobber(&mut self, changed: Registers) {
-        for (register, held) in self.registers.iter_mut().enumerate() {
-            if changed.contains(register) {
-                *held = Content::Unknown;
-            }
-        }
-        self.flags = self.flags - changed;
-        self.counted =
-            self.counted.filter(|counted| !changed.contains(*counted) && (changed & Registers::ZERO_FLAG).is_empty());
-    }
-}
 
 /// The live registers at a place.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -210,8 +95,6 @@ struct Summary {
     reads: Registers,
     /// Registers whose value at the entry is read on every path.
     surely_reads: Registers,
-    /// Whether R1 is zero at each place.
-    zero: Vec<bool>,
 }
 
 /// Which needs are meant.
@@ -235,9 +118,7 @@ pub(crate) fn prove<'a>(
     for routine in handlers.iter().map(|(_, handler)| *handler).chain([main]) {
         survey.summarise(routine)?;
     }
-    for (vector, handler) in handlers {
-        survey.put_back(vector, handler)?;
-    }
+    restored(program, handlers.into_iter())?;
     survey.hold()
 }
 
@@ -256,7 +137,7 @@ pub(crate) fn prove_convention<'a>(
     for routine in functions.filter(|routine| !routine.returns.is_empty()) {
         let broken = |routine: &Routine| {
             Registers::which(|register| {
-                is_preserved(register) && !routine.keeps[register] || register == ZERO && !routine.leaves_zero
+                is_preserved(register) && !routine.keeps.contains(register) || register == ZERO && !routine.leaves_zero
             })
         };
         // An error names the function itself, not its caller.
@@ -267,10 +148,18 @@ pub(crate) fn prove_convention<'a>(
             return Err(BoundsError::NotPreserved { function, registers: broken.to_string() });
         }
     }
-    let mut survey = Survey { program, summaries: BTreeMap::new(), order: Vec::new() };
+    restored(program, handlers)
+}
+
+/// Checks that handlers change no register and no flag.
+fn restored<'a>(program: &Code, handlers: impl Iterator<Item = (u8, &'a Rc<Routine>)>) -> Result<(), BoundsError> {
     for (vector, handler) in handlers {
-        survey.look_at(handler)?;
-        survey.put_back(vector, handler)?;
+        let clobbered = Registers::ALL - handler.keeps;
+        // A handler that never returns may change registers.
+        if !clobbered.is_empty() && !handler.returns.is_empty() {
+            let function = program.name_of(handler.entry);
+            return Err(BoundsError::HandlerSpoils { vector, function, registers: clobbered.to_string() });
+        }
     }
     Ok(())
 }
@@ -288,34 +177,6 @@ impl Survey<'_> {
         &self.summaries[&Rc::as_ptr(routine)]
     }
 
-    /// Finds the registers that a routine preserves, and no other facts.
-    fn look_at(&mut self, routine: &Rc<Routine>) -> Result<(), BoundsError> {
-        if self.summaries.contains_key(&Rc::as_ptr(routine)) {
-            return Ok(());
-        }
-        for called in routine.nodes.iter().flat_map(called) {
-            self.look_at(called)?;
-        }
-        let (keeps, zero) = self.keeps(routine)?;
-        // Registers that are saved in a frame are known to the paths.
-        let keeps = keeps | Registers::which(|register| routine.keeps[register]);
-        let (none, all) = (Registers::NONE, Registers::ALL);
-        let summary = Summary { keeps, gives: none, reads: all, surely_reads: none, zero };
-        self.summaries.insert(Rc::as_ptr(routine), summary);
-        Ok(())
-    }
-
-    /// Checks that a handler changes no register and no flag.
-    fn put_back(&self, vector: u8, handler: &Rc<Routine>) -> Result<(), BoundsError> {
-        let clobbered = Registers::ALL - self.of(handler).keeps;
-        // A handler that never returns may change registers.
-        if !clobbered.is_empty() && handler.nodes.iter().any(|node| node.returns.is_some()) {
-            let function = self.program.name_of(handler.entry);
-            return Err(BoundsError::HandlerSpoils { vector, function, registers: clobbered.to_string() });
-        }
-        Ok(())
-    }
-
     fn summarise(&mut self, routine: &Rc<Routine>) -> Result<(), BoundsError> {
         if self.summaries.contains_key(&Rc::as_ptr(routine)) {
             return Ok(());
@@ -323,69 +184,18 @@ impl Survey<'_> {
         for called in routine.nodes.iter().flat_map(called) {
             self.summarise(called)?;
         }
-        let (keeps, zero) = self.keeps(routine)?;
+        // By the calling convention, R1 is zero at the entry.
+        let leaves_zero = routine.leaves_zero && routine.entry.kind == Kind::Function;
+        let keeps = routine.keeps | Registers::which(|register| register == ZERO && leaves_zero);
         let gives = self.gives(routine, keeps)?;
         let needs = self.needs(routine, gives, What::Needed)?;
         let reads = needs[0].registers;
         // On an endless path every register counts as read, so such paths restrict nothing.
         let surely_reads = self.sure_needs(routine, &needs)?[0] & reads;
-        let summary = Summary { keeps, gives, reads, surely_reads, zero };
+        let summary = Summary { keeps, gives, reads, surely_reads };
         self.summaries.insert(Rc::as_ptr(routine), summary);
         self.order.push(Rc::clone(routine));
         Ok(())
-    }
-
-    /// The registers that are preserved at every return, and the places where R1 is zero.
-    fn keeps(&self, routine: &Routine) -> Result<(Registers, Vec<bool>), BoundsError> {
-        let nodes = &routine.nodes;
-        let mut known: Vec<Option<Preserved>> = vec![None; nodes.len()];
-        known[0] = Some(Preserved::at_entry(routine.entry.kind));
-        let mut keeps = Registers::ALL;
-        let mut to_do = vec![0];
-        while let Some(number) = to_do.pop() {
-            let node = &nodes[number];
-            let Some(mut keeping) = known[number].clone() else { continue };
-            if node.place.interrupts == Interrupts::On {
-                // Any handler that comes in can change these.
-                keeping.gpior = [Content::Unknown; 3];
-            }
-            if node.returns.is_some() {
-                let holds = |register: usize| match keeping.registers[register] {
-                    Content::Register(held) => held == register,
-                    Content::Zero => register == ZERO && routine.entry.kind == Kind::Function,
-                    _ => false,
-                };
-                keeps = keeps & (Registers::which(holds) | keeping.flags);
-            }
-            let instruction = self.program.instruction(node.place.address)?;
-            keeping.carry_out(&instruction);
-            for edge in &node.edges {
-                let mut behind = keeping.clone();
-                if let Some(called) = &edge.through {
-                    behind.clobber(Registers::ALL - self.of(called).keeps);
-                    behind.gpior = [Content::Unknown; 3];
-                }
-                if let Some(counted) =
-                    keeping.counted.filter(|_| branches_on_zero(&instruction, nodes[edge.to].place.address))
-                {
-                    behind.registers[counted] = Content::Zero;
-                }
-                behind.stack.resize(nodes[edge.to].place.depth, Content::Unknown);
-                let is_less = match &mut known[edge.to] {
-                    Some(before) => before.meet(&behind),
-                    new @ None => {
-                        *new = Some(behind);
-                        true
-                    }
-                };
-                if is_less {
-                    to_do.push(edge.to);
-                }
-            }
-        }
-        let is_zero =
-            |known: &Option<Preserved>| known.as_ref().is_some_and(|known| known.registers[ZERO] == Content::Zero);
-        Ok((keeps, known.iter().map(is_zero).collect()))
     }
 
     /// The live registers at each place, for these live registers after the return.
@@ -501,54 +311,46 @@ impl Survey<'_> {
 
     /// Registers that were written on every path to a place, and not read since.
     fn unread(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
-        let nodes = &routine.nodes;
-        let mut unread = vec![Registers::ALL; nodes.len()];
-        unread[0] = Registers::NONE;
-        let mut to_do = vec![0];
-        let mut is_seen = vec![false; nodes.len()];
-        while let Some(number) = to_do.pop() {
-            let node = &nodes[number];
-            let effects = self.program.instruction(node.place.address)?.effects();
-            let new = if effects.acts { Registers::NONE } else { effects.changes };
-            let behind = (unread[number] - effects.reads - effects.changes) | new;
-            for edge in &node.edges {
-                let behind = edge.through.as_ref().map_or(behind, |called| {
-                    let Summary { keeps, reads, .. } = *self.of(called);
-                    behind & (keeps - reads)
-                });
-                let both = unread[edge.to] & behind;
-                if both != unread[edge.to] || !is_seen[edge.to] {
-                    (unread[edge.to], is_seen[edge.to]) = (both, true);
-                    to_do.push(edge.to);
-                }
-            }
-        }
-        Ok(unread)
+        self.on_every_path(
+            routine,
+            |unread, effects| {
+                let new = if effects.acts { Registers::NONE } else { effects.changes };
+                (unread - effects.reads - effects.changes) | new
+            },
+            |unread, called| unread & (self.of(called).keeps - self.of(called).reads),
+        )
     }
 
     /// Registers that a call has clobbered on every path to a place, and that were not written since.
     fn clobbered(&self, routine: &Routine) -> Result<Vec<Registers>, BoundsError> {
-        let nodes = &routine.nodes;
-        let mut clobbered = vec![Registers::ALL; nodes.len()];
-        clobbered[0] = Registers::NONE;
+        let through = |clobbered, called: &Rc<Routine>| (clobbered - self.of(called).gives) | self.clobbers(called);
+        self.on_every_path(routine, |clobbered, effects| clobbered - effects.changes, through)
+    }
+
+    /// The registers of which something is true on every path from the entry to a place: what remains true after an
+    /// instruction, and then after its called function.
+    fn on_every_path(
+        &self,
+        routine: &Routine,
+        after: impl Fn(Registers, &Effects) -> Registers,
+        through: impl Fn(Registers, &Rc<Routine>) -> Registers,
+    ) -> Result<Vec<Registers>, BoundsError> {
+        let mut held = vec![None; routine.nodes.len()];
+        held[0] = Some(Registers::NONE);
         let mut to_do = vec![0];
-        let mut is_seen = vec![false; nodes.len()];
         while let Some(number) = to_do.pop() {
-            let node = &nodes[number];
-            let behind = clobbered[number] - self.program.instruction(node.place.address)?.effects().changes;
+            let node = &routine.nodes[number];
+            let effects = self.program.instruction(node.place.address)?.effects();
+            let behind = after(held[number].unwrap_or(Registers::ALL), &effects);
             for edge in &node.edges {
-                let behind = edge
-                    .through
-                    .as_ref()
-                    .map_or(behind, |called| (behind - self.of(called).gives) | self.clobbers(called));
-                let both = clobbered[edge.to] & behind;
-                if both != clobbered[edge.to] || !is_seen[edge.to] {
-                    (clobbered[edge.to], is_seen[edge.to]) = (both, true);
+                let behind = edge.through.as_ref().map_or(behind, |called| through(behind, called));
+                let both = held[edge.to].map_or(behind, |before| before & behind);
+                if held[edge.to].replace(both) != Some(both) {
                     to_do.push(edge.to);
                 }
             }
         }
-        Ok(clobbered)
+        Ok(held.into_iter().map(|held| held.unwrap_or(Registers::ALL)).collect())
     }
 
     /// Registers that a routine changes and that hold no result. R1 is checked separately.
@@ -577,7 +379,7 @@ impl Survey<'_> {
                     let Summary { keeps, reads, surely_reads, .. } = *self.of(called);
                     read |= surely_reads;
                     let mut clobbers = (needed & unread[number]) - keeps - RESULTS - reads;
-                    let zero = if self.of(routine).zero[number] { needed - keeps } else { needed | reads };
+                    let zero = if node.has_zero { needed - keeps } else { needed | reads };
                     clobbers |= zero & Registers::one(ZERO);
                     if !clobbers.is_empty() {
                         *found.entry((address, called.entry.address)).or_default() |= clobbers;
@@ -642,27 +444,6 @@ fn reads(instruction: &Instruction, needed: Registers) -> Registers {
 /// The registers that are live after an instruction, and after its called function.
 fn behind(node: &Node, needs: &[LiveIn]) -> Registers {
     node.edges.iter().fold(Registers::NONE, |all, edge| all | needs[edge.to].registers)
-}
-
-/// The predecessors of each place.
-fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
-    let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
-    for (number, node) in nodes.iter().enumerate() {
-        for edge in &node.edges {
-            from[edge.to].push(number);
-        }
-    }
-    from
-}
-
-/// Whether a branch leads there if the last result was zero.
-fn branches_on_zero(branch: &Instruction, to: u32) -> bool {
-    let is_of_zero = Registers::ZERO_FLAG == branch.effects().reads;
-    match branch.operation {
-        Brbs if is_of_zero => to != branch.next(),
-        Brbc if is_of_zero => to == branch.next(),
-        _ => false,
-    }
 }
 
 /// The routines that a place calls.

@@ -9,6 +9,7 @@ use crate::concrete::Concrete;
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
 use crate::effects::Registers;
+use crate::error::Problem;
 
 /// More than any SRAM: a stack this deep grows without an end.
 pub(crate) const DEEPEST: usize = 0x4000;
@@ -47,13 +48,26 @@ pub(crate) enum Value {
     StackLow(u8),
     /// The upper byte of the stack pointer at the entry, less this number.
     StackHigh(i32),
-    /// The status register, with interrupts on or off.
-    Status(bool),
+    /// The status register, with interrupts on or off, and whether all other flags are as at the entry.
+    Status(bool, bool),
     /// From memory, at this displacement from a pointer; the pointer itself came from memory if it is deep. `None` is a
     /// fixed address.
     Loaded(Option<u8>, Deep),
     /// An unknown value, less a constant.
     Less(u8),
+}
+
+impl Value {
+    /// The value where two paths meet.
+    fn meet(self, other: Value) -> Value {
+        match (self, other) {
+            (Value::Status(on, is_of_entry), Value::Status(other_on, other_is)) if on == other_on => {
+                Value::Status(on, is_of_entry && other_is)
+            }
+            _ if self == other => self,
+            _ => Value::Unknown,
+        }
+    }
 }
 
 /// Whether a pointer was loaded by a pointer that was loaded too.
@@ -69,6 +83,8 @@ pub(crate) struct Known {
     pub(crate) registers: [Value; 32],
     /// Known flags and their values.
     flags: (u8, u8),
+    /// The flags that still have their values from the entry.
+    pub(crate) unchanged: Registers,
     /// Whether R1 is zero at the entry, as the calling convention requires for functions.
     is_zero_at_entry: bool,
     /// The general purpose I/O registers, which some handlers keep the status register in.
@@ -93,6 +109,7 @@ impl Known {
         Known {
             registers: std::array::from_fn(Value::AtEntry),
             flags: (0, 0),
+            unchanged: Registers::FLAGS,
             is_zero_at_entry: is_function,
             kept: [Value::Unknown; 3],
             stack: Vec::new(),
@@ -147,15 +164,14 @@ impl Known {
         let pairs = (self.registers.iter_mut().zip(&other.registers))
             .chain(self.kept.iter_mut().zip(&other.kept))
             .chain(self.stack.iter_mut().zip(&other.stack));
-        for (mine, _) in pairs.filter(|(mine, theirs)| mine != theirs) {
-            *mine = Value::Unknown;
-        }
+        pairs.for_each(|(mine, theirs)| *mine = mine.meet(*theirs));
         if zero == Value::Constant(0) && other.constant(1) == Some(0) {
             self.registers[1] = zero;
         }
         let (mask, bits) = self.flags;
         let mask = mask & other.flags.0 & !(bits ^ other.flags.1);
         self.flags = (mask, bits & mask);
+        self.unchanged = self.unchanged & other.unchanged;
         if self.borrow != other.borrow {
             self.borrow = None;
         }
@@ -168,15 +184,15 @@ impl Known {
         *self != before
     }
 
-    /// The effect of a call: registers that it does not preserve are unknown, and so are the flags.
-    pub(crate) fn after_call(&mut self, keeps: &[bool; 32]) {
-        for (register, _) in keeps.iter().enumerate().filter(|(_, keeps)| !**keeps) {
+    /// The effect of a routine: registers and flags that it does not preserve are unknown.
+    pub(crate) fn after(&mut self, keeps: Registers) {
+        for register in (Registers::ALL - Registers::FLAGS - keeps).iter() {
             self.registers[register] = Value::Unknown;
         }
         self.flags = (0, 0);
+        self.unchanged = self.unchanged & keeps;
         self.borrow = None;
         self.counted = None;
-        self.kept = [Value::Unknown; 3];
     }
 
     /// The distance of a pair's address below the stack pointer at the entry, if it is known.
@@ -275,7 +291,7 @@ impl Known {
         interrupts_before: Interrupts,
         interrupts: &mut Interrupts,
         is_start_up: bool,
-    ) -> Result<(), Doubt> {
+    ) -> Result<(), Problem> {
         use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
 
         let (d, r) = (instruction.destination(), instruction.source());
@@ -284,6 +300,7 @@ impl Known {
         let changes = instruction.effects().changes;
         let tells = |counted: &usize| (changes & (Registers::ZERO_FLAG | Registers::one(*counted))).is_empty();
         self.counted = if instruction.operation == Dec { Some(d) } else { self.counted.filter(tells) };
+        self.unchanged = self.unchanged - changes;
         let moves = self.moves_stack_pointer(instruction);
         if !moves && !(changes & Registers::CARRY_FLAG).is_empty() {
             self.borrow = None;
@@ -302,7 +319,7 @@ impl Known {
             Bclr if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, false),
             Push => self.stack.push(self.registers[r]),
             Pop => {
-                self.registers[d] = self.stack.pop().ok_or(Doubt::TakesTooMuch)?;
+                self.registers[d] = self.stack.pop().ok_or(Problem::TakesTooMuch)?;
             }
             Mov => self.registers[d] = self.registers[r],
             Movw => {
@@ -315,7 +332,7 @@ impl Known {
                 self.registers[d] = match instruction.data_address() {
                     Some(SPL) => StackLow(depth as u8),
                     Some(SPH) => StackHigh(depth),
-                    Some(SREG) => Status(interrupts_before != Interrupts::Off),
+                    Some(SREG) => Status(interrupts_before != Interrupts::Off, self.unchanged == Registers::FLAGS),
                     _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, Deep::No),
                     _ => gpior.map_or(Unknown, |gpior| self.kept[gpior]),
                 };
@@ -325,16 +342,22 @@ impl Known {
                 match instruction.data_address() {
                     Some(SREG) => {
                         self.flags = (0, 0);
+                        self.unchanged = Registers::NONE;
                         self.counted = None;
                         match value {
-                            Status(on) => turn(interrupts, on),
+                            Status(on, is_of_entry) => {
+                                turn(interrupts, on);
+                                if is_of_entry {
+                                    self.unchanged = Registers::FLAGS;
+                                }
+                            }
                             Constant(status) => turn(interrupts, status >> INTERRUPT_FLAG & 1 == 1),
-                            _ => return Err(Doubt::Status),
+                            _ => return Err(Problem::UnknownStatus),
                         }
                     }
                     Some(EIND) if chip.return_address_bytes() > 2 => {
                         if matches!(value, Constant(1..)) {
-                            return Err(Doubt::LongIndirect);
+                            return Err(Problem::LongIndirect);
                         }
                     }
                     Some(SPH) => self.upper_half = Some(value),
@@ -348,7 +371,7 @@ impl Known {
                             }
                             _ => None,
                         };
-                        let depth = depth.ok_or(Doubt::Stack)?;
+                        let depth = depth.ok_or(Problem::UnknownStack)?;
                         self.stack.resize(depth.min(DEEPEST + 1), Unknown);
                     }
                     _ => {
@@ -412,22 +435,9 @@ impl Known {
 /// compilers save count.
 fn lasting(value: Value) -> Value {
     match value {
-        Value::AtEntry(2..=17 | 28 | 29) | Value::Status(_) | Value::StackLow(_) | Value::StackHigh(_) => value,
+        Value::AtEntry(2..=17 | 28 | 29) | Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
         _ => Value::Unknown,
     }
-}
-
-/// A required fact about an instruction's operands is unknown.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Doubt {
-    /// It pops more than the routine has pushed.
-    TakesTooMuch,
-    /// It sets the stack pointer to an unknown value.
-    Stack,
-    /// It sets the status register to an unknown value.
-    Status,
-    /// It sets EIND to another value than 0.
-    LongIndirect,
 }
 
 /// Sets the interrupt flag, or clears it.

@@ -192,8 +192,7 @@ impl Run {
         commands: &[&str],
         alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>,
     ) -> Self {
-        let mut inputs = vec![trial.machine.beam_before(&trial.row, &trial.motion)];
-        inputs.extend(trial.machine.second_beam_before(&trial.row, &trial.motion));
+        let inputs = trial.machine.beams_before(&trial.row, &trial.motion);
         Self::set_off(trial::boot(&elf(), &inputs).expect("it wakes up"), trial, commands, alter)
     }
 

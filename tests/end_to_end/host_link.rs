@@ -93,7 +93,7 @@ fn every_line_of_a_row_being_weeded_is_understood() {
     let row = row.expect("plants and a weed are a row");
     let machine = Machine::default();
     let motion = Motion::steady(0.0, 1000.0, 500.0, 2200.0).change_speed(0.0, 1000.0);
-    let mut uno = trial::boot(&elf(), &[machine.beam_before(&row, &motion)]).expect("the firmware wakes up");
+    let mut uno = trial::boot(&elf(), &machine.beams_before(&row, &motion)).expect("the firmware wakes up");
     uno.send(b"events on\nstart\n");
     uno.run_for_ms(100).expect("the firmware runs");
     uno.received();

@@ -5,7 +5,7 @@
 
 use crate::common::{Run, ask, elf, run_for_ms, started};
 use crate::interrupt_budgets::roll;
-use avr_bounds::{Bounds, BoundsError, Budgets, Program, instruction_at, prove};
+use avr_bounds::{Bounds, BoundsError, Budgets, Program, prove};
 use control::ground::detection::Detection;
 use control::ground::{examples, field_examples, keep_out, nearest};
 use control::operate::event::{self, Event};
@@ -23,7 +23,6 @@ use model_test::{cases, is_thorough};
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 use trial::firmware::workspace_root;
 use uno::elf::Image;
 use uno::{CYCLES_PER_SECOND, Uno};
@@ -276,30 +275,4 @@ fn a_function_that_writes_to_a_register_that_it_should_preserve_is_found() {
     println!("{found} were found, {unnoticed} went unnoticed");
     let least = if is_thorough() { 10 } else { 0 };
     assert!(found > least, "{found} were found");
-}
-
-#[test]
-fn the_firmware_s_code_is_what_avr_objdump_takes_it_for() {
-    let elf = elf();
-    let flash = Image::read(&elf).expect("it is an ELF").flash;
-    let output =
-        Command::new("avr-objdump").args(["-d", "-z"]).arg(&elf).output().expect("./setup.sh brings avr-objdump");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = String::from_utf8(output.stdout).expect("it is text");
-    let line = |line: &str| {
-        let mut columns = line.split('\t');
-        let address = u32::from_str_radix(columns.next()?.trim().strip_suffix(':')?, 16).ok()?;
-        let length = columns.next()?.split_whitespace().count() as u32;
-        Some((address, length, columns.next()?.trim().to_owned()))
-    };
-    let listed: Vec<_> = text.lines().filter_map(line).collect();
-    assert!(listed.len() > 10_000, "{} instructions", listed.len());
-    for (address, length, name) in listed {
-        // There are tables between the code.
-        if let Some(found) = instruction_at(&flash, address) {
-            assert_eq!(found, (length, name), "{address:#06x}");
-        } else {
-            assert_eq!(name, ".word", "{address:#06x}");
-        }
-    }
 }

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use knn_bench::Task;
 use serde_json::{Value, json};
-use trial::bench::table::{Figures, TURNINGS};
+use trial::bench::table::Figures;
 use trial::bench::{self, encoder, servo, swings};
 use trial::firmware;
 use uno::elf::Size;
@@ -37,9 +37,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let classifier = bench::classifier(&bench_elf, |share| bar.show(share))?;
     bar.finish();
     let bar = Progress::new("turning the encoder");
-    let share_each = 1.0 / TURNINGS.len() as f64;
+    let share_each = 1.0 / encoder::Turning::all().len() as f64;
     let mut rates = Vec::new();
-    for (done, turning) in TURNINGS.into_iter().enumerate() {
+    for (done, turning) in encoder::Turning::all().enumerate() {
         rates.push(encoder::highest_rate(&elf, turning, |share| bar.show((done as f64 + share) * share_each))?);
     }
     bar.finish();

@@ -124,7 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let trouble = arguments.gps_trouble.then(Trouble::default);
         let began_ms = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as i64);
         let (rate_hz, error_mm) = (arguments.gps_rate, arguments.gps_error);
-        (ReceiverSetup { rate_hz, error_mm, began_ms, trouble, ..ReceiverSetup::default() }, Some(link))
+        (ReceiverSetup { rate_hz, error_mm, began_ms, trouble, ..ReceiverSetup::default() }, link)
     });
     let stop = ctrl_c()?;
 

@@ -42,27 +42,23 @@ impl Part {
 
     /// A name for programs.
     pub fn key(self) -> &'static str {
-        match self {
-            Self::Weeded => "weeded",
-            Self::Plants => "plants",
-            Self::Margins => "margins",
-            Self::Weeds => "weeds",
-            Self::Guarded => "guarded",
-            Self::Swings => "swings",
-            Self::Closed => "closed",
-        }
+        self.names().0
     }
 
     /// Its name.
     pub fn title(self) -> &'static str {
+        self.names().1
+    }
+
+    fn names(self) -> (&'static str, &'static str) {
         match self {
-            Self::Weeded => "weeded",
-            Self::Plants => "stem zones and canopies",
-            Self::Margins => "margins",
-            Self::Weeds => "tall weeds and unknowns kept",
-            Self::Guarded => "guarded ground",
-            Self::Swings => "swings",
-            Self::Closed => "unseen ground, holds, alarms",
+            Self::Weeded => ("weeded", "weeded"),
+            Self::Plants => ("plants", "stem zones and canopies"),
+            Self::Margins => ("margins", "margins"),
+            Self::Weeds => ("weeds", "tall weeds and unknowns kept"),
+            Self::Guarded => ("guarded", "guarded ground"),
+            Self::Swings => ("swings", "swings"),
+            Self::Closed => ("closed", "unseen ground, holds, alarms"),
         }
     }
 }
@@ -91,11 +87,8 @@ impl Budget {
         motion: &Motion,
     ) -> Self {
         let ground = |part: Part| {
-            let stretches = reasons.iter().filter(move |reason| reason.part == part).map(|reason| {
-                let stretch = motion.stretch_mm(&reason.times_s);
-                machine.tool_mm(stretch.start)..machine.tool_mm(stretch.end)
-            });
-            stretches.collect::<Vec<_>>()
+            let reasons = reasons.iter().filter(move |reason| reason.part == part);
+            reasons.map(|reason| machine.worked_mm(motion, &reason.times_s)).collect::<Vec<_>>()
         };
         let (mut taken, mut share) = (Vec::new(), 0.0);
         Self(Part::ALL.map(|part| {

@@ -7,22 +7,46 @@
 //!
 //! [`crate::stand`] and [`crate::driving`] apply the conditions.
 
-mod errors;
 mod parameters;
-mod presets;
 
 use crate::machine::{Dirt, Machine};
 use crate::servo::{Scatter, Servo};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
-pub use errors::WrongValue;
-use errors::explain;
 use files::FileError;
+use files::toml_entry::{self, Entry};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
-use presets::PRESETS;
-pub use presets::presets;
+use std::fmt::Display;
 use std::io;
 use std::path::Path;
+use thiserror::Error;
+
+/// The presets: a name, and a file that says what differs from the default.
+const PRESETS: &[(&str, &str)] = &[
+    ("transplanted", ""),
+    ("even-stand", include_str!("../presets/even-stand.toml")),
+    ("direct-sown", include_str!("../presets/direct-sown.toml")),
+    ("weedy", include_str!("../presets/weedy.toml")),
+    ("soft-ground", include_str!("../presets/soft-ground.toml")),
+    ("heavy-soil", include_str!("../presets/heavy-soil.toml")),
+    ("dusty", include_str!("../presets/dusty.toml")),
+    ("hand-steered", include_str!("../presets/hand-steered.toml")),
+    ("hand-steered-set-up", include_str!("../presets/hand-steered-set-up.toml")),
+    ("set-up", include_str!("../presets/set-up.toml")),
+    ("quick-tool", include_str!("../presets/quick-tool.toml")),
+    ("chilli", include_str!("../presets/chilli.toml")),
+    ("broccoli", include_str!("../presets/broccoli.toml")),
+    ("maize", include_str!("../presets/maize.toml")),
+    ("maize-uneven", include_str!("../presets/maize-uneven.toml")),
+    // The same field as the first, named by its machine.
+    ("from-the-box", ""),
+    ("paper", include_str!("../presets/paper.toml")),
+];
+
+/// The presets' names.
+pub fn presets() -> impl Iterator<Item = &'static str> {
+    PRESETS.iter().map(|(preset, _)| *preset)
+}
 
 impl Conditions {
     /// The conditions of a preset, or of a file. `read` returns the file's text.
@@ -184,6 +208,66 @@ impl Conditions {
         let others = Setting::all().filter(|setting| !timing.contains(setting));
         others.filter_map(|setting| Some((setting, *self.settings.get(&setting.text().to_string())?))).collect()
     }
+}
+
+/// A value that a parameter or setting cannot have.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{name} {problem}")]
+pub struct WrongValue {
+    /// The parameter, or `settings` and a setting.
+    name: String,
+    problem: String,
+}
+
+impl WrongValue {
+    fn new(name: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self { name: name.into(), problem: problem.into() }
+    }
+
+    fn out_of_range(name: impl Into<String>, value: f64, range: (f64, f64), meaning: impl Display) -> Self {
+        let (least, greatest) = range;
+        Self::new(name, format!("is {value}, but has to be {least} to {greatest}: {meaning}"))
+    }
+
+    fn not_whole(name: &str, value: f64) -> Self {
+        Self::new(name, format!("is {value}, but has to be a whole number"))
+    }
+
+    fn unknown(name: impl Into<String>) -> Self {
+        let known = names().collect::<Vec<_>>().join(", ");
+        Self::new(name, format!("is neither a parameter of the field nor a setting of the firmware; there are {known}"))
+    }
+}
+
+/// All names that [`Conditions::set`] takes.
+fn names() -> impl Iterator<Item = String> {
+    PARAMETERS
+        .iter()
+        .map(|parameter| parameter.name.to_owned())
+        .chain(Setting::all().map(|setting| setting.text().to_string()))
+}
+
+/// The TOML reader's error at a byte, in one line. For a value of a parameter or setting: the valid values.
+fn explain(text: &str, byte: usize, error: &toml::de::Error) -> String {
+    let entry = toml_entry::around(text, byte).filter(|entry| entry.value.contains(&byte));
+    let wrong = entry.and_then(|Entry { name, value, .. }| {
+        let (table, key) = name.split_once('.')?;
+        let (least, greatest, meaning) = range(table, key)?;
+        let written = &text[value];
+        Some(format!("{name} is {written}, but has to be a number from {least} to {greatest}: {meaning}"))
+    });
+    wrong.unwrap_or_else(|| error.message().trim().replace('\n', ", "))
+}
+
+/// The range of a parameter or setting, and what it is.
+fn range(table: &str, key: &str) -> Option<(f64, f64, String)> {
+    if table == "settings" {
+        let setting = Setting::find(key.as_bytes())?;
+        let range = setting.description();
+        return Some((range.least.into(), range.greatest.into(), setting.help().to_string()));
+    }
+    let parameter = PARAMETERS.iter().find(|known| known.name.split_once('.') == Some((table, key)))?;
+    Some((parameter.least, parameter.greatest, parameter.meaning.to_owned()))
 }
 
 #[cfg(test)]

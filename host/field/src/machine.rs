@@ -101,6 +101,12 @@ impl Machine {
         position_mm - self.beam_to_tool_mm
     }
 
+    /// The stretch of ground that the tool rolls over during a time.
+    pub fn worked_mm(&self, motion: &Motion, times_s: &Range<f64>) -> Range<f64> {
+        let stretch = motion.stretch_mm(times_s);
+        self.tool_mm(stretch.start)..self.tool_mm(stretch.end)
+    }
+
     /// Net counts of a clean encoder, from the beginning of a motion to a time.
     pub fn ticks(&self, motion: &Motion, time_s: f64) -> i64 {
         marks(motion.wheel_mm(time_s) - motion.start_mm(), self.tick_mm())
@@ -158,21 +164,21 @@ impl Machine {
         stroke.times_below_s(self.line_degrees(), during_s)
     }
 
-    /// The beam's level at power-up, before the motion begins.
-    pub fn beam_before(&self, row: &Row, motion: &Motion) -> PinChange {
-        self.level_before(wiring::BEAM, 0.0, row, motion)
+    /// The level of each beam's line at power-up, before the motion begins: the first beam's, and the second one's if
+    /// there is one.
+    pub fn beams_before(&self, row: &Row, motion: &Motion) -> Vec<PinChange> {
+        self.beams(&self.seen_mm(row.blocks_mm()), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
     }
 
-    /// As [`beam_before`](Self::beam_before), of the second beam, if there is one.
-    pub fn second_beam_before(&self, row: &Row, motion: &Motion) -> Option<PinChange> {
-        self.has_second_beam().then(|| self.level_before(wiring::SECOND_BEAM, self.second_beam_mm, row, motion))
-    }
-
-    /// The level of a beam `behind_mm` behind the first.
-    fn level_before(&self, pin: Pin, behind_mm: f64, row: &Row, motion: &Motion) -> PinChange {
-        let ground_mm = motion.start_mm() - behind_mm;
-        let broken = self.seen_mm(row.blocks_mm()).iter().any(|block| block.contains(&ground_mm));
-        PinChange { cycle: 0, pin, high: !broken }
+    /// The sensors of the beams of a machine at `start_mm`, over these leaves.
+    pub(crate) fn beams(&self, leaves_mm: &[Range<f64>], start_mm: f64, start_cycle: u64) -> Vec<Sensor> {
+        let second = self.has_second_beam().then_some((wiring::SECOND_BEAM, self.second_beam_mm));
+        let beam = |(pin, behind_mm): (Pin, f64)| {
+            let is_broken = leaves_mm.iter().any(|leaf| leaf.contains(&(start_mm - behind_mm)));
+            let last = PinChange { cycle: start_cycle, pin, high: !is_broken };
+            Sensor { last, behind_mm, response_s: self.beam_response_ms / 1000.0, changed_s: None }
+        };
+        [(wiring::BEAM, 0.0)].into_iter().chain(second).map(beam).collect()
     }
 
     /// Whether there is a second beam.
@@ -188,11 +194,10 @@ impl Machine {
 
     /// The pin changes of encoder and beam while the machine rolls past the row, in order of time.
     ///
-    /// The motion begins at `start_cycle`, with the encoder at rest and the beam as [`Machine::beam_before`] says.
+    /// The motion begins at `start_cycle`, with the encoder at rest and the beams as [`Machine::beams_before`] says.
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let mut changes = self.encoder_changes(motion, start_cycle);
         changes.extend(self.beam_changes(row, motion, start_cycle));
-        changes.extend(self.second_beam_changes(row, motion, start_cycle));
         changes.sort_by_key(|change| change.cycle);
         changes
     }
@@ -228,28 +233,12 @@ impl Machine {
             .collect()
     }
 
-    /// The beam's line, low while the beam is broken, later than the leaves by the sensor's response.
+    /// The beams' lines, low while a beam is broken, later than the leaves by the sensor's response: first all changes
+    /// of the first beam, then those of the second.
     pub fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        self.changes(self.beam_before(row, motion), 0.0, row, motion, start_cycle)
-    }
-
-    /// As [`beam_changes`](Self::beam_changes), of the second beam; none if there is none.
-    pub fn second_beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        let before = self.second_beam_before(row, motion);
-        before.map_or_else(Vec::new, |before| self.changes(before, self.second_beam_mm, row, motion, start_cycle))
-    }
-
-    /// The pin changes of a beam `behind_mm` behind the first. `before` is its level at the start.
-    fn changes(
-        &self,
-        before: PinChange,
-        behind_mm: f64,
-        row: &Row,
-        motion: &Motion,
-        start_cycle: u64,
-    ) -> Vec<PinChange> {
-        let mut sensor = Sensor::new(self, before, behind_mm);
-        sensor.changes(&self.seen_mm(row.blocks_mm()), motion, 0.0..f64::INFINITY, start_cycle)
+        let leaves_mm = self.seen_mm(row.blocks_mm());
+        let beams = self.beams(&leaves_mm, motion.start_mm(), 0).into_iter();
+        beams.flat_map(|mut beam| beam.changes(&leaves_mm, motion, 0.0..f64::INFINITY, start_cycle)).collect()
     }
 }
 
@@ -266,11 +255,6 @@ pub(crate) struct Sensor {
 }
 
 impl Sensor {
-    /// A sensor `behind_mm` behind the first. `before` is the level that it has reported before the motion begins.
-    pub(crate) fn new(machine: &Machine, before: PinChange, behind_mm: f64) -> Self {
-        Self { last: before, behind_mm, response_s: machine.beam_response_ms / 1000.0, changed_s: None }
-    }
-
     /// The reported changes during a time, while the pieces of the motion that begin in this time roll past these
     /// leaves.
     pub(crate) fn changes(
@@ -422,15 +406,15 @@ mod tests {
     fn the_second_beam_has_the_first_s_edges_at_the_beams_distance() {
         let machine = Machine { second_beam_mm: 220.0, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1300.0).with_slip(|| 0.2);
-        let second = machine.second_beam_changes(&row(), &motion, START_CYCLE);
-        assert_eq!(machine.second_beam_before(&row(), &motion).map(|before| before.high), Some(true));
+        let mut second = machine.beam_changes(&row(), &motion, START_CYCLE);
+        second.retain(|change| change.pin == wiring::SECOND_BEAM);
+        assert!(machine.beams_before(&row(), &motion)[1].high);
         for (change, place_mm) in second.iter().zip([425.0, 575.0, 792.5, 807.5]) {
             let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
             assert!((motion.position_mm(time_s) - 220.0 - place_mm).abs() < 0.001, "{place_mm} mm");
-            assert_eq!(change.pin, wiring::SECOND_BEAM);
         }
         assert_eq!(second.len(), 4);
-        assert!(Machine::default().second_beam_changes(&row(), &motion, START_CYCLE).is_empty());
+        assert_eq!(Machine::default().beams_before(&row(), &motion).len(), 1);
     }
 
     #[test]
@@ -438,7 +422,7 @@ mod tests {
         let motion = Motion::steady(500.0, 1000.0, mm_s(2.0), 700.0);
         let machine = Machine::default();
         let beam = beam(&machine.pin_changes(&row(), &motion, START_CYCLE));
-        assert!(!machine.beam_before(&row(), &motion).high);
+        assert!(!machine.beams_before(&row(), &motion)[0].high);
         assert!(beam.len() == 1 && beam[0].high);
     }
 

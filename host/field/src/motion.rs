@@ -535,25 +535,6 @@ mod tests {
     }
 
     #[test]
-    fn a_cursor_finds_the_same_wheel_position_as_a_search() {
-        let mut slip = [0.02, 0.1, 0.0].into_iter().cycle();
-        let motion = to_and_fro().with_slip(|| slip.next().unwrap_or(0.0));
-        let times_s: Vec<f64> =
-            (0..(1000.0 * motion.duration_s()) as u32 + 500).map(|step| f64::from(step) / 1000.0).collect();
-        // One by one, within a piece, and over several of them.
-        for at_once in [1, 64, 2000] {
-            let mut course = Course::along(&motion);
-            for times_s in times_s.chunks(at_once) {
-                let mut wheel_mm = times_s.to_vec();
-                course.roll(&mut wheel_mm);
-                for (wheel_mm, &time_s) in wheel_mm.into_iter().zip(times_s) {
-                    assert_eq!(wheel_mm, motion.wheel_mm(time_s), "at {time_s} s");
-                }
-            }
-        }
-    }
-
-    #[test]
     fn every_mark_is_passed_at_the_time_when_the_position_says_so() {
         let motion = to_and_fro();
         let mut count = 0;

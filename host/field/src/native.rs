@@ -161,7 +161,6 @@ impl Sensors {
     pub fn new(trial: &Trial, turn_s: f64) -> Self {
         let Trial { machine, motion, row, .. } = trial;
         let mut edges = machine.beam_changes(row, motion, 0);
-        edges.extend(machine.second_beam_changes(row, motion, 0));
         edges.sort_by_key(|edge| edge.cycle);
         let mut beams = beams_before(trial);
         let edges = edges.into_iter().map(|edge| {
@@ -267,10 +266,9 @@ impl<'a> Encoder<'a> {
 /// The beams' levels before the motion begins.
 pub fn beams_before(trial: &Trial) -> Beams {
     let Trial { machine, motion, row, .. } = trial;
-    Beams {
-        broken: !machine.beam_before(row, motion).high,
-        second_broken: machine.second_beam_before(row, motion).is_some_and(|before| !before.high),
-    }
+    let before = machine.beams_before(row, motion);
+    let is_broken = |pin| before.iter().any(|beam| beam.pin == pin && !beam.high);
+    Beams { broken: is_broken(wiring::BEAM), second_broken: is_broken(wiring::SECOND_BEAM) }
 }
 
 /// Weeds the trial's row with the firmware's decisions. The motion begins at time and cycle 0. `sensors` must come from this

@@ -46,8 +46,7 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
             if before_s > 0.0
                 && let Some(passing) = passed.next()
             {
-                let ground = motion.stretch_mm(&(passing.time_s - before_s..passing.time_s + before_s));
-                let ground = machine.tool_mm(ground.start)..machine.tool_mm(ground.end);
+                let ground = machine.worked_mm(motion, &(passing.time_s - before_s..passing.time_s + before_s));
                 let between_mm = before.as_ref().map_or(ground.start, |before| before.start.min(ground.start));
                 lost.push(between_mm..before.map_or(ground.end, |before| before.end.max(ground.end)));
                 before = Some(ground);

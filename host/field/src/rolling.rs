@@ -53,13 +53,8 @@ impl Rolling {
     /// A standing machine before or in a row.
     pub fn new(machine: Machine, row: Vec<Thing>, start_mm: f64, start_cycle: u64) -> Self {
         let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Thing::blocks_mm).collect()));
-        let beam = |pin, behind_mm: f64| {
-            let is_broken = leaves_mm.iter().any(|leaf| leaf.contains(&(start_mm - behind_mm)));
-            Sensor::new(&machine, PinChange { cycle: start_cycle, pin, high: !is_broken }, behind_mm)
-        };
-        let second = machine.has_second_beam().then(|| beam(wiring::SECOND_BEAM, machine.second_beam_mm));
         Self {
-            beams: [beam(wiring::BEAM, 0.0)].into_iter().chain(second).collect(),
+            beams: machine.beams(&leaves_mm, start_mm, start_cycle),
             row,
             commands: 0,
             motion: Motion::starting_at(start_mm),

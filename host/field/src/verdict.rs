@@ -59,7 +59,13 @@ impl Timing {
         span.start + trim_mm..span.end - trim_mm
     }
 
-    /// How wide that is across the row.
+    /// A plant's keep-out zone: that ground with its margins.
+    fn window_mm(&self, plant: &Thing) -> Range<f64> {
+        let (kept, margin_mm) = (self.kept_mm(plant), f64::from(self.margin_mm));
+        kept.start - margin_mm..kept.end + margin_mm
+    }
+
+    /// How wide the kept ground is across the row.
     fn kept_across_mm(&self, plant: &Thing) -> f64 {
         if self.stem_zone_mm == 0 { plant.across_mm } else { plant.across_mm.min(self.stem_zone_mm.into()) }
     }
@@ -174,15 +180,13 @@ impl Judgement {
 /// nothing with the right leads. The inter-row tools are not part of this figure.
 pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Timing) -> f64 {
     let swing_s = machine.idle_share_of_stroke() * machine.stroke_s();
-    let margin_mm = f64::from(timing.margin_mm);
     let lost = row.plants().map(|plant| {
-        let span = timing.kept_mm(plant);
         let swing_mm = |ground_mm: f64| {
             let first = motion.passings(ground_mm + machine.beam_to_tool_mm).next();
             first.map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs()) * swing_s
         };
-        let (start_mm, end_mm) = (span.start - margin_mm, span.end + margin_mm);
-        start_mm - swing_mm(start_mm)..end_mm + swing_mm(end_mm)
+        let window = timing.window_mm(plant);
+        window.start - swing_mm(window.start)..window.end + swing_mm(window.end)
     });
     1.0 - share_of(&row.span_mm(), &union(lost.collect()))
 }
@@ -200,11 +204,7 @@ pub fn judge(
     let stroke = machine.servo.stroke(&commands, start_cycle);
     let whole_s = 0.0..motion.duration_s();
     let ground_of = |times_s: &[Range<f64>]| -> Vec<Range<f64>> {
-        let stretches = times_s.iter().map(|times_s| {
-            let stretch = motion.stretch_mm(times_s);
-            machine.tool_mm(stretch.start)..machine.tool_mm(stretch.end)
-        });
-        union(stretches.collect())
+        union(times_s.iter().map(|times_s| machine.worked_mm(motion, times_s)).collect())
     };
     let closed = ground_of(&machine.times_not_clear_s(&stroke, &whole_s));
     let over_zone = match timing.stem_zone_mm {
@@ -212,15 +212,20 @@ pub fn judge(
         zone_mm => ground_of(&machine.times_within_s(f64::from(zone_mm) / 2.0, &stroke, &whole_s)),
     };
     let weeded = ground_of(&machine.times_weeding_s(&stroke, &whole_s));
-    let run = motion.stretch_mm(&whole_s);
-    let run = machine.tool_mm(run.start)..machine.tool_mm(run.end);
+    let run = machine.worked_mm(motion, &whole_s);
+    // How late a command was against its ideal position, in ticks. `None` unless the machine rolls forward.
+    let late_ticks = |time_s: f64, window_mm: f64, lead_ms: u32| {
+        let speed_mm_s = motion.speed_mm_s(time_s);
+        let ideal_mm = window_mm + machine.beam_to_tool_mm - speed_mm_s * f64::from(lead_ms) / 1000.0;
+        (speed_mm_s > 0.0).then(|| (motion.position_mm(time_s) - ideal_mm) / machine.tick_mm())
+    };
     let swings = Swing::all(&commands, motion, start_cycle);
 
     let mut plants: Vec<PlantOutcome> =
         row.plants().map(|plant| plant_outcome(plant, &over_zone, machine, timing)).collect();
     let mut idle_swings = 0;
     for swing in &swings {
-        let passed = swing.passed_mm(machine, motion);
+        let passed = machine.worked_mm(motion, &swing.during_s);
         // Plants stand in ascending order, and apart.
         let first = plants.partition_point(|plant| plant.plant.span_mm().end <= passed.start);
         let behind = plants.partition_point(|plant| plant.plant.span_mm().start < passed.end);
@@ -228,23 +233,19 @@ pub fn judge(
             plant.swings += 1;
         }
         if let (true, Some(last)) = (first < behind, behind.checked_sub(1)) {
-            let error = SwingError { machine, motion, timing };
+            let [first_mm, last_mm] = [first, last].map(|plant| timing.window_mm(&plants[plant].plant));
             plants[first].out_error_ticks =
-                swing.out_s.and_then(|time_s| error.out_ticks(time_s, &plants[first].plant));
-            plants[last].in_error_ticks = swing.in_s.and_then(|time_s| error.in_ticks(time_s, &plants[last].plant));
+                swing.out_s.and_then(|time_s| late_ticks(time_s, first_mm.start, timing.lead_out_ms));
+            plants[last].in_error_ticks =
+                swing.in_s.and_then(|time_s| late_ticks(time_s, last_mm.end, timing.lead_in_ms));
         } else if swing.out_s.is_some() {
             idle_swings += 1;
         }
     }
 
-    let margin_mm = f64::from(timing.margin_mm);
-    let window = |plant: &Thing| {
-        let kept = timing.kept_mm(plant);
-        kept.start - margin_mm..kept.end + margin_mm
-    };
     Judgement {
         plants,
-        windows_mm: union(row.plants().map(window).collect()),
+        windows_mm: union(row.plants().map(|plant| timing.window_mm(plant)).collect()),
         weeds: row.weeds().map(|weed| weed_outcome(weed, machine, motion, &stroke)).collect(),
         clear_mm: between(&closed, &run),
         path: path(machine, motion, &stroke),
@@ -283,38 +284,6 @@ impl Swing {
             swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
         }
         swings
-    }
-
-    /// The ground that the tool passed during the swing.
-    fn passed_mm(&self, machine: &Machine, motion: &Motion) -> Range<f64> {
-        let passed = motion.stretch_mm(&self.during_s);
-        machine.tool_mm(passed.start)..machine.tool_mm(passed.end)
-    }
-}
-
-/// The ideal positions of swings.
-struct SwingError<'a> {
-    machine: &'a Machine,
-    motion: &'a Motion,
-    timing: Timing,
-}
-
-impl SwingError<'_> {
-    fn out_ticks(&self, time_s: f64, plant: &Thing) -> Option<f64> {
-        let window_mm = self.timing.kept_mm(plant).start - f64::from(self.timing.margin_mm);
-        self.ticks(time_s, window_mm, self.timing.lead_out_ms)
-    }
-
-    fn in_ticks(&self, time_s: f64, plant: &Thing) -> Option<f64> {
-        let window_mm = self.timing.kept_mm(plant).end + f64::from(self.timing.margin_mm);
-        self.ticks(time_s, window_mm, self.timing.lead_in_ms)
-    }
-
-    /// How late a command was against its ideal position, in ticks. `None` unless the machine rolls forward.
-    fn ticks(&self, time_s: f64, window_mm: f64, lead_ms: u32) -> Option<f64> {
-        let speed_mm_s = self.motion.speed_mm_s(time_s);
-        let ideal_mm = window_mm + self.machine.beam_to_tool_mm - speed_mm_s * f64::from(lead_ms) / 1000.0;
-        (speed_mm_s > 0.0).then(|| (self.motion.position_mm(time_s) - ideal_mm) / self.machine.tick_mm())
     }
 }
 

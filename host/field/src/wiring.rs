@@ -48,121 +48,52 @@ pub const WIRES: [Wire; 8] = [
 /// A connection of one contact of the Uno, or of a pair of them.
 #[derive(Clone, Copy, Debug)]
 pub struct Connection {
-    /// The Uno's side.
-    pub contact: Contact,
+    /// The pin that the weeder reads or drives. `None` for D0 and D1: the serial line, also at the Uno's USB plug.
+    pub pin: Option<Pin>,
     /// The other side.
     pub goes_to: &'static str,
-    /// The resistor that keeps the line high when nothing pulls it low.
-    pub pull_up: PullUp,
+    /// The resistor that keeps the line high when nothing pulls it low. It is empty for an output, and for a line that
+    /// is driven both ways.
+    pub pull_up: &'static str,
     /// A note for the builder.
     pub note: &'static str,
 }
 
-/// A contact of the Uno.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Contact {
-    /// A pin that the weeder reads or drives.
-    Pin(Pin),
-    /// D0 and D1, the serial line, which is also at the Uno's USB plug.
-    Serial,
-}
+/// A pull-up to be soldered. The chip's own of 20 to 50 k is too weak for a long cable in a noisy place.
+pub const EXTERNAL: &str = "4.7 k to 5 V";
 
-impl Contact {
-    /// Its label on the board.
-    pub fn label(self) -> String {
-        match self {
-            Contact::Serial => "D0, D1".to_owned(),
-            Contact::Pin(pin) => format!("D{}", pin.number()),
-        }
-    }
-}
-
-/// A resistor to 5 V.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PullUp {
-    /// 4.7 k, to be soldered. The chip's own of 20 to 50 k is too weak for a long cable in a noisy place.
-    External,
-    /// The chip's own.
-    Internal,
-    /// None: the line is an output, or driven both ways.
-    None,
-}
-
-impl PullUp {
-    /// In a table's cell.
-    fn text(self) -> &'static str {
-        match self {
-            PullUp::External => "4.7 k to 5 V",
-            PullUp::Internal => "in the chip",
-            PullUp::None => "",
-        }
-    }
-}
+/// The chip's own pull-up.
+const INTERNAL: &str = "in the chip";
 
 /// Every connection of a contact that carries a signal, in the order of the board's numbering.
 pub const CONNECTIONS: [Connection; 9] = [
+    of_pin(ENCODER_A, "encoder A", EXTERNAL, "forward is A before B"),
+    of_pin(ENCODER_B, "encoder B", EXTERNAL, "swap A and B if the position counts backwards"),
+    of_pin(WORK_SWITCH, "work switch to ground", INTERNAL, "closed = work"),
+    of_pin(END_SWITCH, "end switch to ground, optional", INTERNAL, "closed = tool out; `set end_switch on` enables it"),
+    of_pin(BEAM, "beam's output", EXTERNAL, "low = broken; never above 5 V, or use an optocoupler"),
+    of_pin(SERVO, "servo's signal", "", "1500 us = 0 degrees, tool in the row; 2000 us = 45 degrees, out"),
+    of_pin(SECOND_BEAM, "second beam's output, optional", EXTERNAL, "low = broken; `set second_beam_mm` enables it"),
+    of_pin(LED, "the Uno's own LED", "", "on = work; one flash a second = hold; groups of flashes = alarm code"),
     Connection {
-        contact: Contact::Pin(ENCODER_A),
-        goes_to: "encoder A",
-        pull_up: PullUp::External,
-        note: "forward is A before B",
-    },
-    Connection {
-        contact: Contact::Pin(ENCODER_B),
-        goes_to: "encoder B",
-        pull_up: PullUp::External,
-        note: "swap A and B if the position counts backwards",
-    },
-    Connection {
-        contact: Contact::Pin(WORK_SWITCH),
-        goes_to: "work switch to ground",
-        pull_up: PullUp::Internal,
-        note: "closed = work",
-    },
-    Connection {
-        contact: Contact::Pin(END_SWITCH),
-        goes_to: "end switch to ground, optional",
-        pull_up: PullUp::Internal,
-        note: "closed = tool out; `set end_switch on` enables it",
-    },
-    Connection {
-        contact: Contact::Pin(BEAM),
-        goes_to: "beam's output",
-        pull_up: PullUp::External,
-        note: "low = broken; never above 5 V, or use an optocoupler",
-    },
-    Connection {
-        contact: Contact::Pin(SERVO),
-        goes_to: "servo's signal",
-        pull_up: PullUp::None,
-        note: "1500 us = 0 degrees, tool in the row; 2000 us = 45 degrees, out",
-    },
-    Connection {
-        contact: Contact::Pin(SECOND_BEAM),
-        goes_to: "second beam's output, optional",
-        pull_up: PullUp::External,
-        note: "low = broken; `set second_beam_mm` enables it",
-    },
-    Connection {
-        contact: Contact::Pin(LED),
-        goes_to: "the Uno's own LED",
-        pull_up: PullUp::None,
-        note: "on = work; one flash a second = hold; groups of flashes = alarm code",
-    },
-    Connection {
-        contact: Contact::Serial,
+        pin: None,
         goes_to: "serial, 115200 baud 8N1",
-        pull_up: PullUp::None,
+        pull_up: "",
         note: "through the Uno's USB; connect nothing else",
     },
 ];
 
+const fn of_pin(pin: Pin, goes_to: &'static str, pull_up: &'static str, note: &'static str) -> Connection {
+    Connection { pin: Some(pin), goes_to, pull_up, note }
+}
+
 /// The connections as a table in Markdown.
 pub fn table() -> String {
     let mut table = "| Uno | goes to | pull-up | notes |\n| --- | --- | --- | --- |\n".to_owned();
-    for Connection { contact, goes_to, pull_up, note } in CONNECTIONS {
+    for Connection { pin, goes_to, pull_up, note } in CONNECTIONS {
+        let contact = pin.map_or("D0, D1".to_owned(), |pin| pin.to_string());
         // Writing to a String does not fail.
-        let _ = writeln!(table, "| {} | {goes_to} | {} | {note} |", contact.label(), pull_up.text());
+        let _ = writeln!(table, "| {contact} | {goes_to} | {pull_up} | {note} |");
     }
     table
 }
@@ -174,14 +105,8 @@ mod tests {
     #[test]
     fn every_pin_is_wired_once() {
         for Wire { pin, .. } in WIRES {
-            let wired = CONNECTIONS.iter().filter(|connection| connection.contact == Contact::Pin(pin));
+            let wired = CONNECTIONS.iter().filter(|connection| connection.pin == Some(pin));
             assert_eq!(wired.count(), 1, "{pin:?}");
         }
-    }
-
-    #[test]
-    fn contacts_are_called_as_on_the_board() {
-        let labels: Vec<String> = CONNECTIONS.iter().map(|connection| connection.contact.label()).collect();
-        assert_eq!(labels, ["D2", "D3", "D4", "D5", "D8", "D9", "D10", "D13", "D0, D1"]);
     }
 }

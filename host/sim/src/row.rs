@@ -141,8 +141,8 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
 fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome, speed_mm_s: f64) -> Result<()> {
     let [drawing, moving, row, plants, weeds] = REPORT;
     folder.write(row, |to| trial.row.write_csv(to))?;
-    folder.write(plants, |to| report::write_plants_csv(outcome, to))?;
-    folder.write(weeds, |to| report::write_weeds_csv(outcome, to))?;
+    folder.write(plants, |to| report::write_csv(&report::plants(outcome), to))?;
+    folder.write(weeds, |to| report::write_csv(&report::weeds(outcome), to))?;
     folder.write(drawing, |to| svg::write(to, &picture::draw(&trial.row, &outcome.judgement)))?;
     let animation = animation::draw(&trial.row, &trial.machine, &outcome.judgement, speed_mm_s);
     folder.write(moving, |to| svg::write(to, &animation))

@@ -115,13 +115,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_status_line_is_read_by_its_keys() {
-        let status = Status::parse("state=work tool=in pos=-12 speed_mm_s=0 windows=0 lost=3 unseen_mm=0");
-        let expected = Status { state: "work".to_owned(), position_ticks: -12, lost_ticks: 3 };
-        assert_eq!(status.unwrap(), expected);
-    }
-
-    #[test]
     fn a_status_line_without_a_figure_is_refused_by_its_name() {
         let error = Status::parse("state=work pos=many lost=0").unwrap_err();
         assert!(error.to_string().starts_with("the firmware's status has no `pos=`"), "{error}");

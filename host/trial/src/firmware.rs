@@ -11,15 +11,18 @@ use std::sync::OnceLock;
 use anyhow::{Context, Error, Result, ensure};
 use cargo_metadata::Message;
 
-/// A program for the chip: its package, which is also its binary's name, and the alias that builds it.
+/// A program for the chip.
 struct Program {
+    /// Its package, which is also its binary's name, and the alias that builds it.
     package: &'static str,
     alias: &'static str,
+    /// The path of its ELF, or the error, once it was built in this process.
+    built: OnceLock<Result<PathBuf, String>>,
 }
 
-const FIRMWARE: Program = Program { package: "weeder-firmware", alias: "firmware" };
-const BENCH: Program = Program { package: "knn-bench", alias: "bench-firmware" };
-const TESTER: Program = Program { package: "tester-firmware", alias: "tester-firmware" };
+static FIRMWARE: Program = Program::new("weeder-firmware", "firmware");
+static BENCH: Program = Program::new("knn-bench", "bench-firmware");
+static TESTER: Program = Program::new("tester-firmware", "tester-firmware");
 
 /// Variables of an outer cargo or a shell that would change how the firmware is compiled.
 const FOREIGN_SETTINGS: [&str; 9] = [
@@ -48,8 +51,7 @@ const FOREIGN_SETTINGS: [&str; 9] = [
 ///
 /// Where cargo cannot be started, fails, or makes no ELF.
 pub fn build() -> Result<PathBuf> {
-    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    FIRMWARE.build_once(&BUILT)
+    FIRMWARE.build_once()
 }
 
 /// Builds the classifier's bench, which [`bench`](mod@crate::bench) runs, and returns the path of its ELF.
@@ -58,8 +60,7 @@ pub fn build() -> Result<PathBuf> {
 ///
 /// As [`build`].
 pub fn build_bench() -> Result<PathBuf> {
-    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    BENCH.build_once(&BUILT)
+    BENCH.build_once()
 }
 
 /// Builds the firmware of the tester, the Uno that checks another one. Returns the path of its ELF.
@@ -68,13 +69,16 @@ pub fn build_bench() -> Result<PathBuf> {
 ///
 /// As [`build`].
 pub fn build_tester() -> Result<PathBuf> {
-    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    TESTER.build_once(&BUILT)
+    TESTER.build_once()
 }
 
 impl Program {
-    fn build_once(&self, built: &OnceLock<Result<PathBuf, String>>) -> Result<PathBuf> {
-        built.get_or_init(|| self.build().map_err(|error| format!("{error:#}"))).clone().map_err(Error::msg)
+    const fn new(package: &'static str, alias: &'static str) -> Self {
+        Self { package, alias, built: OnceLock::new() }
+    }
+
+    fn build_once(&self) -> Result<PathBuf> {
+        self.built.get_or_init(|| self.build().map_err(|error| format!("{error:#}"))).clone().map_err(Error::msg)
     }
 
     fn build(&self) -> Result<PathBuf> {

@@ -1,10 +1,9 @@
 //! The live virtual Uno: it runs in real time, at a pseudo terminal that any serial program opens. A simulated machine
 //! rolls along a row again and again.
 //!
-//! [`LiveUno::start`] powers it up. [`LiveUno::run`] runs it until it is stopped, and [`Live::run_in_background`] does
-//! so in a thread. [`rows`] has several Unos that share one encoder. Each millisecond of the chip's time it exchanges
-//! bytes with the terminal, and then waits for the PC's clock. A slow PC makes the chip slower, but does not change the
-//! time between two of its events.
+//! [`rows`] powers up one Uno, or several that share one encoder, and runs them. Each millisecond of the chip's time an
+//! Uno exchanges bytes with its terminal, and then waits for the PC's clock. A slow PC makes the chip slower, but does
+//! not change the time between two of its events.
 //!
 //! - **Reset.** A program that opens the port of a real Uno resets it through the modem line DTR. A pseudo terminal has
 //!   no such line. So the opening itself resets the Uno, unless [`Setup::keeps_running_when_opened`] is set. A
@@ -19,7 +18,7 @@
 //! - **EEPROM.** It is read from a file at the start, if there is one, and written to it after each change.
 
 use crate::receiver::{ReceiverSetup, SimulatedReceiver};
-use anyhow::{Context, Error, Result, bail};
+use anyhow::{Context, Result, bail};
 use field::machine::{Machine, cycle_at, time_at_s};
 use field::motion::Motion;
 use field::row::Row;
@@ -29,19 +28,13 @@ use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::{Duration, Instant};
 use uno::Uno;
 use uno::elf::EEPROM_BYTES;
 use uno::hex::Bootloader;
 use uno::pty::Pty;
 use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
 
-mod background;
 pub mod rows;
-
-pub use background::{Background, Live};
 
 /// The parts of the simulated set-up.
 #[derive(Clone, Debug, Default)]
@@ -55,7 +48,7 @@ pub struct Setup {
     /// Path of a symbolic link to the pseudo terminal.
     pub link: Option<PathBuf>,
     /// The satellite receiver on the machine, and the path of a symbolic link to its pseudo terminal.
-    pub receiver: Option<(ReceiverSetup, Option<PathBuf>)>,
+    pub receiver: Option<(ReceiverSetup, PathBuf)>,
     /// The course of the machine. Without one, the machine stands.
     pub course: Option<Course>,
     /// Whether to run as fast as the host can, not in real time.
@@ -84,10 +77,6 @@ const SLICE_MS: u64 = 1;
 /// Slices between two checks of the EEPROM.
 const EEPROM_SLICES: u64 = 100;
 
-/// Longest delay of the PC that is made up for. A longer delay is dropped: otherwise the chip would run too fast
-/// afterwards.
-const LATE_BY: Duration = Duration::from_millis(50);
-
 /// Greatest number of bytes on their way to the chip. Others stay in the terminal, so that the program waits.
 const MOST_BYTES_ON_THEIR_WAY: usize = 64;
 
@@ -111,13 +100,8 @@ const STANDING_S: u64 = 3;
 const TICKS_IN_A_PERIOD: f64 = 4.0;
 
 impl Course {
-    /// A machine with one row.
-    pub fn new(row: Row, machine: Machine, speed_mm_s: f64) -> Self {
-        Self { span_mm: row.span_mm(), row, machine, speed_mm_s, slip: 0.0, stands_first_s: STANDING_S }
-    }
-
-    /// A machine with several rows and one wheel: one course for each row. All rows roll along the same ground at the
-    /// same time.
+    /// A machine with one or several rows and one wheel: one course for each row. All rows roll along the same ground at
+    /// the same time.
     pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64) -> Vec<Self> {
         let spans = || rows.iter().map(Row::span_mm);
         let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
@@ -189,22 +173,18 @@ struct Receiver {
 }
 
 impl Receiver {
-    fn start((setup, link): (ReceiverSetup, Option<PathBuf>)) -> Result<Self> {
-        let mut pty = Pty::open()?;
-        if let Some(link) = &link {
-            pty.link(link)?;
-        }
-        Ok(Self { simulated: SimulatedReceiver::new(setup), pty, unread: VecDeque::new() })
+    fn start((setup, link): (ReceiverSetup, PathBuf)) -> Result<Self> {
+        Ok(Self { simulated: SimulatedReceiver::new(setup), pty: terminal(Some(&link))?, unread: VecDeque::new() })
     }
 
-    /// Passes on its output so far.
-    fn serve(&mut self, time_s: f64, way: &Way) -> Result<()> {
+    /// Passes on its output until a cycle.
+    fn serve(&mut self, cycle: u64, way: &Way) -> Result<()> {
         // It sends without a request, and takes no commands.
         if self.pty.was_opened()? {
             self.unread.clear();
         }
         self.pty.read(&mut [0; MOST_BYTES_ON_THEIR_WAY])?;
-        self.unread.extend(self.simulated.bytes_until(time_s, |time_s| way.rolled_m(time_s)));
+        self.unread.extend(self.simulated.bytes_until(time_at_s(0, cycle), |time_s| way.rolled_m(time_s)));
         give(&mut self.pty, &mut self.unread)
     }
 }
@@ -276,7 +256,7 @@ impl Arm {
 }
 
 /// A virtual Uno at a pseudo terminal.
-pub struct LiveUno {
+struct LiveUno {
     uno: Uno,
     /// Its terminal. `None` while its cable is unplugged.
     pty: Option<Pty>,
@@ -292,17 +272,13 @@ pub struct LiveUno {
     /// Bytes from the chip that the program has not had room for.
     unread: VecDeque<u8>,
     resets_when_opened: bool,
-    fast: bool,
     /// Its run time, in slices.
     slices: u64,
 }
 
 impl LiveUno {
     /// Powers it up. Its clock stands until it runs.
-    ///
-    /// # Errors
-    /// If there is no program or it does not fit, no terminal can be opened, or a file is wrong.
-    pub fn start(setup: Setup) -> Result<LiveUno> {
+    fn start(setup: Setup) -> Result<LiveUno> {
         let eeprom = setup.eeprom.map(EepromFile::open).transpose()?;
         let content = eeprom.as_ref().map_or(&[][..], |file| &file.content);
         let mut uno = match (&setup.bootloader, &setup.elf) {
@@ -326,40 +302,13 @@ impl LiveUno {
             eeprom,
             unread: VecDeque::new(),
             resets_when_opened: !setup.keeps_running_when_opened,
-            fast: setup.fast,
             slices: 0,
         })
     }
 
-    /// The path under which programs open its serial port.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The path of the receiver's port, if there is one.
-    pub fn receiver_path(&self) -> Option<&Path> {
-        self.receiver.as_ref().map(|receiver| receiver.pty.path())
-    }
-
-    /// Runs until `stop` is set.
-    ///
-    /// # Errors
-    /// If the firmware crashes or halts, or the terminal or the EEPROM's file fails.
-    pub fn run(&mut self, stop: &AtomicBool) -> Result<()> {
-        let mut pace = (!self.fast).then(Pace::new);
-        while !stop.load(Ordering::Relaxed) {
-            self.slice()?;
-            if let Some(pace) = &mut pace {
-                pace.wait(1);
-            }
-        }
-        self.end()
-    }
-
     /// Runs for a slice.
     fn slice(&mut self) -> Result<()> {
-        self.serve_terminal()?;
-        self.serve_receiver()?;
+        self.serve()?;
         self.roll();
         self.slices += 1;
         // Counts from the start. The last instruction of each slice runs over its end, and these errors must not add
@@ -377,14 +326,8 @@ impl LiveUno {
 
     /// Passes on the remaining output.
     fn end(&mut self) -> Result<()> {
-        self.serve_terminal()?;
-        self.serve_receiver()?;
+        self.serve()?;
         self.keep_eeprom()
-    }
-
-    /// Unplugs the cable. The chip runs on: it has its own power.
-    fn unplug(&mut self) {
-        self.pty = None;
     }
 
     /// Plugs the cable in again.
@@ -395,13 +338,11 @@ impl LiveUno {
         Ok(())
     }
 
-    /// The Uno itself.
-    pub fn uno(&self) -> &Uno {
-        &self.uno
-    }
-
-    /// Resets the chip where a program has opened the port, and passes bytes both ways.
-    fn serve_terminal(&mut self) -> Result<()> {
+    /// Passes on the receiver's output, resets the chip if a program has opened the port, and passes bytes both ways.
+    fn serve(&mut self) -> Result<()> {
+        if let Some(receiver) = &mut self.receiver {
+            receiver.serve(self.uno.cycle(), &self.way)?;
+        }
         let Some(pty) = &mut self.pty else {
             // Discards the output: no program is connected.
             self.uno.received_bytes();
@@ -421,14 +362,6 @@ impl LiveUno {
 
         self.unread.extend(self.uno.received_bytes().iter().map(|received| received.byte));
         give(pty, &mut self.unread)
-    }
-
-    /// Passes on the satellite receiver's output so far.
-    fn serve_receiver(&mut self) -> Result<()> {
-        match &mut self.receiver {
-            Some(receiver) => receiver.serve(self.uno.cycle() as f64 / CYCLES_PER_SECOND as f64, &self.way),
-            None => Ok(()),
-        }
     }
 
     /// Starts a run when the machine has stood for long enough.
@@ -461,59 +394,6 @@ fn terminal(link: Option<&Path>) -> Result<Pty> {
         pty.link(link)?;
     }
     Ok(pty)
-}
-
-/// Keeps slices in step with the PC's clock.
-struct Pace {
-    due: Instant,
-}
-
-impl Pace {
-    fn new() -> Self {
-        Self { due: Instant::now() }
-    }
-
-    /// Waits until this number of slices has passed since the last call.
-    fn wait(&mut self, slices: u64) {
-        self.due += Duration::from_millis(slices * SLICE_MS);
-        let now = Instant::now();
-        match self.due.checked_duration_since(now) {
-            Some(wait) => thread::sleep(wait),
-            None if now - self.due > LATE_BY => self.due = now,
-            None => {}
-        }
-    }
-}
-
-/// The ports of an Uno that runs in a thread.
-pub struct Ports {
-    path: PathBuf,
-    receiver_path: Option<PathBuf>,
-}
-
-impl Ports {
-    /// The path under which programs open its serial port.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The path of the receiver's port, if there is one.
-    pub fn receiver_path(&self) -> Option<&Path> {
-        self.receiver_path.as_deref()
-    }
-}
-
-impl Live for LiveUno {
-    type Outside = Ports;
-    type Failure = Error;
-
-    fn outside(&self) -> Ports {
-        Ports { path: self.path().to_owned(), receiver_path: self.receiver_path().map(Path::to_owned) }
-    }
-
-    fn run_until(&mut self, stop: &AtomicBool) -> Result<()> {
-        self.run(stop)
-    }
 }
 
 /// The file with the EEPROM's content.

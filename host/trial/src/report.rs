@@ -242,23 +242,11 @@ pub fn weeds(outcome: &Outcome) -> Vec<WeedRecord> {
     weeds.map(record).collect()
 }
 
-/// Writes [`plants`] as a CSV table.
+/// Writes [`plants`] or [`weeds`] as a CSV table.
 ///
 /// # Errors
 /// The errors of the writer.
-pub fn write_plants_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
-    write_csv(&plants(outcome), to)
-}
-
-/// Writes [`weeds`] as a CSV table.
-///
-/// # Errors
-/// The errors of the writer.
-pub fn write_weeds_csv(outcome: &Outcome, to: impl io::Write) -> Result<(), csv::Error> {
-    write_csv(&weeds(outcome), to)
-}
-
-fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::Error> {
+pub fn write_csv(records: &[impl Serialize], to: impl io::Write) -> Result<(), csv::Error> {
     let mut writer = csv::Writer::from_writer(to);
     records.iter().try_for_each(|record| writer.serialize(record))?;
     writer.flush()?;
@@ -350,8 +338,8 @@ pub(crate) mod tests {
     fn the_csv_tables_have_a_header_and_a_line_each() {
         let (_, outcome) = ruined_row();
         let (mut plants, mut weeds) = (Vec::new(), Vec::new());
-        write_plants_csv(&outcome, &mut plants).unwrap();
-        write_weeds_csv(&outcome, &mut weeds).unwrap();
+        write_csv(&super::plants(&outcome), &mut plants).unwrap();
+        write_csv(&super::weeds(&outcome), &mut weeds).unwrap();
         let plants = String::from_utf8(plants).unwrap();
         assert_eq!(plants.lines().count(), 3);
         assert!(plants.lines().nth(1).unwrap().starts_with("500.0,150.0,"), "{plants}");

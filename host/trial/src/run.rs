@@ -96,8 +96,7 @@ pub fn boot(elf: &Path, levels: &[PinChange]) -> Result<Uno, UnoError> {
 /// If the firmware cannot be run or does not answer.
 pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Outcome, TrialError> {
     let Trial { row, machine, motion, .. } = trial;
-    let mut inputs = vec![machine.beam_before(row, motion)];
-    inputs.extend(machine.second_beam_before(row, motion));
+    let mut inputs = machine.beams_before(row, motion);
     let mut uno = boot(elf, &inputs)?;
     set_up(trial, &mut uno)?;
     match trial.start {

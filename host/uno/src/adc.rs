@@ -8,9 +8,6 @@
 //! AVCC and the pin AREF are at 5 V. The temperature sensor and noise are not simulated, and free running is the only
 //! trigger.
 
-use std::ffi::CStr;
-use std::ptr::NonNull;
-
 use simavr_ffi as simavr;
 
 /// Inputs that are pins of the board.
@@ -29,22 +26,6 @@ const LARGEST: u32 = 1023;
 // Registers by their address in the data space (data sheet, register summary).
 const ADCSRA: u16 = 0x7A;
 const ADMUX: u16 = 0x7C;
-
-/// The ADC in the chip's list of peripherals.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-pub(super) unsafe fn find(avr: *mut simavr::avr_t) -> NonNull<simavr::avr_adc_t> {
-    // SAFETY: as in `uart::find`; only the ADC is called so.
-    unsafe {
-        let mut peripheral = (*avr).io_port;
-        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != c"adc" {
-            peripheral = (*peripheral).next;
-        }
-        NonNull::new(peripheral.cast()).expect("the ATmega328P has an ADC")
-    }
-}
 
 /// Sets the input and the end of the running conversion. simavr calls this when the sample is taken.
 ///

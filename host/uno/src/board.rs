@@ -14,8 +14,13 @@ use crate::hex::Bootloader;
 use crate::interrupts::{InterruptStatistics, Place};
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 use crate::recorder::{ReceivedByte, Reset};
-use crate::terminal::Terminal;
 use crate::turns::Turns;
+
+/// The terminal's bit rate, until it follows the chip.
+pub const BAUD: u64 = 115_200;
+
+/// Cycles of a byte that a terminal sends: a start bit, eight data bits and a stop bit.
+pub const SENT_BYTE_CYCLES: u64 = (10 * CYCLES_PER_SECOND + BAUD / 2) / BAUD;
 
 /// An Arduino Uno with its firmware.
 pub struct Uno {
@@ -25,7 +30,12 @@ pub struct Uno {
     reset_address: u16,
     /// Levels to come, by cycle.
     to_drive: VecDeque<PinChange>,
-    terminal: Terminal,
+    /// Bytes that the terminal at the serial line has not sent, and the time at which the first one's stop bit ends.
+    to_send: VecDeque<u8>,
+    next_byte_ends: u64,
+    /// Whether bytes are sent at the chip's own baud rate, not at [`BAUD`].
+    follows_baud: bool,
+    lost_bytes: u64,
 }
 
 impl Uno {
@@ -75,7 +85,10 @@ impl Uno {
             image,
             reset_address,
             to_drive: VecDeque::new(),
-            terminal: Terminal::default(),
+            to_send: VecDeque::new(),
+            next_byte_ends: 0,
+            follows_baud: false,
+            lost_bytes: 0,
         }
     }
 
@@ -293,9 +306,14 @@ impl Uno {
         while let Some(change) = self.to_drive.pop_front_if(|change| change.cycle <= self.core.cycle()) {
             self.set(change.pin, change.high);
         }
-        self.terminal.send_due(&mut self.core);
+        while let Some(byte) = self.to_send.pop_front_if(|_| self.next_byte_ends <= self.core.cycle()) {
+            // A byte is lost if the chip has no room for it.
+            self.lost_bytes += u64::from(!self.core.receive(byte));
+            self.next_byte_ends += self.byte_cycles();
+        }
         let next_level = self.to_drive.front().map(|change| change.cycle);
-        let until = [next_level, self.terminal.next_byte_ends()].into_iter().flatten().fold(until, u64::min);
+        let until =
+            [next_level, self.to_send.front().map(|_| self.next_byte_ends)].into_iter().flatten().fold(until, u64::min);
         self.core.step(until).map_err(|stop| {
             let (cycle, program_counter) = (self.core.cycle(), self.core.program_counter());
             match stop {
@@ -307,18 +325,25 @@ impl Uno {
 
     /// Sends bytes to the serial line at its pace, after those that are still queued.
     pub fn send(&mut self, bytes: &[u8]) {
-        self.terminal.send(bytes, &self.core);
+        if self.to_send.is_empty() {
+            self.next_byte_ends = self.next_byte_ends.max(self.cycle() + self.byte_cycles());
+        }
+        self.to_send.extend(bytes);
+    }
+
+    fn byte_cycles(&self) -> u64 {
+        if self.follows_baud { self.core.byte_cycles() } else { SENT_BYTE_CYCLES }
     }
 
     /// From now on sent bytes use the rate of the chip's UART instead of 115,200 baud: a bootloader may have another
     /// rate.
     pub fn follow_baud(&mut self) {
-        self.terminal.follow_baud();
+        self.follows_baud = true;
     }
 
     /// Sent bytes that have not reached the receiver yet.
     pub fn bytes_pending(&self) -> usize {
-        self.terminal.bytes_pending()
+        self.to_send.len()
     }
 
     /// Pushes up to 63 bytes into the receiver at once, faster than any line could. simavr buffers them and passes them
@@ -331,7 +356,7 @@ impl Uno {
 
     /// Sent bytes that the receiver had no room for, because the firmware did not read in time.
     pub fn lost_bytes(&self) -> u64 {
-        self.terminal.lost_bytes()
+        self.lost_bytes
     }
 
     /// Takes the bytes that have come from the firmware, with their cycles.
@@ -368,22 +393,22 @@ impl Uno {
 
     /// Counts and times interrupts from now on; a second call restarts. This slows the simulation.
     pub fn measure_interrupts(&mut self) {
-        self.core.measure_interrupts();
+        self.core.recorder_mut().interrupts.turn_on();
     }
 
     /// The interrupts' statistics since [`Uno::measure_interrupts`]; `None` before it.
     pub fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
-        self.core.interrupt_statistics()
+        self.core.recorder().interrupts.statistics.as_ref()
     }
 
     /// Times the main loop's turns from now on; a second call restarts. This slows the simulation.
     pub fn measure_turns(&mut self) {
-        self.core.measure_turns();
+        self.core.recorder_mut().turns.turn_on();
     }
 
     /// The main loop's turns since [`Uno::measure_turns`]; `None` before it.
     pub fn turns(&self) -> Option<&Turns> {
-        self.core.turns()
+        self.core.recorder().turns.turns.as_ref()
     }
 
     /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` if there is no such

@@ -111,12 +111,6 @@ impl Capture {
             None => Ok(Capture { changes }),
         }
     }
-
-    /// The recording's levels with its first one at `cycle`.
-    pub fn starting_at(&self, cycle: u64) -> impl Iterator<Item = PinChange> {
-        let first = self.changes.first().map_or(0, |change| change.cycle);
-        self.changes.iter().map(move |change| PinChange { cycle: change.cycle - first + cycle, ..*change })
-    }
 }
 
 /// The file's head, up to the end of the channels' declarations.
@@ -269,14 +263,6 @@ mod tests {
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("more than 50 scopes"), "{error}");
         let error = Capture::parse(Path::new("pins.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("has no $enddefinitions"), "{error}");
-    }
-
-    #[test]
-    fn a_recording_can_be_moved_to_a_later_start() {
-        let changes = [40, 56, 90].map(|cycle| PinChange { cycle, pin: Pin::D2, high: cycle == 56 });
-        let capture = Capture { changes: changes.to_vec() };
-        let moved: Vec<u64> = capture.starting_at(1000).map(|change| change.cycle).collect();
-        assert_eq!(moved, [1000, 1016, 1050]);
     }
 
     #[test]

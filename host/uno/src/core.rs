@@ -18,15 +18,15 @@ use std::ptr::{self, NonNull};
 
 use simavr_ffi as simavr;
 
-use super::adc::{self, ADC_CHANNELS, SUPPLY_MILLIVOLTS};
+use super::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
 use super::eeprom::{self, Eeprom};
-use super::interrupts::{InterruptRecorder, InterruptStatistics, Place};
-use super::output::{Port, TIMER_OUTPUTS};
+use super::interrupts::{InterruptRecorder, Place};
+use super::output::{PORTS, Port, TIMER_OUTPUTS};
 use super::recorder::{
     Recorder, Reset, ResetCause, on_direction, on_interrupt, on_port, on_reset, on_sample, on_timer_output, on_transmit,
 };
 use super::timer::{self, Timer1};
-use super::turns::{TurnRecorder, Turns};
+use super::turns::TurnRecorder;
 use super::uart;
 use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
 use crate::pins::{CYCLES_PER_SECOND, Pin};
@@ -88,7 +88,7 @@ pub(super) struct Core {
     recorder: NonNull<Recorder>,
     input: NonNull<simavr::avr_irq_t>,
     /// External levels of the inputs, by port and bit.
-    held: [HeldLevels; Port::NAMES.len()],
+    held: [HeldLevels; PORTS.len()],
     /// The last step left the chip asleep.
     asleep: bool,
     /// Address in flash at which the main program loops for ever.
@@ -135,12 +135,12 @@ impl Core {
         }
 
         // SAFETY: `avr` was initialised above.
-        let uart = unsafe { uart::find(avr) };
+        let uart: NonNull<simavr::avr_uart_t> = unsafe { find(avr, c"uart") };
         let recorder = NonNull::from(Box::leak(Box::new(Recorder {
             chip: avr,
             uart: uart.as_ptr(),
             // SAFETY: `avr` was initialised above.
-            adc: unsafe { adc::find(avr) }.as_ptr(),
+            adc: unsafe { find(avr, c"adc") }.as_ptr(),
             // SAFETY: as above.
             timer: unsafe { Timer1::of(avr) },
             // SAFETY: as above.
@@ -169,7 +169,7 @@ impl Core {
                 (Some(on_port::<'C'>), Some(on_direction::<'C'>)),
                 (Some(on_port::<'D'>), Some(on_direction::<'D'>)),
             ];
-            for (name, (on_port, on_direction)) in Port::NAMES.into_iter().zip(port_callbacks) {
+            for (name, (on_port, on_direction)) in PORTS.into_iter().zip(port_callbacks) {
                 let line = |kind: u32| simavr::avr_io_getirq(avr, port_request(name), kind as i32);
                 simavr::avr_irq_register_notify(line(simavr::IOPORT_IRQ_REG_PORT), on_port, parameter);
                 simavr::avr_irq_register_notify(line(simavr::IOPORT_IRQ_DIRECTION_ALL), on_direction, parameter);
@@ -240,26 +240,6 @@ impl Core {
         unsafe { self.recorder.as_mut() }
     }
 
-    /// Starts the interrupts' statistics afresh.
-    pub(super) fn measure_interrupts(&mut self) {
-        self.recorder_mut().interrupts.turn_on();
-    }
-
-    /// The interrupts' statistics since [`Core::measure_interrupts`].
-    pub(super) fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
-        self.recorder().interrupts.statistics()
-    }
-
-    /// Starts the count of the main loop's turns afresh.
-    pub(super) fn measure_turns(&mut self) {
-        self.recorder_mut().turns.turn_on();
-    }
-
-    /// The main loop's turns since [`Core::measure_turns`].
-    pub(super) fn turns(&self) -> Option<&Turns> {
-        self.recorder().turns.turns()
-    }
-
     /// Whether an interrupt's handler runs.
     pub(super) fn is_in_handler(&self) -> bool {
         // SAFETY: as in `cycle`.
@@ -285,8 +265,8 @@ impl Core {
     pub(super) fn step(&mut self, until: u64) -> Result<(), Stop> {
         let avr = self.chip.as_ptr();
         let uart = self.recorder().uart;
-        let measuring = self.interrupt_statistics().is_some();
-        let counting_turns = self.turns().is_some();
+        let measuring = self.recorder().interrupts.statistics.is_some();
+        let counting_turns = self.recorder().turns.turns.is_some();
         let one_by_one = measuring || counting_turns || self.stalled_at.is_some();
         // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder
         // is alive while it runs. This is `avr_callback_run_raw` without its two waits on the PC's clock.
@@ -460,7 +440,7 @@ impl Core {
             // Only so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
             let set_external = request(&[b'i', b'o', b'p', port as u8]);
             simavr::avr_ioctl(avr, set_external, (&raw mut external).cast());
-            if Port::named(port).direction(avr) & 1 << bit == 0 {
+            if Port::of(avr, port).direction & 1 << bit == 0 {
                 let line = simavr::avr_io_getirq(avr, port_request(port), bit.into());
                 simavr::avr_raise_irq(line, high.into());
             }
@@ -476,7 +456,7 @@ impl Core {
     pub(super) fn output(&self, pin: Pin) -> Option<bool> {
         let (port, bit) = pin.port_and_bit();
         // SAFETY: as in `cycle`.
-        let direction = unsafe { Port::named(port).direction(self.chip.as_ptr()) };
+        let Port { direction, .. } = unsafe { Port::of(self.chip.as_ptr(), port) };
         (direction & 1 << bit != 0).then(|| self.recorder().is_driven_high(pin))
     }
 
@@ -484,7 +464,7 @@ impl Core {
     pub(super) fn input(&self, pin: Pin) -> bool {
         let (port, bit) = pin.port_and_bit();
         // SAFETY: as in `cycle`.
-        unsafe { Port::named(port).pins(self.chip.as_ptr()) & 1 << bit != 0 }
+        unsafe { Port::of(self.chip.as_ptr(), port).pins & 1 << bit != 0 }
     }
 
     /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
@@ -577,6 +557,23 @@ impl Drop for Core {
             libc::free(self.chip.as_ptr().cast());
             drop(Box::from_raw(self.recorder.as_ptr()));
         }
+    }
+}
+
+/// A peripheral of the chip, by its kind.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip, and `T` simavr's type for a peripheral of this kind.
+unsafe fn find<T>(avr: *mut simavr::avr_t, kind: &CStr) -> NonNull<T> {
+    // SAFETY: the caller guarantees `avr`: its peripherals form a list that ends in null, each with a C string for its
+    // kind. Every peripheral begins with its `avr_io_t`.
+    unsafe {
+        let mut peripheral = (*avr).io_port;
+        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != kind {
+            peripheral = (*peripheral).next;
+        }
+        NonNull::new(peripheral.cast()).expect("the ATmega328P has this peripheral")
     }
 }
 

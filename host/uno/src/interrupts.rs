@@ -4,6 +4,7 @@
 //! long an interrupt waited; the longest time off is a bound for that.
 
 use std::collections::BTreeMap;
+use std::mem::take;
 
 /// Cycles of one vector's handler, from its entry (4 cycles) to the end of its `reti`, with the handlers that
 /// interrupted it.
@@ -53,7 +54,8 @@ pub struct InterruptStatistics {
 /// Turns the edges that simavr shows into statistics.
 #[derive(Default)]
 pub(super) struct InterruptRecorder {
-    statistics: Option<InterruptStatistics>,
+    /// `None` while it does not measure.
+    pub(super) statistics: Option<InterruptStatistics>,
     /// Handlers that have begun and not returned: vector and first cycle.
     running: Vec<(u8, u64)>,
     off_since: Option<u64>,
@@ -65,14 +67,11 @@ pub(super) struct InterruptRecorder {
 
 impl InterruptRecorder {
     pub(super) fn turn_on(&mut self) {
-        self.statistics = Some(InterruptStatistics::default());
-        self.off_since = None;
-        self.critical_since = None;
-        self.knows_who = false;
-    }
-
-    pub(super) fn statistics(&self) -> Option<&InterruptStatistics> {
-        self.statistics.as_ref()
+        *self = Self {
+            statistics: Some(InterruptStatistics::default()),
+            running: take(&mut self.running),
+            ..Self::default()
+        };
     }
 
     pub(super) fn begins(&mut self, vector: u8, cycle: u64) {
@@ -124,9 +123,6 @@ impl InterruptRecorder {
 
     /// A reset ends every handler without a return.
     pub(super) fn reset(&mut self) {
-        self.running.clear();
-        self.off_since = None;
-        self.critical_since = None;
-        self.knows_who = false;
+        *self = Self { statistics: self.statistics.take(), ..Self::default() };
     }
 }

@@ -4,7 +4,7 @@
 //! # Who knows whom
 //!
 //! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`, `turns` beside them -> `recorder`,
-//! which owns what simavr calls back with -> `core`, which runs it -> `terminal` -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `capture`, `pty` -> `hex`, `core` -> `board`.
+//! which owns what simavr calls back with -> `core`, which runs it -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `capture`, `pty` -> `hex`, `core` -> `board`.
 //! `pins` knows none of these and is known to all; `capture`, `waveform` and `pty` know only `pins`.
 
 #[cfg(feature = "simavr")]
@@ -37,8 +37,6 @@ pub mod pty;
 #[cfg(feature = "simavr")]
 mod recorder;
 #[cfg(feature = "simavr")]
-mod terminal;
-#[cfg(feature = "simavr")]
 mod timer;
 #[cfg(feature = "simavr")]
 mod turns;
@@ -50,11 +48,10 @@ pub mod waveform;
 pub use self::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 #[cfg(feature = "simavr")]
 pub use self::{
-    board::Uno,
+    board::{BAUD, SENT_BYTE_CYCLES, Uno},
     error::UnoError,
     file_error::FileError,
     interrupts::{HandlerCycles, InterruptStatistics, Place},
     recorder::{ReceivedByte, Reset, ResetCause},
-    terminal::{BAUD, SENT_BYTE_CYCLES},
     turns::Turns,
 };

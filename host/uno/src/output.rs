@@ -50,50 +50,35 @@ pub(super) unsafe fn timer_level(
     is_connected.then_some(levels[index])
 }
 
-/// A port's registers, by the address of the first one, PINx, in the data space (data sheet, register summary).
+/// The ports' letters.
+pub(super) const PORTS: [char; 3] = ['B', 'C', 'D'];
+
+/// The contents of a port's registers.
 #[derive(Clone, Copy)]
-pub(super) struct Port(u16);
+pub(super) struct Port {
+    /// PINx: the levels at the pins.
+    pub(super) pins: u8,
+    /// DDRx: the bits of outputs are set.
+    pub(super) direction: u8,
+    /// PORTx: the levels of outputs, and the pull-ups of inputs.
+    pub(super) levels: u8,
+}
 
 impl Port {
-    /// The ports' letters.
-    pub(super) const NAMES: [char; 3] = ['B', 'C', 'D'];
-
     /// The port with this letter.
-    pub(super) const fn named(name: char) -> Port {
-        Port(match name {
-            'B' => 0x23,
-            'C' => 0x26,
-            _ => 0x29,
-        })
-    }
-
-    /// PINx: the levels at the pins.
     ///
     /// # Safety
     ///
     /// `avr` must be an initialised chip.
-    pub(super) unsafe fn pins(self, avr: *mut simavr::avr_t) -> u8 {
-        // SAFETY: the caller vouches for `avr`; the register is an address inside `data`.
-        unsafe { *(*avr).data.add(self.0.into()) }
-    }
-
-    /// DDRx: the bits of outputs are set.
-    ///
-    /// # Safety
-    ///
-    /// As [`Port::pins`].
-    pub(super) unsafe fn direction(self, avr: *mut simavr::avr_t) -> u8 {
-        // SAFETY: as in `pins`.
-        unsafe { *(*avr).data.add((self.0 + 1).into()) }
-    }
-
-    /// PORTx: the levels of outputs, and the pull-ups of inputs.
-    ///
-    /// # Safety
-    ///
-    /// As [`Port::pins`].
-    pub(super) unsafe fn port(self, avr: *mut simavr::avr_t) -> u8 {
-        // SAFETY: as in `pins`.
-        unsafe { *(*avr).data.add((self.0 + 2).into()) }
+    pub(super) unsafe fn of(avr: *mut simavr::avr_t, name: char) -> Port {
+        // The address of PINx in the data space; the others follow (data sheet, register summary).
+        let first = match name {
+            'B' => 0x23,
+            'C' => 0x26,
+            _ => 0x29,
+        };
+        // SAFETY: the caller vouches for `avr`; the registers are addresses inside `data`.
+        let [pins, direction, levels] = unsafe { *(*avr).data.add(first).cast::<[u8; 3]>() };
+        Port { pins, direction, levels }
     }
 }

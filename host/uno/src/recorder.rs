@@ -156,7 +156,7 @@ pub(super) unsafe extern "C" fn on_port<const NAME: char>(_: *mut simavr::avr_ir
     // SAFETY: `recorder` is the one that `Core::new` registered, alive and not borrowed (see the module's text).
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        let direction = Port::named(NAME).direction(recorder.chip);
+        let Port { direction, .. } = Port::of(recorder.chip, NAME);
         recorder.record_port(NAME, direction, port as u8);
     }
 }
@@ -170,8 +170,8 @@ pub(super) unsafe extern "C" fn on_direction<const NAME: char>(
     // SAFETY: as in `on_port`.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        let port = Port::named(NAME).port(recorder.chip);
-        recorder.record_port(NAME, direction as u8, port);
+        let Port { levels, .. } = Port::of(recorder.chip, NAME);
+        recorder.record_port(NAME, direction as u8, levels);
     }
 }
 
@@ -191,8 +191,8 @@ pub(super) unsafe extern "C" fn on_timer_output<const INDEX: usize>(
             recorder.timer.output_becomes(high);
         }
         let name = pin.port_and_bit().0;
-        let port = Port::named(name);
-        recorder.record_port(name, port.direction(recorder.chip), port.port(recorder.chip));
+        let Port { direction, levels, .. } = Port::of(recorder.chip, name);
+        recorder.record_port(name, direction, levels);
     }
 }
 

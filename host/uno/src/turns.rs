@@ -24,17 +24,14 @@ impl Turns {
 /// Counts the turns.
 #[derive(Default)]
 pub(super) struct TurnRecorder {
-    turns: Option<Turns>,
+    /// `None` while it does not measure.
+    pub(super) turns: Option<Turns>,
     begun: Option<u64>,
 }
 
 impl TurnRecorder {
     pub(super) fn turn_on(&mut self) {
         *self = Self { turns: Some(Turns::default()), begun: None };
-    }
-
-    pub(super) fn turns(&self) -> Option<&Turns> {
-        self.turns.as_ref()
     }
 
     /// A `wdr` begins.

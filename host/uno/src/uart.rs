@@ -5,9 +5,6 @@
 //! select. It is available when its stop bit ends, and is lost if three bytes wait. The transmitter's second buffer is
 //! not simulated.
 
-use std::ffi::CStr;
-use std::ptr::NonNull;
-
 use simavr_ffi as simavr;
 
 /// Complete bytes that the receiver holds: two in its buffer and one in the shift register (data sheet, USART0,
@@ -33,23 +30,6 @@ const RXEN0: u8 = 1 << 4;
 const USBS0: u8 = 1 << 3;
 /// UCSR0C: parity is on.
 const UPM01: u8 = 1 << 5;
-
-/// The UART in the chip's list of peripherals.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-pub(super) unsafe fn find(avr: *mut simavr::avr_t) -> NonNull<simavr::avr_uart_t> {
-    // SAFETY: the caller guarantees `avr`: its peripherals form a list that ends in null, each with a C string for its
-    // kind. Every peripheral begins with its `avr_io_t`, and only the UART has this kind.
-    unsafe {
-        let mut peripheral = (*avr).io_port;
-        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != c"uart" {
-            peripheral = (*peripheral).next;
-        }
-        NonNull::new(peripheral.cast()).expect("the ATmega328P has a UART")
-    }
-}
 
 /// Cycles of a byte on the serial line, from the UART's registers (data sheet, USART0, clock generation and frame
 /// formats).

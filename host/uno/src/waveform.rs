@@ -54,31 +54,3 @@ pub fn write(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item =
     }
     writer.flush()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pins::Pin;
-
-    #[test]
-    fn a_cycle_is_a_whole_number_of_the_units() {
-        assert_eq!(UNITS_PER_CYCLE * CYCLES_PER_SECOND, UNITS.1.divisor() / u64::from(UNITS.0));
-    }
-
-    #[test]
-    fn the_file_says_each_pin_by_name_and_each_edge_once() {
-        let mut file = Vec::new();
-        let wires = [
-            Wire { pin: Pin::D8, name: "button", high_at_rest: true },
-            Wire { pin: Pin::D9, name: "servo", high_at_rest: false },
-        ];
-        let changes = [(8, true), (24_008, false)].map(|(cycle, high)| PinChange { cycle, pin: Pin::D9, high });
-        write(&mut file, &wires, changes).unwrap();
-        let file = String::from_utf8(file).unwrap();
-        assert!(file.contains("$timescale 100 ps $end"), "{file}");
-        for wire in wires {
-            assert!(file.contains(&format!(" {} $end", wire.name)), "{file}");
-        }
-        assert!(file.ends_with("#5000\n1\"\n#15005000\n0\"\n"), "{file}");
-    }
-}

@@ -9,7 +9,8 @@ use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 use trial::firmware;
-use trial::live::{Background, Live, LiveUno, Setup};
+use trial::live::Setup;
+use trial::live::rows::{Background, LiveRows};
 use uno::pty::Pty;
 
 /// How many lines of a kind a log has by now.
@@ -76,7 +77,7 @@ fn a_receiver_that_is_unplugged_and_plugged_in_again_goes_on_in_the_record() {
 }
 
 /// A virtual Uno at rest that runs at full speed.
-fn uno() -> Background<LiveUno> {
+fn uno() -> Background {
     let setup = Setup {
         elf: Some(firmware::build().expect("the firmware builds")),
         bootloader: None,
@@ -87,7 +88,7 @@ fn uno() -> Background<LiveUno> {
         fast: true,
         keeps_running_when_opened: false,
     };
-    LiveUno::start(setup).expect("there is a pseudo terminal").run_in_background()
+    LiveRows::start(vec![setup]).expect("there is a pseudo terminal").run_in_background()
 }
 
 /// Runs `weeder` with these words, then `--port` and the port, and this input.

@@ -14,7 +14,8 @@ use std::process::Command;
 use tempfile::TempDir;
 use trial::by_the_manual::Novice;
 use trial::firmware;
-use trial::live::{Course, Live, LiveUno, Setup};
+use trial::live::rows::LiveRows;
+use trial::live::{Course, Setup};
 
 /// The page of the manual.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");
@@ -184,7 +185,8 @@ fn the_terminal_leads_through_the_steps_is_stopped_and_goes_on() {
     let planting = Planting { plants: 7, ..Planting::default() };
     let row = planting.grow(SEED).expect("there is room");
     // Fast, for a test. It stands until the servo is timed: two times twelve swings of 1.5 s, which end where it rolls.
-    let course = Course::new(row, conditions.machine(SEED), 1200.0)
+    let course = Course::of_rows(vec![row], conditions.machine(SEED), 1200.0)
+        .remove(0)
         .slipping(conditions.ground.slip_percent / 100.0)
         .standing_first(65);
     let rolls_mm = course.rolls_mm().round();
@@ -194,7 +196,7 @@ fn the_terminal_leads_through_the_steps_is_stopped_and_goes_on() {
         keeps_running_when_opened: true,
         ..Setup::default()
     };
-    let uno = LiveUno::start(setup).expect("there is a pseudo terminal").run_in_background();
+    let uno = LiveRows::start(vec![setup]).expect("there is a pseudo terminal").run_in_background();
     let folder = TempDir::new().expect("there is room for a folder");
     let weeder = |words: &[&str], input: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));

@@ -8,11 +8,11 @@ use std::thread::sleep;
 use std::time::Duration;
 use tempfile::TempDir;
 use trial::firmware;
-use trial::live::rows::{LiveRows, Mishap};
-use trial::live::{Background, Live, Setup};
+use trial::live::Setup;
+use trial::live::rows::{Background, LiveRows, Mishap};
 
 /// Standing rows. A folder has links to their ports: `row0` and so on.
-fn rows(folder: &TempDir, count: usize) -> Background<LiveRows> {
+fn rows(folder: &TempDir, count: usize) -> Background {
     let elf = firmware::build().expect("the firmware builds");
     let setup =
         |number| Setup { elf: Some(elf.clone()), link: Some(port(folder, number)), fast: true, ..Setup::default() };

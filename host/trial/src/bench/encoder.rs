@@ -71,6 +71,17 @@ pub struct Turning {
     pub jitter: f64,
 }
 
+impl Turning {
+    /// Without further load and with it: evenly and with [`JITTER`], each forward and backward.
+    pub fn all() -> impl ExactSizeIterator<Item = Self> {
+        (0..8).map(|way| Self {
+            load: [Load::Idle, Load::Telemetry][way / 4],
+            direction: [Direction::Forward, Direction::Backward][way % 2],
+            jitter: [0.0, JITTER][way / 2 % 2],
+        })
+    }
+}
+
 /// The jitter of an encoder whose disc is worn or off its centre.
 pub const JITTER: f64 = 0.3;
 
@@ -261,7 +272,7 @@ impl World {
 }
 
 /// Endless edges of the encoder, in order of time.
-fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iterator<Item = PinChange> {
+pub(super) fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iterator<Item = PinChange> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     (0_u32..).map(move |number| {
         let early = rng.random_range(-1.0..=1.0) * turning.jitter;
@@ -318,55 +329,30 @@ fn follow(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Option<Rate
 /// # Errors
 /// If the ELF cannot be run.
 pub fn highest_rate(elf: &Path, turning: Turning, mut progress: impl FnMut(f64)) -> Result<Rate> {
-    let mut passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
-    let mut failed = HIGHEST_PER_S;
     let bisections = ((HIGHEST_PER_S / LOWEST_PER_S).ln() / RESOLUTION.ln_1p()).log2().ceil();
     let trials = bisections + BELOW.len() as f64;
     let mut done = 0.0;
+    let mut follow = |counts_per_s: f64| {
+        let followed = follow(elf, turning, counts_per_s);
+        done += 1.0;
+        progress((done / trials).min(1.0));
+        followed
+    };
+    let mut failed = HIGHEST_PER_S;
     loop {
+        let mut passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
         while failed > passed.counts_per_s * (1.0 + RESOLUTION) {
             let middle = (failed * passed.counts_per_s).sqrt();
-            match follow(elf, turning, middle)? {
+            match follow(middle)? {
                 Some(rate) => passed = rate,
                 None => failed = middle,
             }
-            done += 1.0;
-            progress((done / trials).min(1.0));
         }
-        let mut below = BELOW.iter().map(|share| share * passed.counts_per_s);
-        let chance = loop {
-            let Some(rate) = below.next() else { break None };
-            if follow(elf, turning, rate)?.is_none() {
-                break Some(rate);
-            }
-            done += 1.0;
-            progress((done / trials).min(1.0));
-        };
-        match chance {
-            Some(rate) => {
-                failed = rate;
-                passed = Rate { turning, counts_per_s: LOWEST_PER_S, line_share: 0.0 };
-            }
+        let fails = |rate: f64| follow(rate).map(|followed| followed.is_none().then_some(rate)).transpose();
+        match BELOW.iter().map(|share| share * passed.counts_per_s).find_map(fails).transpose()? {
+            // The rate had passed by chance.
+            Some(rate) => failed = rate,
             None => return Ok(passed),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn edges_go_through_the_four_states_in_order_and_never_change_places() {
-        for (direction, first) in [(Direction::Forward, wiring::ENCODER_A), (Direction::Backward, wiring::ENCODER_B)] {
-            let turning = Turning { load: Load::Idle, direction, jitter: JITTER };
-            let edges: Vec<PinChange> = edges(turning, 80.0, 1000).take(1000).collect();
-            assert!(
-                edges.windows(2).all(|pair| pair[1].cycle - pair[0].cycle >= 31),
-                "40 % of a step and its rounding"
-            );
-            let levels: Vec<_> = edges.iter().take(4).map(|edge| (edge.pin == first, edge.high)).collect();
-            assert_eq!(levels, [(true, true), (false, true), (true, false), (false, false)]);
         }
     }
 }

@@ -32,9 +32,8 @@ impl Telemetry {
     /// Runs to a cycle, and asks the next question after each answer.
     pub(super) fn run_until(&mut self, uno: &mut Uno, cycle: u64) -> Result<(), UnoError> {
         while uno.cycle() < cycle {
-            while self.unanswered < QUESTIONS_AHEAD {
-                uno.send(QUESTION);
-                self.unanswered += 1;
+            while let Some(byte) = self.next_byte() {
+                uno.send(&[byte]);
             }
             uno.run_until(cycle.min(uno.cycle() + LOOK_CYCLES))?;
             self.take(&uno.received_bytes());

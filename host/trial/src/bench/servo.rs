@@ -1,12 +1,13 @@
 //! The servo's jitter: how much its pulses and frames vary under the highest load.
 
+use super::encoder::{Direction, Load, Turning, edges};
 use super::load::{Telemetry, flicker};
 use crate::run;
 use anyhow::Result;
 use field::wiring;
 use serde::Serialize;
 use std::path::Path;
-use uno::{CYCLES_PER_SECOND, PinChange};
+use uno::CYCLES_PER_SECOND;
 
 /// Pulses of the measurement.
 pub const PULSES: usize = 500;
@@ -45,12 +46,9 @@ pub fn jitter(elf: &Path, mut progress: impl FnMut(f64)) -> Result<Jitter> {
     let begin = uno.cycle();
     let end = begin + (PULSES as u64 + 2) * FRAME_CYCLES;
     let step_cycles = CYCLES_PER_SECOND / COUNTS_PER_S;
-    // Forward: A and B in turns, each two counts high and two low.
-    uno.drive((0..(end - begin) / step_cycles).map(|number| PinChange {
-        cycle: begin + number * step_cycles,
-        pin: if number % 2 == 0 { wiring::ENCODER_A } else { wiring::ENCODER_B },
-        high: number % 4 < 2,
-    }));
+    let turning = Turning { load: Load::Telemetry, direction: Direction::Forward, jitter: 0.0 };
+    let counts = (end - begin) / step_cycles;
+    uno.drive(edges(turning, step_cycles as f64, begin).take(counts as usize));
     uno.drive(flicker(begin, end));
     let mut telemetry = Telemetry::default();
     while uno.cycle() < end {

@@ -5,7 +5,7 @@
 //! encoder handlers and classifiers in hand-written assembly.
 
 use super::classifier::ClassifierCosts;
-use super::encoder::{Direction, JITTER, Load, Rate, Turning};
+use super::encoder::{Load, Rate};
 use super::servo::Jitter;
 use super::swings::Lateness;
 use crate::report::number_table;
@@ -27,22 +27,6 @@ pub struct Figures {
     pub jitter: Jitter,
     /// The swings of many rows at 2.5 km/h.
     pub lateness: Lateness,
-}
-
-/// The four ways of turning the encoder beside each load.
-pub const TURNINGS: [Turning; 8] = [
-    turning(Load::Idle, Direction::Forward, 0.0),
-    turning(Load::Idle, Direction::Backward, 0.0),
-    turning(Load::Idle, Direction::Forward, JITTER),
-    turning(Load::Idle, Direction::Backward, JITTER),
-    turning(Load::Telemetry, Direction::Forward, 0.0),
-    turning(Load::Telemetry, Direction::Backward, 0.0),
-    turning(Load::Telemetry, Direction::Forward, JITTER),
-    turning(Load::Telemetry, Direction::Backward, JITTER),
-];
-
-const fn turning(load: Load, direction: Direction, jitter: f64) -> Turning {
-    Turning { load, direction, jitter }
 }
 
 impl Figures {
@@ -149,14 +133,4 @@ fn thousands(number: f64) -> String {
         grouped.push(digit);
     }
     grouped
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_large_number_is_read_in_threes() {
-        assert_eq!([7.0, 999.4, 1000.0, 744_111.0, 1e6].map(thousands), ["7", "999", "1,000", "744,111", "1,000,000"]);
-    }
 }

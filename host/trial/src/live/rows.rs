@@ -7,14 +7,16 @@
 //!
 //! The cable itself is not simulated: it loses and delays no edge.
 
-use super::{Live, LiveUno, Pace, SLICE_MS, Setup};
+use super::{LiveUno, SLICE_MS, Setup};
 use anyhow::{Error, Result};
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
 use rustix::time::{ClockId, clock_gettime};
-use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Barrier, Mutex, PoisonError};
-use std::thread;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 use uno::Uno;
 
@@ -24,6 +26,10 @@ const ROWS_OF_A_THREAD: usize = 3;
 
 /// Slices after which the threads wait for each other: rare enough for a busy PC, and too short for a person to notice.
 const SLICES_IN_STEP: u64 = 5;
+
+/// Longest delay of the PC that is made up for. A longer delay is dropped: otherwise the chip would run too fast
+/// afterwards.
+const LATE_BY: Duration = Duration::from_millis(50);
 
 /// A fault of one row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,8 +44,7 @@ pub enum Mishap {
 
 /// The rows of a machine.
 pub struct LiveRows {
-    unos: Vec<LiveUno>,
-    mishaps: Arc<Mutex<VecDeque<(usize, Mishap)>>>,
+    rows: Vec<Row>,
     fast: bool,
 }
 
@@ -73,84 +78,86 @@ impl LiveRows {
     /// real time.
     ///
     /// # Errors
-    /// As [`LiveUno::start`].
+    /// If there is no program or it does not fit, no terminal can be opened, or a file is wrong.
     pub fn start(setups: Vec<Setup>) -> Result<Self> {
         let fast = setups.first().is_some_and(|setup| setup.fast);
-        let unos = setups.into_iter().map(LiveUno::start).collect::<Result<_, _>>()?;
-        Ok(Self { unos, mishaps: Arc::default(), fast })
+        let row = |setup| Ok(Row { uno: LiveUno::start(setup)?, failed: None });
+        Ok(Self { rows: setups.into_iter().map(row).collect::<Result<_>>()?, fast })
     }
 
     /// The paths under which programs open the rows' serial ports.
     pub fn paths(&self) -> Vec<&Path> {
-        self.unos.iter().map(LiveUno::path).collect()
+        self.rows.iter().map(|row| row.uno.path.as_path()).collect()
     }
 
     /// Runs until `stop` is set, or for this time of the Unos' clock.
     ///
     /// # Errors
-    /// The first error, and its row, after all have ended.
+    /// The first row that has failed, and its error, after all have ended. A row fails if its firmware crashes or
+    /// halts, or if its terminal or its EEPROM's file fails.
     pub fn run(&mut self, stop: &AtomicBool, time: Option<Duration>) -> Result<Ran, (usize, Error)> {
+        self.run_with(stop, time, &channel().1)
+    }
+
+    fn run_with(
+        &mut self,
+        stop: &AtomicBool,
+        time: Option<Duration>,
+        mishaps: &Receiver<(usize, Mishap)>,
+    ) -> Result<Ran, (usize, Error)> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
-        let threads = cores.min(self.unos.len() / ROWS_OF_A_THREAD).max(1);
-        let each = self.unos.len().div_ceil(threads).max(1);
-        let threads = self.unos.len().div_ceil(each).max(1);
+        let threads = cores.min(self.rows.len() / ROWS_OF_A_THREAD).max(1);
+        let each = self.rows.len().div_ceil(threads).max(1);
         let most_slices = time.map_or(u64::MAX, |time| time.as_millis() as u64 / SLICE_MS);
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| (0, error.into()))?;
         let (began, worked) = (Instant::now(), worked());
-        let (barrier, ends) = (Barrier::new(threads), AtomicBool::new(false));
-        let mishaps = &self.mishaps;
-        let fast = self.fast;
-        let mut slices = 0;
-        let failed = thread::scope(|scope| {
-            let mut parts = self.unos.chunks_mut(each).enumerate();
-            // This thread leads: it checks the clock and the stop flag.
-            let own = parts.next();
-            let others: Vec<_> = parts
-                .map(|(part, unos)| {
-                    let (barrier, ends) = (&barrier, &ends);
-                    scope.spawn(move || {
-                        let mut part = Part::new(part * each, unos);
-                        while !ends.load(Ordering::Relaxed) {
-                            part.step(mishaps);
-                            barrier.wait();
-                            // The leader decides in between.
-                            barrier.wait();
-                        }
-                        part.end()
-                    })
-                })
-                .collect();
-            let mut part = Part::new(0, own.map_or(&mut [], |(_, unos)| unos));
-            let mut pace = (!fast).then(Pace::new);
-            while !ends.load(Ordering::Relaxed) {
-                part.step(mishaps);
-                slices += SLICES_IN_STEP;
-                barrier.wait();
-                if let Some(pace) = &mut pace {
-                    pace.wait(SLICES_IN_STEP);
-                }
-                ends.store(stop.load(Ordering::Relaxed) || slices >= most_slices, Ordering::Relaxed);
-                barrier.wait();
+        let (mut due, mut slices) = (began, 0);
+        while !stop.load(Ordering::Relaxed) && slices < most_slices {
+            for (row, mishap) in mishaps.try_iter() {
+                self.rows[row].suffer(mishap);
             }
-            let own = part.end();
-            let others = others
-                .into_iter()
-                .filter_map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            others.fold(own, |first, next| first.or(Some(next)))
-        });
-        match failed {
+            let step = |rows: &mut [Row]| {
+                (0..SLICES_IN_STEP).for_each(|_| rows.iter_mut().for_each(|row| row.run(LiveUno::slice)));
+            };
+            pool.install(|| self.rows.par_chunks_mut(each).for_each(step));
+            slices += SLICES_IN_STEP;
+            if !self.fast {
+                due += Duration::from_millis(SLICES_IN_STEP * SLICE_MS);
+                thread::sleep(due.saturating_duration_since(Instant::now()));
+                if due.elapsed() > LATE_BY {
+                    due = Instant::now();
+                }
+            }
+        }
+        self.rows.iter_mut().for_each(|row| row.run(LiveUno::end));
+        let mut failures = self.rows.iter_mut().map(|row| row.failed.take()).enumerate();
+        match failures.find_map(|(row, failed)| Some((row, failed?))) {
             Some(failed) => Err(failed),
             None => Ok(Ran {
                 simulated: Duration::from_millis(slices * SLICE_MS),
                 took: began.elapsed(),
                 cores: self::worked().saturating_sub(worked),
-                threads,
+                threads: self.rows.len().div_ceil(each).max(1),
             }),
         }
     }
 
     /// The rows' Unos, without their terminals.
     pub fn into_unos(self) -> Vec<Uno> {
-        self.unos.into_iter().map(|live| live.uno).collect()
+        self.rows.into_iter().map(|row| row.uno.uno).collect()
+    }
+
+    /// Runs in a thread until the handle is stopped or dropped.
+    pub fn run_in_background(mut self) -> Background {
+        let paths = self.paths().into_iter().map(Path::to_owned).collect();
+        let stop = Arc::new(AtomicBool::new(false));
+        let stop_there = Arc::clone(&stop);
+        let (mishaps, suffered) = channel();
+        let thread = thread::spawn(move || {
+            self.run_with(&stop_there, None, &suffered)?;
+            Ok(self)
+        });
+        Background { paths, mishaps, stop, thread: Some(thread) }
     }
 }
 
@@ -160,112 +167,79 @@ fn worked() -> Duration {
     Duration::try_from(time).unwrap_or_default()
 }
 
-/// The rows of one thread.
-struct Part<'a> {
-    first: usize,
-    unos: Vec<(&'a mut LiveUno, bool)>,
-    failed: Option<(usize, Error)>,
+/// A row's Uno, and the error that has stopped it.
+struct Row {
+    uno: LiveUno,
+    failed: Option<Error>,
 }
 
-impl<'a> Part<'a> {
-    fn new(first: usize, unos: &'a mut [LiveUno]) -> Self {
-        Self { first, unos: unos.iter_mut().map(|uno| (uno, true)).collect(), failed: None }
-    }
-
-    /// Runs each until the threads wait for each other.
-    fn step(&mut self, mishaps: &Mutex<VecDeque<(usize, Mishap)>>) {
-        self.suffer(mishaps);
-        for _ in 0..SLICES_IN_STEP {
-            for place in 0..self.unos.len() {
-                let (uno, runs) = &mut self.unos[place];
-                if *runs && let Err(error) = uno.slice() {
-                    self.stop(place, error);
-                }
-            }
+impl Row {
+    /// Runs a part of an Uno that has not stopped. At the port of one that stops it looks like a pulled cable.
+    fn run(&mut self, part: impl FnOnce(&mut LiveUno) -> Result<()>) {
+        if self.failed.is_none()
+            && let Err(error) = part(&mut self.uno)
+        {
+            self.uno.pty = None;
+            self.failed = Some(error);
         }
     }
 
-    /// An Uno has stopped. At its port this looks like a pulled cable.
-    fn stop(&mut self, place: usize, error: Error) {
-        let (uno, runs) = &mut self.unos[place];
-        uno.unplug();
-        *runs = false;
-        self.failed.get_or_insert((self.first + place, error));
-    }
-
-    /// Applies pending faults to these rows.
-    fn suffer(&mut self, mishaps: &Mutex<VecDeque<(usize, Mishap)>>) {
-        let own = self.first..self.first + self.unos.len();
-        let mine: Vec<(usize, Mishap)> = {
-            let mut mishaps = mishaps.lock().unwrap_or_else(PoisonError::into_inner);
-            if mishaps.is_empty() {
-                return;
-            }
-            let (mine, others): (VecDeque<_>, _) = mishaps.drain(..).partition(|(row, _)| own.contains(row));
-            *mishaps = others;
-            Vec::from(mine)
-        };
-        for (row, mishap) in mine {
-            let place = row - self.first;
-            let uno = &mut self.unos[place].0;
-            let suffered = match mishap {
-                Mishap::Unplugged => {
-                    uno.unplug();
-                    Ok(())
-                }
-                Mishap::PluggedIn => uno.plug_in(),
-                Mishap::Reset => {
-                    uno.uno.reset();
-                    Ok(())
-                }
-            };
-            if let Err(error) = suffered {
-                self.stop(place, error);
-            }
+    fn suffer(&mut self, mishap: Mishap) {
+        match mishap {
+            // The chip runs on: it has its own power.
+            Mishap::Unplugged => self.uno.pty = None,
+            Mishap::PluggedIn => self.run(LiveUno::plug_in),
+            Mishap::Reset => self.uno.uno.reset(),
         }
-    }
-
-    /// Ends them. Returns the error that has stopped one.
-    fn end(mut self) -> Option<(usize, Error)> {
-        for place in 0..self.unos.len() {
-            let (uno, runs) = &mut self.unos[place];
-            if *runs && let Err(error) = uno.end() {
-                self.stop(place, error);
-            }
-        }
-        self.failed
     }
 }
 
-/// Access to rows that run in a thread: their ports, and their faults.
-pub struct Reached {
+/// Rows that run in a thread: their ports, and their faults. The handle does not notice an early failure;
+/// [`Background::stop`] returns it. Dropping it ends the thread and removes terminals and links.
+pub struct Background {
     paths: Vec<PathBuf>,
-    mishaps: Arc<Mutex<VecDeque<(usize, Mishap)>>>,
+    mishaps: Sender<(usize, Mishap)>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Result<LiveRows, (usize, Error)>>>,
 }
 
-impl Reached {
+impl Background {
     /// The paths under which programs open the rows' serial ports.
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
     }
 
+    /// The path of the first row's serial port.
+    pub fn path(&self) -> &Path {
+        &self.paths[0]
+    }
+
     /// Applies a fault to a row, within some milliseconds.
     pub fn happen(&self, row: usize, mishap: Mishap) {
-        self.mishaps.lock().unwrap_or_else(PoisonError::into_inner).push_back((row, mishap));
+        // A thread that has ended early has no rows to disturb.
+        let _ = self.mishaps.send((row, mishap));
+    }
+
+    /// Stops the rows, and gives them back.
+    ///
+    /// # Errors
+    /// As [`LiveRows::run`].
+    ///
+    /// # Panics
+    /// If their thread did.
+    pub fn stop(mut self) -> Result<LiveRows, (usize, Error)> {
+        self.stop.store(true, Ordering::Relaxed);
+        let thread = self.thread.take().expect("it is taken here and by drop alone");
+        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
 }
 
-impl Live for LiveRows {
-    type Outside = Reached;
-    /// Which row has ended, and why.
-    type Failure = (usize, Error);
-
-    fn outside(&self) -> Reached {
-        let paths = self.paths().into_iter().map(Path::to_owned).collect();
-        Reached { paths, mishaps: Arc::clone(&self.mishaps) }
-    }
-
-    fn run_until(&mut self, stop: &AtomicBool) -> Result<(), Self::Failure> {
-        self.run(stop, None).map(|_| ())
+impl Drop for Background {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // The result is dropped, because the user did not call `stop`.
+            let _ = thread.join();
+        }
     }
 }

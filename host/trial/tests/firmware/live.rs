@@ -11,7 +11,8 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 use trial::firmware;
-use trial::live::{Background, Course, Live, LiveUno, Setup};
+use trial::live::rows::{Background, LiveRows};
+use trial::live::{Course, Setup};
 use uno::Uno;
 use uno::hex::Bootloader;
 use uno::pty::Pty;
@@ -24,13 +25,20 @@ fn product() -> Setup {
 }
 
 #[track_caller]
-fn start(setup: Setup) -> Background<LiveUno> {
-    LiveUno::start(setup).expect("it starts").run_in_background()
+fn start(setup: Setup) -> Background {
+    LiveRows::start(vec![setup]).expect("it starts").run_in_background()
+}
+
+/// Stops the Uno, which has run without an error.
+#[track_caller]
+fn stopped(uno: Background) -> Uno {
+    let rows = uno.stop().map_err(|(_, error)| error).expect("it ran to the end");
+    rows.into_unos().remove(0)
 }
 
 /// Opens the port, and waits until the firmware, which is reset by that, answers.
 #[track_caller]
-fn open(uno: &Background<LiveUno>) -> Link {
+fn open(uno: &Background) -> Link {
     Link::open(uno.path().to_str()).expect("the firmware answers")
 }
 
@@ -40,7 +48,7 @@ fn opening_the_port_resets_the_chip_and_the_firmware_says_that_it_is_there() {
     for _ in 0..2 {
         assert!(open(&uno).version().starts_with(env!("CARGO_PKG_VERSION")));
     }
-    assert_eq!(uno.stop().expect("it ran to the end").uno().resets().len(), 2);
+    assert_eq!(stopped(uno).resets().len(), 2);
 }
 
 #[test]
@@ -49,7 +57,7 @@ fn an_uno_whose_reset_is_cut_runs_on_when_the_port_is_opened() {
     for _ in 0..2 {
         assert!(open(&uno).version().starts_with(env!("CARGO_PKG_VERSION")));
     }
-    assert_eq!(uno.stop().expect("it ran to the end").uno().resets(), []);
+    assert_eq!(stopped(uno).resets(), []);
 }
 
 /// Runs avrdude on the flash through the bootloader, with a user's number of retries.
@@ -82,8 +90,7 @@ fn avrdude_writes_the_flash_through_the_old_bootloader_and_leaves_that_alone() {
     std::fs::write(&hex, uno::hex::text(&flash)).unwrap();
     // avrdude reads back what it wrote, and compares.
     avrdude(uno.path(), "57600", &format!("flash:w:{}:i", hex.display()));
-    let uno = uno.stop().expect("it ran to the end");
-    assert!(uno.uno().flash().starts_with(&bootloader.behind(&flash).unwrap()));
+    assert!(stopped(uno).flash().starts_with(&bootloader.behind(&flash).unwrap()));
 }
 
 #[test]
@@ -106,22 +113,22 @@ fn a_file_of_another_length_is_no_eeprom() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("notes.txt");
     std::fs::write(&file, "not an EEPROM").unwrap();
-    let error = LiveUno::start(Setup { eeprom: Some(file.clone()), ..product() }).err().expect("it is refused");
+    let error = LiveRows::start(vec![Setup { eeprom: Some(file.clone()), ..product() }]).err().expect("it is refused");
     assert!(error.to_string().contains("has 13 bytes: a file that keeps the EEPROM has 1024"), "{error}");
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "not an EEPROM");
 }
 
 #[test]
 fn without_firmware_and_bootloader_there_is_nothing_to_run() {
-    let error = LiveUno::start(Setup::default()).err().expect("it is refused");
+    let error = LiveRows::start(vec![Setup::default()]).err().expect("it is refused");
     assert!(error.to_string().contains("nothing to run"), "{error}");
 }
 
 #[test]
 fn the_machine_rolls_along_its_row_and_stands_between() {
     let row = Row::new(vec![Thing::plant(500.0, 150.0)]).unwrap();
-    let course = Course::new(row, Machine::default(), 2000.0);
-    let uno = start(Setup { course: Some(course), fast: true, ..product() });
+    let course = Course::of_rows(vec![row], Machine::default(), 2000.0).pop();
+    let uno = start(Setup { course, fast: true, ..product() });
     let mut link = open(&uno);
     let mut positions = Vec::new();
     while positions.last().is_none_or(|&position| position < 4000) {

@@ -12,8 +12,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use trial::console::ask;
 use trial::firmware;
-use trial::live::rows::{LiveRows, Mishap};
-use trial::live::{Background, Course, Live, Setup};
+use trial::live::rows::{Background, LiveRows, Mishap};
+use trial::live::{Course, Setup};
 use uno::Uno;
 
 /// Walking pace.
@@ -54,7 +54,7 @@ struct Laptop {
 
 impl Laptop {
     #[track_caller]
-    fn open(machine: &Background<LiveRows>) -> Self {
+    fn open(machine: &Background) -> Self {
         let opener = |path: &PathBuf| -> Opener {
             let path = path.to_str().expect("it is text").to_owned();
             Box::new(move || Link::open(Some(&path)))

@@ -47,7 +47,7 @@ fn logged_from(row: &Row, motion: &Motion, commands: &[&str], sets_off: u64) -> 
 /// The port of a machine that rolls along the row, and a position in ticks just before its end.
 fn port_along(row: &Row, motion: &Motion, sets_off: u64) -> (HostPort, i64) {
     let machine = Machine::default();
-    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[machine.beam_before(row, motion)])
+    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &machine.beams_before(row, motion))
         .expect("the firmware wakes up");
     let changes = machine.pin_changes(row, motion, uno.cycle() + sets_off);
     uno.drive(changes);

@@ -75,7 +75,7 @@ fn recorded(
 ) -> Vec<Entry> {
     let machine = Machine::default();
     let elf = firmware::build().expect("the firmware builds");
-    let mut uno = trial::boot(&elf, &[machine.beam_before(row, motion)]).expect("the firmware wakes up");
+    let mut uno = trial::boot(&elf, &machine.beams_before(row, motion)).expect("the firmware wakes up");
     let sets_off = uno.cycle() + SETS_OFF;
     uno.drive(machine.pin_changes(row, motion, sets_off));
     let distance_m = |time_s: f64| {
