@@ -5,7 +5,7 @@
 
 use crate::frame::{self, Frame, Receiver};
 use crate::message::{Command, PATTERN_STEPS, PROTOCOL, Record, Refusal, Step};
-use crate::piece::Piece;
+use crate::player::Piece;
 use heapless::Deque;
 
 /// Most records in the queue.
