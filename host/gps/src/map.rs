@@ -30,10 +30,10 @@ fn of_job(name: &str, job: &Job) -> Vec<Feature> {
         stretch.ground.iter().filter_map(ground).for_each(&mut add);
         stretch.things.iter().map(|it| thing(job, it)).for_each(&mut add);
     }
-    for jump in &job.jumps {
+    for (line, jump) in &job.jumps {
         let mut feature = feature("gps_jump", Some(Geometry::new_point(position(jump.place))));
         feature.set_property("record", name);
-        feature.set_property("line", jump.line);
+        feature.set_property("line", *line);
         feature.set_property("record_s", rounded(jump.time_ms / 1000.0, 3));
         feature.set_property("far_m", rounded(jump.far_m, 3));
         features.push(feature);
