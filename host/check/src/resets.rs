@@ -53,13 +53,6 @@ pub enum ResetBy {
     Watchdog,
 }
 
-impl ResetBy {
-    /// Whether the weeder works and rolls then. The watchdog can be tested only in hold.
-    pub const fn is_at_work(self) -> bool {
-        !matches!(self, Self::Watchdog)
-    }
-}
-
 /// The result of a reset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restart {
@@ -82,7 +75,7 @@ pub fn restart(
     is_simulated: bool,
 ) -> Result<Restart, CheckError> {
     weeder.to_hold()?;
-    if reset_by.is_at_work() {
+    if reset_by != ResetBy::Watchdog {
         weeder.ask("start now")?;
         let mut plan = Plan::new();
         plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
