@@ -9,6 +9,7 @@ use check::desk::Desk;
 use check::ports;
 use check::run::{Extent, run as check_run};
 use clap::Args;
+use link::row_names::plugged;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -76,7 +77,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         Some(desk) => (name(desk.weeder()), name(desk.tester())),
         None => (arguments.port.clone(), arguments.tester.clone()),
     };
-    let unos = if port.is_some() && tester.is_some() { vec![] } else { link::find_unos()? };
+    let unos =
+        if port.is_some() && tester.is_some() { vec![] } else { plugged()?.into_iter().map(|uno| uno.port).collect() };
     let (mut weeder, mut tester) = ports::open(port.as_deref(), tester.as_deref(), &unos)?;
     let interrupt = Arc::new(AtomicBool::new(false));
     tester.interrupted_by(Arc::clone(&interrupt));

@@ -6,7 +6,6 @@
 
 use crate::job::{Did, Ground, Job, Thing, What};
 use crate::plane::Place;
-use crate::track::Basis;
 use chrono::DateTime;
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue, Position};
 
@@ -58,13 +57,12 @@ fn thing(job: &Job, thing: &Thing) -> Feature {
     feature.set_property("line", thing.line);
     match thing.found {
         Ok(found) => {
-            let basis = if found.basis == Basis::Measured { "measured" } else { "interpolated" };
-            feature.set_property("place", basis);
+            feature.set_property("place", <&str>::from(found.basis));
             feature.set_property("error_m", rounded(found.error_m, 3));
         }
         Err(missing) => {
             feature.set_property("place", "none");
-            feature.set_property("why", missing.text());
+            feature.set_property("why", missing.to_string());
         }
     }
     if let What::Object { votes, .. } = thing.what {

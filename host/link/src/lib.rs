@@ -40,7 +40,7 @@ pub use self::event_line::{
 };
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::port::{find_uno, find_unos, listen, open_other, try_port};
+pub use self::port::{find_uno, listen, open_other, try_port};
 pub use control::{ground::class::Class, say::names};
 
 use std::collections::VecDeque;
