@@ -19,15 +19,9 @@ use core::panic::PanicInfo;
 use lines::Lines;
 use serial::Serial;
 use tester_core::frame::Frame;
-use tester_core::message::{Record, Step};
-use tester_core::piece::Piece;
+use tester_core::message::Record;
 use tester_core::station::{Board, Station};
-use timeline::Timeline;
-
-struct Tester {
-    lines: Lines,
-    timeline: Timeline,
-}
+use timeline::Tester;
 
 #[avr_device::entry]
 fn main() -> ! {
@@ -44,7 +38,7 @@ fn run(station: &mut Station) -> ! {
     let peripherals = unsafe { Peripherals::steal() };
     let lines = Lines::new(peripherals.PORTB, peripherals.PORTC, peripherals.PORTD);
     let mut serial = Serial::new(peripherals.USART0);
-    let mut tester = Tester { lines, timeline: Timeline::new(peripherals.TC1) };
+    let mut tester = Tester::new(peripherals.TC1, lines);
     // SAFETY: each interrupt's peripheral is set up, and no critical section is open.
     unsafe { interrupt::enable() };
 
@@ -61,7 +55,7 @@ fn run(station: &mut Station) -> ! {
             station.record(Record::Led { time: tester.now(), lit });
         }
         // One record a turn: a full queue drops the newest, and the gap in the numbers shows it.
-        if let Some(record) = tester.timeline.measured() {
+        if let Some(record) = tester.measured() {
             station.record(record);
         }
         if sent == sending.len() {
@@ -75,63 +69,6 @@ fn run(station: &mut Station) -> ! {
         {
             sent += 1;
         }
-    }
-}
-
-impl Board for Tester {
-    fn now(&mut self) -> u32 {
-        self.timeline.now()
-    }
-
-    fn position(&mut self) -> i32 {
-        self.timeline.position()
-    }
-
-    fn room(&mut self) -> u8 {
-        self.timeline.room()
-    }
-
-    fn push(&mut self, piece: Piece) {
-        self.timeline.push(piece);
-    }
-
-    fn is_playing(&mut self) -> bool {
-        self.timeline.is_playing()
-    }
-
-    fn start(&mut self) -> u32 {
-        self.timeline.start()
-    }
-
-    fn stop(&mut self) {
-        self.timeline.stop();
-    }
-
-    fn set(&mut self, mask: u8, levels: u8) {
-        self.timeline.set(mask, levels);
-    }
-
-    fn reset(&mut self, pulled: bool) {
-        self.lines.pull_reset(pulled);
-    }
-
-    fn levels(&mut self) -> u8 {
-        lines::shown()
-    }
-
-    fn burst(&mut self, steps: &[Step], run_up: u16, repeats: u16, slower: u8) {
-        let levels = interrupt::free(|_| {
-            let levels = burst::play(steps, run_up, slower, lines::shown());
-            burst::play(steps, repeats, 0, levels)
-        });
-        self.timeline.restart(levels);
-    }
-
-    fn check_capture(&mut self, width: u16) {
-        self.lines.drive_capture(true);
-        let begin = self.timeline.now();
-        while self.timeline.now().wrapping_sub(begin) < width.into() {}
-        self.lines.drive_capture(false);
     }
 }
 

@@ -4,16 +4,17 @@
 //! events. Each wait counts from the time at which the last event was due. So a late event does not delay the next. The capture
 //! unit stamps the servo's edges (data sheet, 16.6), so other interrupts do not change the measurement.
 
-use crate::lines;
+use crate::burst;
+use crate::lines::{self, Lines};
 use avr_device::{
     atmega328p::TC1,
     interrupt::{self, Mutex},
 };
 use core::cell::RefCell;
 use heapless::Deque;
-use tester_core::message::{QUEUE_PIECES, Record};
-use tester_core::piece::Piece;
-use tester_core::player::{Next, Player};
+use tester_core::message::{QUEUE_PIECES, Record, Step};
+use tester_core::player::{Next, Piece, Player};
+use tester_core::station::Board;
 
 /// Longest wait set in the compare unit at once, in cycles. It is below half of the timer's range, which separates future from
 /// past.
@@ -21,9 +22,6 @@ const STRIDE: u16 = 0x4000;
 
 /// From the command to the plan's start, in cycles: 200 us.
 const LEAD: u16 = 3200;
-
-/// Later events are reported as late, in cycles: 10 us.
-const LATE: u16 = 160;
 
 // TIMSK1 and TIFR1.
 const CAPTURE: u8 = 1 << 5;
@@ -41,9 +39,8 @@ struct Inner {
     armed: u16,
     left: u32,
     overflows: u16,
-    late: u16,
-    /// The time and position at the pulse's beginning.
-    rise: Option<(u32, i32)>,
+    /// The time of the pulse's beginning.
+    rise: Option<u32>,
     measured: Deque<Record, 4>,
     lost: u16,
     is_lost_told: bool,
@@ -55,105 +52,35 @@ static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
     armed: 0,
     left: 0,
     overflows: 0,
-    late: 0,
     rise: None,
     measured: Deque::new(),
     lost: 0,
     is_lost_told: true,
 }));
 
-/// The loop's side of the timer.
-pub struct Timeline(TC1);
+/// The hardware as the loop uses it.
+pub struct Tester {
+    timer: TC1,
+    pub lines: Lines,
+}
 
-impl Timeline {
+impl Tester {
     /// Starts the clock.
-    pub fn new(timer: TC1) -> Self {
+    pub fn new(timer: TC1, lines: Lines) -> Self {
         // SAFETY: normal mode, the next edge is rising.
         timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
-        let timeline = Self(timer);
-        timeline.enable(CAPTURE | OVERFLOW);
-        timeline
+        let tester = Self { timer, lines };
+        tester.enable(CAPTURE | OVERFLOW);
+        tester
     }
 
     fn enable(&self, interrupts: u8) {
         // SAFETY: the handlers of all three interrupts are below.
-        self.0.timsk1().write(|w| unsafe { w.bits(interrupts) });
+        self.timer.timsk1().write(|w| unsafe { w.bits(interrupts) });
     }
 
     fn with<R>(&self, change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
-        interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &self.0))
-    }
-
-    /// The time in cycles, modulo 2^32.
-    pub fn now(&self) -> u32 {
-        self.with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
-    }
-
-    /// The encoder's position.
-    pub fn position(&self) -> i32 {
-        self.with(|inner, _| inner.player.position())
-    }
-
-    /// Free places for pieces.
-    pub fn room(&self) -> u8 {
-        self.with(|inner, _| (QUEUE_PIECES - inner.queue.len()) as u8)
-    }
-
-    /// Queues a piece.
-    pub fn push(&self, piece: Piece) {
-        self.with(|inner, _| {
-            let _ = inner.queue.push_back(piece);
-        });
-    }
-
-    /// Whether a plan is being played.
-    pub fn is_playing(&self) -> bool {
-        self.with(|inner, _| inner.player.is_playing())
-    }
-
-    /// Starts the plan. Returns the start time.
-    pub fn start(&self) -> u32 {
-        self.enable(CAPTURE | COMPARE | OVERFLOW);
-        self.with(|inner, timer| {
-            let begin = timer.tcnt1().read().bits().wrapping_add(LEAD);
-            let time = inner.time(timer, timer.tcnt1().read().bits());
-            let time = time.wrapping_add(begin.wrapping_sub(time as u16).into());
-            inner.late = 0;
-            inner.armed = begin;
-            let Inner { player, queue, .. } = inner;
-            let next = player.start(|| queue.pop_front());
-            inner.follow(next, timer);
-            time
-        })
-    }
-
-    /// Stops the plan, and drops its pieces.
-    pub fn stop(&self) {
-        self.enable(CAPTURE | OVERFLOW);
-        self.with(|inner, _| {
-            inner.player.stop();
-            inner.queue.clear();
-        });
-    }
-
-    /// Sets lines.
-    pub fn set(&self, mask: u8, levels: u8) {
-        self.with(|inner, _| {
-            inner.player.set(mask, levels);
-            lines::show(inner.player.levels());
-        });
-    }
-
-    /// Continues after a burst that left these levels. The clock has lost time, so a pulse that has begun is dropped.
-    pub fn restart(&self, levels: u8) {
-        self.set(u8::MAX, levels);
-        self.with(|inner, timer| {
-            inner.rise = None;
-            // SAFETY: the next edge is rising, and a captured edge is dropped.
-            timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
-            // SAFETY: writing 1 clears the flag.
-            timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
-        });
+        interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &self.timer))
     }
 
     /// The oldest measurement.
@@ -164,6 +91,90 @@ impl Timeline {
                 (!is_told).then_some(Record::Lost { pulses: inner.lost })
             })
         })
+    }
+}
+
+impl Board for Tester {
+    fn now(&mut self) -> u32 {
+        self.with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
+    }
+
+    fn position(&mut self) -> i32 {
+        self.with(|inner, _| inner.player.position())
+    }
+
+    fn room(&mut self) -> u8 {
+        self.with(|inner, _| (QUEUE_PIECES - inner.queue.len()) as u8)
+    }
+
+    fn push(&mut self, piece: Piece) {
+        self.with(|inner, _| {
+            let _ = inner.queue.push_back(piece);
+        });
+    }
+
+    fn is_playing(&mut self) -> bool {
+        self.with(|inner, _| inner.player.is_playing())
+    }
+
+    fn start(&mut self) -> u32 {
+        self.enable(CAPTURE | COMPARE | OVERFLOW);
+        self.with(|inner, timer| {
+            let begin = timer.tcnt1().read().bits().wrapping_add(LEAD);
+            let time = inner.time(timer, timer.tcnt1().read().bits());
+            let time = time.wrapping_add(begin.wrapping_sub(time as u16).into());
+            inner.armed = begin;
+            let Inner { player, queue, .. } = inner;
+            let next = player.start(|| queue.pop_front());
+            inner.follow(next, timer);
+            time
+        })
+    }
+
+    fn stop(&mut self) {
+        self.enable(CAPTURE | OVERFLOW);
+        self.with(|inner, _| {
+            inner.player.stop();
+            inner.queue.clear();
+        });
+    }
+
+    fn set(&mut self, mask: u8, levels: u8) {
+        self.with(|inner, _| {
+            inner.player.set(mask, levels);
+            lines::show(inner.player.levels());
+        });
+    }
+
+    fn reset(&mut self, pulled: bool) {
+        self.lines.pull_reset(pulled);
+    }
+
+    fn burst(&mut self, steps: &[Step], run_up: u16, repeats: u16, slower: u8) {
+        let levels = interrupt::free(|_| {
+            let levels = burst::play(steps, run_up, slower, lines::shown());
+            burst::play(steps, repeats, 0, levels)
+        });
+        self.set(u8::MAX, levels);
+        // The clock has lost time, so a pulse that has begun is dropped.
+        self.with(|inner, timer| {
+            inner.rise = None;
+            // SAFETY: the next edge is rising, and a captured edge is dropped.
+            timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
+            // SAFETY: writing 1 clears the flag.
+            timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
+        });
+    }
+
+    fn levels(&mut self) -> u8 {
+        lines::shown()
+    }
+
+    fn check_capture(&mut self, width: u16) {
+        self.lines.drive_capture(true);
+        let begin = self.now();
+        while self.now().wrapping_sub(begin) < width.into() {}
+        self.lines.drive_capture(false);
     }
 }
 
@@ -178,17 +189,12 @@ impl Inner {
 
     /// Waits for the next event, or records the end.
     fn follow(&mut self, next: Next, timer: &TC1) {
-        let position = self.player.position();
         match next {
             Next::After(wait) => self.wait(wait, timer),
-            Next::Ended => {
-                let time = self.time(timer, self.armed);
-                self.measure(Record::Ended { time, position, late: self.late });
-            }
+            Next::Ended => self.measure(Record::Ended { position: self.player.position() }),
             Next::Dry => {
                 self.player.stop();
-                let time = self.time(timer, timer.tcnt1().read().bits());
-                self.measure(Record::Dry { time, position });
+                self.measure(Record::Dry);
             }
         }
     }
@@ -214,7 +220,6 @@ impl Inner {
             let Self { player, queue, .. } = self;
             let next = player.fire(|| queue.pop_front());
             lines::show(self.player.levels());
-            self.late = self.late.saturating_add((since > LATE).into());
             self.follow(next, timer);
         }
     }
@@ -224,7 +229,7 @@ impl Inner {
         let time = self.time(timer, timer.icr1().read().bits());
         let rise = self.rise.take();
         if rise.is_none() {
-            self.rise = Some((time, self.player.position()));
+            self.rise = Some(time);
         }
         let edge = if self.rise.is_none() { RISING } else { 0 };
         // SAFETY: the next edge is the other one.
@@ -232,8 +237,8 @@ impl Inner {
         // Changing the edge may set the flag (data sheet, 16.6.3).
         // SAFETY: writing 1 clears the flag.
         timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
-        if let Some((start, position)) = rise {
-            self.measure(Record::Pulse { start, width: time.wrapping_sub(start), position });
+        if let Some(start) = rise {
+            self.measure(Record::Pulse { start, width: time.wrapping_sub(start) });
         }
     }
 

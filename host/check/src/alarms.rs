@@ -6,14 +6,14 @@
 
 use crate::error::CheckError;
 use crate::plan::Plan;
-use crate::servo::{self, Measured, ORIGIN};
+use crate::servo::{self, ORIGIN};
 use crate::tester::{Tester, ms};
 use crate::wiring::{self, Weeder};
 use control::alarm::Alarm;
 use tester_core::message::{Command, Record};
-use tester_core::piece::Action;
 use tester_core::pins::{AT_REST, Line};
-use uno::CYCLES_PER_SECOND;
+use tester_core::player::Action;
+use uno::{CYCLES_PER_SECOND, Pulse};
 
 /// From the plan's start to the fault, or to the roll before it, in ms.
 const STILL_MS: u32 = 200;
@@ -50,66 +50,62 @@ impl Scene {
     pub const ALL: [Self; 5] =
         [Self::BlockedBeam, Self::FlickeringBeam, Self::SilentEncoder, Self::DeadChannel, Self::EndSwitch];
 
-    /// The alarm that it must raise.
-    pub const fn alarm(self) -> Alarm {
-        match self {
-            Self::BlockedBeam => Alarm::BeamBlocked,
-            Self::FlickeringBeam => Alarm::BeamFlickers,
-            Self::SilentEncoder => Alarm::EncoderSilent,
-            Self::DeadChannel => Alarm::EncoderChannelDead,
-            Self::EndSwitch => Alarm::ToolStuck,
-        }
-    }
-
-    /// Its description in the report.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::BlockedBeam => "blocked beam",
-            Self::FlickeringBeam => "flickering beam",
-            Self::SilentEncoder => "silent encoder",
-            Self::DeadChannel => "dead encoder channel",
-            Self::EndSwitch => "end switch closed with the tool in",
-        }
+    /// The expected reaction.
+    pub const fn expected(self) -> Expected {
+        let (alarm, words, limit_ms) = match self {
+            // The tool first goes out for a plant. The alarm comes after `max_width_mm`, 400 mm: 764 counts of the scene.
+            Self::BlockedBeam => (Alarm::BeamBlocked, "blocked beam", 794.0),
+            // 41 edges.
+            Self::FlickeringBeam => (Alarm::BeamFlickers, "flickering beam", 71.0),
+            // Three breaks of 150 ms each and 150 ms between.
+            Self::SilentEncoder => (Alarm::EncoderSilent, "silent encoder", 780.0),
+            // More than 80 edges in 0.5 s.
+            Self::DeadChannel => (Alarm::EncoderChannelDead, "dead encoder channel", 530.0),
+            // `lead_out_ms` of 230 ms, and 100 ms.
+            Self::EndSwitch => (Alarm::ToolStuck, "end switch closed with the tool in", 360.0),
+        };
+        Expected { alarm, words, limit_ms }
     }
 
     /// The plan, and the cycle of the fault.
     fn plan(self) -> (Plan, u64) {
         let mut plan = Plan::new();
         plan.at(ms(STILL_MS).into(), Action::Pause);
-        let level =
-            |line: Line, high: bool| Action::Levels { mask: line.bit(), levels: if high { line.bit() } else { 0 } };
-        let begin = plan.end();
+        match self {
+            Self::BlockedBeam | Self::DeadChannel => plan.roll(300, COUNTS_PER_S),
+            Self::FlickeringBeam => plan.roll(100, COUNTS_PER_S),
+            Self::SilentEncoder | Self::EndSwitch => {}
+        }
+        let fault = plan.end() + u64::from(ms(if self == Self::EndSwitch { 200 } else { 1 }));
         match self {
             Self::BlockedBeam => {
-                plan.roll(300, COUNTS_PER_S);
-                plan.at(plan.end(), level(Line::Beam, false));
-                let fault = plan.end();
+                plan.at(fault, Action::level(Line::Beam, false));
                 plan.roll(1000, COUNTS_PER_S);
-                return (plan, fault);
             }
-            Self::FlickeringBeam => {
-                plan.roll(100, COUNTS_PER_S);
-                let fault = plan.end() + u64::from(ms(1));
-                plan.repeat(200, ms(1), Action::Flicker { mask: Line::Beam.bit() });
-                return (plan, fault);
-            }
+            Self::FlickeringBeam => plan.repeat(200, ms(1), Action::Flicker { mask: Line::Beam.bit() }),
             Self::SilentEncoder => {
                 for edge in 0..6 {
-                    plan.at(begin + u64::from(ms(1 + 150 * edge)), level(Line::Beam, edge % 2 == 1));
+                    plan.at(fault + u64::from(ms(150 * edge)), Action::level(Line::Beam, edge % 2 == 1));
                 }
             }
             Self::DeadChannel => {
-                plan.roll(300, COUNTS_PER_S);
-                plan.at(plan.end(), Action::Freeze { mask: Line::EncoderB.bit() });
-                let fault = plan.end();
+                plan.at(fault, Action::Freeze { mask: Line::EncoderB.bit() });
                 plan.roll(700, COUNTS_PER_S);
-                return (plan, fault);
             }
-            Self::EndSwitch => plan.at(begin + u64::from(ms(200)), level(Line::EndSwitch, false)),
+            Self::EndSwitch => plan.at(fault, Action::level(Line::EndSwitch, false)),
         }
-        let fault = if self == Self::EndSwitch { plan.end() } else { begin + u64::from(ms(1)) };
         (plan, fault)
     }
+}
+
+/// The expected reaction to a scene.
+pub struct Expected {
+    /// The alarm.
+    pub alarm: Alarm,
+    /// The scene's description in the report.
+    pub words: &'static str,
+    /// The time limit until the tool is out, in ms: the manual's limit, and a frame and a half of the servo.
+    pub limit_ms: f64,
 }
 
 /// The result of a scene.
@@ -133,7 +129,8 @@ pub fn play(scene: Scene, weeder: &mut Weeder, tester: &mut Tester, clock_ratio:
     plan.at(fault + u64::from(ms(AFTER_MS)), Action::Pause);
     let played = tester.play(&plan.finish(), || weeder.drain())?;
     let status = weeder.status()?;
-    let (first, second) = scene.alarm().code();
+    let alarm = scene.expected().alarm;
+    let (first, second) = alarm.code();
     // The record may begin at any phase: so it must hold a code with the pauses before and after it.
     let code_ms = f64::from(2 * (2 * u16::from(first + second) + 8) + 10) * QUARTER_MS;
     let records = tester.record_for_ms(code_ms as u32)?;
@@ -143,11 +140,11 @@ pub fn play(scene: Scene, weeder: &mut Weeder, tester: &mut Tester, clock_ratio:
     weeder.to_hold()?;
     let out_ms = first_out(&servo::pulses(&played.records, played.start), ORIGIN + fault, clock_ratio);
     let code = code(&records, clock_ratio).map_or(f64::NAN, |(first, second)| f64::from(10 * first + second));
-    Ok(Raised { out_ms, is_expected: status.alarm == Some(scene.alarm()), code })
+    Ok(Raised { out_ms, is_expected: status.alarm == Some(alarm), code })
 }
 
 /// Frees every line of a plan.
-fn freed() -> Vec<tester_core::piece::Piece> {
+fn freed() -> Vec<tester_core::player::Piece> {
     let mut plan = Plan::new();
     plan.at(u64::from(ms(1)), Action::Freeze { mask: 0 });
     plan.finish()
@@ -173,14 +170,14 @@ fn to_work(weeder: &mut Weeder, tester: &mut Tester, has_end_switch: bool) -> Re
 
 /// From a moment to the beginning of the next pulse for out, in ms; infinite without one, and NaN if the tool was out
 /// before.
-fn first_out(pulses: &[Measured], moment: u64, clock_ratio: f64) -> f64 {
-    let is_out = |measured: &&Measured| measured.pulse.width_us() * clock_ratio > MIDDLE_US;
-    let behind = pulses.iter().position(|measured| measured.pulse.rise >= moment).unwrap_or(pulses.len());
+fn first_out(pulses: &[Pulse], moment: u64, clock_ratio: f64) -> f64 {
+    let is_out = |pulse: &&Pulse| pulse.width_us() * clock_ratio > MIDDLE_US;
+    let behind = pulses.iter().position(|pulse| pulse.rise >= moment).unwrap_or(pulses.len());
     // If the tool was already out, the pulse does not show the reaction to the fault.
     if pulses[..behind].last().is_none_or(|last| is_out(&last)) {
         return f64::NAN;
     }
-    let first = pulses[behind..].iter().find(is_out).map(|measured| (measured.pulse.rise - moment) as f64);
+    let first = pulses[behind..].iter().find(is_out).map(|pulse| (pulse.rise - moment) as f64);
     first.map_or(f64::INFINITY, |cycles| cycles * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio)
 }
 
@@ -218,12 +215,11 @@ fn code(records: &[Record], clock_ratio: f64) -> Option<(u8, u8)> {
 /// # Errors
 /// If a board does not answer.
 pub fn switch_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
-    let switch = Line::WorkSwitch.bit();
-    tester.set(switch, 0)?;
+    tester.set(Line::WorkSwitch.bit(), 0)?;
     // `start now` at work would skip the unseen ground, so `to_work` first goes to hold.
     to_work(weeder, tester, false)?;
     let mut plan = Plan::new();
-    plan.at(u64::from(ms(2 * STILL_MS)), Action::Levels { mask: switch, levels: switch });
+    plan.at(u64::from(ms(2 * STILL_MS)), Action::level(Line::WorkSwitch, true));
     let opened = plan.end();
     plan.at(opened + u64::from(ms(AFTER_MS)), Action::Pause);
     let played = tester.play(&plan.finish(), || weeder.drain())?;
@@ -252,13 +248,12 @@ pub fn beam_to_window_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: 
     }
     weeder.ask("start now")?;
     tester.record_for_ms(2 * STILL_MS)?;
-    let beam = Line::Beam.bit();
     let mut plan = Plan::new();
     plan.roll(100, SLOW_COUNTS_PER_S);
-    plan.at(plan.end(), Action::Levels { mask: beam, levels: 0 });
+    plan.at(plan.end(), Action::level(Line::Beam, false));
     let edge = plan.end();
     plan.roll(150, SLOW_COUNTS_PER_S);
-    plan.at(plan.end(), Action::Levels { mask: beam, levels: beam });
+    plan.at(plan.end(), Action::level(Line::Beam, true));
     let played = tester.play(&plan.finish(), || weeder.drain())?;
     weeder.to_hold()?;
     let out_ms = first_out(&servo::pulses(&played.records, played.start), ORIGIN + edge, clock_ratio);

@@ -40,7 +40,7 @@ impl Desk {
         let run = move || {
             let mut pair = match second {
                 Some(program) => Pair::with_second_simulator(&elves.0, &elves.1, &program)?,
-                None => Pair::power_up(&elves.0, &elves.1, &[], Wiring::right())?,
+                None => Pair::power_up(&elves.0, &elves.1, Wiring::right())?,
             };
             let mut ptys = [(Side::Tester, tester_pty), (Side::Weeder, weeder_pty)];
             while !is_to_stop.load(Ordering::Relaxed) {

@@ -6,7 +6,7 @@
 //! on purpose.
 
 use crate::second::SecondUno;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -57,9 +57,9 @@ pub struct Wiring {
     /// How much faster the weeder's clock is, in parts per million.
     pub clock_ppm: i64,
     /// Changes the edges from the weeder.
-    pub from_weeder: Option<Edge>,
+    pub from_weeder: Edge,
     /// Changes the edges to the weeder. Cycles are the tester's.
-    pub to_weeder: Option<Edge>,
+    pub to_weeder: Edge,
     /// Changes the weeder's EEPROM when its reset is pulled. The weeder then starts as at power-up.
     pub eeprom_at_reset: Option<Spoil>,
 }
@@ -74,15 +74,12 @@ impl Wiring {
             has_reset: true,
             outputs: vec![SERVO, LED],
             clock_ppm: CLOCK_PPM,
-            from_weeder: None,
-            to_weeder: None,
+            from_weeder: Box::new(Some),
+            to_weeder: Box::new(Some),
             eeprom_at_reset: None,
         }
     }
 }
-
-/// The name of what stopped, for errors.
-const SECOND: &str = "the second simulator";
 
 /// The weeder's virtual Uno, of this project's simulator or of another one.
 enum WeederUno {
@@ -90,49 +87,19 @@ enum WeederUno {
     Second(SecondUno),
 }
 
+/// Does the same with either Uno.
+macro_rules! with {
+    ($weeder:expr, $uno:ident => $done:expr) => {
+        match $weeder {
+            WeederUno::Own($uno) => $done,
+            WeederUno::Second($uno) => $done,
+        }
+    };
+}
+
 impl WeederUno {
     fn cycle(&self) -> u64 {
-        match self {
-            Self::Own(uno) => uno.cycle(),
-            Self::Second(uno) => uno.cycle(),
-        }
-    }
-
-    fn run_until(&mut self, cycle: u64) -> Result<()> {
-        match self {
-            Self::Own(uno) => uno.run_until(cycle)?,
-            Self::Second(uno) => uno.run_until(cycle).context(SECOND)?,
-        }
-        Ok(())
-    }
-
-    fn drive(&mut self, change: PinChange) {
-        match self {
-            Self::Own(uno) => uno.drive([change]),
-            Self::Second(uno) => uno.drive(change),
-        }
-    }
-
-    fn take_changes(&mut self) -> Vec<PinChange> {
-        match self {
-            Self::Own(uno) => uno.take_changes(),
-            Self::Second(uno) => uno.take_changes(),
-        }
-    }
-
-    fn received(&mut self) -> Vec<u8> {
-        match self {
-            Self::Own(uno) => uno.received_bytes().into_iter().map(|received| received.byte).collect(),
-            Self::Second(uno) => uno.received(),
-        }
-    }
-
-    fn reset(&mut self) -> Result<()> {
-        match self {
-            Self::Own(uno) => uno.reset(),
-            Self::Second(uno) => uno.reset().context(SECOND)?,
-        }
-        Ok(())
+        with!(self, uno => uno.cycle())
     }
 }
 
@@ -152,12 +119,12 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Powers both up, with the weeder's EEPROM.
+    /// Powers both up, with an erased EEPROM of the weeder.
     ///
     /// # Errors
     /// If an ELF cannot be run.
-    pub fn power_up(tester: &Path, weeder: &Path, eeprom: &[u8], wiring: Wiring) -> Result<Self> {
-        let weeder_uno = Uno::boot_with_eeprom(weeder, eeprom)?.wired(&field::wiring::WIRES);
+    pub fn power_up(tester: &Path, weeder: &Path, wiring: Wiring) -> Result<Self> {
+        let weeder_uno = Uno::boot(weeder)?.wired(&field::wiring::WIRES);
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
     }
 
@@ -166,7 +133,7 @@ impl Pair {
     /// # Errors
     /// If an ELF cannot be run, or the other simulator.
     pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self> {
-        let second = SecondUno::power_up(program, weeder).context(SECOND)?;
+        let second = SecondUno::power_up(program, weeder)?;
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Second(second), weeder, Wiring::right()))
     }
 
@@ -207,7 +174,10 @@ impl Pair {
             self.step()?;
         }
         self.from_tester.extend(self.tester.received_bytes().into_iter().map(|received| received.byte));
-        self.from_weeder.extend(self.weeder.received());
+        self.from_weeder.extend(match &mut self.weeder {
+            WeederUno::Own(uno) => uno.received_bytes().into_iter().map(|received| received.byte).collect(),
+            WeederUno::Second(uno) => uno.received(),
+        });
         Ok(())
     }
 
@@ -224,10 +194,9 @@ impl Pair {
         if self.is_reset_pulled {
             return Ok(());
         }
-        self.weeder.run_until(self.weeder_cycle(until))?;
-        for change in self.weeder.take_changes() {
-            self.carry_to_tester(change);
-        }
+        let until = self.weeder_cycle(until);
+        with!(&mut self.weeder, uno => uno.run_until(until)?);
+        self.carry_to_tester();
         Ok(())
     }
 
@@ -245,10 +214,8 @@ impl Pair {
                 *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&field::wiring::WIRES);
             }
             self.shared = (self.tester.cycle(), self.weeder.cycle());
-            self.weeder.reset()?;
-            for change in self.weeder.take_changes() {
-                self.carry_to_tester(change);
-            }
+            self.reset_weeder()?;
+            self.carry_to_tester();
         }
         self.is_reset_pulled = pulled;
         Ok(())
@@ -262,7 +229,15 @@ impl Pair {
         self.resets += 1;
         match side {
             Side::Tester => self.tester.reset(),
-            Side::Weeder => self.weeder.reset()?,
+            Side::Weeder => self.reset_weeder()?,
+        }
+        Ok(())
+    }
+
+    fn reset_weeder(&mut self) -> Result<()> {
+        match &mut self.weeder {
+            WeederUno::Own(uno) => uno.reset(),
+            WeederUno::Second(uno) => uno.reset()?,
         }
         Ok(())
     }
@@ -280,37 +255,46 @@ impl Pair {
 
     /// Bytes that were typed into a board's port and have not reached it.
     pub fn bytes_pending(&self, side: Side) -> usize {
-        match (side, &self.weeder) {
-            (Side::Tester, _) => self.tester.bytes_pending(),
-            (Side::Weeder, WeederUno::Own(weeder)) => weeder.bytes_pending(),
-            (Side::Weeder, WeederUno::Second(weeder)) => weeder.bytes_pending(),
+        match side {
+            Side::Tester => self.tester.bytes_pending(),
+            Side::Weeder => with!(&self.weeder, uno => uno.bytes_pending()),
+        }
+    }
+
+    /// Types bytes into a board's port.
+    pub fn send(&mut self, side: Side, bytes: &[u8]) {
+        match side {
+            Side::Tester => self.tester.send(bytes),
+            Side::Weeder => with!(&mut self.weeder, uno => uno.send(bytes)),
+        }
+    }
+
+    /// Unread output of a board.
+    pub fn received(&mut self, side: Side) -> &mut VecDeque<u8> {
+        match side {
+            Side::Tester => &mut self.from_tester,
+            Side::Weeder => &mut self.from_weeder,
         }
     }
 
     fn carry_to_weeder(&mut self, change: PinChange) {
         let Some(&(line, _)) = TESTER_LINES.iter().find(|&&(_, pin)| pin == change.pin) else { return };
-        let change = match &mut self.wiring.to_weeder {
-            Some(becomes) => becomes(change),
-            None => Some(change),
-        };
-        let Some(change) = change else { return };
+        let Some(change) = (self.wiring.to_weeder)(change) else { return };
         let cycle = self.weeder_cycle(change.cycle);
         let wires = self.wiring.inputs.iter().filter(|&&(wired, ..)| wired == line);
         let changes = wires.map(|&(_, pin, inverted)| PinChange { cycle, pin, high: change.high != inverted });
-        changes.for_each(|change| self.weeder.drive(change));
+        with!(&mut self.weeder, uno => uno.drive(changes));
     }
 
-    fn carry_to_tester(&mut self, change: PinChange) {
-        if !self.wiring.outputs.contains(&change.pin) {
-            return;
+    fn carry_to_tester(&mut self) {
+        for change in with!(&mut self.weeder, uno => uno.take_changes()) {
+            if !self.wiring.outputs.contains(&change.pin) {
+                continue;
+            }
+            let pin = if change.pin == field::wiring::SERVO { TESTER_SERVO } else { TESTER_LED };
+            let change = PinChange { cycle: self.tester_cycle(change.cycle) + STEP, pin, ..change };
+            self.tester.drive((self.wiring.from_weeder)(change));
         }
-        let pin = if change.pin == field::wiring::SERVO { TESTER_SERVO } else { TESTER_LED };
-        let change = PinChange { cycle: self.tester_cycle(change.cycle) + STEP, pin, ..change };
-        let change = match &mut self.wiring.from_weeder {
-            Some(becomes) => becomes(change),
-            None => Some(change),
-        };
-        self.tester.drive(change);
     }
 }
 
@@ -333,25 +317,6 @@ pub struct PairPort {
 
 /// Longest time that a read waits for a byte, by the tester's clock.
 const READ_MS: u64 = 20;
-
-impl Pair {
-    /// Types bytes into a board's port.
-    pub fn send(&mut self, side: Side, bytes: &[u8]) {
-        match (side, &mut self.weeder) {
-            (Side::Tester, _) => self.tester.send(bytes),
-            (Side::Weeder, WeederUno::Own(weeder)) => weeder.send(bytes),
-            (Side::Weeder, WeederUno::Second(weeder)) => weeder.send(bytes),
-        }
-    }
-
-    /// Unread output of a board.
-    pub fn received(&mut self, side: Side) -> &mut VecDeque<u8> {
-        match side {
-            Side::Tester => &mut self.from_tester,
-            Side::Weeder => &mut self.from_weeder,
-        }
-    }
-}
 
 impl Read for PairPort {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {

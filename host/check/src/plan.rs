@@ -5,8 +5,8 @@
 //! events.
 
 use field::wiring;
-use tester_core::piece::{Action, Piece};
 use tester_core::pins::Line;
+use tester_core::player::{Action, Piece};
 use uno::{Pin, PinChange};
 
 /// Greatest error of a count's time, in cycles: 20 us, 0.02 mm at 4 km/h.
@@ -125,7 +125,7 @@ impl Plan {
                     if a == b { Action::Forward } else { Action::Backward }
                 }
                 Line::EncoderA | Line::EncoderB => continue,
-                line => Action::Levels { mask: line.bit(), levels: if change.high { line.bit() } else { 0 } },
+                line => Action::level(line, change.high),
             };
             let is_count = matches!(action, Action::Forward | Action::Backward);
             if let Some(running) = run.1

@@ -3,6 +3,7 @@
 use crate::error::CheckError;
 use crate::tester::Tester;
 use crate::wiring::Weeder;
+use link::Link;
 
 /// Opens both boards. A port without a name is one of `unos` where such a board answers: the tester by its protocol,
 /// the weeder by its console.
@@ -13,7 +14,10 @@ pub fn open(weeder: Option<&str>, tester: Option<&str>, unos: &[String]) -> Resu
     let (tester_port, tester) = opened("tester", tester, weeder, unos, |port| {
         Tester::over(link::open_other(port).map_err(CheckError::TesterPort)?)
     })?;
-    let (_, weeder) = opened("weeder", weeder, Some(&tester_port), unos, Weeder::open)?;
+    let (_, weeder) = opened("weeder", weeder, Some(&tester_port), unos, |port| {
+        let port = port.to_owned();
+        Weeder::over(move || Link::open(Some(&port)))
+    })?;
     Ok((weeder, tester))
 }
 

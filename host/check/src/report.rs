@@ -1,6 +1,6 @@
 //! The report: measured figures, beside simulated and proved ones.
 //!
-//! A [`Line`] is one figure. It fails if it is outside its limits. It differs if it is within them, but farther from
+//! A [`Figure`] fails if it is outside its limits. It differs if it is within them, but farther from
 //! the simulated figure than its tolerance. The simulated figures are in `simulated.json`, written by the same check of
 //! two virtual Unos.
 
@@ -39,7 +39,7 @@ impl Verdict {
 
 /// A figure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Line {
+pub struct Figure {
     /// Its name in files, which never changes.
     pub id: String,
     /// Its name.
@@ -62,16 +62,11 @@ pub struct Line {
     pub verdict: Verdict,
 }
 
-/// A line without its verdict.
-#[derive(Clone, Debug)]
-pub struct Figure {
-    line: Line,
-}
-
 impl Figure {
-    /// A figure without limits and with this tolerance. If `measured` is not finite, the event never came.
+    /// A figure without limits and with this tolerance, not yet judged. If `measured` is not finite, the event never
+    /// came.
     pub fn new(id: &str, what: &str, unit: &str, measured: f64, tolerance: f64) -> Self {
-        let line = Line {
+        Self {
             id: id.to_owned(),
             what: what.to_owned(),
             unit: unit.to_owned(),
@@ -83,45 +78,41 @@ impl Figure {
             highest: None,
             tolerance,
             verdict: Verdict::Pass,
-        };
-        Self { line }
+        }
     }
 
     /// The same, right from this value on.
     #[must_use]
     pub fn at_least(mut self, lowest: f64) -> Self {
-        self.line.lowest = Some(lowest);
+        self.lowest = Some(lowest);
         self
     }
 
     /// The same, right up to this value.
     #[must_use]
     pub fn at_most(mut self, highest: f64) -> Self {
-        self.line.highest = Some(highest);
+        self.highest = Some(highest);
         self
     }
 
     /// The same, with its proved value.
     #[must_use]
     pub fn proved(mut self, proved: f64) -> Self {
-        self.line.proved = Some(proved);
+        self.proved = Some(proved);
         self
     }
 
-    /// The line, with its verdict.
-    pub fn judge(self, simulated: Option<f64>) -> Line {
-        let mut line = self.line;
-        line.simulated = simulated;
+    /// The verdict against a simulated value.
+    fn verdict(&self, simulated: Option<f64>) -> Verdict {
         let is_within = |measured: &f64| {
-            line.lowest.is_none_or(|lowest| *measured >= lowest)
-                && line.highest.is_none_or(|highest| *measured <= highest)
+            self.lowest.is_none_or(|lowest| *measured >= lowest)
+                && self.highest.is_none_or(|highest| *measured <= highest)
         };
-        line.verdict = match (line.measured.filter(is_within), simulated) {
+        match (self.measured.filter(is_within), simulated) {
             (None, _) => Verdict::Fail,
-            (Some(measured), Some(simulated)) if (measured - simulated).abs() > line.tolerance => Verdict::Differs,
+            (Some(measured), Some(simulated)) if (measured - simulated).abs() > self.tolerance => Verdict::Differs,
             (Some(_), _) => Verdict::Pass,
-        };
-        line
+        }
     }
 }
 
@@ -141,7 +132,7 @@ pub struct Report {
     /// The errors of the wires. If there are any, nothing else was measured.
     pub wires: Vec<String>,
     /// The figures.
-    pub lines: Vec<Line>,
+    pub lines: Vec<Figure>,
 }
 
 impl Report {
@@ -149,8 +140,8 @@ impl Report {
     pub fn new(firmware: &str, checked: &str, brief: bool, figures: Vec<Figure>) -> Self {
         let simulated = simulated(brief);
         let judge = |figure: Figure| {
-            let found = simulated.get(&figure.line.id).copied();
-            figure.judge(found)
+            let simulated = simulated.get(&figure.id).copied();
+            Figure { simulated, verdict: figure.verdict(simulated), ..figure }
         };
         Self {
             form: FORM,
@@ -173,8 +164,7 @@ impl Report {
             return Err(format!("the form is {}, and {FORM} is known", report.form));
         }
         for line in &report.lines {
-            let judged = Figure { line: line.clone() }.judge(line.simulated);
-            if judged.verdict != line.verdict {
+            if line.verdict(line.simulated) != line.verdict {
                 return Err(format!("{}: the verdict does not follow from the figures", line.id));
             }
         }
@@ -190,11 +180,6 @@ impl Report {
     /// Whether the wires are right, and no line failed.
     pub fn is_good(&self) -> bool {
         self.wires.is_empty() && self.lines.iter().all(|line| line.verdict != Verdict::Fail)
-    }
-
-    /// The lines with this verdict.
-    pub fn with(&self, verdict: Verdict) -> impl Iterator<Item = &Line> {
-        self.lines.iter().filter(move |line| line.verdict == verdict)
     }
 
     /// The page: one file of HTML, without external parts.
@@ -259,11 +244,11 @@ fn simulated(brief: bool) -> BTreeMap<String, f64> {
     both.get(if brief { "brief" } else { "whole" }).cloned().unwrap_or_default()
 }
 
-fn measured(line: &Line) -> String {
+fn measured(line: &Figure) -> String {
     line.measured.map_or_else(|| "none".to_owned(), |measured| number(Some(measured)))
 }
 
-fn limits(line: &Line) -> String {
+fn limits(line: &Figure) -> String {
     match (line.lowest, line.highest) {
         (Some(lowest), Some(highest)) => format!("{} to {}", number(Some(lowest)), number(Some(highest))),
         (Some(lowest), None) => format!("{} or more", number(Some(lowest))),
@@ -297,12 +282,12 @@ mod tests {
 
     #[test]
     fn a_figure_passes_differs_or_fails() {
-        assert_eq!(figure(1500.0).judge(Some(1500.5)).verdict, Verdict::Pass);
-        assert_eq!(figure(1500.0).judge(None).verdict, Verdict::Pass);
-        assert_eq!(figure(1503.0).judge(Some(1500.0)).verdict, Verdict::Differs);
-        assert_eq!(figure(1540.0).judge(Some(1540.0)).verdict, Verdict::Fail);
-        assert_eq!(figure(f64::NAN).judge(None).verdict, Verdict::Fail);
-        assert_eq!(figure(f64::INFINITY).judge(Some(1500.0)).verdict, Verdict::Fail);
+        assert_eq!(figure(1500.0).verdict(Some(1500.5)), Verdict::Pass);
+        assert_eq!(figure(1500.0).verdict(None), Verdict::Pass);
+        assert_eq!(figure(1503.0).verdict(Some(1500.0)), Verdict::Differs);
+        assert_eq!(figure(1540.0).verdict(Some(1540.0)), Verdict::Fail);
+        assert_eq!(figure(f64::NAN).verdict(None), Verdict::Fail);
+        assert_eq!(figure(f64::INFINITY).verdict(Some(1500.0)), Verdict::Fail);
     }
 
     #[test]

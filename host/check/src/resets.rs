@@ -5,7 +5,7 @@
 
 use crate::error::CheckError;
 use crate::plan::Plan;
-use crate::servo::{self, Measured, ORIGIN};
+use crate::servo::{self, ORIGIN};
 use crate::tester::{Tester, ms};
 use crate::wiring::{self, Weeder, reset};
 use control::alarm::Alarm;
@@ -13,7 +13,7 @@ use control::ground::examples::EXAMPLES;
 use link::examples::{self, Taught};
 use link::{ConsoleLine, Mode};
 use tester_core::message::Command;
-use uno::CYCLES_PER_SECOND;
+use uno::{CYCLES_PER_SECOND, Pulse};
 
 /// The weeder's rate when it is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as fit
 /// into the tester.
@@ -53,13 +53,6 @@ pub enum ResetBy {
     Watchdog,
 }
 
-impl ResetBy {
-    /// Whether the weeder works and rolls then. The watchdog can be tested only in hold.
-    pub const fn is_at_work(self) -> bool {
-        !matches!(self, Self::Watchdog)
-    }
-}
-
 /// The result of a reset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restart {
@@ -82,7 +75,7 @@ pub fn restart(
     is_simulated: bool,
 ) -> Result<Restart, CheckError> {
     weeder.to_hold()?;
-    if reset_by.is_at_work() {
+    if reset_by != ResetBy::Watchdog {
         weeder.ask("start now")?;
         let mut plan = Plan::new();
         plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
@@ -101,7 +94,7 @@ pub fn restart(
     }
     records.extend(tester.record_for_ms(if is_simulated { SIMULATED_START_MS } else { START_MS })?);
     let ended = tester.command(&Command::Clock)?.time;
-    if reset_by != ResetBy::Port && weeder.greeting()?.is_none() {
+    if reset_by != ResetBy::Port && !weeder.greeting()? {
         // If the weeder does not restart, the check still goes on.
         wiring::reset(weeder, tester)?;
     }
@@ -109,12 +102,12 @@ pub fn restart(
     let status = weeder.status()?;
     let pulses = servo::pulses(&records, reset);
     // During the reset, pulses are missing. A running machine has one every 20 ms.
-    let gap = |number: &usize| pulses[number + 1].pulse.rise - pulses[*number].pulse.fall;
+    let gap = |number: &usize| pulses[number + 1].rise - pulses[*number].fall;
     let longest = (0..pulses.len().saturating_sub(1)).max_by_key(gap);
     let again = ORIGIN + u64::from(ended.wrapping_sub(reset).saturating_sub(ms(AGAIN_MS)));
-    let longest = longest.filter(|_| pulses.last().is_some_and(|last| last.pulse.rise > again));
+    let longest = longest.filter(|_| pulses.last().is_some_and(|last| last.rise > again));
     let in_ms = |cycles: u64| cycles as f64 * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
-    let is_wide = |measured: &Measured| measured.pulse.width_us() * clock_ratio > 1750.0;
+    let is_wide = |pulse: &Pulse| pulse.width_us() * clock_ratio > 1750.0;
     let stays_out = longest.is_some_and(|number| pulses[number + 1..].iter().all(is_wide));
     Ok(Restart {
         without_pulse_ms: longest.map_or(f64::INFINITY, |number| in_ms(gap(&number))),
@@ -142,7 +135,7 @@ impl Kept {
         };
         Ok(Self {
             settings: weeder.ask("get")?.iter().filter_map(setting).collect(),
-            examples: examples::read(weeder.link()?)?,
+            examples: examples::read(weeder)?,
         })
     }
 
@@ -165,9 +158,9 @@ pub fn with_an_example<T>(
     try_it: impl FnOnce(&mut Weeder, &mut Tester) -> Result<T, CheckError>,
 ) -> Result<T, CheckError> {
     weeder.to_hold()?;
-    let is_taught = examples::read(weeder.link()?)?.is_empty();
+    let is_taught = examples::read(weeder)?.is_empty();
     if is_taught {
-        examples::push(weeder.link()?, &EXAMPLES[..1], false)?;
+        examples::push(weeder, &EXAMPLES[..1], false)?;
     }
     let tried = try_it(weeder, tester);
     if is_taught {
@@ -180,8 +173,6 @@ pub fn with_an_example<T>(
 /// The results of resets during a save.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Saves {
-    /// Resets.
-    pub resets: u32,
     /// Resets after which the settings were neither the old nor the new ones.
     pub torn: u32,
     /// Resets after which the new settings were there.
@@ -203,7 +194,7 @@ pub fn while_saving(moments: u32, weeder: &mut Weeder, tester: &mut Tester) -> R
 }
 
 fn saves(moments: u32, kept: u32, weeder: &mut Weeder, tester: &mut Tester) -> Result<Saves, CheckError> {
-    let (mut saved, mut saves) = (kept, Saves { resets: moments, ..Saves::default() });
+    let (mut saved, mut saves) = (kept, Saves::default());
     for moment in 0..moments {
         let wanted = if saved == 300 + moment { 299 } else { 300 + moment };
         weeder.ask(&format!("set {SETTING} {wanted}"))?;

@@ -3,7 +3,7 @@
 
 use crate::error::CheckError;
 use crate::plan::Plan;
-use crate::servo::{self, Measured, ORIGIN};
+use crate::servo::{self, ORIGIN};
 use crate::tester::{Tester, ms};
 use crate::wiring::Weeder;
 use field::conditions::Conditions;
@@ -11,7 +11,7 @@ use field::planting::Planting;
 use field::trial::Trial;
 use field::verdict::{Judgement, Verdict, judge};
 use link::settings::name;
-use tester_core::piece::Action;
+use tester_core::player::Action;
 use uno::{CYCLES_PER_SECOND, Pulse};
 
 /// The preset of `weeder sim`.
@@ -30,8 +30,6 @@ pub struct Outcome {
     pub judgement: Judgement,
     /// Counts that the weeder has less than were played.
     pub lost_counts: i64,
-    /// Events that the tester played more than 10 us late.
-    pub late: u16,
 }
 
 impl Outcome {
@@ -101,8 +99,8 @@ pub fn weed(trial: &Trial, weeder: &mut Weeder, tester: &mut Tester, clock_ratio
     let status = weeder.status()?;
     weeder.ask("hold")?;
     // By the weeder's clock, as its settings are.
-    let corrected = |Measured { pulse, .. }| {
-        let width_us = Pulse::width_us(pulse) * clock_ratio;
+    let corrected = |pulse: Pulse| {
+        let width_us = pulse.width_us() * clock_ratio;
         let set_us = [machine.servo.in_us, machine.servo.out_us].into_iter();
         let width_us = set_us.clone().find(|set| (width_us - set).abs() < SAME_WIDTH_US).unwrap_or(width_us);
         Pulse { fall: pulse.rise + (width_us * CYCLES_PER_SECOND as f64 / 1e6).round() as u64, ..pulse }
@@ -111,6 +109,5 @@ pub fn weed(trial: &Trial, weeder: &mut Weeder, tester: &mut Tester, clock_ratio
     Ok(Outcome {
         judgement: judge(row, machine, motion, trial.timing, &pulses, ORIGIN + begin),
         lost_counts: i64::from(played.ticks) - i64::from(status.position.wrapping_sub(before)),
-        late: played.late,
     })
 }

@@ -1,6 +1,6 @@
 //! The check, from the wires to the report.
 
-use crate::alarms::{self, Scene};
+use crate::alarms::{self, Expected, Scene};
 use crate::error::CheckError;
 use crate::rates::{self, Turning};
 use crate::report::{Figure, Report};
@@ -142,23 +142,6 @@ fn rates(weeder: &mut Weeder, tester: &mut Tester, extent: Extent) -> Result<Vec
 /// Tolerance of the highest rate against the simulation's, in counts a second: a step of the search.
 const RATE_TOLERANCE: f64 = 40_000.0;
 
-/// The time limit until the tool is out after a fault, in ms: the manual's limit for each, and a frame and a half of
-/// the servo.
-const fn limit_ms(scene: Scene) -> f64 {
-    match scene {
-        // The tool first goes out for a plant. The alarm comes after `max_width_mm`, 400 mm: 764 counts of the scene.
-        Scene::BlockedBeam => 794.0,
-        // 41 edges.
-        Scene::FlickeringBeam => 71.0,
-        // Three breaks of 150 ms each and 150 ms between.
-        Scene::SilentEncoder => 780.0,
-        // More than 80 edges in 0.5 s.
-        Scene::DeadChannel => 530.0,
-        // `lead_out_ms` of 230 ms, and 100 ms.
-        Scene::EndSwitch => 360.0,
-    }
-}
-
 /// Tolerance of times: a servo's frame and some turns of the loop, in ms.
 const TIME_TOLERANCE_MS: f64 = 25.0;
 
@@ -168,18 +151,19 @@ fn alarms(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
     let scenes: &[Scene] = if extent.brief { &[Scene::FlickeringBeam, Scene::DeadChannel] } else { &Scene::ALL };
     for &scene in scenes {
         let raised = alarms::play(scene, weeder, tester, ratio)?;
-        let name = scene.alarm().text().to_string();
-        let (first, second) = scene.alarm().code();
-        let expected = f64::from(10 * first + second);
-        let what = |what: &str| format!("{}: {what}", scene.words());
+        let Expected { alarm, words, limit_ms } = scene.expected();
+        let name = alarm.text().to_string();
+        let (first, second) = alarm.code();
+        let code = f64::from(10 * first + second);
+        let what = |what: &str| format!("{words}: {what}");
         let is_raised = f64::from(u8::from(raised.is_expected));
         figures.extend([
             Figure::new(&format!("{name}_out"), &what("until the tool is out"), "ms", raised.out_ms, TIME_TOLERANCE_MS)
-                .at_most(limit_ms(scene)),
+                .at_most(limit_ms),
             Figure::new(&format!("{name}_raised"), &what("alarm raised"), "", is_raised, 0.0).at_least(1.0),
             Figure::new(&format!("{name}_code"), &what("code of the LED"), "", raised.code, 0.0)
-                .at_least(expected)
-                .at_most(expected),
+                .at_least(code)
+                .at_most(code),
         ]);
     }
     let switch = alarms::switch_to_out_ms(weeder, tester, ratio)?;

@@ -4,12 +4,16 @@
 //! when a turn is over. They always count as made a little more than a turn later. So widths and distances are right,
 //! and delays are longer by 0.1 ms.
 
+use anyhow::{Context, Result, anyhow, ensure};
 use serde::{Deserialize, Serialize};
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use uno::elf::Image;
 use uno::{Pin, PinChange, hex};
+
+/// The name of what stopped, for errors.
+const SECOND: &str = "the second simulator";
 
 /// Cycles of a turn: 0.1 ms.
 const TURN: u64 = 1600;
@@ -61,22 +65,20 @@ impl SecondUno {
     ///
     /// # Errors
     /// If node cannot be started, or the ELF cannot be read.
-    pub fn power_up(program: &Path, elf: &Path) -> io::Result<Self> {
-        let flash = Image::read(elf).map_err(io::Error::other)?.flash;
+    pub fn power_up(program: &Path, elf: &Path) -> Result<Self> {
+        let flash = Image::read(elf).context(SECOND)?.flash;
         let mut process = Command::new("node")
             .arg(program)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .map_err(|error| {
-                io::Error::new(error.kind(), format!("node cannot be started ({error}): ./setup.sh page installs it"))
-            })?;
-        let missing = || io::Error::from(io::ErrorKind::BrokenPipe);
-        let to = process.stdin.take().ok_or_else(missing)?;
-        let from = BufReader::new(process.stdout.take().ok_or_else(missing)?);
+            .map_err(|error| anyhow!("node cannot be started ({error}): ./setup.sh page installs it"))
+            .context(SECOND)?;
+        let to = process.stdin.take().context(SECOND)?;
+        let from = BufReader::new(process.stdout.take().context(SECOND)?);
         let mut uno =
             Self { process, to, from, asked: 0, run: 0, edges: vec![], typed: vec![], changes: vec![], said: vec![] };
-        uno.exchange(&PowerUp { hex: hex::text(&flash) })?;
+        uno.exchange(&PowerUp { hex: hex::text(&flash) }).context(SECOND)?;
         Ok(uno)
     }
 
@@ -89,15 +91,15 @@ impl SecondUno {
     ///
     /// # Errors
     /// If the process has ended.
-    pub fn run_until(&mut self, cycle: u64) -> io::Result<()> {
+    pub fn run_until(&mut self, cycle: u64) -> Result<()> {
         self.asked = self.asked.max(cycle);
         if self.asked < self.run + TURN { Ok(()) } else { self.turn(false) }
     }
 
-    /// Changes an input pin.
-    pub fn drive(&mut self, change: PinChange) {
-        let pin = Pin::ALL.iter().position(|&pin| pin == change.pin).unwrap_or_default();
-        self.edges.push((change.cycle, pin, change.high));
+    /// Changes input pins.
+    pub fn drive(&mut self, changes: impl IntoIterator<Item = PinChange>) {
+        let number = |pin| Pin::ALL.iter().position(|&one| one == pin).unwrap_or_default();
+        self.edges.extend(changes.into_iter().map(|change| (change.cycle, number(change.pin), change.high)));
     }
 
     /// Its new output edges.
@@ -124,15 +126,15 @@ impl SecondUno {
     ///
     /// # Errors
     /// If the process has ended.
-    pub fn reset(&mut self) -> io::Result<()> {
+    pub fn reset(&mut self) -> Result<()> {
         self.turn(false)?;
         self.turn(true)
     }
 
-    fn turn(&mut self, reset: bool) -> io::Result<()> {
+    fn turn(&mut self, reset: bool) -> Result<()> {
         let until = self.asked;
         let (edges, typed) = (std::mem::take(&mut self.edges), std::mem::take(&mut self.typed));
-        let done = self.exchange(&Turn { until, edges, typed, reset })?;
+        let done = self.exchange(&Turn { until, edges, typed, reset }).context(SECOND)?;
         self.run = until;
         let change = |(cycle, pin, high): (u64, usize, bool)| {
             Pin::ALL.get(pin).map(|&pin| PinChange { cycle: cycle + DELAY, pin, high })
@@ -142,13 +144,11 @@ impl SecondUno {
         Ok(())
     }
 
-    fn exchange(&mut self, said: &impl Serialize) -> io::Result<Done> {
+    fn exchange(&mut self, said: &impl Serialize) -> Result<Done> {
         serde_json::to_writer(&mut self.to, said)?;
         self.to.write_all(b"\n")?;
         let mut line = String::new();
-        if self.from.read_line(&mut line)? == 0 {
-            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the second simulator has ended"));
-        }
+        ensure!(self.from.read_line(&mut line)? > 0, "the second simulator has ended");
         Ok(serde_json::from_str(&line)?)
     }
 }

@@ -13,21 +13,12 @@ pub const FRAME_CYCLES: f64 = CYCLES_PER_SECOND as f64 / 50.0;
 /// Times are shifted by this, so that pulses before the plan's start have times above 0.
 pub const ORIGIN: u64 = 1 << 31;
 
-/// A pulse that the tester measured, by its clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Measured {
-    /// Its edges in cycles; [`ORIGIN`] is the moment that they are counted from.
-    pub pulse: Pulse,
-    /// The tester's position at its beginning.
-    pub position: i32,
-}
-
-/// The pulses among these records, counted from `start`.
-pub fn pulses(records: &[Record], start: u32) -> Vec<Measured> {
+/// The pulses among these records, in cycles of the tester: [`ORIGIN`] is the moment `start`.
+pub fn pulses(records: &[Record], start: u32) -> Vec<Pulse> {
     let pulse = |record: &Record| match *record {
-        Record::Pulse { start: rise, width, position } => {
+        Record::Pulse { start: rise, width } => {
             let rise = ORIGIN.wrapping_add_signed((rise.wrapping_sub(start) as i32).into());
-            Some(Measured { pulse: Pulse { rise, fall: rise + u64::from(width) }, position })
+            Some(Pulse { rise, fall: rise + u64::from(width) })
         }
         _ => None,
     };
@@ -48,8 +39,8 @@ pub struct Steady {
 }
 
 /// Measures pulses of constant width; `None` for fewer than three.
-pub fn steady(pulses: &[Measured]) -> Option<Steady> {
-    let frames: Vec<f64> = pulses.windows(2).map(|two| (two[1].pulse.rise - two[0].pulse.rise) as f64).collect();
+pub fn steady(pulses: &[Pulse]) -> Option<Steady> {
+    let frames: Vec<f64> = pulses.windows(2).map(|two| (two[1].rise - two[0].rise) as f64).collect();
     if frames.len() < 2 {
         return None;
     }
@@ -60,7 +51,7 @@ pub fn steady(pulses: &[Measured]) -> Option<Steady> {
     };
     let us = |cycles: f64| cycles * 1e6 / CYCLES_PER_SECOND as f64;
     let clock_ratio = FRAME_CYCLES / mean(&frames);
-    let widths: Vec<f64> = pulses.iter().map(|measured| (measured.pulse.fall - measured.pulse.rise) as f64).collect();
+    let widths: Vec<f64> = pulses.iter().map(|pulse| (pulse.fall - pulse.rise) as f64).collect();
     Some(Steady {
         clock_ratio,
         width_us: us(mean(&widths)) * clock_ratio,
@@ -79,11 +70,11 @@ mod tests {
         let frame = FRAME_CYCLES / 1.003;
         let record = |number: u32| {
             let start = (u32::MAX - 500_000).wrapping_add((f64::from(number) * frame) as u32);
-            Record::Pulse { start, width: (24_000.0 / 1.003) as u32, position: 7 }
+            Record::Pulse { start, width: (24_000.0 / 1.003) as u32 }
         };
         let records: Vec<Record> = (0..20).map(record).collect();
         let pulses = pulses(&records, u32::MAX - 400_000);
-        assert!(pulses[0].pulse.rise < ORIGIN && pulses[1].pulse.rise > ORIGIN);
+        assert!(pulses[0].rise < ORIGIN && pulses[1].rise > ORIGIN);
         let steady = steady(&pulses).unwrap();
         assert!((steady.clock_ratio - 1.003).abs() < 1e-6, "{steady:?}");
         assert!((steady.width_us - 1500.0).abs() < 0.1, "{steady:?}");

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tester_core::frame::{self, Receiver};
 use tester_core::message::{Command, PIECES, PROTOCOL, Record, STEPS, Step};
-use tester_core::piece::Piece;
+use tester_core::player::Piece;
 use uno::CYCLES_PER_SECOND;
 
 /// Reads after which a command is sent again: up to 20 ms each, and shorter while the servo's pulses come.
@@ -39,12 +39,8 @@ pub struct Done {
 pub struct Played {
     /// Its start, in cycles modulo 2^32.
     pub start: u32,
-    /// The tester's position before it.
-    pub before: i32,
     /// Counts forward less counts back.
     pub ticks: i32,
-    /// Events that came more than 10 us late.
-    pub late: u16,
     /// All other records of that time.
     pub records: Vec<Record>,
 }
@@ -220,10 +216,10 @@ impl Tester {
             for record in self.take_records() {
                 match record {
                     Record::Started { time } => start = time,
-                    Record::Ended { position, late, .. } => {
-                        return Ok(Played { start, before, ticks: position.wrapping_sub(before), late, records });
+                    Record::Ended { position } => {
+                        return Ok(Played { start, ticks: position.wrapping_sub(before), records });
                     }
-                    Record::Dry { .. } => return Err(CheckError::Dry),
+                    Record::Dry => return Err(CheckError::Dry),
                     record => records.push(record),
                 }
             }

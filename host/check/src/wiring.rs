@@ -4,14 +4,11 @@ use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo;
 use crate::tester::Tester;
-use link::{Link, LinkError, Mode, Status, is_greeting};
-use std::io;
+use link::{Link, LinkError, Mode, Status};
+use std::ops::{Deref, DerefMut};
 use tester_core::message::{Command, Record};
-use tester_core::piece::Action;
 use tester_core::pins::{AT_REST, Line};
-
-/// Reads of 20 ms until the greeting must have come after a reset: an old bootloader waits for 2 s.
-const GREETING_READS: usize = 150;
+use tester_core::player::Action;
 
 /// Time for a switch to stop bouncing and for the LED and the curves to follow, in ms.
 const SETTLE_MS: u32 = 150;
@@ -28,9 +25,22 @@ const OWN_PULSE_ERROR: u32 = 800;
 
 /// The weeder's console.
 pub struct Weeder {
-    /// `None` while the port is opened again, and if that failed.
-    link: Option<Link>,
+    link: Link,
     open: Box<dyn FnMut() -> Result<Link, LinkError>>,
+}
+
+impl Deref for Weeder {
+    type Target = Link;
+
+    fn deref(&self) -> &Link {
+        &self.link
+    }
+}
+
+impl DerefMut for Weeder {
+    fn deref_mut(&mut self) -> &mut Link {
+        &mut self.link
+    }
 }
 
 impl Weeder {
@@ -39,48 +49,18 @@ impl Weeder {
     /// # Errors
     /// If the port cannot be opened, or no weeder answers.
     pub fn over(mut open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, CheckError> {
-        Ok(Self { link: Some(open()?), open: Box::new(open) })
-    }
-
-    /// The weeder at the port of this name.
-    ///
-    /// # Errors
-    /// If the port cannot be opened, or no weeder answers.
-    pub fn open(port: &str) -> Result<Self, CheckError> {
-        let port = port.to_owned();
-        Self::over(move || Link::open(Some(&port)))
+        Ok(Self { link: open()?, open: Box::new(open) })
     }
 
     /// Closes the port and opens it again, which resets the board through the modem line DTR.
     ///
     /// # Errors
-    /// As [`Weeder::open`].
+    /// As [`Weeder::over`].
     pub fn open_again(&mut self) -> Result<(), CheckError> {
         // A port that is open is locked.
-        self.link = None;
-        self.link = Some((self.open)()?);
+        self.link.close();
+        self.link = (self.open)()?;
         Ok(())
-    }
-
-    /// The link to the console.
-    ///
-    /// # Errors
-    /// If the port could not be opened again.
-    pub fn link(&mut self) -> Result<&mut Link, CheckError> {
-        self.link.as_mut().ok_or_else(|| LinkError::Gone(io::ErrorKind::NotConnected.into()).into())
-    }
-
-    /// The firmware's version; empty if the port could not be opened again.
-    pub fn version(&self) -> &str {
-        self.link.as_ref().map_or("", Link::version)
-    }
-
-    /// The lines of a command's answer.
-    ///
-    /// # Errors
-    /// If it is refused, or not answered.
-    pub fn ask(&mut self, command: &str) -> Result<Vec<String>, CheckError> {
-        Ok(self.link()?.ask(command)?)
     }
 
     /// The status.
@@ -99,9 +79,18 @@ impl Weeder {
     pub fn to_hold(&mut self) -> Result<(), CheckError> {
         self.ask("plot off")?;
         self.ask("events off")?;
-        self.ask("hold").map(drop).or_else(not_refused)?;
-        self.ask("clear").map(drop).or_else(not_refused)?;
-        self.ask("defaults").map(drop)
+        self.try_to("hold")?;
+        self.try_to("clear")?;
+        self.ask("defaults")?;
+        Ok(())
+    }
+
+    /// Types a command that may be refused.
+    fn try_to(&mut self, command: &str) -> Result<(), CheckError> {
+        match self.ask(command) {
+            Ok(_) | Err(LinkError::Refused { .. }) => Ok(()),
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// Drops the lines that the machine has sent without a question.
@@ -111,37 +100,6 @@ impl Weeder {
     pub fn drain(&mut self) -> Result<(), CheckError> {
         while self.next_line()?.is_some() {}
         Ok(())
-    }
-
-    /// The next line that the machine sends without a question; `None` if none came within 20 ms.
-    ///
-    /// # Errors
-    /// If the port is gone.
-    pub fn next_line(&mut self) -> Result<Option<String>, CheckError> {
-        Ok(self.link()?.next_line()?)
-    }
-
-    /// Types a command, and does not wait for its answer.
-    ///
-    /// # Errors
-    /// If the port is gone.
-    pub fn send(&mut self, command: &str) -> Result<(), CheckError> {
-        Ok(self.link()?.send(command)?)
-    }
-
-    /// Waits for the greeting of a starting firmware; `None` if none came.
-    ///
-    /// # Errors
-    /// If the port is gone.
-    pub fn greeting(&mut self) -> Result<Option<String>, CheckError> {
-        for _ in 0..GREETING_READS {
-            if let Some(line) = self.next_line()?
-                && is_greeting(&line)
-            {
-                return Ok(Some(line));
-            }
-        }
-        Ok(None)
     }
 
     /// Whether the beam is broken, by the curves.
@@ -159,24 +117,16 @@ impl Weeder {
     }
 }
 
-/// A refusal is an answer too.
-fn not_refused(error: CheckError) -> Result<(), CheckError> {
-    match error {
-        CheckError::Weeder(LinkError::Refused { .. }) => Ok(()),
-        error => Err(error),
-    }
-}
-
-/// Pulls the reset for a moment, and waits for the greeting.
+/// Pulls the reset for a moment. Returns whether the weeder starts then.
 ///
 /// # Errors
 /// If a port is gone.
-pub fn reset(weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<String>, CheckError> {
+pub fn reset(weeder: &mut Weeder, tester: &mut Tester) -> Result<bool, CheckError> {
     weeder.drain()?;
     tester.command(&Command::Reset { pulled: true })?;
     tester.record_for_ms(20)?;
     tester.command(&Command::Reset { pulled: false })?;
-    weeder.greeting()
+    Ok(weeder.greeting()?)
 }
 
 /// The errors of the wires, in sentences; empty if all are right. Afterwards the weeder is in hold.
@@ -185,7 +135,7 @@ pub fn reset(weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<String>,
 /// If one of the boards does not answer.
 pub fn look(weeder: &mut Weeder, tester: &mut Tester) -> Result<Vec<String>, CheckError> {
     let mut wrong = Vec::new();
-    if reset(weeder, tester)?.is_none() {
+    if !reset(weeder, tester)? {
         wrong.push(
             "reset: the weeder does not start when the tester pulls its reset: check the wire from D7 to RESET"
                 .to_owned(),
@@ -331,7 +281,7 @@ fn noticed(weeder: &mut Weeder, tester: &mut Tester, low: u8) -> Result<Vec<Seen
     if weeder.beam_is_broken()? == Some(true) {
         seen.push(Seen::Beam);
     }
-    weeder.ask("hold").map(drop).or_else(not_refused)?;
+    weeder.try_to("hold")?;
     weeder.ask("set end_switch on")?;
     tester.record_for_ms(STUCK_MS)?;
     // In hold the tool is out. An open end switch contradicts that, which is an alarm.
@@ -352,7 +302,7 @@ fn second_beam(weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<String
     let mut plan = Plan::new();
     let mut play = |counts, line: Line, high: bool| {
         plan.roll(counts, PLANT_COUNTS_PER_S);
-        plan.at(plan.end(), Action::Levels { mask: line.bit(), levels: if high { line.bit() } else { 0 } });
+        plan.at(plan.end(), Action::level(line, high));
     };
     for _ in 0..PLANTS {
         play(500, Line::Beam, false);

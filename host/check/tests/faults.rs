@@ -108,7 +108,7 @@ fn a_missing_servo_and_a_missing_led_are_named() {
 
 /// The pulses in hold. `change` changes the edges from the weeder.
 fn steady(change: impl FnMut(PinChange) -> Option<PinChange> + 'static, clock_ppm: i64) -> servo::Steady {
-    let wires = Wiring { from_weeder: Some(Box::new(change)), clock_ppm, ..Wiring::right() };
+    let wires = Wiring { from_weeder: Box::new(change), clock_ppm, ..Wiring::right() };
     let (mut weeder, mut tester) = boards(wires);
     weeder.to_hold().expect("it holds");
     tester.take_records();
@@ -158,7 +158,7 @@ fn counts_that_are_lost_above_150_000_a_second_are_counted() {
         last = if is_encoder { change.cycle } else { last };
         (!is_too_fast).then_some(change)
     };
-    let wires = Wiring { to_weeder: Some(Box::new(slow)), ..Wiring::right() };
+    let wires = Wiring { to_weeder: Box::new(slow), ..Wiring::right() };
     let (mut weeder, mut tester) = boards(wires);
     let mut lost = |cycles| {
         let turning = Turning { cycles, forward: true, jittered: false, busy: true };
@@ -178,7 +178,7 @@ fn a_channel_that_hides_the_end_of_a_glitch_is_counted() {
         last = change.cycle;
         (!is_short).then_some(change)
     };
-    let wires = Wiring { to_weeder: Some(Box::new(filter)), ..Wiring::right() };
+    let wires = Wiring { to_weeder: Box::new(filter), ..Wiring::right() };
     let (mut weeder, mut tester) = boards(wires);
     let mut left = |channel| rates::left_by_glitches(channel, &mut weeder, &mut tester).expect("both answer");
     assert!(left(Line::EncoderA) > 0.0);
@@ -200,7 +200,7 @@ fn a_code_of_the_led_that_is_off_by_one_is_read_as_it_is_flashed() {
         }
         (!hides).then_some(change)
     };
-    let wires = Wiring { from_weeder: Some(Box::new(swallow)), ..Wiring::right() };
+    let wires = Wiring { from_weeder: Box::new(swallow), ..Wiring::right() };
     let (mut weeder, mut tester) = boards(wires);
     let raised = play(Scene::DeadChannel, &mut weeder, &mut tester, 1.003).expect("both answer");
     assert!(raised.is_expected && raised.code != 22.0, "{raised:?}");
@@ -213,7 +213,7 @@ fn a_swing_that_is_late_by_10_ms_is_measured() {
             let late = if is_servo(&change) { late_cycles } else { 0 };
             Some(PinChange { cycle: change.cycle + late, ..change })
         };
-        let wires = Wiring { from_weeder: Some(Box::new(late)), ..Wiring::right() };
+        let wires = Wiring { from_weeder: Box::new(late), ..Wiring::right() };
         let (mut weeder, mut tester) = boards(wires);
         let trial = row::trial(3, 1, 2.5).expect("it grows");
         let outcome = row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("both answer");
@@ -236,7 +236,7 @@ fn a_channel_that_fails_in_a_row_loses_counts() {
         // One edge of a thousand, and the next one: two steps in all.
         (!is_a || *seen.borrow() % 1000 > 1).then_some(change)
     };
-    let wires = Wiring { to_weeder: Some(Box::new(drops)), ..Wiring::right() };
+    let wires = Wiring { to_weeder: Box::new(drops), ..Wiring::right() };
     let (mut weeder, mut tester) = boards(wires);
     let trial = row::trial(3, 1, 2.5).expect("it grows");
     let outcome = row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("both answer");

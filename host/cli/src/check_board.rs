@@ -10,6 +10,7 @@ use check::desk::Desk;
 use check::ports;
 use check::run::{Extent, run as check_run};
 use clap::Args;
+use link::row_names::plugged;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use trial::firmware;
@@ -71,7 +72,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         Some(desk) => (name(desk.weeder()), name(desk.tester())),
         None => (arguments.port.clone(), arguments.tester.clone()),
     };
-    let unos = if port.is_some() && tester.is_some() { vec![] } else { link::find_unos()? };
+    let unos =
+        if port.is_some() && tester.is_some() { vec![] } else { plugged()?.into_iter().map(|uno| uno.port).collect() };
     let (mut weeder, mut tester) = ports::open(port.as_deref(), tester.as_deref(), &unos)?;
     tester.interrupted_by(ctrl_c()?);
     let bar = Progress::new("checking");

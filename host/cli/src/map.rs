@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     out.write(|to| writeln!(to, "{}", map::features(&named)))?;
     if let Some(svg) = &svg {
         let jobs: Vec<&Job> = jobs.iter().map(|(_, job)| job).collect();
-        match picture::draw(&jobs) {
+        match picture::draw(&jobs, &picture::Words::default()) {
             Some(drawn) => svg.write(|to| svg::write(to, &drawn))?,
             None => tell!("{} is not drawn: no event in the records has a position", svg.path().display()),
         }

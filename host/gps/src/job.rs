@@ -14,7 +14,7 @@
 
 use crate::antenna::Antenna;
 use crate::plane::Place;
-use crate::receiver::{Counts, Fix, Heard, Mark, Receiver};
+use crate::receiver::{Counts, Fix, Heard, Jump, Mark, Receiver};
 use crate::track::{Basis, Found, Missing, Offset, Track};
 use link::log::{Entry, Kind};
 use link::settings::{Setting, Settings, shown};
@@ -127,6 +127,13 @@ pub struct Ground {
     pub lines: Vec<Vec<Place>>,
 }
 
+impl Ground {
+    /// Ground that begins here.
+    fn begin(did: Did, at_m: f64, time_ms: u64) -> Self {
+        Self { did, distance_m: at_m..at_m, time_ms: time_ms..time_ms, lines: Vec::new() }
+    }
+}
+
 /// A part of a log with continuous wheel distance.
 #[derive(Clone, Debug, Default)]
 pub struct Stretch {
@@ -138,19 +145,6 @@ pub struct Stretch {
     pub time_ms: Range<u64>,
 }
 
-/// A fix that has jumped.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jump {
-    /// The antenna's position by the receiver.
-    pub place: Place,
-    /// Metres from the last fix that is used.
-    pub far_m: f64,
-    /// The log's line.
-    pub line: u64,
-    /// When, by the record's clock.
-    pub time_ms: f64,
-}
-
 /// A record read.
 #[derive(Clone, Debug, Default)]
 pub struct Job {
@@ -158,8 +152,8 @@ pub struct Job {
     pub stretches: Vec<Stretch>,
     /// The counts of the receiver.
     pub counts: Counts,
-    /// Fixes that have jumped.
-    pub jumps: Vec<Jump>,
+    /// Fixes that have jumped, each with the log's line.
+    pub jumps: Vec<(u64, Jump)>,
     /// How often the receiver was lost, by the record.
     pub unplugged: u64,
     /// The midnight from which [`Found::utc_ms`] counts, in milliseconds since 1970. `None` if the receiver sent no
@@ -179,17 +173,10 @@ struct Reading {
     last_status: Option<Status>,
     fixes: Vec<Fix>,
     things: Vec<Thing>,
-    ground: Vec<Passed>,
+    ground: Vec<Ground>,
     /// Commands without an answer so far: the line, its time, and the text.
     unanswered: VecDeque<(u64, u64, String)>,
     time_ms: Option<Range<u64>>,
-}
-
-/// Ground in ticks since the stretch began.
-struct Passed {
-    did: Did,
-    ticks: Range<i64>,
-    time_ms: Range<u64>,
 }
 
 impl Job {
@@ -235,7 +222,7 @@ impl Job {
                         }
                         reading.status(status, entry.time_ms);
                         if let (Some(&(_, ticks)), Some(status)) = (reading.wheel.last(), &reading.last_status) {
-                            let rolled_m = ticks as f64 * reading.tick_mm() / 1000.0;
+                            let rolled_m = reading.metres(ticks);
                             receiver.rolled(entry.time_ms as f64, rolled_m, f64::from(status.speed_mm_s));
                         }
                     }
@@ -276,8 +263,8 @@ impl Job {
             reading.fixes.push(Fix { time_ms: fix.time_ms - self.antenna.delay_ms, ..fix });
         }
         for mark in heard.marks {
-            if let Mark::Jumped { place, far_m, time_ms, .. } = mark {
-                self.jumps.push(Jump { place, far_m, line: entry.number, time_ms });
+            if let Mark::Jumped(jump) = mark {
+                self.jumps.push((entry.number, jump));
             }
         }
     }
@@ -289,9 +276,8 @@ impl Job {
             return;
         }
         let tick_m = read.tick_mm() / 1000.0;
-        let metres = move |ticks: f64| ticks * tick_m;
         let mut fixes: Vec<(f64, Fix)> =
-            read.fixes.iter().filter_map(|fix| Some((metres(read.ticks_at(fix.time_ms)?), *fix))).collect();
+            read.fixes.iter().filter_map(|fix| Some((read.ticks_at(fix.time_ms)? * tick_m, *fix))).collect();
         // When a shorter delay is found, a later fix may get an earlier time.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
         let track = Track::through(&fixes, self.antenna.error_m(), wanted.longest_outage_m);
@@ -301,7 +287,7 @@ impl Job {
         };
         let beam_to_tool_mm = read.settings.as_ref().map_or(0.0, |to| f64::from(to.get(Setting::BeamToToolMm)));
         let (beam, tool) = (self.antenna.beam(), self.antenna.tool(beam_to_tool_mm));
-        let mut things = read.things;
+        let (mut things, mut ground) = (read.things, read.ground);
         for thing in &mut things {
             let offset = match thing.what {
                 What::Object { .. } | What::Guarded | What::Label(_) => beam,
@@ -309,17 +295,10 @@ impl Job {
             };
             thing.found = find(thing.distance_m, thing.time_ms, offset);
         }
-        let passed = |passed: Passed| {
-            let distance_m = metres(passed.ticks.start as f64)..metres(passed.ticks.end as f64);
-            let lines = match passed.did {
-                Did::Rolled => Vec::new(),
-                Did::Weeded | Did::Spared => {
-                    lines(&distance_m, |distance_m| find(distance_m, passed.time_ms.end, tool))
-                }
-            };
-            Ground { did: passed.did, distance_m, time_ms: passed.time_ms, lines }
-        };
-        let ground = read.ground.into_iter().map(passed).collect();
+        for ground in ground.iter_mut().filter(|ground| ground.did != Did::Rolled) {
+            let until_ms = ground.time_ms.end;
+            ground.lines = lines(&ground.distance_m, |distance_m| find(distance_m, until_ms, tool));
+        }
         self.stretches.push(Stretch { things, ground, time_ms: read.time_ms.unwrap_or_default() });
     }
 
@@ -352,6 +331,10 @@ fn lines(distance_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) 
 impl Reading {
     fn tick_mm(&self) -> f64 {
         self.settings.as_ref().map_or(0.0, tick_mm)
+    }
+
+    fn metres(&self, ticks: i64) -> f64 {
+        ticks as f64 * self.tick_mm() / 1000.0
     }
 
     fn mm(&self, setting: Setting) -> f64 {
@@ -400,11 +383,11 @@ impl Reading {
         let ticks = self.ticks(status.position).unwrap_or(0);
         self.wheel.push((time_ms as f64, ticks));
         self.last_position = Some(status.position);
-        let did = did(&status);
+        let (did, at_m) = (did(&status), self.metres(ticks));
         match self.ground.last_mut() {
-            None => self.ground.push(Passed { did, ticks: ticks..ticks, time_ms: time_ms..time_ms }),
+            None => self.ground.push(Ground::begin(did, at_m, time_ms)),
             Some(passed) => {
-                passed.ticks.end = passed.ticks.end.max(ticks);
+                passed.distance_m.end = passed.distance_m.end.max(at_m);
                 passed.time_ms.end = time_ms;
                 // A swing has its own position.
                 let is_at_work = |did: Did| did != Did::Rolled;
@@ -418,16 +401,16 @@ impl Reading {
 
     /// From these ticks on the ground gets another kind of work.
     fn turn_to(&mut self, did: Did, ticks: i64, time_ms: u64) {
+        let at_m = self.metres(ticks);
         let Some(passed) = self.ground.last_mut() else { return };
         if passed.did == did {
             return;
         }
         // A swing is reported somewhat later than it is commanded, and perhaps after a status with a farther position.
-        let ticks = ticks.max(passed.ticks.start);
-        passed.ticks.end = ticks;
+        let at_m = at_m.max(passed.distance_m.start);
+        passed.distance_m.end = at_m;
         passed.time_ms.end = time_ms;
-        let ticks = ticks..ticks;
-        self.ground.push(Passed { did, ticks, time_ms: time_ms..time_ms });
+        self.ground.push(Ground::begin(did, at_m, time_ms));
     }
 
     fn event(&mut self, entry: &Entry) {

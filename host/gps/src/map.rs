@@ -6,7 +6,6 @@
 
 use crate::job::{Did, Ground, Job, Thing, What};
 use crate::plane::Place;
-use crate::track::Basis;
 use chrono::DateTime;
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue, Position};
 
@@ -30,10 +29,10 @@ fn of_job(name: &str, job: &Job) -> Vec<Feature> {
         stretch.ground.iter().filter_map(ground).for_each(&mut add);
         stretch.things.iter().map(|it| thing(job, it)).for_each(&mut add);
     }
-    for jump in &job.jumps {
+    for (line, jump) in &job.jumps {
         let mut feature = feature("gps_jump", Some(Geometry::new_point(position(jump.place))));
         feature.set_property("record", name);
-        feature.set_property("line", jump.line);
+        feature.set_property("line", *line);
         feature.set_property("record_s", rounded(jump.time_ms / 1000.0, 3));
         feature.set_property("far_m", rounded(jump.far_m, 3));
         features.push(feature);
@@ -58,13 +57,12 @@ fn thing(job: &Job, thing: &Thing) -> Feature {
     feature.set_property("line", thing.line);
     match thing.found {
         Ok(found) => {
-            let basis = if found.basis == Basis::Measured { "measured" } else { "interpolated" };
-            feature.set_property("place", basis);
+            feature.set_property("place", <&str>::from(found.basis));
             feature.set_property("error_m", rounded(found.error_m, 3));
         }
         Err(missing) => {
             feature.set_property("place", "none");
-            feature.set_property("why", missing.text());
+            feature.set_property("why", missing.to_string());
         }
     }
     if let What::Object { votes, .. } = thing.what {

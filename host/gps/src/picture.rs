@@ -56,12 +56,7 @@ fn mark(what: What) -> Option<(&'static str, f64)> {
 }
 
 /// Draws some jobs. `None` if nothing in them has a position.
-pub fn draw(jobs: &[&Job]) -> Option<Document> {
-    draw_with(jobs, &Words::default())
-}
-
-/// As [`draw`], in other words.
-pub fn draw_with(jobs: &[&Job], words: &Words) -> Option<Document> {
+pub fn draw(jobs: &[&Job], words: &Words) -> Option<Document> {
     let stretches = || jobs.iter().flat_map(|job| &job.stretches);
     let grounds = || stretches().flat_map(|stretch| &stretch.ground);
     let things = || stretches().flat_map(|stretch| &stretch.things);

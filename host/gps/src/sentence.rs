@@ -8,35 +8,29 @@ use crate::plane::Place;
 use chrono::{Datelike, Timelike};
 use nmea::ParseResult;
 use nmea::sentences::{FixType, rmc::RmcStatusOfFix};
-use std::fmt;
+use strum::Display;
 
 /// Milliseconds in a day.
 pub const DAY_MS: i64 = 86_400_000;
 
 /// How good a fix is, by the receiver's own word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Display)]
 pub enum Quality {
     /// From the satellites alone.
+    #[strum(to_string = "satellites")]
     Satellites,
     /// Corrected by signals from a satellite, such as those of SBAS, or from a station.
+    #[strum(to_string = "differential")]
     Differential,
     /// By the carrier's phase, before the number of whole waves is certain.
+    #[strum(to_string = "float RTK")]
     FloatRtk,
     /// By the carrier's phase.
+    #[strum(to_string = "RTK")]
     Rtk,
 }
 
 impl Quality {
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Satellites => "satellites",
-            Self::Differential => "differential",
-            Self::FloatRtk => "float RTK",
-            Self::Rtk => "RTK",
-        }
-    }
-
     /// The usual standard deviation of a fix to the east and to the north under an open sky, in metres.
     pub fn usual_error_m(self) -> f64 {
         match self {
@@ -45,12 +39,6 @@ impl Quality {
             Self::FloatRtk => 0.3,
             Self::Rtk => 0.015,
         }
-    }
-}
-
-impl fmt::Display for Quality {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
     }
 }
 

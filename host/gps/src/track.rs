@@ -14,6 +14,7 @@
 
 use crate::plane::{Metres, Place, Plane};
 use crate::receiver::Fix;
+use strum::{Display, IntoStaticStr};
 
 /// The heading's error that is aimed at, in radians: 20 mm for a metre from the antenna.
 pub const HEADING_ERROR: f64 = 0.02;
@@ -48,7 +49,8 @@ pub struct Offset {
 }
 
 /// How a position was found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Basis {
     /// Between two fixes that follow each other.
     Measured,
@@ -57,31 +59,23 @@ pub enum Basis {
 }
 
 /// Why there is no position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display)]
 pub enum Missing {
     /// There is no earlier fix.
+    #[strum(to_string = "no fix before it")]
     NoFixBefore,
     /// There is no later fix.
+    #[strum(to_string = "no fix behind it")]
     NoFixBehind,
     /// The distance between both fixes is longer than allowed.
+    #[strum(to_string = "the outage is too long")]
     OutageTooLong,
     /// The fixes have jumped between, for good.
+    #[strum(to_string = "the fixes have jumped there")]
     Jumped,
     /// The fixes around do not give the machine's heading.
+    #[strum(to_string = "the fixes do not show the heading")]
     NoHeading,
-}
-
-impl Missing {
-    /// In words.
-    pub fn text(self) -> &'static str {
-        match self {
-            Self::NoFixBefore => "no fix before it",
-            Self::NoFixBehind => "no fix behind it",
-            Self::OutageTooLong => "the outage is too long",
-            Self::Jumped => "the fixes have jumped there",
-            Self::NoHeading => "the fixes do not show the heading",
-        }
-    }
 }
 
 /// A position.

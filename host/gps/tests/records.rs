@@ -2,6 +2,7 @@
 
 use geojson::{FeatureCollection, GeometryValue};
 use gps::job::{Did, Thing, What};
+use gps::picture::Words;
 use gps::plane::{Metres, Place, Plane};
 use gps::summary::{Stand, Summary};
 use gps::{Job, Wanted, map, picture};
@@ -170,10 +171,10 @@ fn the_map_is_one_collection_with_a_geometry_or_the_reason_why_there_is_none() {
 #[test]
 fn the_drawing_has_a_circle_for_each_plant_and_none_without_a_place() {
     let job = Job::read(&whole(), &Wanted::default());
-    let drawn = picture::draw(&[&job]).expect("it has places").to_string();
+    let drawn = picture::draw(&[&job], &Words::default()).expect("it has places").to_string();
     assert_eq!(drawn.matches("<circle").count(), PLANTS);
     assert!(drawn.contains("5 m, north is up"), "{drawn}");
-    assert!(picture::draw(&[&Job::read(&record(|_, _| vec![]), &Wanted::default())]).is_none());
+    assert!(picture::draw(&[&Job::read(&record(|_, _| vec![]), &Wanted::default())], &Words::default()).is_none());
 }
 
 #[test]

@@ -9,6 +9,7 @@ use control::operate::calibration::{Outcome, SwingTimes};
 use control::operate::event::Event;
 use control::operate::state::State;
 use control::say::names;
+use strum::{EnumString, IntoStaticStr};
 
 /// A line, as the tables of [events](control::event_table) and [status](control::status_table) describe it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -215,7 +216,8 @@ fields! {
 }
 
 /// The machine's state, without the reason for an alarm.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Mode {
     /// The tool stays out.
     #[default]
@@ -239,15 +241,7 @@ impl From<State> for Mode {
 impl Mode {
     /// Its name on the console.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Hold => "hold",
-            Self::Work => "work",
-            Self::Alarm => "alarm",
-        }
-    }
-
-    fn find(word: &str) -> Option<Self> {
-        [Self::Hold, Self::Work, Self::Alarm].into_iter().find(|mode| mode.name() == word)
+        self.into()
     }
 }
 
@@ -285,11 +279,11 @@ fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
 
 /// How each kind of value of the tables is read.
 mod kind {
-    use super::{Alarm, Class, Mode, Warning, names};
+    use super::{Alarm, Class, Warning, names};
     use control::say::Text;
     use std::str::FromStr;
 
-    pub(super) use self::{number as count, number as optional, word as cause, word as reason};
+    pub(super) use self::{number as count, number as optional, number as state, word as cause, word as reason};
 
     pub(super) fn number<T: FromStr>(word: &str) -> Option<T> {
         word.parse().ok()
@@ -310,10 +304,6 @@ mod kind {
 
     pub(super) fn answer(word: &str) -> Option<bool> {
         named(word, [false, true], names::answer)
-    }
-
-    pub(super) fn state(word: &str) -> Option<Mode> {
-        Mode::find(word)
     }
 
     pub(super) fn alarm(word: &str) -> Option<Alarm> {

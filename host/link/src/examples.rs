@@ -95,10 +95,7 @@ impl Heading {
 /// If the console fails, [`ExamplesError::NoObject`] and [`ExamplesError::OtherTable`].
 pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
-    for line in link.ask("examples")? {
-        let ConsoleLine::Example { from_field, number, label, features } = ConsoleLine::parse(&line) else { continue };
-        let label = if label == Class::Plant { label::PLANT } else { label::WEED };
-        let example = Example::new(features, label);
+    for (from_field, number, example) in link.ask("examples")?.iter().filter_map(|line| self::taught(line)) {
         if from_field {
             features_of(&example).ok_or(ExamplesError::NoObject { number })?;
             taught.push((number, example));
@@ -107,6 +104,13 @@ pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
         }
     }
     if built_in == EXAMPLES { Ok(taught) } else { Err(ExamplesError::OtherTable) }
+}
+
+/// The example in a line of the answer to `examples`: whether it is from the field, and its number.
+pub(super) fn taught(line: &str) -> Option<(bool, u16, Taught)> {
+    let ConsoleLine::Example { from_field, number, label, features } = ConsoleLine::parse(line) else { return None };
+    let label = if label == Class::Plant { label::PLANT } else { label::WEED };
+    Some((from_field, number, Example::new(features, label)))
 }
 
 /// Teaches the machine these examples. With `replace` it first forgets all others. Known examples are not taught again.

@@ -40,7 +40,7 @@ pub use self::event_line::{
 };
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::port::{find_uno, find_unos, listen, open_other, try_port};
+pub use self::port::{find_uno, listen, open_other, try_port};
 pub use control::{ground::class::Class, say::names};
 
 use std::collections::VecDeque;
@@ -110,7 +110,9 @@ impl Link {
     pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
         let mut link =
             Self { port: Box::new(port), lines: LineReader::new(), events: VecDeque::new(), version: String::new() };
-        link.wait_for_greeting(if resets { BOOT_READS } else { 0 })?;
+        if resets {
+            link.greeting()?;
+        }
         // Ends a line that was typed before. Its answer is ignored.
         link.type_line("")?;
         link.wait_until_quiet()?;
@@ -206,6 +208,24 @@ impl Link {
         }
     }
 
+    /// Waits for the greeting of a firmware that starts. Returns whether it has come.
+    ///
+    /// # Errors
+    /// If the port is gone.
+    pub fn greeting(&mut self) -> Result<bool, LinkError> {
+        for _ in 0..BOOT_READS {
+            if self.next_line()?.is_some_and(|line| is_greeting(&line)) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Closes the port, so that it can be opened again. The link behaves as if the port were gone.
+    pub fn close(&mut self) {
+        self.port = Box::new(io::empty());
+    }
+
     fn type_line(&mut self, line: &str) -> Result<(), LinkError> {
         let gone = |error| LinkError::Gone(error);
         self.port.write_all(format!("{line}\n").as_bytes()).map_err(gone)?;
@@ -227,17 +247,6 @@ impl Link {
             Err(error) if is_nothing(&error) => Ok(Received::Nothing),
             Err(error) => Err(LinkError::Gone(error)),
         }
-    }
-
-    fn wait_for_greeting(&mut self, reads: usize) -> Result<(), LinkError> {
-        for _ in 0..reads {
-            if let Received::Line(line) = self.hear()?
-                && is_greeting(&line)
-            {
-                return Ok(());
-            }
-        }
-        Ok(())
     }
 
     /// Discards input until the line is silent, for a second at most.

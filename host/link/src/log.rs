@@ -12,10 +12,12 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use strum::{EnumString, IntoStaticStr, VariantNames};
 use thiserror::Error;
 
 /// The kind of a line in a log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "snake_case")]
 pub enum Kind {
     /// The Uno is connected; the version.
     Connected,
@@ -48,50 +50,14 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 14] = [
-        Self::Connected,
-        Self::Lost,
-        Self::Setting,
-        Self::Example,
-        Self::Status,
-        Self::Event,
-        Self::Command,
-        Self::Answer,
-        Self::Antenna,
-        Self::GpsFound,
-        Self::GpsLost,
-        Self::Gps,
-        Self::GpsDamaged,
-        Self::GpsMark,
-    ];
-
     /// Its name in the file.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Connected => "connected",
-            Self::Lost => "lost",
-            Self::Setting => "setting",
-            Self::Example => "example",
-            Self::Status => "status",
-            Self::Event => "event",
-            Self::Command => "command",
-            Self::Answer => "answer",
-            Self::Antenna => "antenna",
-            Self::GpsFound => "gps_found",
-            Self::GpsLost => "gps_lost",
-            Self::Gps => "gps",
-            Self::GpsDamaged => "gps_damaged",
-            Self::GpsMark => "gps_mark",
-        }
+        self.into()
     }
 
     /// Whether the operator sees such a line: the receiver was connected, was lost, or has a fault.
     pub fn is_for_the_operator(self) -> bool {
         matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
-    }
-
-    fn find(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == word)
     }
 }
 
@@ -247,8 +213,8 @@ pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
     table
         .lines()
         .map(|line| {
-            let kind = Kind::find(line.text("kind")).ok_or_else(|| {
-                let known = Kind::ALL.map(Kind::name).join(", ");
+            let kind = line.text("kind").parse().map_err(|_| {
+                let known = Kind::VARIANTS.join(", ");
                 line.error(format!("kind is `{}`: it has to be one of {known}", line.text("kind")))
             })?;
             let time_ms = line.value("time_ms", "a whole number of milliseconds")?;

@@ -39,25 +39,12 @@ pub fn find_uno() -> Result<String, LinkError> {
     only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
 }
 
-/// The ports of all Unos.
-///
-/// # Errors
-/// If the ports cannot be listed.
-pub fn find_unos() -> Result<Vec<String>, LinkError> {
-    Ok(unos(&serialport::available_ports().map_err(LinkError::NoList)?))
-}
-
-/// The Unos' ports among these, known by their USB vendor and product.
-fn unos(ports: &[SerialPortInfo]) -> Vec<String> {
-    ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect()
-}
-
 /// The only Uno's port among these.
 ///
 /// # Errors
 /// If there is none, or several.
 fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
-    let unos = unos(ports);
+    let unos: Vec<String> = ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect();
     match unos.as_slice() {
         [only] => Ok(only.clone()),
         [] => Err(LinkError::NoUno(ports.iter().map(|port| port.port_name.clone()).collect())),
@@ -141,24 +128,19 @@ mod tests {
     }
 
     #[test]
-    fn the_only_uno_is_found_among_other_ports() {
-        let ports = [port("ttyS0", None), port("ttyACM0", Some((0x2341, 0x0043)))];
-        assert_eq!(only_uno(&ports).unwrap(), "ttyACM0");
-    }
-
-    #[test]
-    fn two_unos_are_an_error() {
-        let ports = [port("ttyACM0", Some((0x2341, 0x0043))), port("ttyUSB0", Some((0x1A86, 0x7523)))];
-        let error = only_uno(&ports).unwrap_err().to_string();
-        assert!(error.ends_with("choose one by --port, of ttyACM0, ttyUSB0"), "{error}");
-    }
-
-    #[test]
-    fn no_uno_is_an_error_with_the_other_ports() {
-        let error = only_uno(&[port("ttyS0", None)]).unwrap_err().to_string();
-        assert!(error.contains("(there is ttyS0): plug it in"), "{error}");
-        let error = only_uno(&[]).unwrap_err().to_string();
-        assert!(error.starts_with("there is no Uno at any USB port: plug it in"), "{error}");
+    fn the_only_uno_is_found_among_other_ports_and_none_or_two_are_an_error() {
+        let other = port("ttyS0", None);
+        let [one, two] =
+            [("ttyACM0", (0x2341, 0x0043)), ("ttyUSB0", (0x1A86, 0x7523))].map(|(name, ids)| port(name, Some(ids)));
+        assert_eq!(only_uno(&[other.clone(), one.clone()]).unwrap(), "ttyACM0");
+        for (ports, words) in [
+            (vec![one, two], "choose one by --port, of ttyACM0, ttyUSB0"),
+            (vec![other], "(there is ttyS0): plug it in"),
+            (vec![], "there is no Uno at any USB port: plug it in"),
+        ] {
+            let error = only_uno(&ports).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
     }
 
     #[test]

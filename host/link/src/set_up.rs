@@ -389,42 +389,36 @@ mod tests {
 
     #[test]
     fn servo_wheel_and_margin_come_one_after_the_other() {
+        let next = |lines: &[&'static str], changes: &[_]| {
+            SetUp::of_lines(lines.iter().copied()).next(&settings(changes)).expect("something is to be done")
+        };
         let mut lines = vec![TIMED[0]];
         let leads = [(Setting::LeadOutMs, 150), (Setting::LeadInMs, 56)];
-        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::TimeServo(1)));
+        assert_eq!(next(&lines, &leads), Step::TimeServo(1));
         lines.push(TIMED[1]);
-        assert_eq!(
-            SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)),
-            Some(Step::SetLead(Setting::LeadOutMs, 158))
-        );
+        assert_eq!(next(&lines, &leads), Step::SetLead(Setting::LeadOutMs, 158));
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 56)];
-        assert_eq!(
-            SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)),
-            Some(Step::SetLead(Setting::LeadInMs, 52))
-        );
+        assert_eq!(next(&lines, &leads), Step::SetLead(Setting::LeadInMs, 52));
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52)];
-        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::MeasureWheel(0)));
+        assert_eq!(next(&lines, &leads), Step::MeasureWheel(0));
         lines.extend(MEASURED);
         let leads = [leads[0], leads[1], (Setting::TicksPerM, 1920)];
-        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::MeasureWheel(2)));
+        assert_eq!(next(&lines, &leads), Step::MeasureWheel(2));
         lines.extend(["> calibrate 10000", "ticks_per_m=1920 from 0 to 20000, default 0, not saved"]);
         // 10 of 1920 ticks and 3 % over 400 mm, 15 ms at 0.694 m/s, and the firmware's 5 mm.
-        let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&leads));
-        let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
-        assert!(
-            (margin.slip_mm - 400.0 * (10.0 / 1920.0 + 0.03)).abs() < 1e-9
-                && (margin.servo_mm - 15.0 * SPEED_M_S).abs() < 1e-9
-        );
+        let step = next(&lines, &leads);
+        let Step::SetMargin(margin) = step else { panic!("{step:?}") };
+        assert!((margin.slip_mm - 400.0 * (10.0 / 1920.0 + 0.03)).abs() < 1e-9);
+        assert!((margin.servo_mm - 15.0 * SPEED_M_S).abs() < 1e-9);
         assert_eq!(margin.least_mm(), 30);
         assert_eq!(
             Step::SetMargin(margin).to_string(),
             "lower the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"
         );
         let ready = [leads[0], leads[1], leads[2], (Setting::MarginMm, 30)];
-        assert!(matches!(SetUp::of_lines(lines.iter().copied()).next(&settings(&ready)), Some(Step::Ready(_))));
+        assert!(matches!(next(&lines, &ready), Step::Ready(_)));
         let low = [leads[0], leads[1], leads[2], (Setting::MarginMm, 29)];
-        let step =
-            SetUp::of_lines(lines.iter().copied()).next(&settings(&low)).expect("something is to be done").to_string();
+        let step = next(&lines, &low).to_string();
         assert!(step.starts_with("raise the margin: `set margin_mm 30`"), "{step}");
     }
 

@@ -242,22 +242,6 @@ mod tests {
     }
 
     #[test]
-    fn changes_that_widen_a_range_come_first() {
-        let near = settings(&[(Setting::TopSpeedMmS, 100), (Setting::BeamToToolMm, 100), (Setting::MarginMm, 10)]);
-        let far = settings(&[(Setting::BeamToToolMm, 2000), (Setting::MarginMm, 200), (Setting::LeadOutMs, 500)]);
-        assert_leads(&near, &far);
-        assert_leads(&far, &near);
-    }
-
-    #[test]
-    fn a_measured_wheel_is_set_after_the_wheel() {
-        let one = settings(&[(Setting::WheelMm, 400), (Setting::TicksPerM, 1950)]);
-        let other = settings(&[(Setting::WheelMm, 410), (Setting::TicksPerM, 1950)]);
-        assert_leads(&one, &other);
-        assert_leads(&other, &one);
-    }
-
-    #[test]
     fn pulses_that_change_places_never_meet() {
         let one = settings(&[(Setting::ServoInUs, 500), (Setting::ServoOutUs, 2500)]);
         let other = settings(&[(Setting::ServoInUs, 2500), (Setting::ServoOutUs, 500)]);

@@ -7,46 +7,13 @@ use control::ground::examples::EXAMPLES;
 use control::ground::features::Features;
 use control::ground::nearest::Nearest;
 use control::memory::Volatile;
-use rig::Rig;
+use rig::{Rig, ScriptedPort};
 use std::cell::RefCell;
-use std::io::{Read, Write};
 
 /// A port that sends `greeting` before the first line, and answers each line by `answer`.
-struct Script<F> {
-    to_read: VecDeque<u8>,
-    typed: Vec<u8>,
-    answer: F,
-}
-
-impl<F: FnMut(&str) -> Vec<u8>> Read for Script<F> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.to_read.is_empty() {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        self.to_read.read(buffer)
-    }
-}
-
-impl<F: FnMut(&str) -> Vec<u8>> Write for Script<F> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        for &byte in bytes {
-            if byte == b'\n' {
-                let line = String::from_utf8(std::mem::take(&mut self.typed)).unwrap();
-                self.to_read.extend((self.answer)(&line));
-            } else {
-                self.typed.push(byte);
-            }
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-fn script<F: FnMut(&str) -> Vec<u8>>(greeting: &str, answer: F) -> Script<F> {
-    Script { to_read: greeting.bytes().collect(), typed: Vec::new(), answer }
+fn script(greeting: &str, mut answer: impl FnMut(&str) -> Vec<u8>) -> impl Port {
+    let mut greeting = greeting.as_bytes().to_vec();
+    ScriptedPort::new(move |line: Option<&str>| Some(line.map_or_else(|| std::mem::take(&mut greeting), &mut answer)))
 }
 
 /// A link to a firmware that answers `version` correctly, and everything else by `answer`.
@@ -135,21 +102,7 @@ fn a_command_that_would_be_two_lines_or_no_text_is_not_typed() {
 
 #[test]
 fn a_port_that_goes_away_says_so() {
-    struct Unplugged;
-    impl Read for Unplugged {
-        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
-            Ok(0)
-        }
-    }
-    impl Write for Unplugged {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            Ok(bytes.len())
-        }
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-    let error = Link::over(Unplugged, false).err().unwrap();
+    let error = Link::over(ScriptedPort::new(|_: Option<&str>| None), false).err().unwrap();
     assert_eq!(error.to_string(), "the port is gone: plug the Uno in again");
 }
 

@@ -8,7 +8,7 @@
 
 use control::say::command::{self, Command};
 use gps::job::{Job, Wanted};
-use gps::picture::{Words, draw_with};
+use gps::picture::{Words, draw};
 use link::log::{Entry, Kind, Pieces};
 use link::settings::{Setting, Settings, shown};
 use link::{Class, EventLine, Mode, Status, Values, replay};
@@ -303,7 +303,7 @@ pub fn job() -> Value {
 /// The map of all added logs as SVG, and how many of their objects are on it. No SVG if none has a position.
 pub fn map(words: &Words) -> Value {
     let jobs = JOBS.take();
-    let drawn = draw_with(&jobs.iter().collect::<Vec<_>>(), words);
+    let drawn = draw(&jobs.iter().collect::<Vec<_>>(), words);
     let placed = jobs.iter().flat_map(Job::things).filter(|thing| thing.found.is_ok()).count();
     json!({ "svg": drawn.map(|drawn| drawn.to_string()), "placed": placed })
 }

@@ -6,6 +6,10 @@
 //!
 //! The decisions take an edge of a beam as it comes, and the other sensors once a turn.
 
+mod scripted_port;
+
+pub use self::scripted_port::ScriptedPort;
+
 use control::ground::{class::Classifier, features, nearest::Nearest};
 use control::measure::readings::{Edge, Readings, Startup};
 use control::measure::reset::Cause;

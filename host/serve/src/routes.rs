@@ -16,7 +16,7 @@ use super::door::{Door, Knock};
 use super::hub::{Hub, Message};
 use super::lengths::Lengths;
 use super::machine::{Machine, Tell, Typed};
-use super::page::{File, Page, form};
+use super::page::{Page, form};
 use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
 use super::places::{Client, Place, Stage};
 use super::rules::{self, Forbidden, Order, Reach};
@@ -31,7 +31,7 @@ use axum::http::header::{
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, Sse};
-use axum::response::{IntoResponse, Response};
+use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_util::future::join_all;
 use futures_util::stream::{self, Stream, StreamExt};
@@ -112,13 +112,19 @@ impl Known {
 
 /// All paths.
 pub fn routes(served: Arc<Served>) -> Router {
-    Router::new()
+    let [_, css, js] = served.page.0.clone();
+    let mut routes = Router::new();
+    for (path, media, content) in [
+        ("/page.css", "text/css; charset=utf-8", css),
+        ("/page.js", "text/javascript; charset=utf-8", js),
+        ("/pair.css", "text/css; charset=utf-8", form::CSS.into()),
+        ("/pair.js", "text/javascript; charset=utf-8", form::JS.into()),
+    ] {
+        routes = routes.route(path, get(move || async move { ([(CONTENT_TYPE, media)], content) }));
+    }
+    routes
         .route("/", get(front))
-        .route("/page.css", get(|State(served): State<Arc<Served>>| async move { file(&served.page.css) }))
-        .route("/page.js", get(|State(served): State<Arc<Served>>| async move { file(&served.page.js) }))
         .route("/pair", post(pair))
-        .route("/pair.css", get(|| async { ([(CONTENT_TYPE, "text/css; charset=utf-8")], form::CSS) }))
-        .route("/pair.js", get(|| async { ([(CONTENT_TYPE, "text/javascript; charset=utf-8")], form::JS) }))
         .route("/machines", get(machines))
         .route("/machines/hold", post(hold_all))
         .route("/machines/{number}/command", post(command))
@@ -192,18 +198,14 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
     pairs.filter(|&(name, _)| name == COOKIE_NAME).map(|(_, value)| value)
 }
 
-fn file(file: &File) -> impl IntoResponse + use<> {
-    ([(CONTENT_TYPE, file.media)], file.content.clone())
-}
-
 /// The page, or the form for the code.
 async fn front(State(served): State<Arc<Served>>, Extension(Known(known)): Extension<Known>, uri: Uri) -> Response {
     if known.is_none() {
-        return ([(CONTENT_TYPE, "text/html; charset=utf-8")], form::HTML).into_response();
+        return Html(form::HTML).into_response();
     }
     // This tells the page that it is connected to a machine.
     match uri.query() {
-        Some("served") => file(&served.page.html).into_response(),
+        Some("served") => Html(served.page.0[0].clone()).into_response(),
         _ => (StatusCode::SEE_OTHER, [(LOCATION, "/?served#work")]).into_response(),
     }
 }
@@ -291,7 +293,7 @@ async fn command(
         Order::Type => timeout(ANSWER_TIME, machine.command(line)).await,
     };
     match typed {
-        Ok(Typed::Answered(lines)) => (plain(), lines.join("\n") + "\n").into_response(),
+        Ok(Typed::Answered(lines)) => (lines.join("\n") + "\n").into_response(),
         Ok(Typed::Dropped) => refused(StatusCode::CONFLICT, "hold came first, so this was not sent"),
         Ok(Typed::Lost(why)) => refused(StatusCode::SERVICE_UNAVAILABLE, &why),
         Ok(Typed::Busy) => refused(StatusCode::SERVICE_UNAVAILABLE, "too much waits for the machine: try again"),
@@ -339,11 +341,7 @@ fn why_not_held(typed: Option<Typed>) -> Option<String> {
 
 /// The answer to a line that was not typed, in the machine's own form of an error.
 fn refused(status: StatusCode, why: &str) -> Response {
-    (status, plain(), format!("error: {why}\n")).into_response()
-}
-
-fn plain() -> [(HeaderName, &'static str); 1] {
-    [(CONTENT_TYPE, "text/plain; charset=utf-8")]
+    (status, format!("error: {why}\n")).into_response()
 }
 
 /// Reads a request with its short body. Otherwise returns the error.

@@ -165,48 +165,32 @@ mod tests {
         ("plot teleplot", Forbidden::ChangesWire),
     ];
 
+    /// All of these lines, and why the network may not type them.
+    fn lines() -> impl Iterator<Item = (&'static str, Option<Forbidden>)> {
+        let harmless = HARMLESS.map(|line| (line, None)).into_iter();
+        let starts = STARTS.map(|line| (line, Some(Forbidden::NoStart)));
+        harmless.chain(starts).chain(NEVER.map(|(line, why)| (line, Some(why))))
+    }
+
     #[test]
-    fn every_client_that_may_type_may_hold() {
-        for reach in [Reach::Here, WATCHING, STARTING] {
-            for line in ["hold", " hold", "hold   "] {
+    fn every_line_is_typed_by_its_rule_and_every_client_may_hold() {
+        for (line, why) in lines() {
+            let started = why.filter(|why| *why != Forbidden::NoStart);
+            for (reach, why) in [(Reach::Here, None), (WATCHING, why), (STARTING, started)] {
+                assert_eq!(allow(line, reach), why.map_or(Ok(Order::Type), Err), "{line:?} from {reach:?}");
+            }
+        }
+        for line in ["hold", " hold", "hold   "] {
+            for reach in [Reach::Here, WATCHING, STARTING] {
                 assert_eq!(allow(line, reach), Ok(Order::Hold), "{line:?} from {reach:?}");
             }
         }
     }
 
     #[test]
-    fn questions_are_allowed_to_all_clients() {
-        for line in HARMLESS {
-            for reach in [Reach::Here, WATCHING, STARTING] {
-                assert_eq!(allow(line, reach), Ok(Order::Type), "{line:?} from {reach:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn start_and_clear_are_for_those_whom_the_operator_allowed_it() {
-        for line in STARTS {
-            assert_eq!(allow(line, WATCHING), Err(Forbidden::NoStart), "{line:?}");
-            assert_eq!(allow(line, STARTING), Ok(Order::Type), "{line:?}");
-            assert_eq!(allow(line, Reach::Here), Ok(Order::Type), "{line:?}");
-        }
-    }
-
-    #[test]
-    fn manual_moves_and_changes_of_the_machine_are_never_typed_over_the_network() {
-        for (line, why) in NEVER {
-            for reach in [WATCHING, STARTING] {
-                assert_eq!(allow(line, reach), Err(why), "{line:?} from {reach:?}");
-            }
-            assert_eq!(allow(line, Reach::Here), Ok(Order::Type), "{line:?}");
-        }
-    }
-
-    #[test]
     fn every_command_of_the_console_is_under_a_rule_that_is_tested() {
         use control::say::command::Word;
-        let tested: Vec<&str> =
-            HARMLESS.into_iter().chain(STARTS).chain(NEVER.map(|(line, _)| line)).chain(["hold"]).collect();
+        let tested: Vec<&str> = lines().map(|(line, _)| line).chain(["hold"]).collect();
         for word in (0..).map_while(Word::from_index) {
             let word: String = word.text().bytes().map(char::from).collect();
             assert!(tested.iter().any(|line| line.split_whitespace().next() == Some(&word)), "{word}");
@@ -229,8 +213,7 @@ mod tests {
             let own = words.filter(|(_, word)| format!("{line} ").starts_with(&format!("{word} ")));
             own.max_by_key(|(_, word)| word.len()).map(|(cells, _)| cells)
         };
-        let never = NEVER.map(|(line, _)| line);
-        for line in HARMLESS.into_iter().chain(STARTS).chain(never).chain(["hold"]) {
+        for line in lines().map(|(line, _)| line).chain(["hold"]) {
             let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
             let cells = of(&line).unwrap_or_else(|| panic!("{line} is not in the table"));
             let phone = match [WATCHING, STARTING].map(|reach| allow(&line, reach).is_ok()) {

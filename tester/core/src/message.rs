@@ -4,12 +4,12 @@
 //! the command again with the same number. The tester does not run it twice. Times are cycles of the tester's clock (62.5 ns),
 //! modulo 2^32.
 
-use crate::piece::Piece;
+use crate::player::Piece;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// The version of the protocol. Both sides need the same.
-pub const PROTOCOL: u8 = 1;
+pub const PROTOCOL: u8 = 2;
 
 /// Most pieces in a command.
 pub const PIECES: usize = 4;
@@ -131,8 +131,6 @@ pub enum Record {
         start: u32,
         /// Its width in cycles.
         width: u32,
-        /// The position at its beginning.
-        position: i32,
     },
     /// The weeder's LED changed.
     Led {
@@ -148,20 +146,11 @@ pub enum Record {
     },
     /// The plan ended.
     Ended {
-        /// The time of the end.
-        time: u32,
         /// The encoder's position.
         position: i32,
-        /// Events that came more than 10 us late.
-        late: u16,
     },
     /// The plan stopped, because the next piece came too late.
-    Dry {
-        /// The time of the stop.
-        time: u32,
-        /// The encoder's position.
-        position: i32,
-    },
+    Dry,
     /// Pulses were lost, because the serial line was too slow.
     Lost {
         /// Their number since the start.

@@ -5,7 +5,7 @@
 
 use crate::frame::{self, Frame, Receiver};
 use crate::message::{Command, PATTERN_STEPS, PROTOCOL, Record, Refusal, Step};
-use crate::piece::Piece;
+use crate::player::Piece;
 use heapless::Deque;
 
 /// Most records in the queue.
@@ -85,8 +85,8 @@ impl Station {
     }
 
     fn obey(&mut self, command: Command, board: &mut impl Board) -> Result<(), Refusal> {
-        let idle = |board: &mut dyn FnMut() -> bool| if board() { Err(Refusal::Playing) } else { Ok(()) };
         match command {
+            Command::Start | Command::Burst { .. } if board.is_playing() => return Err(Refusal::Playing),
             Command::Hello => {
                 board.stop();
                 board.reset(false);
@@ -100,7 +100,6 @@ impl Station {
                 pieces.into_iter().for_each(|piece| board.push(piece));
             }
             Command::Start => {
-                idle(&mut || board.is_playing())?;
                 let time = board.start();
                 self.record(Record::Started { time });
             }
@@ -112,7 +111,6 @@ impl Station {
                 place.get_mut(..steps.len()).ok_or(Refusal::Range)?.copy_from_slice(&steps);
             }
             Command::Burst { steps, run_up, slower, repeats } => {
-                idle(&mut || board.is_playing())?;
                 let steps = self.pattern.get(..steps.into()).filter(|steps| !steps.is_empty()).ok_or(Refusal::Range)?;
                 if repeats == 0 {
                     return Err(Refusal::Range);

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use tester_core::frame::{Receiver, encode};
 use tester_core::message::{Command, QUEUE_PIECES, Record, Refusal, Step};
-use tester_core::piece::{Action, Piece};
 use tester_core::pins::{AT_REST, Line};
+use tester_core::player::{Action, Piece};
 use tester_core::player::{Next, Player};
 use tester_core::station::{Board, Station};
 

@@ -23,7 +23,7 @@ pub fn boards_and_pair(wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
 /// The same with another firmware of the weeder.
 pub fn boards_with(weeder: &Path, wiring: Wiring) -> (Rc<RefCell<Pair>>, Weeder, Tester) {
     let tester = firmware::build_tester().expect("the tester's firmware is built");
-    let pair = Rc::new(RefCell::new(Pair::power_up(&tester, weeder, &[], wiring).expect("both start")));
+    let pair = Rc::new(RefCell::new(Pair::power_up(&tester, weeder, wiring).expect("both start")));
     let tester = Tester::over(PairPort { pair: Rc::clone(&pair), side: Side::Tester }).expect("the tester answers");
     let opened = Rc::clone(&pair);
     let open = move || {

@@ -53,7 +53,7 @@ const READERS: [Reader; 11] = [
             let log = log::read(path)?;
             let job = Job::read(&log, &Wanted::default());
             assert!(map::features(&[("log", &job)]).features.len() >= job.things().count());
-            picture::draw(&[&job]);
+            picture::draw(&[&job], &picture::Words::default());
             replay::replay(&log)?;
             Ok(())
         },

@@ -579,6 +579,8 @@ fn a_failure_to_serve_is_explained_with_a_remedy() {
             "index.html of the page cannot be read: name a release's folder `page` by --page",
         ),
         (&page, &["--http-port", "0", "--allow-start"], "--lan"),
+        (&page, &["--http-port", "0", "--lan", "0.0.0.0"], "cannot be opened by a phone"),
+        (&page, &["--http-port", "0", "--lan", "127.0.0.1"], "cannot be opened by a phone"),
         (&page, &["--http-port", "0", "--lan", "192.0.2.1"], "192.0.2.1 is no address of this computer"),
         (&page, &["--http-port", &taken], "is in use: end the other program, or choose another port by --http-port"),
         (&page, &["--port", "a/uno", "--port", "b/uno"], "two machines are called uno: name them"),

@@ -5,13 +5,13 @@
 //! classes both are possible. So the replay classifies a detection in every possible speed class. It accepts the log's
 //! vote if one of them gives it.
 
+use crate::examples::Taught;
 use control::ground::features::{self, Features};
 use control::ground::{
     class::{Class, Classifier, ExamplesFull, Listed, Vote},
     nearest::Nearest,
 };
 use control::memory::Volatile;
-use knn::Example;
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -58,8 +58,8 @@ impl Witness {
 /// The firmware's classifier, with values from the log.
 pub(super) struct ReplayClassifier<'a> {
     /// The built-in examples alone. A label must not contradict them.
-    built_in: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
-    nearest: Nearest<&'a [Example<{ features::COUNT }>], Volatile>,
+    built_in: Nearest<&'a [Taught], Volatile>,
+    nearest: Nearest<&'a [Taught], Volatile>,
     witness: Rc<Witness>,
     /// The last detections: the replay's features, and the machine's features.
     described: RefCell<VecDeque<(Features, Features)>>,
@@ -67,7 +67,7 @@ pub(super) struct ReplayClassifier<'a> {
 
 impl<'a> ReplayClassifier<'a> {
     /// A classifier with a log's examples. The first `built_in` of them are those of the firmware.
-    pub(super) fn new(examples: &'a [Example<{ features::COUNT }>], built_in: usize, witness: Rc<Witness>) -> Self {
+    pub(super) fn new(examples: &'a [Taught], built_in: usize, witness: Rc<Witness>) -> Self {
         let nearest = |examples| Nearest::new(examples, Volatile::new());
         let (built_in, all) = (nearest(&examples[..built_in]), nearest(examples));
         Self { built_in, nearest: all, witness, described: RefCell::default() }
@@ -103,7 +103,7 @@ impl Classifier for ReplayClassifier<'_> {
         self.nearest.teach(&self.by_machine(features), label)
     }
 
-    fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
+    fn keep(&mut self, example: Taught) -> Result<(), ExamplesFull> {
         self.nearest.keep(example)
     }
 
@@ -129,6 +129,7 @@ mod tests {
     use super::*;
     use control::ground::class::label;
     use control::ground::examples::EXAMPLES;
+    use knn::Example;
 
     #[test]
     fn a_label_is_refused_by_the_built_in_examples_alone() {

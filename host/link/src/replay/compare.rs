@@ -1,6 +1,6 @@
 //! Compares the events of a log with those of its replay.
 
-use super::replayed::{DETECTION_TICKS, Difference, Replayed, SWING_MS, SWING_TICKS};
+use super::{DETECTION_TICKS, Difference, Replayed, SWING_MS, SWING_TICKS};
 use crate::{EventLine, advice};
 use control::say::names;
 

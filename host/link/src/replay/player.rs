@@ -1,8 +1,8 @@
 //! Drives the decisions along a log: the machine's motion, the beam's edges, and the typed commands.
 
+use super::DETECTION_TICKS;
 use super::classifier::{ReplayClassifier, Seen, Witness};
 use super::compare::Heard;
-use super::replayed::DETECTION_TICKS;
 use super::stretch::{Happened, Stretch};
 use crate::settings::{Setting, steps};
 use crate::{EventLine, Mode, Status};

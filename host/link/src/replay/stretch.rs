@@ -1,14 +1,12 @@
 //! A stretch of a log, from one start of the link to its end: its lines in order, and the machine's positions that
 //! follow from them.
 
-use super::replayed::ReplayError;
+use super::ReplayError;
+use crate::examples::{Taught, taught};
 use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
 use crate::{ConsoleLine, EventLine, Mode, Status};
-use control::ground::class::label;
-use control::ground::features;
 use control::say::command::{self, Command};
-use knn::Example;
 use std::collections::VecDeque;
 
 /// The content of a log line.
@@ -26,7 +24,7 @@ pub(super) enum Happened<'a> {
 pub(super) struct Stretch<'a> {
     pub(super) settings: Settings,
     /// All examples, the built-in ones first, and the number of built-in ones.
-    pub(super) examples: Vec<Example<{ features::COUNT }>>,
+    pub(super) examples: Vec<Taught>,
     pub(super) built_in: usize,
     /// The first of its statuses.
     pub(super) first: Status,
@@ -52,8 +50,13 @@ impl<'a> Stretch<'a> {
                     settings.set(setting, value).map_err(|_| wrong("out of range"))?;
                 }
                 Kind::Example => {
-                    examples.extend(example(&entry.text).map_err(|()| wrong("no example"))?);
-                    built_in += usize::from(entry.text.starts_with("built_in "));
+                    // The list may end with the number of damaged examples.
+                    if entry.text.starts_with("spoiled=") {
+                        continue;
+                    }
+                    let (from_field, _, example) = taught(&entry.text).ok_or_else(|| wrong("no example"))?;
+                    examples.push(example);
+                    built_in += usize::from(!from_field);
                 }
                 Kind::Status => {
                     let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
@@ -68,10 +71,10 @@ impl<'a> Stretch<'a> {
                     happened.push((entry, Happened::Command { line: &entry.text, is_refused: false }));
                 }
                 Kind::Answer => {
-                    let Some(is_error) = end_of_answer(&entry.text) else { continue };
+                    let ConsoleLine::End { error } = ConsoleLine::parse(&entry.text) else { continue };
                     let place = unanswered.pop_front();
                     if let Some((_, Happened::Command { is_refused, .. })) = place.map(|place| &mut happened[place]) {
-                        *is_refused = is_error;
+                        *is_refused = error.is_some();
                     }
                 }
                 Kind::Connected | Kind::Lost => {}
@@ -79,10 +82,7 @@ impl<'a> Stretch<'a> {
                 Kind::Antenna | Kind::GpsFound | Kind::GpsLost | Kind::Gps | Kind::GpsDamaged | Kind::GpsMark => {}
             }
         }
-        let first = happened.iter().find_map(|(_, happened)| match happened {
-            Happened::Status(status) => Some(status.clone()),
-            _ => None,
-        });
+        let first = happened.iter().find_map(status).cloned();
         Ok(first.map(|first| Self { settings, examples, built_in, first, happened }))
     }
 
@@ -131,10 +131,7 @@ impl<'a> Stretch<'a> {
         {
             return Some(position);
         }
-        let (entry, next) = self.happened[place..].iter().find_map(|(entry, happened)| match happened {
-            Happened::Status(status) => Some((entry, status)),
-            _ => None,
-        })?;
+        let (entry, next) = self.happened[place..].iter().find_map(|told| Some((told.0, status(told)?)))?;
         let whole_ms = entry.time_ms.checked_sub(last.1).filter(|&time_ms| time_ms > 0)?;
         let share = time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
         let distance = f64::from(next.position.wrapping_sub(last.0.position)) * share;
@@ -189,10 +186,7 @@ impl<'a> Stretch<'a> {
 
     /// The next status after an index.
     pub(super) fn next_status(&self, place: usize) -> Option<&Status> {
-        self.happened[place..].iter().find_map(|(_, happened)| match happened {
-            Happened::Status(status) => Some(status),
-            _ => None,
-        })
+        self.happened[place..].iter().find_map(status)
     }
 }
 
@@ -205,29 +199,7 @@ fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)
     }
 }
 
-/// Whether a line that ends an answer is an error. `None` if it ends no answer.
-fn end_of_answer(line: &str) -> Option<bool> {
-    match ConsoleLine::parse(line) {
-        ConsoleLine::End { error } => Some(error.is_some()),
-        _ => None,
-    }
-}
-
-/// Parses a line of the examples. `None` for the line that counts damaged ones.
-fn example(line: &str) -> Result<Option<Example<{ features::COUNT }>>, ()> {
-    let words: Vec<&str> = line.split(' ').collect();
-    match words.as_slice() {
-        ["built_in" | "field", _, class, rest @ ..] => {
-            let label = match *class {
-                "plant" => label::PLANT,
-                "weed" => label::WEED,
-                _ => return Err(()),
-            };
-            let bytes: Result<Vec<u8>, _> = rest.iter().map(|word| word.parse()).collect();
-            let features = bytes.map_err(|_| ())?.try_into().map_err(|_| ())?;
-            Ok(Some(Example::new(features, label)))
-        }
-        [line] if line.starts_with("spoiled=") => Ok(None),
-        _ => Err(()),
-    }
+/// The status in a line of the log.
+fn status<'a>((_, happened): &'a (&Entry, Happened<'_>)) -> Option<&'a Status> {
+    if let Happened::Status(status) = happened { Some(status) } else { None }
 }

@@ -1,8 +1,10 @@
-//! Rows whose firmware answers by a script, stops answering, or is unplugged.
+//! Rows whose firmware stops answering, or is unplugged.
 
 use super::*;
-use crate::settings::{Setting, name};
-use std::io::{self, Read, Write};
+use control::ground::nearest::Nearest;
+use control::measure::reset::Cause;
+use control::memory::Volatile;
+use rig::{Rig, ScriptedPort};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -25,63 +27,27 @@ impl Desk {
         self.typed.lock().unwrap().clone()
     }
 
+    /// Opens the board's port: a new board, whose alarm about its settings is not cleared.
     fn opener(&self) -> Opener {
         let desk = self.clone();
         Box::new(move || {
+            let (desk, is_there) = (desk.clone(), Arc::clone(&desk.is_there));
             if !desk.is_there.load(Ordering::Relaxed) {
                 return Err(LinkError::Absent("it".to_owned()));
             }
-            Link::over(Firmware { desk: desk.clone(), line: Vec::new(), to_read: VecDeque::new() }, false)
-        })
-    }
-}
-
-struct Firmware {
-    desk: Desk,
-    line: Vec<u8>,
-    to_read: VecDeque<u8>,
-}
-
-impl Read for Firmware {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if !self.desk.is_there.load(Ordering::Relaxed) {
-            return Ok(0);
-        }
-        if self.to_read.is_empty() || self.desk.is_silent.load(Ordering::Relaxed) {
-            thread::sleep(Duration::from_millis(1));
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        self.to_read.read(buffer)
-    }
-}
-
-impl Write for Firmware {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        for &byte in bytes {
-            if byte != b'\n' {
-                self.line.push(byte);
-                continue;
-            }
-            let line = String::from_utf8(std::mem::take(&mut self.line)).unwrap();
-            let setting = |setting: Setting| format!("{}={}\n", name(setting), setting.description().default);
-            let answer = match line.as_str() {
-                "" => continue,
-                "version" => "weeder 0.2.0\nok\n".to_owned(),
-                "get" => Setting::all().map(setting).collect::<String>() + "ok\n",
-                "status" => "state=hold tool=out pos=7 speed_mm_s=0 windows=0 unseen_mm=400\nok\n".to_owned(),
-                "examples" | "events on" => "ok\n".to_owned(),
-                _ => {
-                    self.desk.typed.lock().unwrap().push(line.clone());
-                    if line == "start" { "error: alarm latched\n".to_owned() } else { "ok\n".to_owned() }
+            let mut rig = Rig::wake(Nearest::new(&[][..], Volatile::new()), Volatile::new(), Cause::PowerOn);
+            let mut answer = move |line: &str| {
+                if !["", "version", "get", "status", "examples", "events on"].contains(&line) {
+                    desk.typed.lock().unwrap().push(line.to_owned());
                 }
+                let is_silent = line.is_empty() || desk.is_silent.load(Ordering::Relaxed);
+                if is_silent { String::new() } else { rig.ask(line).join("\n") + "\n" }
             };
-            self.to_read.extend(answer.bytes());
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
+            let script = move |line: Option<&str>| {
+                is_there.load(Ordering::Relaxed).then(|| line.map(&mut answer).unwrap_or_default().into_bytes())
+            };
+            Link::over(ScriptedPort::new(script), false)
+        })
     }
 }
 
