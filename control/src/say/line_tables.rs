@@ -27,7 +27,7 @@ macro_rules! event_table {
         $make! {
             Detection "a detection was seen in full and classified",
             Event::Detection { vote, leading, spacing, plan } => "" {
-                "" = class(vote.class) => class: Class, "what it was taken for";
+                "" = class(vote.class) => class: Class, "its class";
                 "pos" = number(leading.count()) => position: i32, "its leading edge, in encoder ticks";
                 "votes" = count(vote.votes) => votes: u8, "how many of the `k` nearest examples voted for its class";
                 "spacing" = number(spacing.0) => spacing: i32, "ticks since the last plant's leading edge";

@@ -33,7 +33,7 @@ fn the_built_in_table_is_the_command_s_output() {
         written == built_in,
         "the table is out of date: run `cargo run --release -p weeder-cli -- train --synthetic --force --out {BUILT_IN}`"
     );
-    assert_eq!(said.matches("Plants taken for weeds   0 of ").count(), 3, "{said}");
+    assert_eq!(said.matches("Plants classified as weeds   0 of ").count(), 3, "{said}");
     assert!(fs::read_to_string(folder.path().join("regions.svg")).unwrap().starts_with("<svg"));
 }
 
@@ -52,7 +52,7 @@ fn a_plant_that_would_be_cut_ends_with_status_1() {
     let output = weeder(folder.path(), &["classify", "objects.csv"]);
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("Plants taken for weeds   1 of 2, 50.00 %"), "{said}");
+    assert!(said.contains("Plants classified as weeds   1 of 2, 50.00 %"), "{said}");
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn objects_without_labels_are_classified_without_a_score() {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(0), "{said}");
     assert!(said.contains("weed") && said.contains("known"), "{said}");
-    assert!(!said.contains("taken for"), "{said}");
+    assert!(!said.contains("classified as"), "{said}");
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub struct Confusion {
     weeds: Counts,
 }
 
-/// Objects of one kind: those taken for a plant, the unknown ones, and those taken for a weed.
+/// Objects of one kind: those classified as a plant, the unknown ones, and those classified as a weed.
 type Counts = [usize; 3];
 
 impl FromIterator<(Kind, Class)> for Confusion {
@@ -78,15 +78,15 @@ impl Confusion {
 
 impl fmt::Display for Confusion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = number_table(["", "taken for\nplant", "\nunknown", "taken for\nweed"], 1);
+        let mut table = number_table(["", "classified as\nplant", "\nunknown", "classified as\nweed"], 1);
         for (name, counts) in [("plants", self.plants), ("weeds", self.weeds)] {
             table.add_row([name.to_owned()].into_iter().chain(counts.map(|count| count.to_string())));
         }
         writeln!(f, "{table}")?;
         let percent = |part: usize, total: usize| format!("{part} of {total}, {:.2} %", 100.0 * share(part, total));
         let (plants, weeds) = (self.count(Kind::Plant), self.count(Kind::Weed));
-        writeln!(f, "Plants taken for weeds   {}", percent(self.plants_taken_for_weeds(), plants))?;
-        writeln!(f, "Weeds taken for plants   {}", percent(self.weeds_taken_for_plants(), weeds))?;
+        writeln!(f, "Plants classified as weeds   {}", percent(self.plants_taken_for_weeds(), plants))?;
+        writeln!(f, "Weeds classified as plants   {}", percent(self.weeds_taken_for_plants(), weeds))?;
         writeln!(f, "Plants spared unknown    {}", percent(self.plants_unknown(), plants))?;
         write!(f, "Treated as they should   {:.2} % of all", 100.0 * self.accuracy())
     }
