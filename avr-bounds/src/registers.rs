@@ -327,8 +327,8 @@ impl Survey<'_> {
         self.on_every_path(routine, |clobbered, effects| clobbered - effects.changes, through)
     }
 
-    /// The registers of which something is true on every path from the entry to a place: what remains true after an
-    /// instruction, and then after its called function.
+    /// For each place: the registers that are in a set on every path from the entry. The set changes after each
+    /// instruction, and then through its called function.
     fn on_every_path(
         &self,
         routine: &Routine,

@@ -10,7 +10,6 @@
 use super::{LiveUno, SLICE_MS, Setup};
 use anyhow::{Error, Result};
 use rayon::ThreadPoolBuilder;
-use rayon::prelude::*;
 use rustix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -109,7 +108,8 @@ impl LiveRows {
         let threads = cores.min(self.rows.len() / ROWS_OF_A_THREAD).max(1);
         let each = self.rows.len().div_ceil(threads).max(1);
         let most_slices = time.map_or(u64::MAX, |time| time.as_millis() as u64 / SLICE_MS);
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| (0, error.into()))?;
+        let others = ThreadPoolBuilder::new().num_threads((threads - 1).max(1));
+        let pool = others.build().map_err(|error| (0, error.into()))?;
         let (began, worked) = (Instant::now(), worked());
         let (mut due, mut slices) = (began, 0);
         while !stop.load(Ordering::Relaxed) && slices < most_slices {
@@ -119,7 +119,13 @@ impl LiveRows {
             let step = |rows: &mut [Row]| {
                 (0..SLICES_IN_STEP).for_each(|_| rows.iter_mut().for_each(|row| row.run(LiveUno::slice)));
             };
-            pool.install(|| self.rows.par_chunks_mut(each).for_each(step));
+            // This thread takes the first rows. It waits for no other thread if there are few rows.
+            pool.in_place_scope(|scope| {
+                let mut parts = self.rows.chunks_mut(each);
+                let own = parts.next();
+                parts.for_each(|rows| scope.spawn(move |_| step(rows)));
+                own.map(step);
+            });
             slices += SLICES_IN_STEP;
             if !self.fast {
                 due += Duration::from_millis(SLICES_IN_STEP * SLICE_MS);
