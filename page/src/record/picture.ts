@@ -78,11 +78,12 @@ export class Table<Row> {
 
     /** The rows on this ground. */
     near(fromMm: number, toMm: number): Row[] {
+        const { values, columns, first, end } = this;
         const rows: Row[] = [];
-        for (let row = 0; row < this.values.length; row += this.columns) {
+        for (let row = 0; row < values.length; row += columns) {
             let [isBefore, isBehind] = [true, true];
-            for (let at = row + this.first; at < row + this.end; at++) {
-                const mm = this.values[at] ?? 0;
+            for (let at = row + first; at < row + end; at++) {
+                const mm = values[at] ?? 0;
                 isBefore &&= mm < fromMm;
                 isBehind &&= mm > toMm;
             }

@@ -15,7 +15,6 @@ function values(): Map<string, number> {
     return new Map(tasks.flatMap((found) => (found?.[1] ? [[found[1], Number(found[2])] as const] : [])));
 }
 
-/** The machine. */
 export function machineSetUp(): MachineKind {
     const of = values();
     const taken = [
