@@ -58,10 +58,7 @@ pub enum RegisterRule {
     /// all registers and flags.
     #[default]
     Convention,
-    /// Every value that a caller needs after a call is preserved, and handlers preserve all registers. For compilers
-    /// that drop the calling convention.
-    Followed,
-    /// Nothing.
+    /// Nothing. For programs that break the convention.
     Unchecked,
 }
 

@@ -174,12 +174,6 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
         line(format!("An edge of the input waits at most {} cycles for its handler.", edges.wait_cycles));
         line(format!("No edge is lost up to {} a second.", edges.never_lost_per_s));
     }
-    if let Some(lasting) = &bounds.lasting {
-        line(format!(
-            "Over {} calls, {} bytes are live in registers, and none is clobbered. Handlers restore all registers and flags.",
-            lasting.calls, lasting.bytes
-        ));
-    }
     if let Some(turn) = &bounds.turn {
         match turn.cycles {
             Some(cycles) => line(format!(

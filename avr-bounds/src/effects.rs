@@ -9,7 +9,7 @@ use std::fmt;
 use std::ops::{self, RangeInclusive};
 
 /// A set of registers and flags: registers by their number, then flags by their bit in SREG.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Registers(u64);
 
 /// The number of registers; the flags follow them.
@@ -118,8 +118,6 @@ const HSVNZC: Registers = flags(0b11_1111);
 pub(crate) struct Effects {
     pub(crate) reads: Registers,
     pub(crate) changes: Registers,
-    /// It does something else as well: to memory, to a peripheral, to the stack, or to the control flow.
-    pub(crate) acts: bool,
 }
 
 impl Instruction {
@@ -135,46 +133,46 @@ impl Instruction {
         // Subtracting a register from itself, or XOR with itself, gives 0 or a value made from the carry. The old value
         // does not matter.
         let is_same = d == r;
-        let (reads, changes, acts) = match self.operation {
-            Sub | Eor if is_same => (R::NONE, to | if self.operation == Sub { HSVNZC } else { SVNZ }, false),
-            Sbc if is_same => (C | Z, to | HSVNZC, false),
-            Add | Sub => (to | from, to | HSVNZC, false),
-            Adc => (to | from | C, to | HSVNZC, false),
-            Sbc => (to | from | C | Z, to | HSVNZC, false),
-            Subi | Neg => (to, to | HSVNZC, false),
-            Sbci => (to | C | Z, to | HSVNZC, false),
-            And | Or | Eor => (to | from, to | SVNZ, false),
-            Andi | Ori | Inc | Dec => (to, to | SVNZ, false),
-            Com | Asr | Lsr => (to, to | SVNZC, false),
-            Ror => (to | C, to | SVNZC, false),
-            Adiw | Sbiw => (R::pair(d), R::pair(d) | SVNZC, false),
-            Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => (to | from, R::PRODUCT | Z | C, false),
-            Cp => (to | from, HSVNZC, false),
-            Cpc => (to | from | C | Z, HSVNZC, false),
-            Cpi => (to, HSVNZC, false),
-            Swap => (to, to, false),
-            Mov => (from, to, false),
-            Movw => (R::pair(r), R::pair(d), false),
-            Ldi => (R::NONE, to, false),
-            Bst => (to, T, false),
-            Bld => (to | T, to, false),
-            Bset | Bclr => (R::NONE, flag, flag.is_empty()),
-            Brbs | Brbc => (flag, R::NONE, true),
-            Cpse => (to | from, R::NONE, true),
-            Sbrc | Sbrs => (from, R::NONE, true),
+        let (reads, changes) = match self.operation {
+            Sub | Eor if is_same => (R::NONE, to | if self.operation == Sub { HSVNZC } else { SVNZ }),
+            Sbc if is_same => (C | Z, to | HSVNZC),
+            Add | Sub => (to | from, to | HSVNZC),
+            Adc => (to | from | C, to | HSVNZC),
+            Sbc => (to | from | C | Z, to | HSVNZC),
+            Subi | Neg => (to, to | HSVNZC),
+            Sbci => (to | C | Z, to | HSVNZC),
+            And | Or | Eor => (to | from, to | SVNZ),
+            Andi | Ori | Inc | Dec => (to, to | SVNZ),
+            Com | Asr | Lsr => (to, to | SVNZC),
+            Ror => (to | C, to | SVNZC),
+            Adiw | Sbiw => (R::pair(d), R::pair(d) | SVNZC),
+            Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => (to | from, R::PRODUCT | Z | C),
+            Cp => (to | from, HSVNZC),
+            Cpc => (to | from | C | Z, HSVNZC),
+            Cpi => (to, HSVNZC),
+            Swap => (to, to),
+            Mov => (from, to),
+            Movw => (R::pair(r), R::pair(d)),
+            Ldi => (R::NONE, to),
+            Bst => (to, T),
+            Bld => (to | T, to),
+            Bset | Bclr => (R::NONE, flag),
+            Brbs | Brbc => (flag, R::NONE),
+            Cpse => (to | from, R::NONE),
+            Sbrc | Sbrs => (from, R::NONE),
             // Functions read SREG for its interrupt flag, handlers to restore it; another analysis follows this.
-            In | Lds => (R::NONE, to, false),
-            Out | Sts => (from, R::NONE, true),
-            Ld | Ldd => (pointer, to | moved, false),
-            Lpm | Elpm => (pointer, to | moved, false),
-            St | Std => (pointer | from, moved, true),
+            In | Lds => (R::NONE, to),
+            Out | Sts => (from, R::NONE),
+            Ld | Ldd => (pointer, to | moved),
+            Lpm | Elpm => (pointer, to | moved),
+            St | Std => (pointer | from, moved),
             // Another analysis follows the stack.
-            Push => (R::NONE, R::NONE, true),
-            Pop => (R::NONE, to, true),
+            Push => (R::NONE, R::NONE),
+            Pop => (R::NONE, to),
             Break | Call | Cbi | Eicall | Eijmp | Icall | Ijmp | Jmp | Nop | Rcall | Ret | Reti | Rjmp | Sbi | Sbic
-            | Sbis | Sleep | Spm | Wdr => (R::NONE, R::NONE, true),
+            | Sbis | Sleep | Spm | Wdr => (R::NONE, R::NONE),
         };
-        Effects { reads, changes, acts }
+        Effects { reads, changes }
     }
 }
 
@@ -259,10 +257,11 @@ mod tests {
             else {
                 continue;
             };
-            let Effects { reads, changes, acts } = instruction.effects();
+            let Effects { reads, changes } = instruction.effects();
             let is_store = matches!(instruction.operation, St | Std | Sts);
             let is_harmless_input = instruction.operation != In || instruction.data_address() == Some(GPIOR0);
-            if acts && !is_store || !is_harmless_input {
+            // The others act on the stack or the control flow, or on what is no register.
+            if changes.is_empty() && !is_store || instruction.operation == Pop || !is_harmless_input {
                 continue;
             }
             seen += 1;

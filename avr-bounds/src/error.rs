@@ -64,16 +64,10 @@ pub enum BoundsError {
         /// The loop's first address.
         place: Place,
     },
-    /// Functions clobber live registers.
-    #[error("a value is needed behind a call that clobbers it:{}", all.iter().map(Clobbered::to_string).collect::<String>())]
-    Clobbered {
-        /// Every call that does.
-        all: Vec<Clobbered>,
-    },
     /// A function breaks the calling convention.
     #[error(
         "{function} does not preserve {registers}, which the calling convention asks of every function: mend it, or write \
-         `registers = \"followed\"` into the budgets if a compiler chose so, or `registers = \"unchecked\"`"
+         `registers = \"unchecked\"` into the budgets"
     )]
     NotPreserved {
         /// The function.
@@ -177,25 +171,5 @@ impl Problem {
             Problem::NoInstruction => ": check that the program was built for the chip of --chip".into(),
             _ => String::new(),
         }
-    }
-}
-
-/// A call to a function that clobbers live registers.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Clobbered {
-    /// The call's address.
-    pub address: u32,
-    /// The function that calls.
-    pub function: String,
-    /// The function that is called.
-    pub called: String,
-    /// The registers.
-    pub registers: String,
-}
-
-impl fmt::Display for Clobbered {
-    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        let Clobbered { address, function, called, registers } = self;
-        write!(to, "\n  {address:#06x} {function} calls {called}, which clobbers {registers}")
     }
 }

@@ -95,8 +95,6 @@ pub(crate) struct Node {
     pub(crate) ends_in: Vec<(u32, Rc<Routine>)>,
     /// Whether the instruction waits for an unknown time.
     pub(crate) waits: bool,
-    /// Whether R1 is zero before the instruction.
-    pub(crate) has_zero: bool,
 }
 
 /// A routine with all its paths.
@@ -309,7 +307,6 @@ impl<'p, 'a> Follower<'p, 'a> {
                 returns: *returns,
                 ends_in: ends_in.clone(),
                 waits: *waits,
-                has_zero: self.known[place].constant(1) == Some(0),
             }
         };
         let nodes: Vec<Node> = places.iter().map(node).collect();

@@ -65,13 +65,11 @@ pub use self::chip::{CHIPS, Chip};
 use self::cycles::{Passes, Stretch, Time, Timer};
 use self::decode::Operation;
 pub use self::elf::{ElfError, Program, Symbol};
-pub use self::error::{BoundsError, Clobbered, Problem};
+pub use self::error::{BoundsError, Problem};
 use self::flow::{Code, Entry, Kind, Node, Routine, bytes};
 pub use self::loops::{LoopBound, LoopBounds};
 pub use self::order::order;
-pub use self::proved::{
-    Bounds, EdgeBounds, Found, Frame, FunctionBounds, Handler, Indirect, Input, Lasting, Longest, Place,
-};
+pub use self::proved::{Bounds, EdgeBounds, Found, Frame, FunctionBounds, Handler, Indirect, Input, Longest, Place};
 use self::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -113,7 +111,6 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         }
     }
     let code = code;
-    let all = || handlers.iter().map(|(&vector, handler)| (vector, handler));
     let mut timer = Timer::new(&code, passes(&code, budgets));
     let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
         .map(|kind| timer.longest_stretch(&main, kind).map(|time| time.longest(&code)))
@@ -132,11 +129,9 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     let turn = turns.into_iter().reduce(|longest, turn| longest.or(&turn)).map(|turn| turn.longest(&code));
     let loops: BTreeSet<u32> = code.routines().flat_map(|routine| timer.loops_without_bound(routine)).collect();
 
-    let lasting = match budgets.registers {
-        RegisterRule::Convention => registers::prove_convention(&code, all()).map(|()| None)?,
-        RegisterRule::Followed => Some(registers::prove(&code, &main, all())?),
-        RegisterRule::Unchecked => None,
-    };
+    if budgets.registers == RegisterRule::Convention {
+        registers::prove(&code, &handlers)?;
+    }
 
     let stack = deepest(&main, handlers.values(), elf.chip.return_address_bytes());
     Ok(Bounds {
@@ -148,7 +143,6 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         closed,
         edges,
         turn,
-        lasting,
         loops_without_bound: loops.into_iter().map(|address| code.place(address)).collect(),
         indirect: indirect(&code),
         functions: functions(&code, &mut timer),

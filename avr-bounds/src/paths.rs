@@ -3,20 +3,13 @@
 use crate::flow::Node;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The predecessors of each place.
-pub(crate) fn leading_to(nodes: &[Node]) -> Vec<Vec<usize>> {
-    let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
-    for (number, node) in nodes.iter().enumerate() {
-        for edge in &node.edges {
-            from[edge.to].push(number);
-        }
-    }
-    from
-}
-
 /// The nodes from which a node with `is_end` can be reached, itself included.
 pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bool> {
-    let from = leading_to(nodes);
+    // The predecessors of each place.
+    let mut from: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+    for (number, node) in nodes.iter().enumerate() {
+        node.edges.iter().for_each(|edge| from[edge.to].push(number));
+    }
     let mut reaches = vec![false; nodes.len()];
     let mut to_do: Vec<usize> = (0..nodes.len()).filter(|&node| is_end(node)).collect();
     while let Some(node) = to_do.pop() {

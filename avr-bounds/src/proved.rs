@@ -91,15 +91,6 @@ pub struct EdgeBounds {
     pub never_lost_per_s: u64,
 }
 
-/// Values that are live over a call. Each register was found to be untouched, or saved and restored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Lasting {
-    /// Places that call a function.
-    pub calls: usize,
-    /// Bytes in live registers over all these calls.
-    pub bytes: usize,
-}
-
 /// A function, with all functions that it calls.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FunctionBounds {
@@ -164,8 +155,6 @@ pub struct Bounds {
     /// The longest turn of the main program's loop, from one `wdr` to the next, without handlers; `None` if no loop
     /// feeds the watchdog.
     pub turn: Option<Longest>,
-    /// The live values over calls, if the rule `followed` is used.
-    pub lasting: Option<Lasting>,
     /// Every loop without a bound, except those that the program never leaves.
     pub loops_without_bound: Vec<Place>,
     /// Calls and jumps to computed addresses.

@@ -12,8 +12,7 @@ fn try_to_prove(program: &str, input: Option<&Input>) -> Result<Bounds, BoundsEr
 
 /// The same with loop bounds of its functions.
 fn try_to_prove_with(program: &str, input: Option<&Input>, loops: &LoopBounds) -> Result<Bounds, BoundsError> {
-    let (input, loops, registers) = (input.cloned(), loops.clone(), RegisterRule::Followed);
-    try_to_prove_by(program, &Budgets { input, loops, registers, ..Budgets::default() })
+    try_to_prove_by(program, &Budgets { input: input.cloned(), loops: loops.clone(), ..Budgets::default() })
 }
 
 /// The same with facts of any kind. Every time that a budget can limit must have a bound.
@@ -459,97 +458,6 @@ fn calling(caller: &str, called: &str) -> String {
 }
 
 #[test]
-fn a_value_lasts_over_a_call_where_the_function_leaves_it_alone_or_puts_it_back() {
-    let lasts = |caller: &str, called: &str| proved(&calling(caller, called)).lasting.expect("it is followed");
-    let keep = "ldi r20, 5\n rcall called\n sts 0x0100, r20";
-    let lasting = lasts(keep, "ldi r21, 1\n sts 0x0101, r21");
-    assert_eq!((lasting.calls, lasting.bytes), (2, 1));
-    // Saved on the stack, and elsewhere.
-    for saved in [
-        "push r20\n lds r20, 0x0101\n inc r20\n sts 0x0101, r20\n pop r20",
-        "mov r30, r20\n ldi r20, 1\n sts 0x0101, r20\n mov r20, r30",
-    ] {
-        assert_eq!(lasts(keep, saved).bytes, 1, "{saved}");
-    }
-    // Saving and restoring is no use.
-    assert_eq!(lasts("push r2\n rcall called\n pop r2", "clr r2\n inc r2\n sts 0x0100, r2").bytes, 0);
-}
-
-#[test]
-fn a_clobbered_register_that_only_the_convention_preserves_is_found() {
-    let clobbers = "lds r16, 0x0101\n inc r16\n sts 0x0101, r16";
-    let program = calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", clobbers);
-    assert_refused(&program, "caller calls called, which clobbers r16");
-    // One of two paths suffices, and so does a function further down.
-    assert_refused(
-        &calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "sbrc r24, 0\n ldi r16, 1\n sts 0x0101, r16"),
-        "caller calls called, which clobbers r16",
-    );
-    let deeper = format!(
-        "{}\ndeeper:\n {clobbers}\n ret",
-        calling("ldi r16, 5\n rcall called\n sts 0x0100, r16", "rcall deeper")
-    );
-    assert_refused(&deeper, "caller calls called, which clobbers r16");
-    // Only if it is live.
-    proved(&calling("ldi r16, 5\n sts 0x0100, r16\n rcall called\n ldi r16, 6\n sts 0x0100, r16", clobbers));
-    // A value of the caller's caller.
-    let above = format!(
-        "start:\n clr r1\n ldi r16, 5\n1: rcall caller\n sts 0x0100, r16\n rjmp 1b\ncaller:\n rcall called\n ret\ncalled:\n {clobbers}\n ret"
-    );
-    assert_refused(&above, "start calls caller, which clobbers r16");
-    // Set before the call, and used after it, where another path has its own value.
-    let joined = "sbrs r24, 0\n rjmp 3f\n ldi r16, 5\n rcall called\n rjmp 4f\n3: ldi r16, 6\n4: sts 0x0100, r16";
-    assert_refused(&calling(joined, clobbers), "caller calls called, which clobbers r16");
-}
-
-#[test]
-fn a_result_is_no_clobbered_value_and_a_scratch_register_is_no_result() {
-    // A result, in one byte and in several.
-    proved(&calling("ldi r24, 5\n rcall called\n sts 0x0100, r24", "lds r24, 0x0101\n inc r24"));
-    proved(&calling(
-        "rcall called\n sts 0x0100, r22\n sts 0x0101, r25",
-        "lds r22, 0x0101\n lds r23, 0x0102\n clr r24\n clr r25",
-    ));
-    // Calculated in a loop that also reads it.
-    let shifts = "ldi r18, 3\n2: lsl r24\n rol r25\n dec r18\n brne 2b";
-    proved(&calling("ldi r24, 1\n clr r25\n rcall called\n sts 0x0100, r24\n sts 0x0101, r25", shifts));
-    // The result of a called function.
-    let deeper =
-        format!("{}\ndeeper:\n lds r24, 0x0101\n ret", calling("rcall called\n sts 0x0100, r24", "rcall deeper"));
-    proved(&deeper);
-    // The loop's counter belongs to the function.
-    let counts = "ldi r18, 3\n2: sts 0x0101, r18\n dec r18\n brne 2b";
-    assert_refused(
-        &calling("ldi r18, 5\n rcall called\n sts 0x0100, r18", counts),
-        "caller calls called, which clobbers r18",
-    );
-    // The same if the caller counts with it, too.
-    assert_refused(
-        &calling("ldi r18, 5\n3: sts 0x0100, r18\n rcall called\n dec r18\n brne 3b", counts),
-        "caller calls called, which clobbers r18",
-    );
-    // A pointer and a flag are never results.
-    assert_refused(&calling("rcall called\n st X, r1", "lds r26, 0x0101\n lds r27, 0x0102"), "which clobbers r26, r27");
-    assert_refused(&calling("rcall called\n brts 3f\n sts 0x0100, r1\n3:", "bst r24, 0"), "which clobbers flag T");
-}
-
-#[test]
-fn r1_is_zero_wherever_a_function_takes_it_for_that() {
-    let product = "mul r24, r22\n movw r24, r0";
-    let caller = "rcall called\n sts 0x0100, r24\n sts 0x0101, r1";
-    assert_refused(&calling(caller, product), "caller calls called, which clobbers r1");
-    proved(&calling(caller, &format!("{product}\n clr r1")));
-    assert_refused(
-        &calling("inc r1\n rcall called\n clr r1", "sts 0x0100, r1"),
-        "caller calls called, which clobbers r1",
-    );
-    // Counted down to zero.
-    let counted = "ldi r26, 3\n mov r1, r26\n2: dec r1\n brne 2b";
-    proved(&calling("rcall called\n sts 0x0101, r1", counted));
-    assert_refused(&calling("rcall called\n sts 0x0101, r1", &counted.replace("brne", "brpl")), "clobbers r1");
-}
-
-#[test]
 fn a_handler_puts_every_register_and_every_flag_back() {
     let main = "start:\n sei\n1: rjmp 1b\n";
     let flags = "push r24\n in r24, 0x3f\n out 0x1e, r24\n inc r24\n in r24, 0x1e\n out 0x3f, r24\n pop r24\n reti";
@@ -700,22 +608,28 @@ fn a_switch_jumps_to_every_entry_of_its_table_and_to_no_other_function() {
 
 #[test]
 fn a_function_that_breaks_the_convention_is_found() {
-    let convention = Budgets::default();
-    let refused = |called: &str| {
+    let breaks = |called: &str, registers: &str| {
         let program = calling("rcall called", called);
-        try_to_prove_by(&program, &convention).expect_err("it is broken").to_string()
+        assert_refused(&program, &format!("called does not preserve {registers}, "));
+        let unchecked = Budgets { registers: RegisterRule::Unchecked, ..Budgets::default() };
+        try_to_prove_by(&program, &unchecked).expect("its stack and time have bounds");
     };
-    assert!(refused("lds r16, 0x0100").contains("called does not preserve r16"));
-    assert!(refused("mul r24, r22").contains("called does not preserve r1"));
-    for kept in ["push r16\n lds r16, 0x0100\n pop r16", "lds r24, 0x0100", "mul r24, r22\n clr r1"] {
-        try_to_prove_by(&calling("rcall called", kept), &convention).expect("it is kept");
+    breaks("lds r16, 0x0100", "r16");
+    breaks("sbrc r24, 0\n ldi r16, 1", "r16");
+    breaks("mul r24, r22", "r1");
+    breaks("ldi r26, 3\n mov r1, r26\n2: dec r1\n brpl 2b", "r1");
+    for kept in [
+        "push r16\n lds r16, 0x0100\n pop r16",
+        "mov r30, r16\n lds r16, 0x0100\n mov r16, r30",
+        "lds r24, 0x0100",
+        "mul r24, r22\n clr r1",
+        // Counted down to zero.
+        "ldi r26, 3\n mov r1, r26\n2: dec r1\n brne 2b",
+        // Saved in a frame, as `-mcall-prologues` does.
+        "push r28\n push r29\n in r28, 0x3d\n in r29, 0x3e\n push r1\n std Y+0, r16\n lds r16, 0x0100\n ldd r16, Y+0\n pop r0\n pop r29\n pop r28",
+    ] {
+        proved(&calling("rcall called", kept));
     }
-    // Saved in a frame, as `-mcall-prologues` does.
-    let frame = "push r28\n push r29\n in r28, 0x3d\n in r29, 0x3e\n push r1\n std Y+0, r16\n lds r16, 0x0100\n ldd r16, Y+0\n pop r0\n pop r29\n pop r28";
-    try_to_prove_by(&calling("rcall called", frame), &convention).expect("it is kept");
-    let handler = |body: &str| format!("start:\n clr r1\n sei\n1: rjmp 1b\nhandler:\n {body}\n reti");
-    let error = try_to_prove_by(&handler("in r24, 0x09"), &convention).expect_err("it is broken").to_string();
-    assert!(error.contains("does not restore r24"), "{error}");
 }
 
 #[test]

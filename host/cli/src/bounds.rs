@@ -20,8 +20,8 @@ Examples:
   weeder bounds --elf other.elf --budgets other.toml --json
 
 The status is 0 if every bound is within its budget, and 1 if one is not. It is 2 if there is no bound.
-Reasons are recursion, calls to unknown addresses, handlers that enable interrupts, clobbered live
-registers, and loops without a bound where time needs one.")]
+Reasons are recursion, calls to unknown addresses, handlers that enable interrupts, functions that
+break the calling convention, and loops without a bound where time needs one.")]
 pub struct Arguments {
     /// Analyse this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
