@@ -261,7 +261,7 @@ mod tests {
         let mut lines = vec![(0, Kind::Connected, "0.2.0".to_owned())];
         for status in 0..statuses {
             let (time_ms, position) = (100 * status, status as i64 * 95);
-            let unseen_mm = 400_u64.saturating_sub(50 * status);
+            let unseen_mm = 450_u64.saturating_sub(50 * status);
             let line = format!("state=hold tool=out pos={position} speed_mm_s=500 windows=0 unseen_mm={unseen_mm}");
             lines.push((time_ms, Kind::Status, line));
             lines.extend(happens(status).into_iter().map(|(kind, line)| (time_ms + 1, kind, line.to_owned())));

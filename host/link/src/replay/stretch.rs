@@ -90,10 +90,11 @@ impl<'a> Stretch<'a> {
     /// start of the log, or the beginning of the detection in the beam there.
     pub(super) fn began(&self) -> i32 {
         let first = self.first.position;
-        let beam_to_tool_mm = self.settings.get(Setting::BeamToToolMm);
-        let unseen_mm = self.first.unseen_mm.clamp(0, beam_to_tool_mm.into()) as u16;
+        // There the tool had all of this to go: the distance from the beam, and the margin ahead of unseen ground.
+        let all_mm = self.settings.get(Setting::BeamToToolMm) + self.settings.get(Setting::MarginMm);
+        let unseen_mm = self.first.unseen_mm.clamp(0, all_mm.into()) as u16;
         if unseen_mm > 0 {
-            return first.wrapping_sub(self.settings.wheel().ticks(beam_to_tool_mm - unseen_mm).0);
+            return first.wrapping_sub(self.settings.wheel().ticks(all_mm - unseen_mm).0);
         }
         self.in_the_beam_at_first().map_or(first, |(from, _)| from)
     }
