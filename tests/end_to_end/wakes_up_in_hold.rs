@@ -130,7 +130,8 @@ fn nothing_that_was_scheduled_survives_a_reset() {
         assert_in_hold_with_tool_out(&mut run.uno);
         let after = status(&mut run.uno);
         assert_eq!((number(&after, "pos"), number(&after, "windows")), (0, 0), "{after}");
-        assert_eq!(number(&after, "unseen_mm"), 459, "{after}");
+        // From beam to tool, and the saved margin.
+        assert!((459..=460).contains(&number(&after, "unseen_mm")), "{after}");
         let pulses = run.uno.pulses(wiring::SERVO);
         let mut since = pulses.iter().filter(|pulse| pulse.rise > cycle);
         assert!(since.all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));

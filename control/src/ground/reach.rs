@@ -145,7 +145,8 @@ impl Leads {
             // Coming back pays only if the tool can stay for at least its stroke, the difference of the leads. This also keeps it
             // out for the same zone if the speed drops. The tick at either end allows for an encoder that trembles on an edge.
             near -= near / 5 + 1;
-            far += (out - back).max(out / 4).cast_signed() + 1;
+            // It wraps at a lead of 6.8 m. Such a machine has the alarm `too_fast`.
+            far = far.wrapping_add((out - back).max(out / 4).cast_signed() + 1);
         }
         if self.out < Length::ZERO { (Length(-near), Length(-far)) } else { (Length(near), Length(far)) }
     }
@@ -164,6 +165,15 @@ mod tests {
                 let (stays_from, stays_to) = sorted(leads.stretch(false));
                 let (enters_from, enters_to) = sorted(leads.stretch(true));
                 assert!(enters_from < stays_from && stays_to < enters_to, "{leads:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_stretch_of_a_lead_that_no_machine_has_is_calculated_too() {
+        for (out, back) in [(16_384, 0), (i16::MAX, 0), (i16::MAX, i16::MAX), (-i16::MAX, 0), (-i16::MAX, -i16::MAX)] {
+            for tool_out in [false, true] {
+                Leads { out: Length(out), back: Length(back), response: Length::ZERO }.stretch(tool_out);
             }
         }
     }
