@@ -146,7 +146,7 @@ impl Leads {
             // out for the same zone if the speed drops. The tick at either end allows for an encoder that trembles on an edge.
             near -= near / 5 + 1;
             // It wraps at a lead of 6.8 m. Such a machine has the alarm `too_fast`.
-            far = far.wrapping_add((out - back).max(out / 4).cast_signed() + 1);
+            far = far.wrapping_add_unsigned((out - back).max(out / 4) + 1);
         }
         if self.out < Length::ZERO { (Length(-near), Length(-far)) } else { (Length(near), Length(far)) }
     }
