@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{ByWidth, machine};
+use common::{ByWidth, LEAST_HOLD_MM, machine};
 use control::{
     alarm::{Alarm, Warning},
     ground::{
@@ -263,7 +263,7 @@ fn settings_are_saved_in_hold_only() {
 
 #[test]
 fn a_machine_without_saved_settings_says_so_and_does_not_start_until_that_is_cleared() {
-    let mut machine = Rig::wake(ByWidth::late_by(0), Volatile::new(), Cause::BrownOut);
+    let mut machine = Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), Volatile::new(), Cause::BrownOut);
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsLost));
     assert_eq!(machine.ask("start"), ["error: an alarm is latched, see status, then clear it"]);
     assert_eq!(machine.ask("clear"), ["ok"]);

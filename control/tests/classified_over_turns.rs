@@ -7,7 +7,7 @@ mod common;
 #[path = "common/rolling.rs"]
 mod rolling;
 
-use common::ByWidth;
+use common::{ByWidth, LEAST_HOLD_MM};
 use control::{
     alarm::Alarm,
     ground::class::{Class, Vote},
@@ -37,7 +37,7 @@ fn rolling(turns: u16, seen_mm: &[(f64, f64)], unseen: usize, settings: &[(Setti
     let (first_mm, second_mm) = (first_mm.collect(), seen_mm.to_vec());
     match turns {
         0 => Rolling::along(first_mm, second_mm, settings),
-        _ => Rolling::with(Rig::new(ByWidth::late_by(turns)), first_mm, second_mm, settings),
+        _ => Rolling::with(Rig::new(ByWidth::new(LEAST_HOLD_MM, turns)), first_mm, second_mm, settings),
     }
 }
 

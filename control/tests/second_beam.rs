@@ -187,7 +187,7 @@ fn stand(
         (Setting::LeadOutMs, 60),
         (Setting::LeadInMs, 0),
     ];
-    (Rolling::with(Rig::new(ByWidth::of_stalks()), first, second, &settings), plants)
+    (Rolling::with(Rig::new(ByWidth::new(0, 0)), first, second, &settings), plants)
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn a_plant_missed_by_the_first_beam_is_not_mixed_up_with_the_next() {
         let mut first = both.clone();
         first.remove(8);
         let settings = [(Setting::MarginMm, 20), (Setting::SecondBeamMm, 200), (Setting::LeadInMs, 0)];
-        let mut rolling = Rolling::with(Rig::new(ByWidth::of_stalks()), first, both.clone(), &settings);
+        let mut rolling = Rolling::with(Rig::new(ByWidth::new(0, 0)), first, both.clone(), &settings);
         rolling.roll_to(6000.0, 500.0);
         assert_eq!(rolling.alarms(), []);
         assert!(rolling.least_margin_mm(&both) > 0.0, "{behind_mm} mm: {}", rolling.least_margin_mm(&both));
@@ -282,7 +282,7 @@ fn plants_of_nine_millimetres_are_compared_with_every_encoder() {
     for (ticks_per_m, is_told) in [(900, true), (1910, true), (8000, true)] {
         let plants: Vec<_> = (1..=10).map(|plant| f64::from(plant) * 400.0).map(|from| (from, from + 10.0)).collect();
         let settings = [(Setting::TicksPerM, ticks_per_m), (Setting::SecondBeamMm, 200)];
-        let machine = Rig::new(ByWidth::of_stalks());
+        let machine = Rig::new(ByWidth::new(0, 0));
         let mut rolling = Rolling::with(machine, plants.clone(), plants, &settings);
         rolling.turns = f64::from(ticks_per_m) / (1000.0 * rolling::TICKS_A_MM);
         rolling.roll_to(4000.0, 500.0);

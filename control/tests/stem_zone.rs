@@ -4,7 +4,7 @@ mod common;
 #[path = "common/rolling.rs"]
 mod rolling;
 
-use common::ByWidth;
+use common::{ByWidth, LEAST_HOLD_MM};
 use control::settings::Setting;
 use proptest::prelude::*;
 use rig::Rig;
@@ -89,7 +89,7 @@ fn a_cut_detection_is_kept_from_end_to_end() {
 #[test]
 fn a_detection_unclassified_before_the_next_is_kept_from_end_to_end() {
     let plants = vec![(500.0, 650.0), (680.0, 830.0)];
-    let machine = Rig::new(ByWidth::late_by(1250));
+    let machine = Rig::new(ByWidth::new(LEAST_HOLD_MM, 1250));
     let mut rolling = Rolling::with(machine, plants, Vec::new(), &SETTINGS);
     rolling.roll_to(1600.0, 300.0);
     rolling.assert_kept(500.0, 650.0);

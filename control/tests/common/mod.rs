@@ -7,10 +7,12 @@ use control::ground::{
 use knn::Example;
 use rig::Rig;
 
-/// Classifies detections narrower than 60 mm as weeds, or none.
+/// The least hold of a plant that is 60 mm wide, in mm.
+pub const LEAST_HOLD_MM: i16 = 160;
+
+/// Classifies detections with a shorter hold as weeds.
 #[derive(Clone, Debug)]
 pub struct ByWidth {
-    /// The least hold of a plant.
     least_hold_mm: i16,
     /// Additional turns for each classification.
     turns: u16,
@@ -19,15 +21,10 @@ pub struct ByWidth {
 }
 
 impl ByWidth {
-    /// A classifier that answers this many turns later.
-    pub fn late_by(turns: u16) -> Self {
-        Self { least_hold_mm: 160, turns, vote: (Vote::UNKNOWN, 0) }
-    }
-
-    /// A classifier that calls all detections plants, as after teaching a crop of stalks.
-    #[allow(dead_code, reason = "not every test has stalks")]
-    pub fn of_stalks() -> Self {
-        Self { least_hold_mm: 0, ..Self::late_by(0) }
+    /// A classifier with this least hold of a plant that answers `turns` turns later. With 0 mm all detections are plants, as after
+    /// teaching a crop of stalks.
+    pub fn new(least_hold_mm: i16, turns: u16) -> Self {
+        Self { least_hold_mm, turns, vote: (Vote::UNKNOWN, 0) }
     }
 }
 
@@ -81,7 +78,7 @@ impl Classifier for ByWidth {
 
 /// A machine in HOLD that started without saved settings; the operator has cleared that alarm.
 pub fn machine() -> Machine {
-    Rig::new(ByWidth::late_by(0))
+    Rig::new(ByWidth::new(LEAST_HOLD_MM, 0))
 }
 
 /// A machine as the tests have it.

@@ -1,7 +1,7 @@
 //! Encoder faults: silent, dead, a dead channel, jumps. And similar readings without a fault: stops, trembling, leaves.
 
 use crate::{
-    common::{ByWidth, machine},
+    common::{ByWidth, LEAST_HOLD_MM, machine},
     drive::{Drive, TICKS_A_METRE, TURN_US},
 };
 use control::{
@@ -319,7 +319,7 @@ fn jumps_are_an_alarm_by_the_distance_between_them() {
         for speed_m_s in [0.3, 1.2] {
             let mut readings = machine().readings;
             readings.jumps = u16::MAX - 10;
-            let (classifier, memory) = (ByWidth::late_by(0), Volatile::new());
+            let (classifier, memory) = (ByWidth::new(LEAST_HOLD_MM, 0), Volatile::new());
             let mut machine = Rig::wake_at(classifier, memory, readings, Beams::default(), Cause::PowerOn);
             machine.clear();
             let mut drive = Drive { machine, place: 0.0 };

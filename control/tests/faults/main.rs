@@ -9,7 +9,7 @@ mod drive;
 mod encoder;
 mod saved_settings;
 
-use common::ByWidth;
+use common::{ByWidth, LEAST_HOLD_MM};
 use control::{
     alarm::{Alarm, Warning},
     measure::{readings::Readings, reset::Cause},
@@ -158,7 +158,7 @@ fn nothing_happens_when_time_and_position_wrap() {
     // Both counters pass their end in the middle of a row.
     let swings = |first_steps: u32, first_count: i32| {
         let readings = Readings::new(Instant::new(first_steps), Position::new(first_count));
-        let (classifier, memory) = (ByWidth::late_by(0), Volatile::new());
+        let (classifier, memory) = (ByWidth::new(LEAST_HOLD_MM, 0), Volatile::new());
         let mut machine = Rig::wake_at(classifier, memory, readings, Beams::default(), Cause::PowerOn);
         machine.clear();
         machine.start(false).unwrap();

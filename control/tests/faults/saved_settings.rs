@@ -1,6 +1,6 @@
 //! Saved settings at start-up, valid or contradicting each other.
 
-use crate::common::ByWidth;
+use crate::common::{ByWidth, LEAST_HOLD_MM};
 use control::{
     alarm::Alarm,
     measure::reset::Cause,
@@ -14,7 +14,7 @@ use rig::{Beams, Rig};
 fn saved_settings_are_in_use_after_a_restart() {
     let mut settings = Settings::new();
     settings.set(Setting::K, 7).unwrap();
-    let machine = Rig::wake(ByWidth::late_by(0), saved(&settings), Cause::PowerOn);
+    let machine = Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), saved(&settings), Cause::PowerOn);
     assert_eq!((machine.state(), machine.settings()), (State::Hold, &settings));
 }
 
@@ -30,7 +30,7 @@ fn saved(settings: &Settings) -> Volatile {
 fn a_dry_run_refused_for_contradicting_settings_keeps_the_open_detection() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
-    let mut machine = Rig::wake(ByWidth::late_by(0), saved(&settings), Cause::PowerOn);
+    let mut machine = Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), saved(&settings), Cause::PowerOn);
     machine.clear();
     machine.turn();
     machine.see(Beams::one(true));
@@ -45,7 +45,7 @@ fn saved_settings_that_contradict_each_other_are_an_alarm_and_do_not_start() {
     let mut settings = Settings::new();
     settings.set(Setting::ServoInUs, 2000).unwrap();
     settings.set(Setting::BeamToToolMm, 200).unwrap();
-    let mut machine = Rig::wake(ByWidth::late_by(0), saved(&settings), Cause::PowerOn);
+    let mut machine = Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), saved(&settings), Cause::PowerOn);
     assert_eq!(machine.state(), State::Alarm(Alarm::SettingsContradict));
     machine.clear();
     assert_eq!(machine.start(false), Err(CommandError::PulsesEqual));

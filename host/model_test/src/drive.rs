@@ -608,7 +608,7 @@ impl<M: Machine> Drive<M> {
         let (slowest, fastest) = (slowest - SPEED_RESOLUTION, fastest + SPEED_RESOLUTION);
         let ground = self.ground.floor() as i64 - self.geometry().beam_to_tool;
         let place = Place { tool: place - self.ticks(Setting::BeamToToolMm), slowest, fastest };
-        self.check_stand(ground, out || self.is_tried)?;
+        self.check_stand(place, ground, out || self.is_tried)?;
         if out || !works || self.machine.settings_are_in_doubt() {
             self.suspect = None;
         } else {

@@ -11,8 +11,8 @@
 //! the soak as a failure, with the seed and the time to repeat it. So does any other failed check of the model. Two
 //! other cases are counted separately, and are allowed:
 //! - *mistaken*: plants that were classified as weeds;
-//! - *blind*: plants that the firmware could not protect, because a faulty encoder had the count off by a quarter of the
-//!   margin, or within a swing and a tenth of a second of the fault.
+//! - *blind*: plants that the firmware could not protect. A faulty encoder had the count off by a quarter of the margin,
+//!   or the fault was less than a swing and a tenth of a second ago.
 
 mod board;
 mod field;

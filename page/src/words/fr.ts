@@ -1,6 +1,6 @@
 // The page's texts in French: en.ts is their source.
 
-import type { Language } from "./words.ts";
+import type { Language } from "./language.ts";
 
 export const fr: Language = {
     words: {

@@ -1,6 +1,6 @@
 // The page's texts in Hindi: en.ts is their source.
 
-import type { Language } from "./words.ts";
+import type { Language } from "./language.ts";
 
 export const hi: Language = {
     words: {

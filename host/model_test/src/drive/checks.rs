@@ -37,7 +37,7 @@ impl<M: Machine> Drive<M> {
     }
 
     /// Checks the swinging tool against the real plants, in every state.
-    pub(super) fn check_stand(&mut self, ground: i64, out: bool) -> Checked {
+    pub(super) fn check_stand(&mut self, Place { tool, .. }: Place, ground: i64, out: bool) -> Checked {
         let geometry = self.geometry();
         let Some(stand) = &mut self.stand else { return Ok(()) };
         let now_us = self.world.time_us;
@@ -45,8 +45,7 @@ impl<M: Machine> Drive<M> {
             stand.mistrust_speed(now_us, &geometry);
         }
         let clear = stand.is_clear(out, now_us, M::LATENESS_US, &geometry);
-        let margin_mm = self.machine.settings().get(Setting::MarginMm) as i16;
-        let is_unseen = out && self.machine.unseen_mm() > margin_mm;
+        let is_unseen = out && self.model.is_unseen(tool, 0);
         stand.judge(clear, ground, now_us, &geometry, is_unseen).map_err(TestCaseError::fail)
     }
 
@@ -91,9 +90,9 @@ impl<M: Machine> Drive<M> {
 
     /// Checks that a tool stays out for a plant only if the beam has seen one near it.
     pub(super) fn check_reason(&mut self, Place { tool, slowest, fastest, .. }: Place) -> Checked {
-        // The machine expects at most all of its speed once more, and comes in only if the row is open for twice the lead.
+        // The machine expects at most 2.3 times its speed, and comes in only if the row is open for twice the lead.
         let lead_s = f64::from(self.machine.settings().get(Setting::LeadOutMs) + 1) / 1000.0;
-        let reach = (4.0 * fastest.max(-slowest) * lead_s) as i64 + self.ticks(Setting::MarginMm);
+        let reach = (4.6 * fastest.max(-slowest) * lead_s) as i64 + self.ticks(Setting::MarginMm);
         let is_explained = self.machine.reason() != Some(Reason::Plant)
             || self.model.has_canopy_near(tool, reach)
             // The machine may guard ground that it has not reported yet, and a second beam closes more.
