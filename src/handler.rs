@@ -3,11 +3,11 @@
 //! The handlers are in assembly because the encoder waits for each of them. The longest handler and the longest critical section
 //! limit the wheel's speed (see `encoder`). No handler turns interrupts on, so only one runs at a time and all share the same save
 //! locations: SREG in GPIOR0, r24 in GPIOR2. Each takes one cycle to save and one to restore; the stack takes two. GPIOR1 is the
-//! encoder's. A handler that needs a pointer pushes Z itself. No handler uses any other register, not even r1, which need not be 0
-//! here.
+//! encoder's. Bit 7 of GPIOR0 tells the loop whether a handler has run (`idle`). A handler that needs a pointer pushes Z itself. No
+//! handler uses any other register, not even r1, which need not be 0 here.
 //!
-//! A handler's budget runs from the interrupt's response to the end of `reti`. Four cycles are the response, two the vector's jump,
-//! and ten this file's. `shared` and `ring` hold the data that handlers share with the loop.
+//! A handler's budget runs from the interrupt's response to the end of `reti`. Four cycles are the response, four
+//! more after sleep, two the vector's jump, and ten this file's. `shared` and `ring` hold the data that handlers share with the loop.
 
 /// Defines the handler of an interrupt vector from the vector's symbol, its assembly and the operands. The handler may use r24 and
 /// the flags. It returns after the last line. Rarely used lines go `aside`, after the return, and jump back.

@@ -1,7 +1,8 @@
 //! The weeder's firmware: setup, and the loop that reads, decides and applies.
 //!
 //! The crate `control` decides. Each file beside this one drives one peripheral and its interrupt; interrupts only count, stamp or
-//! move bytes. Only this file uses them all. The loop never waits for the serial line, the field, or an EEPROM write.
+//! move bytes. Only this file uses them all. The loop never waits for the serial line, the field, or an EEPROM write. It sleeps
+//! until an interrupt brings something new.
 
 #![no_std]
 #![no_main]
@@ -16,6 +17,7 @@ mod encoder;
 mod examples;
 mod handler;
 mod heartbeat;
+mod idle;
 mod loop_bound;
 mod reset;
 mod ring;
@@ -73,9 +75,10 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
     encoder::watch(&peripherals.EXINT, &peripherals.PORTD, &peripherals.CPU);
     let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB);
     let mut serial = serial::Serial::new(peripherals.USART0);
+    idle::allow(&peripherals.CPU);
+    watchdog::start();
     // SAFETY: each interrupt's peripheral is set up, and no critical section is open.
     unsafe { interrupt::enable() };
-    watchdog::start();
 
     let mut stack = stack::Stack::new();
     let mut read = move || {
@@ -90,8 +93,9 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
     // The pulse for "tool out" is a setting, so the servo starts after the settings are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
-    loop {
+    'turn: loop {
         watchdog::feed();
+        idle::begin_turn();
         // Read first: an edge that is still queued then has no later position than the next readings.
         let readings = read();
         beam.watch_second(controller.has_second_beam());
@@ -103,8 +107,10 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
         let Ok(()) = lamp.set_state(controller.lamp_is_lit().into());
 
         // A turn has time for one of these: a long calculation, some bytes of the console, or one step of its work.
-        let bytes = if controller.catch_up() { 0 } else { CONSOLE_BYTES };
-        for _ in 0..bytes {
+        if controller.catch_up() {
+            continue;
+        }
+        for _ in 0..CONSOLE_BYTES {
             loop_bound::at_most::<CONSOLE_BYTES>();
             if serial.room() > 0
                 && let Some(byte) = console.next_byte()
@@ -121,10 +127,13 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
                     break;
                 }
             } else {
-                console.carry_on(controller);
+                if console.carry_on(controller) {
+                    continue 'turn;
+                }
                 break;
             }
         }
+        idle::sleep();
     }
 }
 

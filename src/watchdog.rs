@@ -36,7 +36,7 @@ unsafe extern "C" fn switch_watchdog_off() {
     )
 }
 
-/// Starts the watchdog: the loop must feed it every 250 ms.
+/// Starts the watchdog: the loop must feed it every 250 ms. Called before interrupts are turned on.
 pub fn start() {
     set(RESET_LATER);
 }
@@ -58,18 +58,17 @@ pub fn reset() -> ! {
     }
 }
 
+/// Sets the control register, with interrupts off: none may delay the second write.
 fn set(control: u8) {
-    interrupt::free(|_| {
-        // SAFETY: only this file uses WDTCSR (0x60). The two writes are within four cycles. Interrupts are off, so none can delay
-        // the second (11.9.2).
-        unsafe {
-            asm!(
-                "wdr",
-                "sts 0x60, {allow}",
-                "sts 0x60, {control}",
-                allow = in(reg_upper) ALLOW_CHANGE,
-                control = in(reg_upper) control,
-            );
-        }
-    });
+    // SAFETY: only this file uses WDTCSR (0x60). The two writes are within four cycles (data sheet, 11.9.2), because both callers have
+    // interrupts off.
+    unsafe {
+        asm!(
+            "wdr",
+            "sts 0x60, {allow}",
+            "sts 0x60, {control}",
+            allow = in(reg_upper) ALLOW_CHANGE,
+            control = in(reg_upper) control,
+        );
+    }
 }

@@ -177,7 +177,7 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
     if let Some(turn) = &bounds.turn {
         match turn.cycles {
             Some(cycles) => line(format!(
-                "A turn of the main loop takes at most {cycles} cycles, without handlers. No real turn comes near that: the bounds of \
+                "A turn of the main loop takes at most {cycles} cycles, without handlers and sleep. No real turn comes near that: the bounds of \
                  nested loops multiply."
             )),
             None => line(format!(

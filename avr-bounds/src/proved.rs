@@ -152,7 +152,7 @@ pub struct Bounds {
     pub closed: Longest,
     /// The watched input.
     pub edges: Option<EdgeBounds>,
-    /// The longest turn of the main program's loop, from one `wdr` to the next, without handlers; `None` if no loop
+    /// The longest turn of the main program's loop, from one `wdr` to the next, without handlers and sleep; `None` if no loop
     /// feeds the watchdog.
     pub turn: Option<Longest>,
     /// Every loop without a bound, except those that the program never leaves.

@@ -63,11 +63,14 @@ impl Console {
     }
 
     /// Runs one step that fits a turn: writes a byte to the EEPROM, runs a command, or builds the next line. An answer is never
-    /// interrupted; events come after it, and curves last.
-    pub fn carry_on<C: Classifier, M: Memory>(&mut self, controller: &mut Controller<C, M>) {
+    /// interrupted; events come after it, and curves last. Returns whether the EEPROM has more bytes to write.
+    pub fn carry_on<C: Classifier, M: Memory>(&mut self, controller: &mut Controller<C, M>) -> bool {
+        if !self.line.is_done() {
+            return false;
+        }
         // An answer waits for its command's EEPROM writes: `ok` means that they are done.
-        if !self.line.is_done() || !controller.carry_on() {
-            return;
+        if !controller.carry_on() {
+            return true;
         }
         if let Answer::Typed(line) = self.answer {
             self.answer = execute(line, controller);
@@ -78,5 +81,6 @@ impl Console {
         } else if let Some(plot) = controller.next_plot() {
             write_plot(controller, plot, &mut self.line);
         }
+        false
     }
 }

@@ -67,8 +67,8 @@ fn the_end_switch_times_the_servo() {
     let told = uno.received();
     let line = told.lines().find(|line| line.starts_with("calibrated ")).expect("how it ended");
     let number = |key| value(line, key).parse::<f64>().expect("a number");
-    // A pulse is known only at its end, and the firmware adds 11 ms to the swing out.
-    assert!((159.0..=168.0).contains(&number("lead_out_ms")), "{line}");
+    // A pulse is known only at its end, the switch is read a millisecond late at most, and the firmware adds 11 ms to the swing out.
+    assert!((159.0..=169.0).contains(&number("lead_out_ms")), "{line}");
     assert!((58.0..=66.0).contains(&number("lead_in_ms")), "{line}");
     assert_eq!(value(line, "set"), "yes");
     assert_eq!(value(&ask(&mut uno, "get lead_out_ms")[0], "lead_out_ms"), value(line, "lead_out_ms"));

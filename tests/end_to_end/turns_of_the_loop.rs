@@ -2,9 +2,9 @@
 //!
 //! The loop reads the ground once a turn, so its decisions are late by up to a turn. A turn may therefore take a
 //! millisecond. In that time a machine at 5 km/h rolls 1.4 mm. Longer work is divided over several turns. The time is
-//! counted in cycles from one reset of the watchdog to the next, interrupts included.
+//! counted in cycles from one reset of the watchdog to the next, interrupts included. Sleep is not counted: an interrupt ends it.
 
-use crate::common::{Run, run_for_ms, started, steady, trial};
+use crate::common::{Run, encoder_steps, run_for_ms, started, steady, trial};
 use control::ground::field_examples;
 use control::say::command::{LINE_LENGTH, Word};
 use control::settings::Setting;
@@ -186,6 +186,30 @@ fn no_turn_takes_more_than_a_millisecond_where_fifteen_examples_vote_of_as_many_
         let longest = run.uno.turns().expect("they are measured").longest;
         println!("{longest} of {TURN} cycles with {taught} from the field");
         assert!(longest <= TURN, "a turn took {longest} cycles with {taught} from the field");
+    }
+}
+
+/// Encoder counts a second, with more time between two than a turn takes.
+const COUNTS_PER_S: u64 = 2000;
+
+#[test]
+fn each_interrupt_starts_a_turn_and_the_loop_sleeps_between() {
+    let mut uno = started();
+    // Without counts only the clock's overflows start turns.
+    for counts in [0, COUNTS_PER_S] {
+        let begin = uno.cycle();
+        let cycles = (1..=counts).map(|number| begin + number * CYCLES_PER_SECOND / COUNTS_PER_S);
+        uno.drive(encoder_steps(cycles.map(|cycle| (cycle, 1))));
+        uno.measure_turns();
+        run_for_ms(&mut uno, 1000);
+        let turns = uno.turns().expect("they are measured");
+        let awake = turns.total as f64 / CYCLES_PER_SECOND as f64;
+        println!("{counts} counts: {} turns, {:.0} % of the time awake", turns.count, awake * 100.0);
+        let overflows = CYCLES_PER_SECOND / (64 * 256);
+        // No sleep is between a long calculation, such as that of new leads, and the next turn.
+        let calculations = 100;
+        assert!((counts.max(overflows)..=counts + overflows + calculations).contains(&turns.count), "{turns:?}");
+        assert!(awake < 0.6, "{turns:?}");
     }
 }
 

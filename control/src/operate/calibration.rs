@@ -73,6 +73,9 @@ const SPARE_MS: u8 = 7;
 /// Longest wait of a command in fixed frames.
 const FRAME_MS: u8 = 20;
 
+/// How late the end switch may be read: the loop sleeps for so long at most.
+const LATE_MS: u16 = 1;
+
 /// The servo's measured times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SwingTimes {
@@ -140,7 +143,7 @@ impl Swings {
             if self.tool_out() {
                 self.leads.out_ms = self.leads.out_ms.max(lasted_ms + 1 + u16::from(self.spare_ms));
             } else {
-                self.leads.in_ms = self.leads.in_ms.min(lasted_ms);
+                self.leads.in_ms = self.leads.in_ms.min(lasted_ms - LATE_MS);
             }
         }
         if lasted < SWING {

@@ -303,7 +303,9 @@ impl Core {
                 simavr::cpu_Sleeping => {
                     self.asleep = true;
                     let rest = until.saturating_sub((*avr).cycle);
-                    (*avr).cycle += until_next_timer.min(rest).max(1);
+                    let slept = until_next_timer.min(rest).max(1);
+                    (*avr).cycle += slept;
+                    self.recorder_mut().turns.slept(slept);
                 }
                 _ => return Err(Stop::Crashed),
             }

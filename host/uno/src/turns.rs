@@ -1,7 +1,7 @@
 //! The length of a turn of the firmware's main loop: the cycles from one `wdr` instruction to the next.
 //!
-//! This works for any loop that feeds the watchdog once a turn. The time of interrupts during a turn is included. The
-//! recorder is off by default, because watching every instruction slows the simulation.
+//! This works for any loop that feeds the watchdog once a turn. The time of interrupts during a turn is included, sleep
+//! is not. The recorder is off by default, because watching every instruction slows the simulation.
 
 /// Cycles of the main loop's turns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +42,11 @@ impl TurnRecorder {
             turns.longest = turns.longest.max(cycle - begun);
             turns.total += cycle - begun;
         }
+    }
+
+    /// The processor has slept, which is not a part of the turn.
+    pub(super) fn slept(&mut self, cycles: u64) {
+        self.begun = self.begun.map(|begun| begun + cycles);
     }
 
     /// A reset ends a turn, which is not counted.

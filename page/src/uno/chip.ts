@@ -9,7 +9,6 @@ import {
     AVREEPROM,
     AVRIOPort,
     type AVRPortConfig,
-    AVRTimer,
     AVRUSART,
     AVRWatchdog,
     avrInstruction,
@@ -26,6 +25,7 @@ import {
     usart0Config,
     watchdogConfig,
 } from "avr8js";
+import { addTimer } from "./timer.ts";
 
 /** Cycles of the Uno's clock in a second. */
 export const CYCLES_PER_SECOND = 16_000_000;
@@ -39,11 +39,14 @@ export const EEPROM_BYTES = 1024;
 const RESET_CAUSES = { "power-on": 1, external: 2, "brown-out": 4, watchdog: 8 } as const;
 export type ResetCause = keyof typeof RESET_CAUSES;
 
-/** MCUSR's and UCSR0A's addresses in the data space (data sheet, register summary). */
+/** Addresses in the data space (data sheet, register summary). */
+const SMCR = 0x53;
 const MCUSR = 0x54;
 const UCSR0A = 0xc0;
 /** UCSR0A: a byte has been received and not read yet. */
 const RXC0 = 0x80;
+/** SMCR: sleep is enabled. */
+const SE = 0x01;
 
 /** Start address of SRAM in the data space. */
 const SRAM_START = 0x100;
@@ -53,10 +56,13 @@ const EEPROM_HALF_CYCLES = (CYCLES_PER_SECOND * 3.4e-3) / 2;
 
 /** Cycles that entering an interrupt takes more than avr8js counts: 4 (data sheet, 7.7.1) less 2. */
 const INTERRUPT_ENTRY_CYCLES = 2;
+/** Cycles that an interrupt takes more if it ends a sleep (data sheet, 7.7.1). */
+const WAKE_UP_CYCLES = 4;
 
 /** Instructions after which one more is executed before an interrupt (data sheet, 7.7). */
 const RETI = 0x9518;
 const SEI = 0x9478;
+const SLEEP = 0x9588;
 
 export class Chip {
     /** The board's pins, each a bit of a port: D0 to D13, then A0 to A5. */
@@ -66,6 +72,7 @@ export class Chip {
     watchdogRanOut = false;
     readonly #cpu: CPU;
     #until = 0;
+    #isAsleep = false;
 
     /** Starts with these memories, after this cause, at this cycle. */
     constructor(program: Uint16Array, sram: Uint8Array, eeprom: EEPROMBackend, cause: ResetCause, cycle: number) {
@@ -79,7 +86,7 @@ export class Chip {
             return Array.from({ length: count }, (_, bit) => ({ port, bit }));
         };
         this.pins = [...bits(portDConfig, 8), ...bits(portBConfig, 6), ...bits(portCConfig, 6)];
-        for (const config of [timer0Config, timer1Config, timer2Config]) new AVRTimer(cpu, config);
+        for (const config of [timer0Config, timer1Config, timer2Config]) addTimer(cpu, config);
         this.usart = new AVRUSART(cpu, usart0Config, CYCLES_PER_SECOND);
         new AVREEPROM(cpu, eeprom, {
             ...eepromConfig,
@@ -115,13 +122,31 @@ export class Chip {
         const program = cpu.progMem;
         this.#until = cycle;
         while (cpu.cycles < this.#until) {
-            const instruction = program[cpu.pc];
-            avrInstruction(cpu);
-            if (instruction === RETI || instruction === SEI) avrInstruction(cpu);
+            if (this.#isAsleep) this.#skipToEvent();
+            else {
+                let instruction = program[cpu.pc];
+                avrInstruction(cpu);
+                if (instruction === RETI || instruction === SEI) {
+                    instruction = program[cpu.pc];
+                    avrInstruction(cpu);
+                }
+                this.#isAsleep = instruction === SLEEP && ((cpu.data[SMCR] ?? 0) & SE) !== 0;
+            }
             const next = cpu.pc;
             cpu.tick();
-            if (cpu.pc !== next) cpu.cycles += INTERRUPT_ENTRY_CYCLES;
+            if (cpu.pc !== next) {
+                cpu.cycles += INTERRUPT_ENTRY_CYCLES + (this.#isAsleep ? WAKE_UP_CYCLES : 0);
+                this.#isAsleep = false;
+            }
         }
+    }
+
+    /** Lets the time pass to the next event of a peripheral, unless an interrupt is waiting. */
+    #skipToEvent(): void {
+        const cpu = this.#cpu;
+        if (cpu.nextInterrupt >= 0 && cpu.interruptsEnabled) return;
+        const { nextClockEvent } = cpu as unknown as { nextClockEvent?: { cycles: number } };
+        cpu.cycles = Math.max(cpu.cycles, Math.min(this.#until, nextClockEvent?.cycles ?? this.#until));
     }
 
     /** Calls `happen` after this number of cycles, unless a reset comes before. */

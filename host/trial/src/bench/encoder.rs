@@ -166,8 +166,10 @@ const RUN: std::ops::RangeInclusive<u32> = 3..=12;
 const RUN_UP: u32 = 4000;
 const RUN_UP_CYCLES: u64 = CYCLES_PER_SECOND / 40_000;
 
-/// The most critical sections of the loop between two that are made worse: some turns of the loop.
-const SECTIONS_PASSED: u32 = 40;
+/// The most critical sections of the loop between two that are made worse: some turns of the loop. The loop sleeps up to a
+/// millisecond between two turns, and the wheel stands meanwhile. After a longer stand the firmware would take the jumps
+/// for noise.
+const SECTIONS_PASSED: u32 = 12;
 
 /// Turns the encoder of the firmware at `elf` for half a second, with edges that wait for the moments at which they have to wait
 /// longest themselves, and are never closer together than `counts_per_s` and the jitter have them.

@@ -1,0 +1,46 @@
+// A timer of avr8js that is called only when something happens.
+//
+// avr8js calls a timer at each of its steps: two million times a second at a prescaler of 8. The count is right after any number of
+// steps (`count`), so a call is needed only at a compare match and at the end of the period. `lazily` postpones the calls up to there.
+// A write to a register calls the timer first, and at the next step again.
+
+import { AVRTimer, type AVRTimerConfig, type CPU } from "avr8js";
+
+/** avr8js's number of the mode in which a timer counts up from 0 and starts again: all but the phase correct ones. */
+const COUNTS_UP = [0, 2, 3];
+
+/** A timer's private state, as avr8js 0.21 has it. */
+interface State {
+    readonly tcnt: number;
+    readonly ocrA: number;
+    readonly ocrB: number;
+    readonly TOP: number;
+    readonly divider: number;
+    readonly timerMode: number;
+}
+
+/** Adds a timer to a chip. */
+export function addTimer(cpu: CPU, config: AVRTimerConfig): void {
+    const timer = new AVRTimer(cpu, config);
+    const { count } = timer;
+    const add = cpu.addClockEvent.bind(cpu);
+    cpu.addClockEvent = (callback, cycles) =>
+        add(callback, callback === count && cycles > 1 ? cycles + moreCycles(timer as unknown as State) : cycles);
+    for (const register of [config.TCCRA, config.OCRA, config.OCRB, config.ICR]) {
+        const write = cpu.writeHooks[register];
+        if (!register || !write) continue;
+        cpu.writeHooks[register] = (...change) => {
+            count(false);
+            const done = write(...change);
+            cpu.updateClockEvent(count, 1);
+            return done;
+        };
+    }
+}
+
+/** Cycles from a timer's next step to the first step at which something happens. */
+function moreCycles({ tcnt, ocrA, ocrB, TOP, divider, timerMode }: State): number {
+    if (!COUNTS_UP.includes(timerMode)) return 0;
+    const next = Math.min(...[ocrA, ocrB, TOP + 1].filter((value) => value > tcnt));
+    return Number.isFinite(next) ? (next - tcnt - 1) * divider : 0;
+}

@@ -1,0 +1,26 @@
+//! Sleep between turns: the loop starts a turn for each interrupt, and sleeps when none has come since the turn began.
+//!
+//! In idle mode (data sheet, 10.3) only the processor stops. Every interrupt wakes it, the clock's after 1.024 ms at most. A change that
+//! no interrupt reports, such as the work switch, is seen within that time. The handlers save SREG in GPIOR0 with the interrupt flag clear
+//! (`handler`), so its bit 7 stays set only if none has run.
+
+use avr_device::atmega328p::CPU;
+use core::arch::asm;
+
+/// Allows sleep, in idle mode.
+pub fn allow(cpu: &CPU) {
+    cpu.smcr().write(|w| w.se().set_bit());
+}
+
+/// Notes that a turn begins.
+pub fn begin_turn() {
+    // SAFETY: outside of handlers, only this file uses GPIOR0.
+    unsafe { asm!("sbi 0x1e, 7", options(nostack, preserves_flags)) };
+}
+
+/// Sleeps until the next interrupt, if none has come since the turn began. One that comes between the two instructions is followed by a
+/// sleep, of 1.024 ms at most.
+pub fn sleep() {
+    // SAFETY: the instructions change nothing.
+    unsafe { asm!("sbic 0x1e, 7", "sleep", options(nostack, preserves_flags)) };
+}
