@@ -31,10 +31,11 @@ impl Clock {
         let (high, low, steps, flags) = interrupt::free(|_| {
             (OVERFLOWS_HIGH.get(), OVERFLOWS_LOW.get(), self.0.tcnt0().read().bits(), self.0.tifr0().read())
         });
-        let instant = u32::from(high) << 16 | u32::from(u16::from_le_bytes([steps, low]));
         // An overflow during these reads is still pending. It counts if the steps were read after it, which a small number shows.
         let is_pending = flags.tov0().bit_is_set() && steps < 128;
-        Instant::new(if is_pending { instant.wrapping_add(1 << 8) } else { instant })
+        let (low, carry) = low.overflowing_add(is_pending.into());
+        let high = high.wrapping_add(carry.into());
+        Instant::new(u32::from(high) << 16 | u32::from(u16::from_le_bytes([steps, low])))
     }
 }
 

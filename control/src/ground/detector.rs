@@ -124,9 +124,12 @@ impl Detector {
         // The machine may return to the frontier with another level than it left with.
         self.turn(merge_gap);
         self.frontier = position;
-        let clear = !self.broken_at_frontier;
-        let complete = self.detection.take_if(|detection| clear && position - detection.trailing >= merge_gap);
-        complete.filter(|detection| !detection.is_empty())
+        let detection = self.detection?;
+        if self.broken_at_frontier || position - detection.trailing < merge_gap {
+            return None;
+        }
+        self.detection = None;
+        (!detection.is_empty()).then_some(detection)
     }
 
     /// Applies the beam's level to the frontier.

@@ -63,11 +63,10 @@ impl<M: Memory> FieldExamples<M> {
     pub fn init(&mut self) {
         self.spoiled = 0;
         for (number, example) in (0..).zip(&mut self.examples) {
-            let mut bytes = [0; SLOT];
-            for (address, byte) in (address(number)..).zip(&mut bytes) {
-                *byte = self.memory.read(address);
-            }
-            *example = example_in(bytes);
+            let bytes: [u8; SLOT] = core::array::from_fn(|place| self.memory.read(address(number) + place as u16));
+            let (features, rest) = bytes.split_at(features::COUNT);
+            example.features.copy_from_slice(features);
+            example.label = rest[0];
             if bytes != encode(*example) || usize::from(example.label) >= label::COUNT {
                 example.label = VACANT;
                 self.spoiled += u8::from(bytes != [ERASED; SLOT]);
@@ -197,12 +196,6 @@ fn encode(example: Taught) -> [u8; SLOT] {
     let [mark, scale] = SCALE_MARK;
     let [low, high] = checksum(&[a, b, c, d, e, example.label, mark, scale]).to_le_bytes();
     [a, b, c, d, e, example.label, low, high]
-}
-
-/// The example in a slot's bytes, without a check.
-fn example_in(bytes: [u8; SLOT]) -> Taught {
-    let [a, b, c, d, e, label, ..] = bytes;
-    Example::new([a, b, c, d, e], label)
 }
 
 #[cfg(test)]

@@ -119,10 +119,10 @@ impl Leads {
     /// way back begins in a moment, at the measured speed. A lead that is too long would let the tool in too early.
     pub fn at(speed: TicksPerSecond, expected: TicksPerSecond, settings: &Settings, scale: LengthScale) -> Self {
         let out_ms = settings.get(Setting::LeadOutMs);
-        let rolled = |speed: TicksPerSecond, milliseconds| scale.length(speed.distance_in_ms(milliseconds));
+        let rolled = move |speed: TicksPerSecond, milliseconds| scale.length(speed.distance_in_ms(milliseconds));
         // 1 ms is added for the mean delay of a command: half a tick, half a turn, half a pulse. A lead of 0 stays 0, as the paper
         // has it.
-        let lead = |speed, milliseconds: u16| rolled(speed, milliseconds + u16::from(milliseconds > 0));
+        let lead = move |speed, milliseconds: u16| rolled(speed, milliseconds + u16::from(milliseconds > 0));
         Self {
             out: lead(expected, out_ms),
             back: lead(speed, settings.get(Setting::LeadInMs).min(out_ms)),
