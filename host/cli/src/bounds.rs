@@ -2,8 +2,8 @@
 //! The firmware and its budgets are this repository's. Commands that flash a firmware first check here whether its
 //! bounds are proved.
 
-use crate::finding::Finding;
 use crate::output::{print, tell};
+use crate::program::Finding;
 use anyhow::{Result, bail};
 use avr_bounds::command::{Options, Report, report};
 use avr_bounds::{Budgets, Held, Program};
@@ -40,7 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     let Report { text, keeps } = report(&elf, &options)?;
     print(format_args!("{text}"))?;
-    Ok(if keeps { Finding::Good } else { Finding::Bad })
+    Ok(Finding::of(keeps))
 }
 
 /// A budget file of this repository.

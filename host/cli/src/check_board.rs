@@ -1,10 +1,10 @@
 //! `weeder check-board`: a second Uno, the tester, drives the weeder's inputs and measures its outputs.
 
 use crate::ctrl_c;
-use crate::destination::{FileName, Replace};
-use crate::finding::Finding;
+use crate::destination::{OutName, Replace};
 use crate::output::{print, say, tell};
-use crate::progress::Progress;
+use crate::program::Finding;
+use crate::progress::with_bar;
 use anyhow::Result;
 use check::desk::Desk;
 use check::ports;
@@ -53,7 +53,7 @@ pub struct Arguments {
     json: bool,
     /// Write a page as well.
     #[arg(long, value_name = "FILE.html")]
-    page: Option<FileName>,
+    page: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
 }
@@ -63,7 +63,7 @@ pub struct Arguments {
 /// # Errors
 /// If a board does not answer, or the page cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let page = arguments.page.as_ref().map(|page| page.check(arguments.replace)).transpose()?;
+    let page = arguments.page.as_ref().map(|page| page.file(arguments.replace)).transpose()?;
     let second = arguments.second_simulator.as_deref();
     let start = || Desk::start(&firmware::build_tester()?, &firmware::build()?, second);
     let desk = arguments.simulated.then(start).transpose()?;
@@ -76,16 +76,16 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         if port.is_some() && tester.is_some() { vec![] } else { plugged()?.into_iter().map(|uno| uno.port).collect() };
     let (mut weeder, mut tester) = ports::open(port.as_deref(), tester.as_deref(), &unos)?;
     tester.interrupted_by(ctrl_c()?);
-    let bar = Progress::new("checking");
     let extent = Extent { brief: arguments.brief, simulated: arguments.simulated };
     let last = Cell::new("");
-    let result = check_run(&mut weeder, &mut tester, extent, |what, share| {
-        if last.replace(what) != what {
-            tell!("Next: {what}");
-        }
-        bar.show(share);
+    let result = with_bar("checking", |show| {
+        check_run(&mut weeder, &mut tester, extent, |what, share| {
+            if last.replace(what) != what {
+                tell!("Next: {what}");
+            }
+            show(share);
+        })
     });
-    bar.finish();
     drop((weeder, tester));
     if let Some(desk) = desk {
         desk.stop()?;
@@ -100,5 +100,5 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         }
     }
     printed?;
-    if report.is_good() { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+    Ok(Finding::of(report.is_good()))
 }

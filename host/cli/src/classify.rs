@@ -2,9 +2,9 @@
 //!
 //! The built-in examples, the scale, the radius and the code of the search are the firmware's.
 
-use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::say;
+use crate::program::Finding;
 use crate::source;
 use anyhow::Result;
 use clap::Args;
@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             say!("\n{confusion}")?;
         }
     }
-    if confusion.plants_taken_for_weeds() == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+    Ok(Finding::of(confusion.plants_taken_for_weeds() == 0))
 }
 
 /// The class of each detection, with its votes.

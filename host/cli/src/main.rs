@@ -38,13 +38,9 @@ mod trial;
 mod virtual_uno;
 
 use anyhow::{Context, Result};
-use clap::builder::StyledStr;
-use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use sim::finding::Finding;
-use sim::{course, destination, finding, numbers, output, progress, row, source};
-use std::env;
-use std::ffi::OsString;
+use clap::{Parser, Subcommand};
+use sim::program::Finding;
+use sim::{course, destination, numbers, output, program, progress, row, source};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -125,38 +121,8 @@ enum Command {
     Completions(completions::Arguments),
 }
 
-/// The grammar of all commands.
-fn grammar() -> clap::Command {
-    numbers::with_negative_numbers(Arguments::command())
-}
-
-/// Parses a command line.
-fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
-    let found = grammar().try_get_matches_from(&words);
-    found.and_then(|found| Arguments::from_arg_matches(&found)).map_err(|error| with_known_commands(error, &words))
-}
-
-/// The same error. For an unknown command, it lists the known ones.
-fn with_known_commands(mut error: clap::Error, words: &[OsString]) -> clap::Error {
-    if error.kind() == ErrorKind::InvalidSubcommand {
-        let mut command = grammar();
-        let mut words = words.iter().skip(1);
-        while let Some(inner) = words.next().and_then(|word| command.find_subcommand(word)) {
-            command = inner.clone();
-        }
-        let known: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
-        let tip = StyledStr::from(format!("the commands are {}", known.join(", ")));
-        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
-    }
-    error
-}
-
 fn main() -> ExitCode {
-    let arguments = match parse(env::args_os().collect()) {
-        Ok(arguments) => arguments,
-        Err(error) => error.exit(),
-    };
-    finding::exit(run(arguments.command))
+    program::main(|arguments: Arguments| run(arguments.command))
 }
 
 /// A flag that Ctrl-C sets, and SIGTERM and SIGHUP: it asks a command to end.
@@ -181,7 +147,7 @@ fn run(command: Command) -> Result<Finding> {
         Command::Trial(arguments) => trial::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),
         Command::Merge(arguments) => merge::run(&arguments),
-        Command::Train(arguments) => train::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments).map(|()| Finding::Good),
         Command::Classify(arguments) => classify::run(&arguments),
         Command::Monitor(arguments) => monitor::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments).map(|()| Finding::Good),
@@ -196,19 +162,27 @@ fn run(command: Command) -> Result<Finding> {
         Command::Plan(arguments) => plan::run(&arguments).map(|()| Finding::Good),
         Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
         Command::Figures(arguments) => figures::run(&arguments),
-        Command::Completions(arguments) => completions::run(&arguments, grammar()).map(|()| Finding::Good),
+        Command::Completions(arguments) => {
+            completions::run(&arguments, program::grammar::<Arguments>()).map(|()| Finding::Good)
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::destination::{FileName, FolderName};
+    use crate::destination::OutName;
+    use crate::program::parse;
     use clap::{Arg, Command};
     use std::any::TypeId;
     use std::collections::BTreeSet;
+    use std::ffi::OsString;
     use std::fs;
     use std::path::{Path, PathBuf};
+
+    fn grammar() -> Command {
+        program::grammar::<Arguments>()
+    }
 
     #[test]
     fn the_arguments_are_well_formed() {
@@ -231,7 +205,7 @@ mod tests {
             for option in command.get_arguments().filter(|option| option.get_action().takes_values()) {
                 let Some(long) = option.get_long() else { continue };
                 let words = name.split(' ').map(OsString::from).chain([format!("--{long}").into(), "-1".into()]);
-                let Err(error) = parse(words.collect()) else { continue };
+                let Err(error) = parse::<Arguments>(words.collect()) else { continue };
                 let said = error.to_string();
                 assert!(!said.contains("unexpected argument"), "{name} --{long}: {said}");
                 let Some((_, rest)) = said.split_once("number from ") else { continue };
@@ -305,23 +279,14 @@ mod tests {
     fn is_free(argument: &Arg) -> bool {
         let parser = argument.get_value_parser();
         let found = parser.type_id();
-        let kinds = [
-            TypeId::of::<String>(),
-            TypeId::of::<OsString>(),
-            TypeId::of::<PathBuf>(),
-            TypeId::of::<FileName>(),
-            TypeId::of::<FolderName>(),
-        ];
         let has_words_alone = !argument.is_hide_possible_values_set() && parser.possible_values().is_some();
-        kinds.iter().any(|kind| found == *kind) && !has_words_alone
+        let names = [TypeId::of::<String>(), TypeId::of::<PathBuf>()].iter().any(|kind| found == *kind);
+        writes(argument) || names && !has_words_alone
     }
 
     /// Whether it names an output.
     fn writes(argument: &Arg) -> bool {
-        let found = argument.get_value_parser().type_id();
-        [TypeId::of::<FileName>(), TypeId::of::<FolderName>(), TypeId::of::<OsString>()]
-            .iter()
-            .any(|kind| found == *kind)
+        argument.get_value_parser().type_id() == TypeId::of::<OutName>()
     }
 
     #[test]
@@ -362,7 +327,7 @@ mod tests {
         let folder = folder.to_str().expect("it is text");
         let words = words.split(' ').map(|word| OsString::from(word.replace("DIR", folder)));
         let words = ["weeder".into()].into_iter().chain(words).chain([last.into()]);
-        run(parse(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
+        run(parse::<Arguments>(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
     }
 
     #[test]
@@ -428,7 +393,7 @@ mod tests {
             let mut seen = 0;
             for example in examples {
                 let words = shlex::split(example).expect("its quotes are balanced");
-                if let Err(error) = parse(words.into_iter().map(OsString::from).collect()) {
+                if let Err(error) = parse::<Arguments>(words.into_iter().map(OsString::from).collect()) {
                     panic!("{example}: {error}");
                 }
                 seen += 1;

@@ -9,12 +9,13 @@ mod plain;
 mod terminal;
 mod view;
 
-use crate::finding::Finding;
 use crate::ports::Ports;
+use crate::program::Finding;
 use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
 use link::row_names::ALL;
+use link::rows::Rows;
 use std::path::PathBuf;
 
 /// The arguments.
@@ -66,6 +67,14 @@ fn row(name: &str, names: &[String]) -> Result<Option<usize>, String> {
     match names.iter().position(|known| known == name) {
         None if name != ALL => Err(format!("there is no row {name}: there are {}", names.join(", "))),
         row => Ok(row),
+    }
+}
+
+/// Sends a command to a row. `hold` comes before all waiting commands.
+fn send(rows: &Rows, row: usize, command: &str) {
+    match command {
+        "hold" => rows.hold(row),
+        _ => rows.command(row, command),
     }
 }
 

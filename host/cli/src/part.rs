@@ -1,33 +1,55 @@
-//! `--shard`: writes a part of a study to a file, for `weeder merge`.
+//! A study's result: how `weeder merge` and the study's own command show it, and the part of it that `--shard` writes.
 //!
 //! A part names the program that computed it: the version, and a checksum of the program's file. The version alone is
 //! not enough, because an unreleased build has the version of the last release.
 
-use crate::destination::{FileName, OutFile, Replace};
+use crate::destination::{OutFile, OutName, Replace};
 use crate::output::{say, tell};
 use anyhow::{Context, Result};
+use clap::{Args, builder::PossibleValuesParser};
 use experiments::shard::{self, Header, Numbered, Program, Shard};
+use experiments::sweep::RESULTS;
 use serde::Serialize;
 use std::env;
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
+/// How to show a study's result.
+#[derive(Args)]
+pub struct Shown {
+    /// The folder for a trial's report, or the file for a sweep, as --out of that command.
+    #[arg(long, value_name = "FOLDER|FILE.csv")]
+    pub out: Option<OutName>,
+    #[command(flatten)]
+    pub replace: Replace,
+    /// Print JSON instead of tables or words.
+    #[arg(long)]
+    pub json: bool,
+    /// Print only the most important columns of a trial.
+    #[arg(long, conflicts_with = "json")]
+    pub brief: bool,
+    /// The result to show for a sweep with two axes. Default: plant_damage.
+    #[arg(long, value_parser = PossibleValuesParser::new(RESULTS))]
+    pub result: Option<String>,
+}
+
 /// A part, and a file that was writable when it was checked.
-pub struct Part<'a> {
+pub struct Part {
     shard: Shard,
-    out: OutFile<'a>,
+    out: OutFile,
     program: Program,
     began: Instant,
 }
 
-impl<'a> Part<'a> {
-    /// A shard's.
+impl Part {
+    /// The part of a shard, if the user asks for one.
     ///
     /// # Errors
     /// If the file could not be written, or this program cannot be read.
-    pub fn new(shard: Shard, out: &'a FileName, replace: Replace) -> Result<Self> {
-        Ok(Self { shard, out: out.check(replace)?, program: program()?, began: Instant::now() })
+    pub fn asked(shard: Option<Shard>, out: Option<&OutName>, replace: Replace) -> Result<Option<Self>> {
+        let Some((shard, out)) = shard.zip(out) else { return Ok(None) };
+        Ok(Some(Self { shard, out: out.file(replace)?, program: program()?, began: Instant::now() }))
     }
 
     /// Which one it is.

@@ -1,7 +1,7 @@
 //! `weeder record`: logs the machine's output to a file, or each row's to its own file.
 
 use crate::ctrl_c;
-use crate::destination::{FolderName, Replace};
+use crate::destination::{OutName, Replace};
 use crate::output::tell;
 use crate::ports::{Chosen, Ports};
 use crate::receiver::GpsArguments;
@@ -131,10 +131,8 @@ impl Logs {
     /// If one cannot be written, or is something else.
     pub fn open(out: &std::path::Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
-            let folder = FolderName::from(out.as_os_str().to_owned());
-            // An existing log is continued.
-            folder.check([""; 0], Replace::default())?;
-            folder.make()?;
+            // An existing log is continued, so no name is checked.
+            OutName::from(out.as_os_str().to_owned()).folder([""; 0], Replace::default())?.make()?;
         }
         let path = |row| if chosen.are_several { Chosen::file_in(out, row, "csv") } else { out.to_owned() };
         let paths = chosen.rows.iter().map(path);
@@ -147,15 +145,16 @@ impl Logs {
     /// # Errors
     /// At the first failure of a log.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
-        match self.logs.get_mut(row) {
-            Some(log) if log.is_written => log.writer.write(happening).inspect_err(|_| log.is_written = false),
-            _ => Ok(()),
+        let log = &mut self.logs[row];
+        if !log.is_written {
+            return Ok(());
         }
+        log.writer.write(happening).inspect_err(|_| log.is_written = false)
     }
 
     /// The time of a row's line written now, in milliseconds.
     fn now_ms(&self, row: usize) -> u64 {
-        self.logs.get(row).map_or(0, |log| log.writer.now_ms())
+        self.logs[row].writer.now_ms()
     }
 
     /// Writes the lines that `lines` returns for the present time into a row's log, as [`Logs::write`].
@@ -163,7 +162,7 @@ impl Logs {
     /// # Errors
     /// At the first failure of a log.
     fn lines_at(&mut self, row: usize, lines: impl FnOnce(u64) -> Lines) -> Result<(), LogError> {
-        let Some(log) = self.logs.get_mut(row) else { return Ok(()) };
+        let log = &mut self.logs[row];
         let time_ms = log.writer.now_ms();
         let lines = lines(time_ms);
         if !log.is_written {

@@ -1,7 +1,7 @@
 //! `weeder replay`: repeats the decisions of a log on the PC.
 
-use crate::finding::Finding;
 use crate::output::say;
+use crate::program::Finding;
 use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
@@ -57,5 +57,5 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             None => say!("The decisions of {name} are those of this version")?,
         }
     }
-    Ok(if difference.is_none() { Finding::Good } else { Finding::Bad })
+    Ok(Finding::of(difference.is_none()))
 }

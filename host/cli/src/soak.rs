@@ -1,11 +1,11 @@
 //! `weeder soak`: hours of the decisions and minutes of the real firmware, with random faults.
 
-use crate::destination::{FileName, Replace};
-use crate::finding::Finding;
+use crate::destination::{OutName, Replace};
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::part::{self, Part};
-use crate::progress::Progress;
+use crate::program::Finding;
+use crate::progress::{Show, with_bar};
 use anyhow::{Result, ensure};
 use clap::Args;
 use experiments::shard::{Numbered, Shard};
@@ -49,7 +49,7 @@ pub struct Arguments {
     shard: Option<Shard>,
     /// The file for --shard.
     #[arg(long, value_name = "FILE", requires = "shard")]
-    out: Option<FileName>,
+    out: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Print JSON instead of words.
@@ -84,13 +84,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         hours > 0 || uno_minutes > 0,
         "with --hours 0 and --uno-minutes 0 nothing is tried: one of them has to be above 0"
     );
-    let part = arguments.shard.zip(arguments.out.as_ref());
-    let part = part.map(|(shard, out)| Part::new(shard, out, arguments.replace)).transpose()?;
-    let elf = match &arguments.elf {
-        _ if uno_minutes == 0 => None,
-        Some(path) => Some(path.clone()),
-        None => Some(firmware::build()?),
-    };
+    let part = Part::asked(arguments.shard, arguments.out.as_ref(), arguments.replace)?;
+    let elf = (uno_minutes > 0).then(|| arguments.elf.clone().map_or_else(firmware::build, Ok)).transpose()?;
     let firmware = elf.as_deref().map(part::check_sum).transpose()?;
     let study = Study { seed, faults, hours, uno_minutes, firmware };
     if let Some(part) = part {
@@ -98,13 +93,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
     let mut stages = Vec::new();
     if hours > 0 {
-        stages
-            .push(Stage::of(DECISIONS, json, |bar| soak::hours(study.plan(), hours.into(), |share| bar.show(share)))?);
+        stages.push(Stage::of(DECISIONS, json, |show| soak::hours(study.plan(), hours.into(), show))?);
     }
     if let Some(elf) = &elf {
-        stages.push(Stage::of(FIRMWARE, json, |bar| {
-            soak::minutes(study.plan(), uno_minutes.into(), elf, |share| bar.show(share))
-        })?);
+        stages.push(Stage::of(FIRMWARE, json, |show| soak::minutes(study.plan(), uno_minutes.into(), elf, show))?);
     }
     conclude(&study, &stages, json)
 }
@@ -115,18 +107,18 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
     let all = hours + u64::from(study.uno_minutes);
     let numbers = part.shard().numbers(all);
     let count = numbers.len() as f64;
-    let bar = Progress::new("soaking");
-    let mut tallies = Vec::new();
-    for (number, begun) in numbers.zip(0..) {
-        let show = |share: f64| bar.show((f64::from(begun) + share) / count);
-        let outcome = match elf {
-            Some(elf) if number >= hours => soak::minute(study.plan(), number - hours, elf, show)?,
-            _ => soak::hour(study.plan(), number, show)?,
+    let tallies = with_bar("soaking", |show| {
+        let tally = |(number, begun)| {
+            let show = |share: f64| show((f64::from(begun) + share) / count);
+            let outcome = match elf {
+                Some(elf) if number >= hours => soak::minute(study.plan(), number - hours, elf, show)?,
+                _ => soak::hour(study.plan(), number, show)?,
+            };
+            show(1.0);
+            Ok(Numbered { number, outcome })
         };
-        show(1.0);
-        tallies.push(Numbered { number, outcome });
-    }
-    bar.finish();
+        numbers.zip(0..).map(tally).collect::<Result<Vec<_>>>()
+    })?;
     part.write(COMMAND, all, study, tallies)?;
     Ok(Finding::Good)
 }
@@ -158,7 +150,7 @@ fn conclude(study: &Study, stages: &[Stage], json: bool) -> Result<Finding> {
     } else if !is_good {
         say!("To see it again: weeder soak --seed {seed} --faults {faults}")?;
     }
-    Ok(if is_good { Finding::Good } else { Finding::Bad })
+    Ok(Finding::of(is_good))
 }
 
 /// A stage's name for programs, and for people.
@@ -175,12 +167,9 @@ struct Stage {
 
 impl Stage {
     /// Runs it with a progress bar, and prints its result, unless the output is JSON.
-    fn of(title: Title, json: bool, work: impl FnOnce(&Progress) -> Result<Tally, SoakError>) -> Result<Self> {
+    fn of(title: Title, json: bool, work: impl FnOnce(Show) -> Result<Tally, SoakError>) -> Result<Self> {
         let began = Instant::now();
-        let bar = Progress::new(title.1);
-        let tally = work(&bar);
-        bar.finish();
-        let stage = Self { title, tally: tally? };
+        let stage = Self { title, tally: with_bar(title.1, work)? };
         stage.say(json)?;
         let took_s = began.elapsed().as_secs_f64();
         tell!("Pace        {took_s:.1} s, {:.0} times real time", stage.tally.seconds / took_s);

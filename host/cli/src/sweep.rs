@@ -1,10 +1,10 @@
 //! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
 
-use crate::destination::{FileName, OutFile, Replace};
+use crate::destination::{OutFile, OutName, Replace};
 use crate::numbers::{number_within, whole_within};
 use crate::output::{print, say};
-use crate::part::Part;
-use crate::progress::Progress;
+use crate::part::{Part, Shown};
+use crate::progress::with_bar;
 use crate::source::{self, offering};
 use anyhow::Result;
 use clap::Args;
@@ -25,7 +25,7 @@ use trial::report::number_table;
 pub const COMMAND: &str = "sweep";
 
 /// The default result.
-pub const RESULT: &str = RESULTS[0];
+const RESULT: &str = RESULTS[0];
 
 /// The examples in the help.
 const EXAMPLES: &str = "\
@@ -114,7 +114,7 @@ pub struct Arguments {
     seed: u64,
     /// Also write all results of all points to this file; with --shard, the part.
     #[arg(long, value_name = "FILE.csv")]
-    out: Option<FileName>,
+    out: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Compute only the points of this shard, the Ith of N, and write them to the file of --out.
@@ -123,24 +123,6 @@ pub struct Arguments {
     /// Print all results of all points as JSON instead of a table.
     #[arg(long)]
     json: bool,
-}
-
-/// How to show a sweep's points.
-pub struct Shown {
-    /// The output file.
-    pub out: Option<FileName>,
-    /// Whether to replace existing files.
-    pub replace: Replace,
-    /// Whether to print JSON.
-    pub json: bool,
-    /// The result to show, if there are two axes.
-    pub result: String,
-}
-
-impl Shown {
-    fn out(&self) -> Result<Option<OutFile<'_>>> {
-        self.out.as_ref().map(|out| out.check(self.replace)).transpose()
-    }
 }
 
 /// Runs it and prints the result, or writes a part of it.
@@ -158,19 +140,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         spacing_cm: arguments.spacing,
         seed: arguments.seed,
     };
-    if let Some((shard, out)) = arguments.shard.zip(out.as_ref()) {
-        let part = Part::new(shard, out, replace)?;
-        let bar = Progress::new("sweeping");
-        let outcomes = sweep.run_shard(shard, |share| bar.show(share))?;
-        bar.finish();
+    if let Some(part) = Part::asked(arguments.shard, out.as_ref(), replace)? {
+        let outcomes = with_bar("sweeping", |show| sweep.run_shard(part.shard(), show))?;
         return part.write(COMMAND, sweep.size(), &sweep, outcomes);
     }
-    let shown = Shown { out: out.clone(), replace, json, result: result.clone() };
-    let out = shown.out()?;
-    let bar = Progress::new("sweeping");
-    let points = sweep.run(|share| bar.show(share))?;
-    bar.finish();
-    show(&sweep, &points, &shown, out.as_ref())
+    let shown = Shown { out: out.clone(), replace, json, brief: false, result: Some(result.clone()) };
+    let out = file(&shown)?;
+    let points = with_bar("sweeping", |show| sweep.run(show))?;
+    show(&sweep, &points, &shown, out)
 }
 
 /// Prints the result of all points' plots, from this or other machines.
@@ -178,17 +155,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// # Errors
 /// If the file cannot be written.
 pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
-    let out = shown.out()?;
-    show(sweep, &sweep.points(outcomes)?, shown, out.as_ref())
+    let out = file(shown)?;
+    show(sweep, &sweep.points(outcomes)?, shown, out)
 }
 
-fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<&OutFile>) -> Result<()> {
+fn file(shown: &Shown) -> Result<Option<OutFile>> {
+    shown.out.as_ref().map(|out| out.file(shown.replace)).transpose()
+}
+
+fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<OutFile>) -> Result<()> {
     let printed = match shown.json {
         true => say!("{:#}", in_json(sweep, points)),
-        false => print(format_args!("{}", in_words(&shown.result, sweep, points))),
+        false => print(format_args!("{}", in_words(shown.result.as_deref().unwrap_or(RESULT), sweep, points))),
     };
     if let Some(out) = out {
-        write(out, sweep, points)?;
+        write(&out, sweep, points)?;
         if !shown.json {
             say!("Written: {}", out.path().display())?;
         }

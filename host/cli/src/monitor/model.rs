@@ -168,15 +168,10 @@ impl Model {
         match heard.what {
             What::Happened(happening) => self.update(heard.row, happening),
             What::Answered { refusal, .. } => {
-                let answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
-                if let Some(row) = self.rows.get_mut(heard.row) {
-                    row.answer = answer;
-                }
+                self.rows[heard.row].answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
             }
             What::NotTyped { command, why } => {
-                if let Some(row) = self.rows.get_mut(heard.row) {
-                    row.answer = Answer::Refused;
-                }
+                self.rows[heard.row].answer = Answer::Refused;
                 self.say_of(heard.row, &format!("-- `{command}` was not typed: {why}"));
             }
         }
@@ -198,25 +193,25 @@ impl Model {
             Happening::Status(..) | Happening::Settings(..) | Happening::Examples(_) => None,
         };
         if let Happening::Answer(line) = &happening
-            && let Some(head) = self.rows.get_mut(number).and_then(|row| row.heading.before(line))
+            && let Some(head) = self.rows[number].heading.before(line)
         {
             self.say_of(number, &format!("-- {head}"));
         }
         if let Some(said) = said {
             self.say_of(number, &said);
         }
-        let Some(row) = self.rows.get_mut(number) else { return };
+        let row = &mut self.rows[number];
         self.rings |= match &happening {
             Happening::Event(EventLine::Alarm { .. }, _) => true,
             Happening::Lost(_) => row.is_there(),
             _ => false,
         };
         row.update(happening);
-        if let Some(step) = row.take_step() {
+        let (step, warning) = (row.take_step(), row.take_warning());
+        if let Some(step) = step {
             self.say_of(number, &format!("-- next, {step}"));
         }
-        let Some(row) = self.rows.get_mut(number) else { return };
-        if let Some(warning) = row.take_warning() {
+        if let Some(warning) = warning {
             self.say_of(number, &format!("-- warning: {warning}"));
         }
     }
@@ -231,9 +226,9 @@ impl Model {
 
     /// Adds a line of a row, with its name if there are several.
     fn say_of(&mut self, number: usize, line: &str) {
-        match self.rows.get(number) {
-            Some(row) if self.are_several() => self.say(format!("{}: {line}", row.name)),
-            _ => self.say(line.to_owned()),
+        match self.are_several() {
+            true => self.say(format!("{}: {line}", self.rows[number].name)),
+            false => self.say(line.to_owned()),
         }
     }
 }

@@ -4,10 +4,10 @@
 //! the row's name. A `hold` to all goes to all rows at the same moment, and its result includes the time of the last
 //! row.
 
-use super::addressed;
-use crate::finding::Finding;
+use super::{addressed, send};
 use crate::output::tell;
 use crate::ports::Chosen;
+use crate::program::Finding;
 use crate::record::Logs;
 use anyhow::{Error, Result, ensure};
 use link::examples::Heading;
@@ -121,10 +121,7 @@ impl Talk<'_> {
                 continue;
             }
             (standing.unanswered, standing.statuses) = (standing.unanswered + 1, 0);
-            match command {
-                "hold" => self.rows.hold(row),
-                _ => self.rows.command(row, command),
-            }
+            send(self.rows, row, command);
         }
         self.report_hold(output)
     }

@@ -1,7 +1,7 @@
 //! The monitor on a terminal: keys go in, the screen comes out.
 
 use super::model::{Model, RowModel};
-use super::{addressed, view};
+use super::{addressed, send, view};
 use crate::record::Logs;
 use anyhow::{Context, Result};
 use link::rows::{Hold, Rows, What};
@@ -70,25 +70,13 @@ fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
         KeyCode::PageDown => model.choose(true),
         _ => {
             let Some(line) = model.line.key(key) else { return };
-            let (to, command) = match addressed(&line, &model.names(), model.target) {
-                Ok(meant) => meant,
-                Err(why) => {
-                    model.say(format!("-- {why}; nothing was sent"));
-                    return;
-                }
-            };
-            match command {
-                "" => return,
-                "hold" if to.is_none() => {
-                    hold_all(model, rows);
-                    return;
-                }
-                _ => model.sent(to, command),
-            }
-            for row in model.targets(to) {
-                match command {
-                    "hold" => rows.hold(row),
-                    _ => rows.command(row, command),
+            match addressed(&line, &model.names(), model.target) {
+                Err(why) => model.say(format!("-- {why}; nothing was sent")),
+                Ok((_, "")) => {}
+                Ok((None, "hold")) => hold_all(model, rows),
+                Ok((to, command)) => {
+                    model.sent(to, command);
+                    model.targets(to).into_iter().for_each(|row| send(rows, row, command));
                 }
             }
         }
@@ -135,7 +123,11 @@ mod tests {
             model.hold.as_ref().map(|hold| hold.summary(&model.names())).as_deref(),
             Some("HOLD 0 of 2; NOT THERE: left, right")
         );
-        assert_eq!((model.line.text(), model.target), ("", Some(0)), "it does not stand before the next command");
+        assert_eq!(
+            (model.line.text.as_str(), model.target),
+            ("", Some(0)),
+            "it does not stand before the next command"
+        );
         // The word `hold`, typed to all rows, does the same.
         (model.hold, model.target) = (None, None);
         typed(&mut model, &rows, "hold");

@@ -123,10 +123,10 @@ fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
 fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect) {
     let prompt = format!("{to}> ");
     // A line has at most 80 characters.
-    let column = (area.x + (prompt.chars().count() + model.line.cursor()) as u16).min(area.right().saturating_sub(1));
-    frame.render_widget(Line::from(vec![prompt.bold(), model.line.text().into()]), area);
+    let column = (area.x + (prompt.chars().count() + model.line.cursor) as u16).min(area.right().saturating_sub(1));
+    frame.render_widget(Line::from(vec![prompt.bold(), model.line.text.as_str().into()]), area);
     frame.set_cursor_position(Position::new(column, area.y));
-    let candidates = model.line.candidates();
+    let candidates = &model.line.candidates;
     let text = if !candidates.is_empty() {
         let last = |line: &String| line.rsplit(' ').next().unwrap_or_default().to_owned();
         Line::raw(candidates.iter().map(last).collect::<Vec<_>>().join("  ")).dim()
