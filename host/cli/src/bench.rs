@@ -11,7 +11,6 @@ use trial::bench::{self, encoder, servo, swings};
 use trial::firmware;
 use uno::elf::Size;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -11,7 +11,6 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use trial::firmware;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -15,7 +15,6 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use trial::firmware;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 The tester is an Uno with the tester's firmware, wired to the weeder's Uno: docs/check-board.md has the wires.

@@ -14,7 +14,6 @@ use field::row::Kind;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -8,7 +8,6 @@ use anyhow::Result;
 use clap::Args;
 use clap_complete::Shell;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

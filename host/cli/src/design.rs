@@ -12,7 +12,6 @@ use mechanics::{file, paper, report};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

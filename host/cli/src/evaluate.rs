@@ -13,7 +13,6 @@ use std::path::{Path, PathBuf};
 /// The report's name in its folder.
 const REPORT: &str = "report.html";
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder evaluate trial.csv                   the results, and what they depend on\n  \

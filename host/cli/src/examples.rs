@@ -15,7 +15,6 @@ use link::examples::{self, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder examples pull chilli.csv             write the taught examples into a table

@@ -13,7 +13,6 @@ use trial::firmware;
 use uno::elf::Image;
 use uno::hex;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

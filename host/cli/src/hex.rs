@@ -9,7 +9,6 @@ use clap::Args;
 use uno::elf::Image;
 use uno::hex;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Example:

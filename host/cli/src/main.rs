@@ -237,32 +237,42 @@ mod tests {
     const NO_FILE: &str = "bounds:chip bounds:function check-board:board check-board:port check-board:tester examples.diff:port examples.pull:port examples.push:port flash:port rows.forget:name rows.name:name \
         rows.name:port set-up:port sim:channel_a sim:channel_b sim:channel_beam";
 
-    /// The words before the name of each file or folder that a command writes; for a folder also its files. `DIR` is a
-    /// folder with the required inputs.
-    const WRITERS: [(&str, &str, &[&str]); 18] = [
-        ("check-board:page", "check-board --simulated --page", &[]),
-        ("evaluate:out", "evaluate DIR/filled.csv --out", &["report.html"]),
-        ("examples.pull:file", "examples pull --port /dev/no-such-port", &[]),
-        ("hex:out", "hex", &[]),
-        ("map:out", "map DIR/log.csv --out", &[]),
-        ("map:svg", "map DIR/log.csv --out DIR/new --svg", &[]),
-        ("map:table", "map DIR/log.csv --out DIR/new --table", &[]),
-        ("merge:out", "merge DIR/trial.part --out", &["report.html", "trial.csv", "controllers.csv"]),
-        ("merge:out", "merge DIR/sweep.part --out", &[]),
-        ("plan:out", "plan --out", &[]),
-        ("settings.pull:file", "settings pull --port /dev/no-such-port", &[]),
-        ("settings.pull:file", "settings pull --port a=/dev/no-a --port b=/dev/no-b", &["a.toml", "b.toml"]),
-        ("sim:out", "sim --out", &["row.svg", "weeding.svg", "row.csv", "plants.csv", "weeds.csv"]),
-        ("sim:vcd", "sim --vcd", &[]),
-        ("soak:out", "soak --shard 1/2 --out", &[]),
-        ("sweep:out", "sweep --x k=1..3:1 --out", &[]),
-        ("train:picture", "train --synthetic --picture", &[]),
-        ("trial:out", "trial --out", &["report.html", "trial.csv", "controllers.csv"]),
+    /// Each argument that names an output, a command line that has it, and the files of which each alone must stop the
+    /// command. `DIR` is a folder with the required inputs.
+    const WRITERS: [(&str, &str, &[&str]); 21] = [
+        ("check-board:page", "check-board --simulated --page DIR/new", &["new"]),
+        ("evaluate:out", "evaluate DIR/filled.csv --out DIR/reports", &["reports/report.html"]),
+        ("examples.pull:file", "examples pull --port /dev/no-such-port DIR/new", &["new"]),
+        ("hex:out", "hex DIR/new", &["new"]),
+        ("map:out", "map DIR/log.csv --out DIR/new", &["new"]),
+        ("map:svg", "map DIR/log.csv --out DIR/map --svg DIR/new", &["new"]),
+        ("map:table", "map DIR/log.csv --out DIR/map --table DIR/new", &["new"]),
+        ("merge:out", "merge DIR/trial.part --out DIR/reports", &TRIAL),
+        ("merge:out", "merge DIR/sweep.part --out DIR/new", &["new"]),
+        ("plan:out", "plan --out DIR/new", &["new"]),
+        ("settings.pull:file", "settings pull --port /dev/no-such-port DIR/new", &["new"]),
+        (
+            "settings.pull:file",
+            "settings pull --port a=/dev/no-a --port b=/dev/no-b DIR/reports",
+            &["reports/a.toml", "reports/b.toml"],
+        ),
+        (
+            "sim:out",
+            "sim --out DIR/reports",
+            &["reports/row.svg", "reports/weeding.svg", "reports/row.csv", "reports/plants.csv", "reports/weeds.csv"],
+        ),
+        ("sim:vcd", "sim --vcd DIR/new", &["new"]),
+        ("soak:out", "soak --shard 1/2 --out DIR/new", &["new"]),
+        ("sweep:out", "sweep --x k=1..3:1 --out DIR/new", &["new"]),
+        ("train:out", "train --synthetic --out DIR/new.rs", &["new.rs"]),
+        ("train:out", "train --synthetic --out DIR/new.csv", &["new.csv"]),
+        ("train:picture", "train --synthetic --picture DIR/new", &["new"]),
+        ("trial:out", "trial --out DIR/reports", &TRIAL),
+        ("trial:out", "trial --shard 1/2 --out DIR/new.part", &["new.part"]),
     ];
 
-    /// Writers whose file name ends with its format.
-    const BY_ENDING: [(&str, &str, &[&str]); 2] =
-        [("train:out", "train --synthetic --out", &["rs", "csv"]), ("trial:out", "trial --shard 1/2 --out", &["part"])];
+    /// The report of a trial.
+    const TRIAL: [&str; 3] = ["reports/report.html", "reports/trial.csv", "reports/controllers.csv"];
 
     /// Every argument that takes a word that could name a file, as `command.subcommand:argument`, and its type.
     fn words_taken() -> Vec<(String, Arg)> {
@@ -296,8 +306,7 @@ mod tests {
             .flat_map(|list| list.split_whitespace())
             .map(str::to_owned)
             .collect();
-        let replaced: BTreeSet<String> =
-            WRITERS.iter().chain(&BY_ENDING).map(|(argument, ..)| (*argument).to_owned()).collect();
+        let replaced: BTreeSet<String> = WRITERS.iter().map(|(argument, ..)| (*argument).to_owned()).collect();
         let taken = words_taken();
         for (name, argument) in &taken {
             assert_eq!(writes(argument), replaced.contains(name), "{name}: is what is there replaced? See WRITERS");
@@ -312,8 +321,7 @@ mod tests {
 
     #[test]
     fn a_command_that_writes_has_force_and_no_other_has_it_for_that() {
-        let writers: BTreeSet<&str> =
-            WRITERS.iter().chain(&BY_ENDING).filter_map(|(argument, ..)| argument.split(':').next()).collect();
+        let writers: BTreeSet<&str> = WRITERS.iter().filter_map(|(argument, ..)| argument.split(':').next()).collect();
         for (name, command) in subcommands(&grammar(), "weeder") {
             let name = name.trim_start_matches("weeder ").replace(' ', ".");
             let mut options = command.get_arguments().filter(|argument| argument.get_long() == Some("force"));
@@ -322,11 +330,11 @@ mod tests {
         }
     }
 
-    /// Runs a command in this process, with `DIR` for a folder, and a last word.
-    fn run_with(words: &str, folder: &Path, last: &Path) -> Result<Finding> {
+    /// Runs a command in this process, with `DIR` for a folder.
+    fn run_in(folder: &Path, words: &str) -> Result<Finding> {
         let folder = folder.to_str().expect("it is text");
-        let words = words.split(' ').map(|word| OsString::from(word.replace("DIR", folder)));
-        let words = ["weeder".into()].into_iter().chain(words).chain([last.into()]);
+        let words = ["weeder"].into_iter().chain(words.split(' '));
+        let words = words.map(|word| OsString::from(word.replace("DIR", folder)));
         run(parse::<Arguments>(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
     }
 
@@ -338,45 +346,32 @@ mod tests {
         fs::write(path("log.csv"), "time_ms,kind,line\n0,connected,0.2.0\n").unwrap();
         let filled = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
         fs::copy(filled, path("filled.csv")).unwrap();
-        for words in ["trial --speeds 2 --spacings 50", "sweep --x k=1..1:1"] {
-            let part = path(words.split(' ').next().unwrap()).with_extension("part");
-            let words = format!("{words} --field DIR/small.toml --shard 1/1 --out");
-            run_with(&words, folder.path(), &part).expect("it computes a part");
-        }
-        let assert_kept = |words: &str, there: &Path, named: &Path| {
-            fs::write(there, "mine").unwrap();
-            let error = run_with(words, folder.path(), named).expect_err(words).to_string();
-            let right =
-                format!("{} is there already: choose another name, or have --force replace it", there.display());
-            assert_eq!(error, right, "{words}");
-            assert_eq!(fs::read_to_string(there).unwrap(), "mine", "{words}");
-            fs::remove_file(there).unwrap();
-        };
+        let run = |words: &str| run_in(folder.path(), words);
+        let small = "--field DIR/small.toml --shard 1/1 --out";
+        run(&format!("trial --speeds 2 --spacings 50 {small} DIR/trial.part")).expect("it computes a part");
+        run(&format!("sweep --x k=1..1:1 {small} DIR/sweep.part")).expect("it computes a part");
+        fs::create_dir(path("reports")).unwrap();
         for (_, words, names) in WRITERS {
-            if names.is_empty() {
-                assert_kept(words, &path("there"), &path("there"));
-            }
-            for name in names {
-                fs::create_dir_all(path("reports")).unwrap();
-                assert_kept(words, &path("reports").join(name), &path("reports"));
-            }
-        }
-        for (_, words, endings) in BY_ENDING {
-            for ending in endings {
-                let there = path("there").with_extension(ending);
-                assert_kept(words, &there, &there);
+            for there in names.iter().map(|name| path(name)) {
+                fs::write(&there, "mine").unwrap();
+                let error = run(words).expect_err(words).to_string();
+                let right =
+                    format!("{} is there already: choose another name, or have --force replace it", there.display());
+                assert_eq!(error, right, "{words}");
+                assert_eq!(fs::read_to_string(&there).unwrap(), "mine", "{words}");
+                fs::remove_file(there).unwrap();
             }
         }
         // With `--force` it does, and an empty file holds no work.
         let table = path("plan.csv");
         fs::write(&table, "mine").unwrap();
-        run_with("plan --force --out", folder.path(), &table).expect("it is told to");
+        run("plan --force --out DIR/plan.csv").expect("it is told to");
         assert!(fs::read_to_string(&table).unwrap().contains("plot,replication"));
         fs::write(&table, "").unwrap();
-        run_with("plan --out", folder.path(), &table).expect("nothing is lost");
+        run("plan --out DIR/plan.csv").expect("nothing is lost");
         let report = path("reports/report.html");
         fs::write(&report, "mine").unwrap();
-        run_with("merge DIR/trial.part --brief --force --out", folder.path(), &path("reports")).expect("it is told to");
+        run("merge DIR/trial.part --brief --force --out DIR/reports").expect("it is told to");
         assert!(fs::read_to_string(&report).unwrap().contains("<svg"));
     }
 

@@ -16,7 +16,6 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It writes GeoJSON (WGS84) for QGIS: a point for each plant, weed, swing, alarm and label.\n\

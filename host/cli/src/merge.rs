@@ -13,7 +13,6 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -18,7 +18,6 @@ use link::row_names::ALL;
 use link::rows::Rows;
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Keys:\n  \

@@ -9,7 +9,6 @@ use experiments::plan::Plan;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use experiments::table::distinct;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use etcetera::BaseStrategy;
 use link::Link;
-use link::row_names::{Board, Names, Row, plugged, wrong_with};
+use link::row_names::{Board, Names, Plugged, Row, plugged, wrong_with};
 use link::rows::Opener;
 use std::collections::HashSet;
 use std::panic::resume_unwind;
@@ -189,16 +189,16 @@ fn end_of(port: &str) -> String {
     Path::new(port).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// The Unos that control no row with a name.
+pub fn unnamed<'a>(names: &'a Names, unos: &'a [Plugged]) -> impl Iterator<Item = &'a Plugged> {
+    let has = |row: &Row, uno: &Plugged| row.board == uno.board || row.board == Board::Port(uno.port.clone());
+    unos.iter().filter(move |uno| !names.rows().iter().any(|row| has(row, uno)))
+}
+
 /// Every row with a name, and every other Uno.
 fn every_row(names: &Names) -> Result<Vec<Row>> {
-    let mut rows = names.rows().to_vec();
-    let have_ports: Vec<Option<String>> = rows.iter().map(|row| row.board.port().ok()).collect();
-    for uno in plugged()? {
-        let is_named = rows.iter().any(|row| row.board == uno.board) || have_ports.contains(&Some(uno.port.clone()));
-        if !is_named {
-            rows.push(Row { name: end_of(&uno.port), board: uno.board });
-        }
-    }
+    let (mut rows, unos) = (names.rows().to_vec(), plugged()?);
+    rows.extend(unnamed(names, &unos).map(|uno| Row { name: end_of(&uno.port), board: uno.board.clone() }));
     ensure!(
         !rows.is_empty(),
         "there is no Uno at any USB port, and {} names no row: plug them in, or name their ports by --port",

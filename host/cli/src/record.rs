@@ -18,7 +18,6 @@ use std::time::{Duration, Instant};
 /// Time between two checks whether to end.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It records plants, swings and alarms, and the status ten times a second, until Ctrl-C.\n\

@@ -9,7 +9,6 @@ use link::{log, replay};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It shows the first difference between log and replay, and the status is then 1.\n\

@@ -18,7 +18,6 @@ use trial::firmware;
 /// The default TCP port.
 const HTTP_PORT: u16 = 8866;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 At this computer, the page may do the same as `weeder monitor`. In the network (--lan), it needs the

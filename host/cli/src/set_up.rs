@@ -21,7 +21,6 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It goes through the steps of docs/set-up.md. Enter accepts, s skips a step, q stops.

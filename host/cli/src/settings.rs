@@ -16,7 +16,6 @@ use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder settings pull machine.toml           write the machine's settings into a file\n  \

@@ -19,7 +19,6 @@ use trial::firmware;
 /// The name of the command in its parts.
 pub const COMMAND: &str = "soak";
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

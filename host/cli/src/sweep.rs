@@ -84,7 +84,6 @@ fn controller() -> impl TypedValueParser<Value = Treatment> {
     })
 }
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = format!("{EXAMPLES} `weeder sweep --help` lists them all."), after_long_help = long_help())]
 pub struct Arguments {

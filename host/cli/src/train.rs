@@ -17,7 +17,6 @@ use link::examples::CAPACITY;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(group = ArgGroup::new("objects").required(true).args(["files", "synthetic"]), after_help = "\
 Examples:

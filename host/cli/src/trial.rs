@@ -36,7 +36,6 @@ pub const COMMAND: &str = "trial";
 /// Most plants of a trial, roughly: counts are limited to four billion.
 const MOST_PLANTS: f64 = 2e9;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

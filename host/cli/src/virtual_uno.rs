@@ -17,7 +17,6 @@ use trial::receiver::{ReceiverSetup, Trouble};
 use uno::FileError;
 use uno::hex::Bootloader;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 The firmware runs as on a real Uno, with a simulated machine that rolls along the row repeatedly.

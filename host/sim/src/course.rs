@@ -57,18 +57,10 @@ const SPACING_SCATTER: f64 = 0.08;
 const CANOPY_SCATTER: f64 = 0.15;
 
 impl CourseArguments {
-    /// The row, read or grown.
+    /// The row of this number, read or grown. Each random row has other plants.
     ///
     /// # Errors
     /// If the file is wrong, or the numbers make no row.
-    pub fn row(&self) -> Result<Row> {
-        self.nth_row(0)
-    }
-
-    /// A neighbouring row. A random row has other plants.
-    ///
-    /// # Errors
-    /// As [`CourseArguments::row`].
     pub fn nth_row(&self, number: u64) -> Result<Row> {
         let seed = self.seed.wrapping_add(number);
         if let Some(path) = &self.row {

@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             let capture = Capture::read(path, &channels)?;
             play(arguments, &capture, vcd.as_ref())
         }
-        _ => weed(arguments, arguments.course.row()?, folder.as_ref(), vcd.as_ref()),
+        _ => weed(arguments, arguments.course.nth_row(0)?, folder.as_ref(), vcd.as_ref()),
     }
 }
 
