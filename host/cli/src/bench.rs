@@ -26,9 +26,6 @@ pub struct Arguments {
 const ROWS: u64 = 50;
 
 /// Measures and prints the figures.
-///
-/// # Errors
-/// If the bench or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bench_elf = firmware::build_bench()?;
     let elf = firmware::build()?;

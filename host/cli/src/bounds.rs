@@ -30,9 +30,6 @@ pub struct Arguments {
 }
 
 /// Proves and prints.
-///
-/// # Errors
-/// If the firmware cannot be built, read or followed, or the budgets not be read.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut options = arguments.options.clone();
     options.budgets.get_or_insert_with(|| budgets("budgets.toml"));

@@ -58,9 +58,6 @@ pub struct Arguments {
 }
 
 /// Checks, and prints the report.
-///
-/// # Errors
-/// If a board does not answer, or the page cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let page = arguments.page.as_ref().map(|page| page.file(arguments.replace)).transpose()?;
     let second = arguments.second_simulator.as_deref();

@@ -39,9 +39,6 @@ pub struct Arguments {
 }
 
 /// Classifies, and prints a line for each detection. With labels it also prints the confusion matrix.
-///
-/// # Errors
-/// If the file or its contents are wrong.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let objects = table::read(&arguments.file)?;
     let mut model = Model::built_in();

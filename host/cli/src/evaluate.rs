@@ -34,9 +34,6 @@ pub struct Arguments {
 }
 
 /// Reads, evaluates and prints.
-///
-/// # Errors
-/// If the table cannot be read or has an invalid plot, or the report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.folder([REPORT], arguments.replace)).transpose()?;
     let records = evaluation::read_csv(&arguments.file)?;

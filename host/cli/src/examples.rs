@@ -77,9 +77,6 @@ Example: weeder examples push chilli.csv --replace")]
 }
 
 /// Pulls, pushes or compares.
-///
-/// # Errors
-/// If table or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, port } => {

@@ -34,9 +34,6 @@ pub struct Arguments {
 const MARK: &str = "<!-- figures: ";
 
 /// Writes the figures, or compares them.
-///
-/// # Errors
-/// If a page cannot be read or written, has a figure without a block, or a command fails.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut differ = Vec::new();
     for path in &arguments.pages {

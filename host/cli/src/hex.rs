@@ -28,9 +28,6 @@ pub struct Arguments {
 }
 
 /// Writes it.
-///
-/// # Errors
-/// If the firmware cannot be built, read or proved, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.file(arguments.replace)?;
     let elf = arguments.firmware.elf()?;

@@ -63,62 +63,79 @@ struct Arguments {
     command: Command,
 }
 
-#[derive(Subcommand)]
-enum Command {
+/// The grammar of the commands, and the function that runs one. The module of each has its `Arguments`, and `run`. That
+/// fails if an argument, a file, the firmware or a machine cannot be used. The error says what would be right.
+macro_rules! commands {
+    ($($(#[$about:meta])+ $command:ident: $module:ident,)+) => {
+        #[derive(Subcommand)]
+        enum Command {
+            $($(#[$about])+ $command(Box<$module::Arguments>),)+
+        }
+
+        /// Runs a command and returns its finding.
+        fn run(command: Command) -> Result<Finding> {
+            match command {
+                $(Command::$command(arguments) => $module::run(&arguments).map(Into::into),)+
+            }
+        }
+    };
+}
+
+commands! {
     /// Weed a simulated row with the real firmware on a virtual Uno.
-    Sim(Box<row::Arguments>),
+    Sim: row,
     /// Build the firmware and flash the Uno at a USB port.
-    Flash(flash::Arguments),
+    Flash: flash,
     /// Write the firmware as an Intel HEX file, for the Arduino tools.
-    Hex(hex::Arguments),
+    Hex: hex,
     /// Run the firmware or a bootloader on a virtual Uno, in real time, at a serial port.
-    VirtualUno(Box<virtual_uno::Arguments>),
+    VirtualUno: virtual_uno,
     /// Measure the cycles and bytes of the firmware on a virtual Uno.
-    BenchUno(bench::Arguments),
+    BenchUno: bench,
     /// Prove bounds from the ELF: stack, interrupts, and the encoder's rate.
-    Bounds(bounds::Arguments),
+    Bounds: bounds,
     /// Check a real board with a second Uno, the tester.
-    CheckBoard(check_board::Arguments),
+    CheckBoard: check_board,
     /// Work for a day with random faults.
-    Soak(soak::Arguments),
+    Soak: soak,
     /// Run the paper's experiment in a simulated field, with several controllers.
-    Trial(Box<trial::Arguments>),
+    Trial: trial,
     /// Map a result of the simulated trial against one or two parameters.
-    Sweep(Box<sweep::Arguments>),
+    Sweep: sweep,
     /// Merge the parts of a trial, sweep or soak from several machines.
-    Merge(merge::Arguments),
+    Merge: merge,
     /// Learn a table of examples from labelled detections, and print its error rates.
-    Train(train::Arguments),
+    Train: train,
     /// Classify recorded detections with the firmware's classifier.
-    Classify(classify::Arguments),
+    Classify: classify,
     /// List the Unos and the rows that they control, and name rows.
-    Rows(rows::Arguments),
+    Rows: rows,
     /// Watch the machine, and type commands.
-    Monitor(monitor::Arguments),
+    Monitor: monitor,
     /// Serve the page to a phone, with the state of the machines and HOLD.
-    Serve(serve::Arguments),
+    Serve: serve,
     /// Record what the machine does.
-    Record(record::Arguments),
+    Record: record,
     /// Replay a log with the same decisions on this computer, and compare.
-    Replay(replay::Arguments),
+    Replay: replay,
     /// Make a map of a record with a satellite receiver, and count plants.
-    Map(Box<map::Arguments>),
+    Map: map,
     /// Save taught examples in a table, teach them, or compare.
-    Examples(examples::Arguments),
+    Examples: examples,
     /// Set up the machine step by step: ask, measure, set and save.
-    SetUp(set_up::Arguments),
+    SetUp: set_up,
     /// Save the machine's settings in a file, set them from it, or compare.
-    Settings(settings::Arguments),
+    Settings: settings,
     /// Calculate engine, servo, shanks, chain, wheels and handle of a machine.
-    Design(design::Arguments),
+    Design: design,
     /// Create a randomised plan of a field trial, as a table to fill in.
-    Plan(plan::Arguments),
+    Plan: plan,
     /// Evaluate a field trial from the counts of its plots.
-    Evaluate(evaluate::Arguments),
+    Evaluate: evaluate,
     /// Update or check the manual's figures.
-    Figures(figures::Arguments),
+    Figures: figures,
     /// Print the completion script for a shell.
-    Completions(completions::Arguments),
+    Completions: completions,
 }
 
 fn main() -> ExitCode {
@@ -131,41 +148,6 @@ fn ctrl_c() -> Result<Arc<AtomicBool>> {
     let asked_to_stop = Arc::clone(&stop);
     ctrlc::set_handler(move || asked_to_stop.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
     Ok(stop)
-}
-
-/// Runs a command and returns its finding.
-fn run(command: Command) -> Result<Finding> {
-    match command {
-        Command::Sim(arguments) => row::run(&arguments),
-        Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
-        Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
-        Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
-        Command::BenchUno(arguments) => bench::run(&arguments).map(|()| Finding::Good),
-        Command::Bounds(arguments) => bounds::run(&arguments),
-        Command::CheckBoard(arguments) => check_board::run(&arguments),
-        Command::Soak(arguments) => soak::run(&arguments),
-        Command::Trial(arguments) => trial::run(&arguments),
-        Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),
-        Command::Merge(arguments) => merge::run(&arguments),
-        Command::Train(arguments) => train::run(&arguments).map(|()| Finding::Good),
-        Command::Classify(arguments) => classify::run(&arguments),
-        Command::Monitor(arguments) => monitor::run(&arguments),
-        Command::Serve(arguments) => serve::run(&arguments).map(|()| Finding::Good),
-        Command::Rows(arguments) => rows::run(&arguments).map(|()| Finding::Good),
-        Command::Record(arguments) => record::run(&arguments).map(|()| Finding::Good),
-        Command::Replay(arguments) => replay::run(&arguments),
-        Command::Map(arguments) => map::run(&arguments).map(|()| Finding::Good),
-        Command::Examples(arguments) => examples::run(&arguments),
-        Command::SetUp(arguments) => set_up::run(&arguments).map(|()| Finding::Good),
-        Command::Settings(arguments) => settings::run(&arguments),
-        Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
-        Command::Plan(arguments) => plan::run(&arguments).map(|()| Finding::Good),
-        Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
-        Command::Figures(arguments) => figures::run(&arguments),
-        Command::Completions(arguments) => {
-            completions::run(&arguments, program::grammar::<Arguments>()).map(|()| Finding::Good)
-        }
-    }
 }
 
 #[cfg(test)]

@@ -57,9 +57,6 @@ pub struct Arguments {
 }
 
 /// Reads the records, writes the map, and prints the count.
-///
-/// # Errors
-/// If a record cannot be read, or a file not be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
     let out = arguments.out.file(replace)?;

@@ -32,9 +32,6 @@ pub struct Arguments {
 }
 
 /// Puts them together and prints the result.
-///
-/// # Errors
-/// If the parts are not all of one study, or the result cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let headers = arguments.parts.iter().map(|path| Ok((name(path), header(path)?)));
     let headers: Vec<(String, Header)> = headers.collect::<Result<_>>()?;

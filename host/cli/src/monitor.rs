@@ -78,9 +78,6 @@ fn send(rows: &Rows, row: usize, command: &str) {
 }
 
 /// Watches until the user quits.
-///
-/// # Errors
-/// If there is no Uno to begin with, or terminal or log fail.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let chosen = arguments.ports.choose()?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;

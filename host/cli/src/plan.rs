@@ -42,9 +42,6 @@ pub struct Arguments {
 }
 
 /// Creates the plan and prints or writes it.
-///
-/// # Errors
-/// If the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.as_ref().map(|out| out.file(arguments.replace)).transpose()?;
     let plan = Plan {

@@ -11,7 +11,7 @@ use gps::recorder::Lines;
 use link::log::{LogError, LogWriter};
 use link::rows::{Rows, What};
 use link::session::Happening;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -40,16 +40,13 @@ pub struct Arguments {
 }
 
 /// Records until Ctrl-C.
-///
-/// # Errors
-/// If there is no Uno or no receiver to begin with, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let chosen = arguments.ports.choose()?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
     let mut gps = match gps {
         Some((receiver, lines)) => {
-            logs.lines_at(receiver.row, |_| lines)?;
+            logs.lines_at(receiver.row, logs.now_ms(receiver.row), &lines)?;
             Some(receiver)
         }
         None => None,
@@ -59,11 +56,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
     while !stop.load(Ordering::Relaxed) {
         if let Some(gps) = &mut gps {
-            let mut said = Vec::new();
-            let written = logs.lines_at(gps.row, |time_ms| {
-                said = gps.turn(time_ms, Instant::now());
-                said.clone()
-            });
+            let time_ms = logs.now_ms(gps.row);
+            let said = gps.turn(time_ms, Instant::now());
+            let written = logs.lines_at(gps.row, time_ms, &said);
             logs.go_on_after(written, gps.row, &chosen)?;
             for (_, line) in said.iter().filter(|(kind, _)| kind.is_for_the_operator()) {
                 tell!("Receiver: {line}");
@@ -123,12 +118,22 @@ struct Log {
     is_written: bool,
 }
 
+impl Log {
+    /// Writes, unless it has failed before.
+    fn write(&mut self, work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>) -> Result<(), LogError> {
+        if !self.is_written {
+            return Ok(());
+        }
+        work(&mut self.writer).inspect_err(|_| self.is_written = false)
+    }
+}
+
 impl Logs {
     /// Opens them all, so that their times begin together.
     ///
     /// # Errors
     /// If one cannot be written, or is something else.
-    pub fn open(out: &std::path::Path, chosen: &Chosen) -> Result<Self> {
+    pub fn open(out: &Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
             // An existing log is continued, so no name is checked.
             OutName::from(out.as_os_str().to_owned()).folder([""; 0], Replace::default())?.make()?;
@@ -144,11 +149,7 @@ impl Logs {
     /// # Errors
     /// At the first failure of a log.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
-        let log = &mut self.logs[row];
-        if !log.is_written {
-            return Ok(());
-        }
-        log.writer.write(happening).inspect_err(|_| log.is_written = false)
+        self.logs[row].write(|writer| writer.write(happening))
     }
 
     /// The time of a row's line written now, in milliseconds.
@@ -156,18 +157,12 @@ impl Logs {
         self.logs[row].writer.now_ms()
     }
 
-    /// Writes the lines that `lines` returns for the present time into a row's log, as [`Logs::write`].
+    /// Writes lines of this time into a row's log, as [`Logs::write`].
     ///
     /// # Errors
     /// At the first failure of a log.
-    fn lines_at(&mut self, row: usize, lines: impl FnOnce(u64) -> Lines) -> Result<(), LogError> {
-        let log = &mut self.logs[row];
-        let time_ms = log.writer.now_ms();
-        let lines = lines(time_ms);
-        if !log.is_written {
-            return Ok(());
-        }
-        log.writer.lines_at(time_ms, &lines).inspect_err(|_| log.is_written = false)
+    fn lines_at(&mut self, row: usize, time_ms: u64, lines: &Lines) -> Result<(), LogError> {
+        self.logs[row].write(|writer| writer.lines_at(time_ms, lines))
     }
 
     /// Reports a log that could not be written. The other rows' logs continue.

@@ -23,9 +23,6 @@ pub struct Arguments {
 }
 
 /// Replays, and prints on what log and replay agree.
-///
-/// # Errors
-/// If the log cannot be read or replayed.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let name = arguments.log.display();
     let replayed = replay::replay(&log::read(&arguments.log)?).with_context(|| format!("{name} cannot be replayed"))?;

@@ -55,9 +55,6 @@ enum Action {
 }
 
 /// Lists, names or forgets.
-///
-/// # Errors
-/// If the file, a name or a port is wrong.
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.action {
         None => list(&arguments.file.read()?, arguments.json),

@@ -54,9 +54,6 @@ pub struct Arguments {
 }
 
 /// Serves until Ctrl-C.
-///
-/// # Errors
-/// If there is no page, two machines have a name, or an address cannot be bound.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let page = match (&arguments.page, Page::inside()) {
         (Some(folder), _) => Page::read(folder)?,

@@ -81,9 +81,6 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
 }
 
 /// Pulls, pushes or compares.
-///
-/// # Errors
-/// If file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose()?),

@@ -74,9 +74,6 @@ impl Study {
 }
 
 /// Runs it and prints what it has shown, or writes a part of it.
-///
-/// # Errors
-/// If nothing is asked for, or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { hours, uno_minutes, seed, faults, json, .. } = arguments;
     ensure!(

@@ -125,9 +125,6 @@ pub struct Arguments {
 }
 
 /// Runs it and prints the result, or writes a part of it.
-///
-/// # Errors
-/// If an axis or the field is wrong, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let &Arguments { ref out, replace, json, ref result, .. } = arguments;
     let sweep = Sweep {

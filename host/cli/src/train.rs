@@ -93,9 +93,6 @@ fn votes(text: &str) -> Result<Votes, String> {
 }
 
 /// Trains, and prints the result.
-///
-/// # Errors
-/// If a file or its contents are wrong, or the table would not fit.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
     let table = arguments.out.as_ref().map(|out| destination(out, replace)).transpose()?;

@@ -203,9 +203,6 @@ fn folder(shown: &Shown) -> Result<Option<OutFolder>> {
 }
 
 /// Runs it and prints the result, or writes a part of it.
-///
-/// # Errors
-/// If the field is wrong, the firmware cannot be built or run, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { replace, json, brief, .. } = arguments;
     let part = Part::asked(arguments.shard, arguments.out.as_ref(), replace)?;

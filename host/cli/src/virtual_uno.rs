@@ -99,9 +99,6 @@ fn bootloader(name: &Path) -> Result<Bootloader, FileError> {
 }
 
 /// Runs until Ctrl-C, or until it is asked to end by SIGTERM or SIGHUP.
-///
-/// # Errors
-/// If a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
     let count = arguments.rows;

@@ -19,6 +19,12 @@ pub enum Finding {
     Bad,
 }
 
+impl From<()> for Finding {
+    fn from((): ()) -> Self {
+        Self::Good
+    }
+}
+
 impl Finding {
     /// Good if this is true.
     pub fn of(is_good: bool) -> Self {
