@@ -32,16 +32,11 @@ pub struct Arguments {
 /// Proves and prints.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut options = arguments.options.clone();
-    options.budgets.get_or_insert_with(|| budgets("budgets.toml"));
+    options.budgets.get_or_insert_with(|| firmware::workspace_root().join("budgets.toml"));
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     let Report { text, keeps } = report(&elf, &options)?;
     print(format_args!("{text}"))?;
     Ok(Finding::of(keeps))
-}
-
-/// A budget file of this repository.
-fn budgets(name: &str) -> PathBuf {
-    firmware::workspace_root().join(name)
 }
 
 /// The bounds of a firmware, each beside its budget.
@@ -71,9 +66,6 @@ const RISK: &str = "its stack may overwrite its data, and plants may be missed, 
 
 impl Firmware {
     /// The firmware's ELF, built if none was named.
-    ///
-    /// # Errors
-    /// If it cannot be built.
     pub fn elf(&self) -> Result<PathBuf> {
         Ok(match &self.elf {
             Some(elf) => elf.clone(),
@@ -87,8 +79,8 @@ impl Firmware {
     /// # Errors
     /// If it fails, or a bound is over its budget, without `--unproved`.
     pub fn check(&self, elf: &Path) -> Result<()> {
-        let budgets = budgets(if self.tester { "tester/budgets.toml" } else { "budgets.toml" });
-        let why = match prove(elf, &budgets) {
+        let name = if self.tester { "tester/budgets.toml" } else { "budgets.toml" };
+        let why = match prove(elf, &firmware::workspace_root().join(name)) {
             Ok(held) => match held.into_iter().find(|held| !held.keeps) {
                 Some(Held { name, proved, budget, .. }) => format!("{name} is {proved}, and its budget is {budget}"),
                 None => return Ok(()),

@@ -162,32 +162,31 @@ mod tests {
     use std::fs;
     use std::path::{Path, PathBuf};
 
-    fn grammar() -> Command {
-        program::grammar::<Arguments>()
-    }
-
     #[test]
     fn the_arguments_are_well_formed() {
-        grammar().debug_assert();
+        program::grammar::<Arguments>().debug_assert();
     }
 
-    /// A command's subcommands and theirs, each with its name in full.
-    fn subcommands(command: &Command, name: &str) -> Vec<(String, Command)> {
-        let of_one = |command: &Command| {
-            let name = format!("{name} {}", command.get_name());
-            [vec![(name.clone(), command.clone())], subcommands(command, &name)].concat()
-        };
-        command.get_subcommands().flat_map(of_one).collect()
+    /// All commands and their subcommands, each with its name in full, without `weeder`.
+    fn commands() -> Vec<(String, Command)> {
+        fn below(command: &Command, name: &str) -> Vec<(String, Command)> {
+            let of_one = |command: &Command| {
+                let name = format!("{name} {}", command.get_name()).trim_start().to_owned();
+                [vec![(name.clone(), command.clone())], below(command, &name)].concat()
+            };
+            command.get_subcommands().flat_map(of_one).collect()
+        }
+        below(&program::grammar::<Arguments>(), "")
     }
 
     #[test]
     fn every_number_s_range_is_in_its_help_and_in_its_error() {
         let mut ranges = 0;
-        for (name, command) in subcommands(&grammar(), "weeder") {
+        for (name, command) in commands() {
             for option in command.get_arguments().filter(|option| option.get_action().takes_values()) {
                 let Some(long) = option.get_long() else { continue };
-                let words = name.split(' ').map(OsString::from).chain([format!("--{long}").into(), "-1".into()]);
-                let Err(error) = parse::<Arguments>(words.collect()) else { continue };
+                let words = format!("weeder {name} --{long} -1");
+                let Err(error) = parse::<Arguments>(words.split(' ').map(OsString::from).collect()) else { continue };
                 let said = error.to_string();
                 assert!(!said.contains("unexpected argument"), "{name} --{long}: {said}");
                 let Some((_, rest)) = said.split_once("number from ") else { continue };
@@ -258,13 +257,12 @@ mod tests {
 
     /// Every argument that takes a word that could name a file, as `command.subcommand:argument`, and its type.
     fn words_taken() -> Vec<(String, Arg)> {
-        let commands = subcommands(&grammar(), "weeder");
         let of_one = |(name, command): &(String, Command)| -> Vec<(String, Arg)> {
-            let name = name.trim_start_matches("weeder ").replace(' ', ".");
+            let name = name.replace(' ', ".");
             let takes = |arg: &&Arg| arg.get_action().takes_values() && is_free(arg);
             command.get_arguments().filter(takes).map(|arg| (format!("{name}:{}", arg.get_id()), arg.clone())).collect()
         };
-        commands.iter().flat_map(of_one).collect()
+        commands().iter().flat_map(of_one).collect()
     }
 
     /// Whether it takes free text or a path, without its own parser or list of values.
@@ -304,8 +302,8 @@ mod tests {
     #[test]
     fn a_command_that_writes_has_force_and_no_other_has_it_for_that() {
         let writers: BTreeSet<&str> = WRITERS.iter().filter_map(|(argument, ..)| argument.split(':').next()).collect();
-        for (name, command) in subcommands(&grammar(), "weeder") {
-            let name = name.trim_start_matches("weeder ").replace(' ', ".");
+        for (name, command) in commands() {
+            let name = name.replace(' ', ".");
             let mut options = command.get_arguments().filter(|argument| argument.get_long() == Some("force"));
             let force = options.next().and_then(Arg::get_help).map(ToString::to_string).unwrap_or_default();
             assert_eq!(force.starts_with("Replace existing files"), writers.contains(name.as_str()), "{name}");
@@ -359,11 +357,11 @@ mod tests {
 
     #[test]
     fn every_command_s_help_has_examples_that_are_well_formed() {
-        for (name, command) in subcommands(&grammar(), "weeder") {
+        for (name, command) in commands() {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             let lines = help.lines().map(|line| line.trim_start().trim_start_matches("Example: "));
             // Text behind a pipe, `&&` or some blanks is not part of the command.
-            let examples = lines.filter(|line| line.starts_with(&name)).map(|line| {
+            let examples = lines.filter(|line| line.starts_with(&format!("weeder {name}"))).map(|line| {
                 let end = ["  ", " |", " >", " &&"].into_iter().filter_map(|end| line.find(end)).min();
                 &line[..end.unwrap_or(line.len())]
             });
@@ -375,7 +373,7 @@ mod tests {
                 }
                 seen += 1;
             }
-            assert!(seen > 0, "the help of `{name}` has no example");
+            assert!(seen > 0, "the help of `weeder {name}` has no example");
         }
     }
 }

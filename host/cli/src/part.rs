@@ -58,9 +58,6 @@ impl Part {
     }
 
     /// Writes it whole, once all is computed, and says so.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
     pub fn write<T: Serialize>(
         self,
         command: &str,
@@ -79,18 +76,12 @@ impl Part {
 }
 
 /// This program.
-///
-/// # Errors
-/// If its file cannot be read.
 pub fn program() -> Result<Program> {
     let file = env::current_exe().context("the running program cannot be found")?;
     Ok(Program { version: env!("WEEDER_VERSION").to_owned(), build: check_sum(&file)? })
 }
 
 /// A file's check sum, CRC-32 as of zip: it tells builds apart that differ by accident.
-///
-/// # Errors
-/// If it cannot be read.
 pub fn check_sum(file: &Path) -> Result<String> {
     let bytes = fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     Ok(format!("{:08x}", crc32fast::hash(&bytes)))

@@ -261,9 +261,6 @@ impl Chosen {
     }
 
     /// The row of this name.
-    ///
-    /// # Errors
-    /// If there is none.
     pub fn find(&self, name: &str) -> Result<usize> {
         let found = self.rows.iter().position(|row| row.name == name);
         found.with_context(|| format!("there is no row {name}: there are {}", self.names().join(", ")))

@@ -120,9 +120,6 @@ fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> 
 }
 
 /// Prints the results of all hours and minutes, which may come from several machines.
-///
-/// # Errors
-/// If it cannot be printed.
 pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Finding> {
     let minutes = tallies.split_off((study.hours as usize).min(tallies.len()));
     let mut stages = Vec::new();

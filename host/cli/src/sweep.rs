@@ -147,9 +147,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Prints the result of all points' plots, from this or other machines.
-///
-/// # Errors
-/// If the file cannot be written.
 pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
     let out = file(shown)?;
     show(sweep, &sweep.points(outcomes)?, shown, out)

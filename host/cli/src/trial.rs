@@ -254,9 +254,6 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 }
 
 /// Prints the result of all plots, from this or other machines.
-///
-/// # Errors
-/// If a file cannot be written.
 pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Finding> {
     let folder = folder(shown)?;
     let picture = plots.first_mut().and_then(|plot| plot.picture.take());

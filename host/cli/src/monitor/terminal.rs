@@ -100,9 +100,17 @@ fn ends(key: KeyEvent) -> bool {
 mod tests {
     use super::*;
     use crate::monitor::model::Answer;
+    use link::rows::Opener;
     use link::session::Happening;
     use link::settings::Settings;
     use link::{EventLine, LinkError};
+
+    /// Rows that are not there.
+    fn absent<const COUNT: usize>(names: [&str; COUNT]) -> (Rows, Model) {
+        let opener = |_| -> Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
+        let (rows, _) = Rows::open(names.map(opener).into());
+        (rows, Model::new(names.map(str::to_owned).into()))
+    }
 
     fn typed(model: &mut Model, rows: &Rows, text: &str) {
         for character in text.chars() {
@@ -112,9 +120,7 @@ mod tests {
 
     #[test]
     fn one_key_holds_all_rows_during_typing_and_for_every_chosen_row() {
-        let opener = || -> link::rows::Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
-        let (rows, _) = Rows::open(vec![opener(), opener()]);
-        let mut model = Model::new(vec!["left".to_owned(), "right".to_owned()]);
+        let (rows, mut model) = absent(["left", "right"]);
         take_key(&mut model, &rows, KeyCode::PageDown.into());
         typed(&mut model, &rows, "set k");
         assert!(model.hold.is_none());
@@ -163,9 +169,7 @@ mod tests {
 
     #[test]
     fn a_row_s_name_before_a_colon_has_the_command_go_to_that_row_alone() {
-        let opener = || -> link::rows::Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
-        let (rows, _) = Rows::open((0..3).map(|_| opener()).collect());
-        let mut model = Model::new(["row1", "row2", "row3"].map(str::to_owned).to_vec());
+        let (rows, mut model) = absent(["row1", "row2", "row3"]);
         let mut enter = |text: &str| {
             typed(&mut model, &rows, text);
             take_key(&mut model, &rows, KeyCode::Enter.into());

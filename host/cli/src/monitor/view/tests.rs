@@ -174,9 +174,8 @@ fn numbers_that_no_machine_gives_are_drawn_as_far_as_they_go() {
 #[test]
 fn a_screen_too_small_for_all_of_it_is_drawn_as_far_as_it_goes() {
     let model = machine(&ROW);
-    for (width, height) in [(1, 1), (3, 40), (80, 2), (10, 10)] {
-        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| draw(&model, frame)).unwrap();
+    for (columns, lines) in [(1, 1), (3, 40), (80, 2), (10, 10)] {
+        screen_of(&model, columns, lines);
     }
 }
 
