@@ -1,8 +1,8 @@
 //! `weeder check-board`: a second Uno, the tester, drives the weeder's inputs and measures its outputs.
 
 use crate::ctrl_c;
-use crate::destination::{OutName, Replace};
-use crate::output::{print, say, tell};
+use crate::destination::{OutName, Replace, write_if_asked};
+use crate::output::{print, tell};
 use crate::program::Finding;
 use crate::progress::with_bar;
 use anyhow::Result;
@@ -89,12 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut report = result?;
     report.board.clone_from(&arguments.board);
     let printed = print(format_args!("{}", if arguments.json { report.json() } else { report.text() }));
-    if let Some(page) = page {
-        page.write(|to| to.write_all(report.page().as_bytes()))?;
-        if !arguments.json {
-            say!("Written     {}", page.path().display())?;
-        }
-    }
+    write_if_asked(page.as_ref(), "Written", arguments.json, |to| to.write_all(report.page().as_bytes()))?;
     printed?;
     Ok(Finding::of(report.is_good()))
 }

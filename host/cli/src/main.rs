@@ -218,8 +218,8 @@ mod tests {
     const NO_FILE: &str = "bounds:chip bounds:function check-board:board check-board:port check-board:tester examples.diff:port examples.pull:port examples.push:port flash:port rows.forget:name rows.name:name \
         rows.name:port set-up:port sim:channel_a sim:channel_b sim:channel_beam";
 
-    /// Each argument that names an output, a command line that has it, and the files of which each alone must stop the
-    /// command. `DIR` is a folder with the required inputs.
+    /// Each argument that names an output, a command line that has it, and its files. One of these files is enough to
+    /// stop the command. `DIR` is a folder with the required inputs.
     const WRITERS: [(&str, &str, &[&str]); 21] = [
         ("check-board:page", "check-board --simulated --page DIR/new", &["new"]),
         ("evaluate:out", "evaluate DIR/filled.csv --out DIR/reports", &["reports/report.html"]),

@@ -33,7 +33,7 @@ pub struct Arguments {
 
 /// Puts them together and prints the result.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let headers = arguments.parts.iter().map(|path| Ok((name(path), header(path)?)));
+    let headers = arguments.parts.iter().map(|path| Ok((name(path), open(path)?.0)));
     let headers: Vec<(String, Header)> = headers.collect::<Result<_>>()?;
     shard::together(&headers, &part::program()?)?;
     let (_, header) = headers.into_iter().next().context("no part is named")?;
@@ -57,19 +57,16 @@ fn name(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn open(path: &Path) -> Result<BufReader<File>> {
-    Ok(BufReader::new(File::open(path).with_context(|| format!("{} cannot be read", name(path)))?))
-}
-
-fn header(path: &Path) -> Result<Header> {
-    shard::read_header(&name(path), &mut open(path)?)
+/// A part's header, and the rest of its file.
+fn open(path: &Path) -> Result<(Header, BufReader<File>)> {
+    let mut file = BufReader::new(File::open(path).with_context(|| format!("{} cannot be read", name(path)))?);
+    Ok((shard::read_header(&name(path), &mut file)?, file))
 }
 
 /// All outcomes, in the order of an undivided study.
 fn outcomes<T: DeserializeOwned>(parts: &[PathBuf]) -> Result<Vec<T>> {
     let read = |path: &PathBuf| {
-        let mut file = open(path)?;
-        let header = shard::read_header(&name(path), &mut file)?;
+        let (header, mut file) = open(path)?;
         shard::read_outcomes(&name(path), &header, &mut file)
     };
     Ok(shard::outcomes(parts.iter().map(read).collect::<Result<_>>()?))

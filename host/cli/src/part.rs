@@ -3,7 +3,7 @@
 //! A part names the program that computed it: the version, and a checksum of the program's file. The version alone is
 //! not enough, because an unreleased build has the version of the last release.
 
-use crate::destination::{OutFile, OutName, Replace};
+use crate::destination::{OutFile, OutFolder, OutName, Replace};
 use crate::output::{say, tell};
 use anyhow::{Context, Result};
 use clap::{Args, builder::PossibleValuesParser};
@@ -34,9 +34,21 @@ pub struct Shown {
     pub result: Option<String>,
 }
 
+impl Shown {
+    /// The checked file for the result, if the user asks for one.
+    pub fn file(&self) -> Result<Option<OutFile>> {
+        self.out.as_ref().map(|out| out.file(self.replace)).transpose()
+    }
+
+    /// The checked folder for files of these names, if the user asks for one.
+    pub fn folder<const COUNT: usize>(&self, names: [&str; COUNT]) -> Result<Option<OutFolder>> {
+        self.out.as_ref().map(|out| out.folder(names, self.replace)).transpose()
+    }
+}
+
 /// A part, and a file that was writable when it was checked.
 pub struct Part {
-    shard: Shard,
+    pub shard: Shard,
     out: OutFile,
     program: Program,
     began: Instant,
@@ -50,11 +62,6 @@ impl Part {
     pub fn asked(shard: Option<Shard>, out: Option<&OutName>, replace: Replace) -> Result<Option<Self>> {
         let Some((shard, out)) = shard.zip(out) else { return Ok(None) };
         Ok(Some(Self { shard, out: out.file(replace)?, program: program()?, began: Instant::now() }))
-    }
-
-    /// Which one it is.
-    pub fn shard(&self) -> Shard {
-        self.shard
     }
 
     /// Writes it whole, once all is computed, and says so.

@@ -177,10 +177,7 @@ impl Logs {
         Ok(())
     }
 
-    /// Says what is in them.
-    ///
-    /// # Errors
-    /// If one could not be written.
+    /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.logs {
             tell!("{} lines were added: {} has {} now", writer.added(), path.display(), writer.lines());
@@ -188,10 +185,7 @@ impl Logs {
         self.check()
     }
 
-    /// Checks that all logs are complete.
-    ///
-    /// # Errors
-    /// If one could not be written.
+    /// Fails if one could not be written.
     pub fn check(&self) -> Result<()> {
         match self.logs.iter().find(|log| !log.is_written) {
             Some(log) => bail!("{} is not whole: it could not be written", log.path.display()),

@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> {
     let hours = u64::from(study.hours);
     let all = hours + u64::from(study.uno_minutes);
-    let numbers = part.shard().numbers(all);
+    let numbers = part.shard.numbers(all);
     let count = numbers.len() as f64;
     let tallies = with_bar("soaking", |show| {
         let tally = |(number, begun)| {

@@ -137,23 +137,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
     };
     if let Some(part) = Part::asked(arguments.shard, out.as_ref(), replace)? {
-        let outcomes = with_bar("sweeping", |show| sweep.run_shard(part.shard(), show))?;
+        let outcomes = with_bar("sweeping", |show| sweep.run_shard(part.shard, show))?;
         return part.write(COMMAND, sweep.size(), &sweep, outcomes);
     }
     let shown = Shown { out: out.clone(), replace, json, brief: false, result: Some(result.clone()) };
-    let out = file(&shown)?;
+    let out = shown.file()?;
     let points = with_bar("sweeping", |show| sweep.run(show))?;
     show(&sweep, &points, &shown, out)
 }
 
 /// Prints the result of all points' plots, from this or other machines.
 pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
-    let out = file(shown)?;
+    let out = shown.file()?;
     show(sweep, &sweep.points(outcomes)?, shown, out)
-}
-
-fn file(shown: &Shown) -> Result<Option<OutFile>> {
-    shown.out.as_ref().map(|out| out.file(shown.replace)).transpose()
 }
 
 fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<OutFile>) -> Result<()> {

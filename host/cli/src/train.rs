@@ -1,7 +1,7 @@
 //! `weeder train`: trains an example table from labelled detections, and reports how well it separates plants from
 //! weeds.
 
-use crate::destination::{OutFile, OutName, Replace};
+use crate::destination::{OutFile, OutName, Replace, write_if_asked};
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::source::{self, offering};
@@ -109,21 +109,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         true => say!("{:#}", in_json(&training, &objects, another_field.as_ref())),
         false => report(&training, &objects, another_field.as_ref()),
     };
-    if let Some(table) = &table {
-        match is_rust(table.path()) {
-            true => table.write(|to| to.write_all(listing::rust(&training, &arguments.command()).as_bytes()))?,
-            false => table.write(|to| listing::write_csv(&training.kept, to))?,
-        }
-        if !arguments.json {
-            say!("Table       {}", table.path().display())?;
-        }
-    }
-    if let Some(picture) = &picture {
-        picture.write(|to| svg::write(to, &regions::draw(&training, &objects)))?;
-        if !arguments.json {
-            say!("Picture     {}", picture.path().display())?;
-        }
-    }
+    let is_rust = table.as_ref().is_some_and(|table| is_rust(table.path()));
+    write_if_asked(table.as_ref(), "Table", arguments.json, |to| match is_rust {
+        true => Ok(to.write_all(listing::rust(&training, &arguments.command()).as_bytes())?),
+        false => listing::write_csv(&training.kept, to),
+    })?;
+    write_if_asked(picture.as_ref(), "Picture", arguments.json, |to| {
+        svg::write(to, &regions::draw(&training, &objects))
+    })?;
     printed
 }
 
@@ -180,12 +173,7 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
             chosen.len()
         ),
     };
-    if let Some(table) = table {
-        table.write(|to| listing::write_csv(&chosen, to))?;
-        if !arguments.json {
-            say!("Table       {}", table.path().display())?;
-        }
-    }
+    write_if_asked(table, "Table", arguments.json, |to| listing::write_csv(&chosen, to))?;
     printed
 }
 

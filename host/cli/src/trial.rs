@@ -198,17 +198,13 @@ pub struct PlotPart {
 /// The files of a report.
 const REPORT: [&str; 3] = ["report.html", "trial.csv", "controllers.csv"];
 
-fn folder(shown: &Shown) -> Result<Option<OutFolder>> {
-    shown.out.as_ref().map(|out| out.folder(REPORT, shown.replace)).transpose()
-}
-
 /// Runs it and prints the result, or writes a part of it.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { replace, json, brief, .. } = arguments;
     let part = Part::asked(arguments.shard, arguments.out.as_ref(), replace)?;
     let out = arguments.out.clone().filter(|_| part.is_none());
     let shown = Shown { out, replace, json, brief, result: None };
-    let folder = folder(&shown)?;
+    let folder = shown.folder(REPORT)?;
     let experiment = Experiment {
         speeds_km_h: distinct(arguments.speeds.clone()),
         spacings_cm: distinct(arguments.spacings.clone()),
@@ -235,7 +231,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let study = Study { experiment, engine: arguments.engine, firmware, field, words };
     let began = Instant::now();
     if let Some(part) = part {
-        let plots = with_bar("weeding", |show| study.experiment.run_shard(part.shard(), &engine, show))?;
+        let plots = with_bar("weeding", |show| study.experiment.run_shard(part.shard, &engine, show))?;
         let with_picture = |Numbered { number, outcome: by_controller }| {
             let picture = if number == 0 { picture_of(&study.experiment, &engine)? } else { None };
             Ok(Numbered { number, outcome: PlotPart { by_controller, picture } })
@@ -255,7 +251,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 
 /// Prints the result of all plots, from this or other machines.
 pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Finding> {
-    let folder = folder(shown)?;
+    let folder = shown.folder(REPORT)?;
     let picture = plots.first_mut().and_then(|plot| plot.picture.take());
     let outcomes: Vec<PlotOutcome> = plots.into_iter().flat_map(|plot| plot.by_controller).collect();
     show(&study, &outcomes, shown, folder.as_ref(), || Ok(picture))
@@ -342,8 +338,8 @@ const COLUMNS: [Column; 12] = [
     ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
     ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
     ("rows with\nan alarm", |total| total.alarms.to_string(), &[Plants]),
-    ("row ground\nweeded, %", |total| weeded(total), &[Brief, Ground]),
-    ("most\nlost to, %", |total| most_lost(total), &[Brief, Ground]),
+    ("row ground\nweeded, %", weeded, &[Brief, Ground]),
+    ("most\nlost to, %", most_lost, &[Brief, Ground]),
     ("with all\nmargins\nkept at\nmost, %", |total| format!("{:.1}", 100.0 * total.weedable_share), &[Ground]),
     ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.undamaged_share), &[Ground]),
     ("weeds\ngone in\nrow, %", |total| gone(total.effect.in_row), &[Brief, Ground]),

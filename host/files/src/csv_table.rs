@@ -145,7 +145,6 @@ impl Line<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::error::Error;
 
     /// The values of the column `place_mm` with their lines, or the error for a file with this text.
     fn read(text: impl AsRef<[u8]>) -> Result<Vec<(u64, i16)>, String> {
@@ -203,12 +202,5 @@ mod tests {
         }
         assert!(read("place_mm,width_mm\nok\n7,1\n").unwrap_err().starts_with("table.csv, line 2: fields: 1"));
         assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: no line is below"));
-    }
-
-    #[test]
-    fn the_system_s_error_for_a_missing_file_is_printed_once() {
-        let error = CsvTable::read(Path::new("no/such/table.csv"), &[]).err().unwrap();
-        assert_eq!(error.to_string(), "no/such/table.csv cannot be read");
-        assert!(error.source().is_some());
     }
 }

@@ -9,6 +9,7 @@
 //! So no command replaces a file without [`Replace`], the option `--force`. A test in `main.rs` checks every argument
 //! that names an output.
 
+use crate::output::say;
 use anyhow::{Context, Error, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;
@@ -145,6 +146,24 @@ impl OutFolder {
     pub fn path(&self) -> &Path {
         &self.folder
     }
+}
+
+/// Writes a file that the user asked for, and prints its name behind a title, unless the output is JSON.
+///
+/// # Errors
+/// If it cannot be written, or its name not be printed.
+pub fn write_if_asked<E>(
+    file: Option<&OutFile>,
+    title: &str,
+    json: bool,
+    contents: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+) -> Result<()>
+where
+    E: From<io::Error> + Into<Error>,
+{
+    let Some(file) = file else { return Ok(()) };
+    file.write(contents)?;
+    if json { Ok(()) } else { say!("{title:<12}{}", file.path().display()) }
 }
 
 fn cannot_be_written(path: &Path) -> String {

@@ -1,7 +1,7 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
 use crate::course::CourseArguments;
-use crate::destination::{OutFile, OutFolder, OutName, Replace};
+use crate::destination::{OutFile, OutFolder, OutName, Replace, write_if_asked};
 use crate::output::{print, say};
 use crate::program::Finding;
 use crate::progress::with_bar;
@@ -138,9 +138,7 @@ fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome, speed_mm_s
 }
 
 fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinChange]) -> Result<()> {
-    let Some(vcd) = vcd else { return Ok(()) };
-    vcd.write(|to| waveform::write(to, &wiring::WIRES, changes.iter().copied()))?;
-    if arguments.json { Ok(()) } else { say!("Waveform    {}", vcd.path().display()) }
+    write_if_asked(vcd, "Waveform", arguments.json, |to| waveform::write(to, &wiring::WIRES, changes.iter().copied()))
 }
 
 /// The result for the row, with the names of the CSV tables.

@@ -57,11 +57,8 @@ pub enum Answer {
 pub struct RowModel {
     /// The operator's name for it.
     pub name: String,
-    /// Whether it is there.
     pub connection: Connection,
-    /// Its last status.
     pub status: Status,
-    /// Its settings.
     pub settings: Settings,
     /// The last objects, the newest first.
     pub objects: VecDeque<Seen>,
@@ -69,7 +66,6 @@ pub struct RowModel {
     pub zones: VecDeque<Seen>,
     /// Advice for the operator.
     pub advice: Option<String>,
-    /// The state of the last command.
     pub answer: Answer,
     /// The measurements since the start, and the last step that was shown.
     set_up: SetUp,
@@ -90,7 +86,6 @@ pub struct Model {
     pub hold: Option<Hold>,
     /// Typed lines, answers and events, the newest last.
     pub lines: VecDeque<String>,
-    /// The line being typed.
     pub line: CommandLine,
     /// Whether to ring the bell.
     rings: bool,
@@ -114,12 +109,10 @@ impl Model {
         std::mem::take(&mut self.rings)
     }
 
-    /// Whether there are several rows.
     pub fn are_several(&self) -> bool {
         self.rows.len() > 1
     }
 
-    /// The rows' names.
     pub fn names(&self) -> Vec<String> {
         self.rows.iter().map(|row| row.name.clone()).collect()
     }
@@ -269,7 +262,6 @@ impl RowModel {
         step.filter(|_| before != self.step && !goes_on)
     }
 
-    /// Whether the Uno is there.
     pub fn is_there(&self) -> bool {
         matches!(self.connection, Connection::Up(_))
     }
@@ -309,8 +301,8 @@ impl RowModel {
         } else if self.status.mode == Mode::Alarm {
             self.advice = None;
         }
-        let tool = status.position.wrapping_sub(self.settings.ticks(Setting::BeamToToolMm).0);
         let behind = self.settings.ticks(Setting::BeamToToolMm).0;
+        let tool = status.position.wrapping_sub(behind);
         self.zones.retain(|seen| seen.leading.wrapping_add(seen.width).wrapping_sub(tool) > -behind);
         self.status = status;
     }

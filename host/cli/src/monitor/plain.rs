@@ -132,6 +132,7 @@ impl Talk<'_> {
         if let (Some(logs), What::Happened(happening)) = (&mut self.logs, &heard.what) {
             logs.write(row, happening)?;
         }
+        let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
         match &heard.what {
             What::Happened(Happening::Connected { .. }) => standing.is_there = true,
             What::Happened(Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_)) => {}
@@ -143,14 +144,14 @@ impl Talk<'_> {
                 ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
                 tell!("{}", self.chosen.under_name(row, why));
             }
-            What::Happened(Happening::Event(_, line)) => writeln!(output, "{}", self.chosen.under_name(row, line))?,
+            What::Happened(Happening::Event(_, line)) => print(line)?,
             What::Happened(Happening::Answer(line)) => {
                 standing.statuses = 0;
                 // The lines on standard output are the machine's own.
                 if let Some(head) = standing.heading.before(line) {
                     tell!("{}", self.chosen.under_name(row, head));
                 }
-                writeln!(output, "{}", self.chosen.under_name(row, line))?;
+                print(line)?;
             }
             What::Answered { refusal, .. } => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
@@ -161,11 +162,7 @@ impl Talk<'_> {
             What::NotTyped { command, why } => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
                 standing.has_failed = true;
-                writeln!(
-                    output,
-                    "{}",
-                    self.chosen.under_name(row, &format!("error: `{command}` was not typed: {why}"))
-                )?;
+                print(&format!("error: `{command}` was not typed: {why}"))?;
             }
         }
         if let Some(hold) = &mut self.hold {

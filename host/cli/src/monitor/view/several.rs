@@ -2,12 +2,12 @@
 //! tool, and the state of the last command. If there is not room for all, rows that are lost or in alarm come first,
 //! and the rest are counted by state.
 
-use super::{colour, draw_line, draw_said, draw_top, ground, last_lines};
+use super::{URGENT, bold, colour, draw_line, draw_said, draw_top, ground, last_lines};
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
 use link::{Mode, advice};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::{Color, Style, Stylize};
+use ratatui::style::{Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
@@ -38,8 +38,7 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     draw_top(counted(rows), frame, top);
     draw_list(model, rows, frame, list);
     if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice.as_ref()?))) {
-        let style = Style::new().fg(Color::Red).bold();
-        frame.render_widget(Line::styled(format!("{}: {text}", row.name), style), advice);
+        frame.render_widget(Line::styled(format!("{}: {text}", row.name), URGENT), advice);
     }
     if is_roomy {
         draw_said(model, frame, said);
@@ -65,7 +64,7 @@ fn name(state: Option<Mode>) -> &'static str {
 }
 
 fn style(state: Option<Mode>) -> Style {
-    Style::new().fg(state.map_or(Color::Red, colour)).bold()
+    state.map_or(URGENT, |mode| bold(colour(mode)))
 }
 
 /// How many rows are in each state, the worst first.
@@ -117,7 +116,7 @@ fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'sta
     let room = usize::from(columns).saturating_sub(name + 13);
     let (tool, rest) = match (&row.connection, row.status.alarm) {
         (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), style(mode))),
-        (Connection::Up(_), Some(alarm)) => ("out", Span::styled(advice::name(alarm), style(Some(Mode::Alarm)))),
+        (Connection::Up(_), Some(alarm)) => ("out", Span::styled(advice::name(alarm), URGENT)),
         (Connection::Up(_), None) => {
             (if row.status.tool_out { "out" } else { "in " }, Span::raw(ground(row, room)).green())
         }
