@@ -104,7 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let count = arguments.rows;
     let rows = (0..count as u64).map(|number| arguments.course.nth_row(number)).collect::<Result<Vec<_>>>()?;
     let conditions = arguments.course.conditions_of(&arguments.course.field)?;
-    let courses = Course::of_rows(rows, arguments.course.machine(&conditions), mm_s(arguments.course.speed))
+    let courses = Course::of_rows(rows, conditions.machine(arguments.course.seed), mm_s(arguments.course.speed))
         .into_iter()
         .map(|course| course.slipping(conditions.ground.slip_percent / 100.0))
         .collect::<Vec<_>>();

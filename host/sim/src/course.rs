@@ -5,7 +5,6 @@ use crate::source;
 use anyhow::{Result, ensure};
 use clap::Args;
 use field::conditions::Conditions;
-use field::machine::Machine;
 use field::planting::Planting;
 use field::row::Row;
 use files::csv_table;
@@ -32,7 +31,7 @@ pub struct CourseArguments {
     weeds: Option<usize>,
     /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
-    seed: u64,
+    pub seed: u64,
     /// Distance from the beam back to the tool in mm, 100 to 2000. Default: the field's, 400.
     #[arg(long, value_parser = whole_within(100..=2000_u32))]
     beam_to_tool: Option<u32>,
@@ -103,10 +102,5 @@ impl CourseArguments {
             conditions.set("machine.beam_to_tool_mm", beam_to_tool_mm.into())?;
         }
         Ok(conditions)
-    }
-
-    /// The machine in a field. The row's seed selects its random deviations.
-    pub fn machine(&self, conditions: &Conditions) -> Machine {
-        conditions.machine(self.seed)
     }
 }

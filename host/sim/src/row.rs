@@ -96,7 +96,7 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     let course = &arguments.course;
     let conditions = course.conditions_of(if arguments.paper { "paper" } else { &course.field })?;
     let mut trial =
-        Trial::at_speed(row, course.machine(&conditions), conditions.timing(), mm_s(arguments.course.speed));
+        Trial::at_speed(row, conditions.machine(course.seed), conditions.timing(), mm_s(arguments.course.speed));
     trial.settings = conditions.firmware_settings();
     trial.motion = trial.motion.with_slip(|| conditions.ground.slip_percent / 100.0);
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
