@@ -1,7 +1,7 @@
 //! `weeder bench-uno`: limits and costs of the firmware and its classifier on an Arduino Uno.
 
 use crate::output::say;
-use crate::progress::Progress;
+use crate::progress::with_bar;
 use anyhow::Result;
 use clap::Args;
 use knn_bench::Task;
@@ -11,7 +11,6 @@ use trial::bench::{self, encoder, servo, swings};
 use trial::firmware;
 use uno::elf::Size;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -27,28 +26,18 @@ pub struct Arguments {
 const ROWS: u64 = 50;
 
 /// Measures and prints the figures.
-///
-/// # Errors
-/// If the bench or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bench_elf = firmware::build_bench()?;
     let elf = firmware::build()?;
-    let bar = Progress::new("classifying");
-    let classifier = bench::classifier(&bench_elf, |share| bar.show(share))?;
-    bar.finish();
-    let bar = Progress::new("turning the encoder");
-    let share_each = 1.0 / encoder::Turning::all().len() as f64;
-    let mut rates = Vec::new();
-    for (done, turning) in encoder::Turning::all().enumerate() {
-        rates.push(encoder::highest_rate(&elf, turning, |share| bar.show((done as f64 + share) * share_each))?);
-    }
-    bar.finish();
-    let bar = Progress::new("watching the servo");
-    let jitter = servo::jitter(&elf, |share| bar.show(share))?;
-    bar.finish();
-    let bar = Progress::new("swinging");
-    let lateness = swings::lateness(&elf, &swings::Rows::at_walking_speed(0..ROWS), |share| bar.show(share))?;
-    bar.finish();
+    let classifier = with_bar("classifying", |show| bench::classifier(&bench_elf, show))?;
+    let rates = with_bar("turning the encoder", |show| {
+        let all = encoder::Turning::all();
+        let count = all.len() as f64;
+        let rate = |(done, turning)| encoder::highest_rate(&elf, turning, |share| show((done as f64 + share) / count));
+        all.enumerate().map(rate).collect::<Result<Vec<_>>>()
+    })?;
+    let jitter = with_bar("watching the servo", |show| servo::jitter(&elf, show))?;
+    let lateness = with_bar("swinging", |show| swings::lateness(&elf, &swings::Rows::at_walking_speed(0..ROWS), show))?;
     let figures = Figures { classifier, size: Size::read(&elf)?, rates, jitter, lateness };
     if arguments.json {
         return say!("{:#}", in_json(&figures));

@@ -2,8 +2,8 @@
 //! The firmware and its budgets are this repository's. Commands that flash a firmware first check here whether its
 //! bounds are proved.
 
-use crate::finding::Finding;
 use crate::output::{print, tell};
+use crate::program::Finding;
 use anyhow::{Result, bail};
 use avr_bounds::command::{Options, Report, report};
 use avr_bounds::{Budgets, Held, Program};
@@ -11,7 +11,6 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use trial::firmware;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -31,21 +30,13 @@ pub struct Arguments {
 }
 
 /// Proves and prints.
-///
-/// # Errors
-/// If the firmware cannot be built, read or followed, or the budgets not be read.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut options = arguments.options.clone();
-    options.budgets.get_or_insert_with(|| budgets("budgets.toml"));
+    options.budgets.get_or_insert_with(|| firmware::workspace_root().join("budgets.toml"));
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     let Report { text, keeps } = report(&elf, &options)?;
     print(format_args!("{text}"))?;
-    Ok(if keeps { Finding::Good } else { Finding::Bad })
-}
-
-/// A budget file of this repository.
-fn budgets(name: &str) -> PathBuf {
-    firmware::workspace_root().join(name)
+    Ok(Finding::of(keeps))
 }
 
 /// The bounds of a firmware, each beside its budget.
@@ -75,9 +66,6 @@ const RISK: &str = "its stack may overwrite its data, and plants may be missed, 
 
 impl Firmware {
     /// The firmware's ELF, built if none was named.
-    ///
-    /// # Errors
-    /// If it cannot be built.
     pub fn elf(&self) -> Result<PathBuf> {
         Ok(match &self.elf {
             Some(elf) => elf.clone(),
@@ -91,8 +79,8 @@ impl Firmware {
     /// # Errors
     /// If it fails, or a bound is over its budget, without `--unproved`.
     pub fn check(&self, elf: &Path) -> Result<()> {
-        let budgets = budgets(if self.tester { "tester/budgets.toml" } else { "budgets.toml" });
-        let why = match prove(elf, &budgets) {
+        let name = if self.tester { "tester/budgets.toml" } else { "budgets.toml" };
+        let why = match prove(elf, &firmware::workspace_root().join(name)) {
             Ok(held) => match held.into_iter().find(|held| !held.keeps) {
                 Some(Held { name, proved, budget, .. }) => format!("{name} is {proved}, and its budget is {budget}"),
                 None => return Ok(()),

@@ -1,10 +1,10 @@
 //! `weeder check-board`: a second Uno, the tester, drives the weeder's inputs and measures its outputs.
 
 use crate::ctrl_c;
-use crate::destination::{FileName, Replace};
-use crate::finding::Finding;
-use crate::output::{print, say, tell};
-use crate::progress::Progress;
+use crate::destination::{OutName, Replace, write_if_asked};
+use crate::output::{print, tell};
+use crate::program::Finding;
+use crate::progress::with_bar;
 use anyhow::Result;
 use check::desk::Desk;
 use check::ports;
@@ -15,7 +15,6 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use trial::firmware;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 The tester is an Uno with the tester's firmware, wired to the weeder's Uno: docs/check-board.md has the wires.
@@ -53,17 +52,14 @@ pub struct Arguments {
     json: bool,
     /// Write a page as well.
     #[arg(long, value_name = "FILE.html")]
-    page: Option<FileName>,
+    page: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
 }
 
 /// Checks, and prints the report.
-///
-/// # Errors
-/// If a board does not answer, or the page cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
-    let page = arguments.page.as_ref().map(|page| page.check(arguments.replace)).transpose()?;
+    let page = arguments.page.as_ref().map(|page| page.file(arguments.replace)).transpose()?;
     let second = arguments.second_simulator.as_deref();
     let start = || Desk::start(&firmware::build_tester()?, &firmware::build()?, second);
     let desk = arguments.simulated.then(start).transpose()?;
@@ -76,16 +72,16 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         if port.is_some() && tester.is_some() { vec![] } else { plugged()?.into_iter().map(|uno| uno.port).collect() };
     let (mut weeder, mut tester) = ports::open(port.as_deref(), tester.as_deref(), &unos)?;
     tester.interrupted_by(ctrl_c()?);
-    let bar = Progress::new("checking");
     let extent = Extent { brief: arguments.brief, simulated: arguments.simulated };
     let last = Cell::new("");
-    let result = check_run(&mut weeder, &mut tester, extent, |what, share| {
-        if last.replace(what) != what {
-            tell!("Next: {what}");
-        }
-        bar.show(share);
+    let result = with_bar("checking", |show| {
+        check_run(&mut weeder, &mut tester, extent, |what, share| {
+            if last.replace(what) != what {
+                tell!("Next: {what}");
+            }
+            show(share);
+        })
     });
-    bar.finish();
     drop((weeder, tester));
     if let Some(desk) = desk {
         desk.stop()?;
@@ -93,12 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut report = result?;
     report.board.clone_from(&arguments.board);
     let printed = print(format_args!("{}", if arguments.json { report.json() } else { report.text() }));
-    if let Some(page) = page {
-        page.write(|to| to.write_all(report.page().as_bytes()))?;
-        if !arguments.json {
-            say!("Written     {}", page.path().display())?;
-        }
-    }
+    write_if_asked(page.as_ref(), "Written", arguments.json, |to| to.write_all(report.page().as_bytes()))?;
     printed?;
-    if report.is_good() { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+    Ok(Finding::of(report.is_good()))
 }

@@ -2,9 +2,9 @@
 //!
 //! The built-in examples, the scale, the radius and the code of the search are the firmware's.
 
-use crate::finding::Finding;
 use crate::numbers::whole_within;
 use crate::output::say;
+use crate::program::Finding;
 use crate::source;
 use anyhow::Result;
 use clap::Args;
@@ -14,7 +14,6 @@ use field::row::Kind;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -40,9 +39,6 @@ pub struct Arguments {
 }
 
 /// Classifies, and prints a line for each detection. With labels it also prints the confusion matrix.
-///
-/// # Errors
-/// If the file or its contents are wrong.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let objects = table::read(&arguments.file)?;
     let mut model = Model::built_in();
@@ -57,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             say!("\n{confusion}")?;
         }
     }
-    if confusion.plants_taken_for_weeds() == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+    Ok(Finding::of(confusion.plants_taken_for_weeds() == 0))
 }
 
 /// The class of each detection, with its votes.

@@ -3,12 +3,11 @@
 //! clap_complete makes them from the arguments themselves. They include presets and the axes of sweeps, but neither
 //! ports nor values of settings.
 
-use crate::output;
+use crate::{output, program};
 use anyhow::Result;
 use clap::Args;
 use clap_complete::Shell;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -21,10 +20,8 @@ pub struct Arguments {
 }
 
 /// Prints the script that the shell reads.
-///
-/// # Errors
-/// If it cannot be printed.
-pub fn run(arguments: &Arguments, mut command: clap::Command) -> Result<()> {
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let mut command = program::grammar::<crate::Arguments>();
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "weeder", &mut script);
     output::print(format_args!("{}", String::from_utf8_lossy(&script)))

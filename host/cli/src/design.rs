@@ -12,7 +12,6 @@ use mechanics::{file, paper, report};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -35,9 +34,6 @@ pub struct Arguments {
 }
 
 /// Calculates and prints.
-///
-/// # Errors
-/// If the machine's file cannot be read, or makes no machine that could be calculated.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let own = arguments.machine.as_deref().map(file::read).transpose()?;
     let machine = own.unwrap_or_default();

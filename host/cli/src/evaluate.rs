@@ -1,6 +1,6 @@
 //! `weeder evaluate`: evaluates a field trial from the counts and measurements of its plots.
 
-use crate::destination::{FolderName, OutFolder, Replace};
+use crate::destination::{OutFolder, OutName, Replace};
 use crate::output::{self, say};
 use crate::source;
 use anyhow::{Context, Result};
@@ -13,7 +13,6 @@ use std::path::{Path, PathBuf};
 /// The report's name in its folder.
 const REPORT: &str = "report.html";
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder evaluate trial.csv                   the results, and what they depend on\n  \
@@ -29,17 +28,14 @@ pub struct Arguments {
     json: bool,
     /// Write report.html into this folder, and create it if needed.
     #[arg(long, value_name = "FOLDER")]
-    out: Option<FolderName>,
+    out: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
 }
 
 /// Reads, evaluates and prints.
-///
-/// # Errors
-/// If the table cannot be read or has an invalid plot, or the report cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let folder = arguments.out.as_ref().map(|out| out.check([REPORT], arguments.replace)).transpose()?;
+    let folder = arguments.out.as_ref().map(|out| out.folder([REPORT], arguments.replace)).transpose()?;
     let records = evaluation::read_csv(&arguments.file)?;
     let analysis = Analysis::of(records).with_context(|| arguments.file.display().to_string())?;
     let printed = match arguments.json {

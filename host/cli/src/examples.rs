@@ -1,10 +1,10 @@
 //! `weeder examples`: the taught examples of a machine as a table, to save, to train from, and to teach to another
 //! machine.
 
-use crate::destination::{FileName, Replace};
-use crate::finding::Finding;
+use crate::destination::{OutName, Replace};
 use crate::output::{say, tell};
 use crate::ports::Port;
+use crate::program::Finding;
 use crate::source;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
@@ -15,7 +15,6 @@ use link::examples::{self, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder examples pull chilli.csv             write the taught examples into a table
@@ -34,7 +33,7 @@ enum Action {
     Pull {
         /// The file.
         #[arg(value_name = "FILE.csv", required_unless_present = "json")]
-        file: Option<FileName>,
+        file: Option<OutName>,
         #[command(flatten)]
         replace: Replace,
         /// Also print them as JSON.
@@ -78,13 +77,10 @@ Example: weeder examples push chilli.csv --replace")]
 }
 
 /// Pulls, pushes or compares.
-///
-/// # Errors
-/// If table or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, port } => {
-            let file = file.as_ref().map(|file| file.check(*replace)).transpose()?;
+            let file = file.as_ref().map(|file| file.file(*replace)).transpose()?;
             let taught = on_machine(port)?;
             let printed =
                 if *json { say!("{:#}", Value::from_iter(taught.iter().filter_map(in_json))) } else { Ok(()) };
@@ -130,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
                 false if is_same => say!("The machine was taught the examples in {}", file.display())?,
                 false => say!("{}", differences(&in_file, &on_machine))?,
             }
-            Ok(if is_same { Finding::Good } else { Finding::Bad })
+            Ok(Finding::of(is_same))
         }
     }
 }

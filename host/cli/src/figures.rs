@@ -4,8 +4,8 @@
 //! --speeds 1,2 -->`. The command runs, and its output becomes the block. The output is the same on every machine: run
 //! times go to standard error, which is left out.
 
-use crate::finding::Finding;
 use crate::output::{say, tell};
+use crate::program::Finding;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;
@@ -34,9 +34,6 @@ pub struct Arguments {
 const MARK: &str = "<!-- figures: ";
 
 /// Writes the figures, or compares them.
-///
-/// # Errors
-/// If a page cannot be read or written, has a figure without a block, or a command fails.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut differ = Vec::new();
     for path in &arguments.pages {

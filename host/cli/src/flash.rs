@@ -6,14 +6,13 @@ use crate::ports::Port;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use std::collections::HashSet;
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::{self, Path};
 use std::process::{Command, Stdio};
 use trial::firmware;
 use uno::elf::Image;
 use uno::hex;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -43,9 +42,6 @@ const AVAILABLE_BYTES: usize = 32_256;
 pub const OLD_AVAILABLE_BYTES: usize = 30_720;
 
 /// Flashes, with each of avrdude's own messages once on the terminal.
-///
-/// # Errors
-/// If there is no Uno, it cannot be opened, or building, proving or writing fails; each says what to do.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let (baud, available) =
         if arguments.old_bootloader { (OLD_BAUD, OLD_AVAILABLE_BYTES) } else { (BAUD, AVAILABLE_BYTES) };
@@ -94,7 +90,7 @@ fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Res
         .spawn()
         .context("avrdude cannot be started: ./setup.sh installs it")?;
     if let Some(words) = avrdude.stderr.take() {
-        Messages::new(io::stderr()).pass(words);
+        pass_on(BufReader::new(words), io::stderr());
     }
     let status = avrdude.wait().context("avrdude cannot be waited for")?;
     let other = if old_bootloader { "without" } else { "with" };
@@ -112,62 +108,33 @@ fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Res
     Ok(())
 }
 
-/// Passes on avrdude's messages, each once over all tries, and its progress at once.
-struct Messages<W> {
-    to: W,
-    line: Vec<u8>,
-    /// How much of the line was passed on.
-    passed: usize,
-    /// The messages that were passed on, without their numbers.
-    said: HashSet<Vec<u8>>,
-}
-
 /// How avrdude's messages begin.
 const MESSAGE: &[u8] = b"avrdude";
 
-impl<W: Write> Messages<W> {
-    fn new(to: W) -> Self {
-        Self { to, line: Vec::new(), passed: 0, said: HashSet::new() }
-    }
-
-    /// Passes on the input until it ends.
-    fn pass(&mut self, mut from: impl Read) {
-        let mut buffer = [0; 256];
-        while let Ok(count @ 1..) = from.read(&mut buffer) {
-            buffer[..count].iter().for_each(|&byte| self.take(byte));
-            // The output is closed, so no message can be shown. avrdude goes on.
-            let _ = self.to.flush();
+/// Passes on avrdude's messages, each once over all tries, and its progress at once, until the input ends.
+fn pass_on(from: impl BufRead, mut to: impl Write) {
+    // The messages that were passed on, without their numbers.
+    let mut said = HashSet::new();
+    let (mut line, mut passed) = (Vec::new(), 0);
+    for byte in from.bytes().map_while(Result::ok).map(Some).chain([None]) {
+        line.extend(byte);
+        let ends = matches!(byte, None | Some(b'\n' | b'\r'));
+        let is_shown = match line.starts_with(MESSAGE) {
+            true => {
+                ends && said.insert(line.iter().filter(|byte| !byte.is_ascii_hexdigit()).copied().collect::<Vec<_>>())
+            }
+            // It may become a message.
+            false => ends || !MESSAGE.starts_with(&line),
+        };
+        if is_shown {
+            // If the output is closed, no message can be shown. avrdude goes on.
+            let _ = to.write_all(&line[passed..]).and_then(|()| to.flush());
+            passed = line.len();
         }
-        self.end_line();
-    }
-
-    fn take(&mut self, byte: u8) {
-        self.line.push(byte);
-        if matches!(byte, b'\n' | b'\r') {
-            self.end_line();
-        } else if !self.may_be_message() {
-            self.pass_line();
+        if ends {
+            line.clear();
+            passed = 0;
         }
-    }
-
-    /// Whether the line so far may be a message.
-    fn may_be_message(&self) -> bool {
-        self.line.starts_with(MESSAGE) || MESSAGE.starts_with(&self.line)
-    }
-
-    fn end_line(&mut self) {
-        let words = self.line.iter().filter(|byte| !byte.is_ascii_hexdigit()).copied().collect();
-        if !self.line.starts_with(MESSAGE) || self.said.insert(words) {
-            self.pass_line();
-        }
-        self.line.clear();
-        self.passed = 0;
-    }
-
-    fn pass_line(&mut self) {
-        // As above.
-        let _ = self.to.write_all(&self.line[self.passed..]);
-        self.passed = self.line.len();
     }
 }
 
@@ -183,7 +150,7 @@ mod tests {
         }
         words += "Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you.";
         let mut said = Vec::new();
-        Messages::new(&mut said).pass(words.as_bytes());
+        pass_on(words.as_bytes(), &mut said);
         let said = String::from_utf8(said).unwrap();
         assert_eq!(said.matches("not in sync").count(), 1, "{said}");
         assert!(said.starts_with("avrdude: ser_open(): no modem lines\n\navrdude: stk500_getsync() attempt 1 of 10"));

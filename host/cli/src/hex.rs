@@ -2,14 +2,13 @@
 //! use this command, so they contain a proved firmware.
 
 use crate::bounds::Firmware;
-use crate::destination::{FileName, Replace};
+use crate::destination::{OutName, Replace};
 use crate::output::say;
 use anyhow::Result;
 use clap::Args;
 use uno::elf::Image;
 use uno::hex;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -21,7 +20,7 @@ avrdude flashes the file. The Arduino IDE contains it:
 pub struct Arguments {
     /// The file to write.
     #[arg(value_name = "OUT.hex")]
-    out: FileName,
+    out: OutName,
     #[command(flatten)]
     replace: Replace,
     #[command(flatten)]
@@ -29,11 +28,8 @@ pub struct Arguments {
 }
 
 /// Writes it.
-///
-/// # Errors
-/// If the firmware cannot be built, read or proved, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = arguments.out.check(arguments.replace)?;
+    let out = arguments.out.file(arguments.replace)?;
     let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
     arguments.firmware.check(&elf)?;

@@ -38,13 +38,9 @@ mod trial;
 mod virtual_uno;
 
 use anyhow::{Context, Result};
-use clap::builder::StyledStr;
-use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use sim::finding::Finding;
-use sim::{course, destination, finding, numbers, output, progress, row, source};
-use std::env;
-use std::ffi::OsString;
+use clap::{Parser, Subcommand};
+use sim::program::Finding;
+use sim::{course, destination, numbers, output, program, progress, row, source};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,96 +63,83 @@ struct Arguments {
     command: Command,
 }
 
-#[derive(Subcommand)]
-enum Command {
-    /// Weed a simulated row with the real firmware on a virtual Uno.
-    Sim(Box<row::Arguments>),
-    /// Build the firmware and flash the Uno at a USB port.
-    Flash(flash::Arguments),
-    /// Write the firmware as an Intel HEX file, for the Arduino tools.
-    Hex(hex::Arguments),
-    /// Run the firmware or a bootloader on a virtual Uno, in real time, at a serial port.
-    VirtualUno(Box<virtual_uno::Arguments>),
-    /// Measure the cycles and bytes of the firmware on a virtual Uno.
-    BenchUno(bench::Arguments),
-    /// Prove bounds from the ELF: stack, interrupts, and the encoder's rate.
-    Bounds(bounds::Arguments),
-    /// Check a real board with a second Uno, the tester.
-    CheckBoard(check_board::Arguments),
-    /// Work for a day with random faults.
-    Soak(soak::Arguments),
-    /// Run the paper's experiment in a simulated field, with several controllers.
-    Trial(Box<trial::Arguments>),
-    /// Map a result of the simulated trial against one or two parameters.
-    Sweep(Box<sweep::Arguments>),
-    /// Merge the parts of a trial, sweep or soak from several machines.
-    Merge(merge::Arguments),
-    /// Learn a table of examples from labelled detections, and print its error rates.
-    Train(train::Arguments),
-    /// Classify recorded detections with the firmware's classifier.
-    Classify(classify::Arguments),
-    /// List the Unos and the rows that they control, and name rows.
-    Rows(rows::Arguments),
-    /// Watch the machine, and type commands.
-    Monitor(monitor::Arguments),
-    /// Serve the page to a phone, with the state of the machines and HOLD.
-    Serve(serve::Arguments),
-    /// Record what the machine does.
-    Record(record::Arguments),
-    /// Replay a log with the same decisions on this computer, and compare.
-    Replay(replay::Arguments),
-    /// Make a map of a record with a satellite receiver, and count plants.
-    Map(Box<map::Arguments>),
-    /// Save taught examples in a table, teach them, or compare.
-    Examples(examples::Arguments),
-    /// Set up the machine step by step: ask, measure, set and save.
-    SetUp(set_up::Arguments),
-    /// Save the machine's settings in a file, set them from it, or compare.
-    Settings(settings::Arguments),
-    /// Calculate engine, servo, shanks, chain, wheels and handle of a machine.
-    Design(design::Arguments),
-    /// Create a randomised plan of a field trial, as a table to fill in.
-    Plan(plan::Arguments),
-    /// Evaluate a field trial from the counts of its plots.
-    Evaluate(evaluate::Arguments),
-    /// Update or check the manual's figures.
-    Figures(figures::Arguments),
-    /// Print the completion script for a shell.
-    Completions(completions::Arguments),
-}
-
-/// The grammar of all commands.
-fn grammar() -> clap::Command {
-    numbers::with_negative_numbers(Arguments::command())
-}
-
-/// Parses a command line.
-fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
-    let found = grammar().try_get_matches_from(&words);
-    found.and_then(|found| Arguments::from_arg_matches(&found)).map_err(|error| with_known_commands(error, &words))
-}
-
-/// The same error. For an unknown command, it lists the known ones.
-fn with_known_commands(mut error: clap::Error, words: &[OsString]) -> clap::Error {
-    if error.kind() == ErrorKind::InvalidSubcommand {
-        let mut command = grammar();
-        let mut words = words.iter().skip(1);
-        while let Some(inner) = words.next().and_then(|word| command.find_subcommand(word)) {
-            command = inner.clone();
+/// The grammar of the commands, and the function that runs one. The module of each has its `Arguments`, and `run`. That
+/// fails if an argument, a file, the firmware or a machine cannot be used. The error says what would be right.
+macro_rules! commands {
+    ($($(#[$about:meta])+ $command:ident: $module:ident,)+) => {
+        #[derive(Subcommand)]
+        enum Command {
+            $($(#[$about])+ $command(Box<$module::Arguments>),)+
         }
-        let known: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
-        let tip = StyledStr::from(format!("the commands are {}", known.join(", ")));
-        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
-    }
-    error
+
+        /// Runs a command and returns its finding.
+        fn run(command: Command) -> Result<Finding> {
+            match command {
+                $(Command::$command(arguments) => $module::run(&arguments).map(Into::into),)+
+            }
+        }
+    };
+}
+
+commands! {
+    /// Weed a simulated row with the real firmware on a virtual Uno.
+    Sim: row,
+    /// Build the firmware and flash the Uno at a USB port.
+    Flash: flash,
+    /// Write the firmware as an Intel HEX file, for the Arduino tools.
+    Hex: hex,
+    /// Run the firmware or a bootloader on a virtual Uno, in real time, at a serial port.
+    VirtualUno: virtual_uno,
+    /// Measure the cycles and bytes of the firmware on a virtual Uno.
+    BenchUno: bench,
+    /// Prove bounds from the ELF: stack, interrupts, and the encoder's rate.
+    Bounds: bounds,
+    /// Check a real board with a second Uno, the tester.
+    CheckBoard: check_board,
+    /// Work for a day with random faults.
+    Soak: soak,
+    /// Run the paper's experiment in a simulated field, with several controllers.
+    Trial: trial,
+    /// Map a result of the simulated trial against one or two parameters.
+    Sweep: sweep,
+    /// Merge the parts of a trial, sweep or soak from several machines.
+    Merge: merge,
+    /// Learn a table of examples from labelled detections, and print its error rates.
+    Train: train,
+    /// Classify recorded detections with the firmware's classifier.
+    Classify: classify,
+    /// List the Unos and the rows that they control, and name rows.
+    Rows: rows,
+    /// Watch the machine, and type commands.
+    Monitor: monitor,
+    /// Serve the page to a phone, with the state of the machines and HOLD.
+    Serve: serve,
+    /// Record what the machine does.
+    Record: record,
+    /// Replay a log with the same decisions on this computer, and compare.
+    Replay: replay,
+    /// Make a map of a record with a satellite receiver, and count plants.
+    Map: map,
+    /// Save taught examples in a table, teach them, or compare.
+    Examples: examples,
+    /// Set up the machine step by step: ask, measure, set and save.
+    SetUp: set_up,
+    /// Save the machine's settings in a file, set them from it, or compare.
+    Settings: settings,
+    /// Calculate engine, servo, shanks, chain, wheels and handle of a machine.
+    Design: design,
+    /// Create a randomised plan of a field trial, as a table to fill in.
+    Plan: plan,
+    /// Evaluate a field trial from the counts of its plots.
+    Evaluate: evaluate,
+    /// Update or check the manual's figures.
+    Figures: figures,
+    /// Print the completion script for a shell.
+    Completions: completions,
 }
 
 fn main() -> ExitCode {
-    let arguments = match parse(env::args_os().collect()) {
-        Ok(arguments) => arguments,
-        Err(error) => error.exit(),
-    };
-    finding::exit(run(arguments.command))
+    program::main(|arguments: Arguments| run(arguments.command))
 }
 
 /// A flag that Ctrl-C sets, and SIGTERM and SIGHUP: it asks a command to end.
@@ -167,71 +150,43 @@ fn ctrl_c() -> Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// Runs a command and returns its finding.
-fn run(command: Command) -> Result<Finding> {
-    match command {
-        Command::Sim(arguments) => row::run(&arguments),
-        Command::Flash(arguments) => flash::run(&arguments).map(|()| Finding::Good),
-        Command::Hex(arguments) => hex::run(&arguments).map(|()| Finding::Good),
-        Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(|()| Finding::Good),
-        Command::BenchUno(arguments) => bench::run(&arguments).map(|()| Finding::Good),
-        Command::Bounds(arguments) => bounds::run(&arguments),
-        Command::CheckBoard(arguments) => check_board::run(&arguments),
-        Command::Soak(arguments) => soak::run(&arguments),
-        Command::Trial(arguments) => trial::run(&arguments),
-        Command::Sweep(arguments) => sweep::run(&arguments).map(|()| Finding::Good),
-        Command::Merge(arguments) => merge::run(&arguments),
-        Command::Train(arguments) => train::run(&arguments),
-        Command::Classify(arguments) => classify::run(&arguments),
-        Command::Monitor(arguments) => monitor::run(&arguments),
-        Command::Serve(arguments) => serve::run(&arguments).map(|()| Finding::Good),
-        Command::Rows(arguments) => rows::run(&arguments).map(|()| Finding::Good),
-        Command::Record(arguments) => record::run(&arguments).map(|()| Finding::Good),
-        Command::Replay(arguments) => replay::run(&arguments),
-        Command::Map(arguments) => map::run(&arguments).map(|()| Finding::Good),
-        Command::Examples(arguments) => examples::run(&arguments),
-        Command::SetUp(arguments) => set_up::run(&arguments).map(|()| Finding::Good),
-        Command::Settings(arguments) => settings::run(&arguments),
-        Command::Design(arguments) => design::run(&arguments).map(|()| Finding::Good),
-        Command::Plan(arguments) => plan::run(&arguments).map(|()| Finding::Good),
-        Command::Evaluate(arguments) => evaluate::run(&arguments).map(|()| Finding::Good),
-        Command::Figures(arguments) => figures::run(&arguments),
-        Command::Completions(arguments) => completions::run(&arguments, grammar()).map(|()| Finding::Good),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::destination::{FileName, FolderName};
+    use crate::destination::OutName;
+    use crate::program::parse;
     use clap::{Arg, Command};
     use std::any::TypeId;
     use std::collections::BTreeSet;
+    use std::ffi::OsString;
     use std::fs;
     use std::path::{Path, PathBuf};
 
     #[test]
     fn the_arguments_are_well_formed() {
-        grammar().debug_assert();
+        program::grammar::<Arguments>().debug_assert();
     }
 
-    /// A command's subcommands and theirs, each with its name in full.
-    fn subcommands(command: &Command, name: &str) -> Vec<(String, Command)> {
-        let of_one = |command: &Command| {
-            let name = format!("{name} {}", command.get_name());
-            [vec![(name.clone(), command.clone())], subcommands(command, &name)].concat()
-        };
-        command.get_subcommands().flat_map(of_one).collect()
+    /// All commands and their subcommands, each with its name in full, without `weeder`.
+    fn commands() -> Vec<(String, Command)> {
+        fn below(command: &Command, name: &str) -> Vec<(String, Command)> {
+            let of_one = |command: &Command| {
+                let name = format!("{name} {}", command.get_name()).trim_start().to_owned();
+                [vec![(name.clone(), command.clone())], below(command, &name)].concat()
+            };
+            command.get_subcommands().flat_map(of_one).collect()
+        }
+        below(&program::grammar::<Arguments>(), "")
     }
 
     #[test]
     fn every_number_s_range_is_in_its_help_and_in_its_error() {
         let mut ranges = 0;
-        for (name, command) in subcommands(&grammar(), "weeder") {
+        for (name, command) in commands() {
             for option in command.get_arguments().filter(|option| option.get_action().takes_values()) {
                 let Some(long) = option.get_long() else { continue };
-                let words = name.split(' ').map(OsString::from).chain([format!("--{long}").into(), "-1".into()]);
-                let Err(error) = parse(words.collect()) else { continue };
+                let words = format!("weeder {name} --{long} -1");
+                let Err(error) = parse::<Arguments>(words.split(' ').map(OsString::from).collect()) else { continue };
                 let said = error.to_string();
                 assert!(!said.contains("unexpected argument"), "{name} --{long}: {said}");
                 let Some((_, rest)) = said.split_once("number from ") else { continue };
@@ -263,65 +218,65 @@ mod tests {
     const NO_FILE: &str = "bounds:chip bounds:function check-board:board check-board:port check-board:tester examples.diff:port examples.pull:port examples.push:port flash:port rows.forget:name rows.name:name \
         rows.name:port set-up:port sim:channel_a sim:channel_b sim:channel_beam";
 
-    /// The words before the name of each file or folder that a command writes; for a folder also its files. `DIR` is a
-    /// folder with the required inputs.
-    const WRITERS: [(&str, &str, &[&str]); 18] = [
-        ("check-board:page", "check-board --simulated --page", &[]),
-        ("evaluate:out", "evaluate DIR/filled.csv --out", &["report.html"]),
-        ("examples.pull:file", "examples pull --port /dev/no-such-port", &[]),
-        ("hex:out", "hex", &[]),
-        ("map:out", "map DIR/log.csv --out", &[]),
-        ("map:svg", "map DIR/log.csv --out DIR/new --svg", &[]),
-        ("map:table", "map DIR/log.csv --out DIR/new --table", &[]),
-        ("merge:out", "merge DIR/trial.part --out", &["report.html", "trial.csv", "controllers.csv"]),
-        ("merge:out", "merge DIR/sweep.part --out", &[]),
-        ("plan:out", "plan --out", &[]),
-        ("settings.pull:file", "settings pull --port /dev/no-such-port", &[]),
-        ("settings.pull:file", "settings pull --port a=/dev/no-a --port b=/dev/no-b", &["a.toml", "b.toml"]),
-        ("sim:out", "sim --out", &["row.svg", "weeding.svg", "row.csv", "plants.csv", "weeds.csv"]),
-        ("sim:vcd", "sim --vcd", &[]),
-        ("soak:out", "soak --shard 1/2 --out", &[]),
-        ("sweep:out", "sweep --x k=1..3:1 --out", &[]),
-        ("train:picture", "train --synthetic --picture", &[]),
-        ("trial:out", "trial --out", &["report.html", "trial.csv", "controllers.csv"]),
+    /// Each argument that names an output, a command line that has it, and its files. One of these files is enough to
+    /// stop the command. `DIR` is a folder with the required inputs.
+    const WRITERS: [(&str, &str, &[&str]); 21] = [
+        ("check-board:page", "check-board --simulated --page DIR/new", &["new"]),
+        ("evaluate:out", "evaluate DIR/filled.csv --out DIR/reports", &["reports/report.html"]),
+        ("examples.pull:file", "examples pull --port /dev/no-such-port DIR/new", &["new"]),
+        ("hex:out", "hex DIR/new", &["new"]),
+        ("map:out", "map DIR/log.csv --out DIR/new", &["new"]),
+        ("map:svg", "map DIR/log.csv --out DIR/map --svg DIR/new", &["new"]),
+        ("map:table", "map DIR/log.csv --out DIR/map --table DIR/new", &["new"]),
+        ("merge:out", "merge DIR/trial.part --out DIR/reports", &TRIAL),
+        ("merge:out", "merge DIR/sweep.part --out DIR/new", &["new"]),
+        ("plan:out", "plan --out DIR/new", &["new"]),
+        ("settings.pull:file", "settings pull --port /dev/no-such-port DIR/new", &["new"]),
+        (
+            "settings.pull:file",
+            "settings pull --port a=/dev/no-a --port b=/dev/no-b DIR/reports",
+            &["reports/a.toml", "reports/b.toml"],
+        ),
+        (
+            "sim:out",
+            "sim --out DIR/reports",
+            &["reports/row.svg", "reports/weeding.svg", "reports/row.csv", "reports/plants.csv", "reports/weeds.csv"],
+        ),
+        ("sim:vcd", "sim --vcd DIR/new", &["new"]),
+        ("soak:out", "soak --shard 1/2 --out DIR/new", &["new"]),
+        ("sweep:out", "sweep --x k=1..3:1 --out DIR/new", &["new"]),
+        ("train:out", "train --synthetic --out DIR/new.rs", &["new.rs"]),
+        ("train:out", "train --synthetic --out DIR/new.csv", &["new.csv"]),
+        ("train:picture", "train --synthetic --picture DIR/new", &["new"]),
+        ("trial:out", "trial --out DIR/reports", &TRIAL),
+        ("trial:out", "trial --shard 1/2 --out DIR/new.part", &["new.part"]),
     ];
 
-    /// Writers whose file name ends with its format.
-    const BY_ENDING: [(&str, &str, &[&str]); 2] =
-        [("train:out", "train --synthetic --out", &["rs", "csv"]), ("trial:out", "trial --shard 1/2 --out", &["part"])];
+    /// The report of a trial.
+    const TRIAL: [&str; 3] = ["reports/report.html", "reports/trial.csv", "reports/controllers.csv"];
 
     /// Every argument that takes a word that could name a file, as `command.subcommand:argument`, and its type.
     fn words_taken() -> Vec<(String, Arg)> {
-        let commands = subcommands(&grammar(), "weeder");
         let of_one = |(name, command): &(String, Command)| -> Vec<(String, Arg)> {
-            let name = name.trim_start_matches("weeder ").replace(' ', ".");
+            let name = name.replace(' ', ".");
             let takes = |arg: &&Arg| arg.get_action().takes_values() && is_free(arg);
             command.get_arguments().filter(takes).map(|arg| (format!("{name}:{}", arg.get_id()), arg.clone())).collect()
         };
-        commands.iter().flat_map(of_one).collect()
+        commands().iter().flat_map(of_one).collect()
     }
 
     /// Whether it takes free text or a path, without its own parser or list of values.
     fn is_free(argument: &Arg) -> bool {
         let parser = argument.get_value_parser();
         let found = parser.type_id();
-        let kinds = [
-            TypeId::of::<String>(),
-            TypeId::of::<OsString>(),
-            TypeId::of::<PathBuf>(),
-            TypeId::of::<FileName>(),
-            TypeId::of::<FolderName>(),
-        ];
         let has_words_alone = !argument.is_hide_possible_values_set() && parser.possible_values().is_some();
-        kinds.iter().any(|kind| found == *kind) && !has_words_alone
+        let names = [TypeId::of::<String>(), TypeId::of::<PathBuf>()].iter().any(|kind| found == *kind);
+        writes(argument) || names && !has_words_alone
     }
 
     /// Whether it names an output.
     fn writes(argument: &Arg) -> bool {
-        let found = argument.get_value_parser().type_id();
-        [TypeId::of::<FileName>(), TypeId::of::<FolderName>(), TypeId::of::<OsString>()]
-            .iter()
-            .any(|kind| found == *kind)
+        argument.get_value_parser().type_id() == TypeId::of::<OutName>()
     }
 
     #[test]
@@ -331,8 +286,7 @@ mod tests {
             .flat_map(|list| list.split_whitespace())
             .map(str::to_owned)
             .collect();
-        let replaced: BTreeSet<String> =
-            WRITERS.iter().chain(&BY_ENDING).map(|(argument, ..)| (*argument).to_owned()).collect();
+        let replaced: BTreeSet<String> = WRITERS.iter().map(|(argument, ..)| (*argument).to_owned()).collect();
         let taken = words_taken();
         for (name, argument) in &taken {
             assert_eq!(writes(argument), replaced.contains(name), "{name}: is what is there replaced? See WRITERS");
@@ -347,22 +301,21 @@ mod tests {
 
     #[test]
     fn a_command_that_writes_has_force_and_no_other_has_it_for_that() {
-        let writers: BTreeSet<&str> =
-            WRITERS.iter().chain(&BY_ENDING).filter_map(|(argument, ..)| argument.split(':').next()).collect();
-        for (name, command) in subcommands(&grammar(), "weeder") {
-            let name = name.trim_start_matches("weeder ").replace(' ', ".");
+        let writers: BTreeSet<&str> = WRITERS.iter().filter_map(|(argument, ..)| argument.split(':').next()).collect();
+        for (name, command) in commands() {
+            let name = name.replace(' ', ".");
             let mut options = command.get_arguments().filter(|argument| argument.get_long() == Some("force"));
             let force = options.next().and_then(Arg::get_help).map(ToString::to_string).unwrap_or_default();
             assert_eq!(force.starts_with("Replace existing files"), writers.contains(name.as_str()), "{name}");
         }
     }
 
-    /// Runs a command in this process, with `DIR` for a folder, and a last word.
-    fn run_with(words: &str, folder: &Path, last: &Path) -> Result<Finding> {
+    /// Runs a command in this process, with `DIR` for a folder.
+    fn run_in(folder: &Path, words: &str) -> Result<Finding> {
         let folder = folder.to_str().expect("it is text");
-        let words = words.split(' ').map(|word| OsString::from(word.replace("DIR", folder)));
-        let words = ["weeder".into()].into_iter().chain(words).chain([last.into()]);
-        run(parse(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
+        let words = ["weeder"].into_iter().chain(words.split(' '));
+        let words = words.map(|word| OsString::from(word.replace("DIR", folder)));
+        run(parse::<Arguments>(words.collect()).unwrap_or_else(|error| panic!("{error}")).command)
     }
 
     #[test]
@@ -373,67 +326,54 @@ mod tests {
         fs::write(path("log.csv"), "time_ms,kind,line\n0,connected,0.2.0\n").unwrap();
         let filled = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/trial-example.csv");
         fs::copy(filled, path("filled.csv")).unwrap();
-        for words in ["trial --speeds 2 --spacings 50", "sweep --x k=1..1:1"] {
-            let part = path(words.split(' ').next().unwrap()).with_extension("part");
-            let words = format!("{words} --field DIR/small.toml --shard 1/1 --out");
-            run_with(&words, folder.path(), &part).expect("it computes a part");
-        }
-        let assert_kept = |words: &str, there: &Path, named: &Path| {
-            fs::write(there, "mine").unwrap();
-            let error = run_with(words, folder.path(), named).expect_err(words).to_string();
-            let right =
-                format!("{} is there already: choose another name, or have --force replace it", there.display());
-            assert_eq!(error, right, "{words}");
-            assert_eq!(fs::read_to_string(there).unwrap(), "mine", "{words}");
-            fs::remove_file(there).unwrap();
-        };
+        let run = |words: &str| run_in(folder.path(), words);
+        let small = "--field DIR/small.toml --shard 1/1 --out";
+        run(&format!("trial --speeds 2 --spacings 50 {small} DIR/trial.part")).expect("it computes a part");
+        run(&format!("sweep --x k=1..1:1 {small} DIR/sweep.part")).expect("it computes a part");
+        fs::create_dir(path("reports")).unwrap();
         for (_, words, names) in WRITERS {
-            if names.is_empty() {
-                assert_kept(words, &path("there"), &path("there"));
-            }
-            for name in names {
-                fs::create_dir_all(path("reports")).unwrap();
-                assert_kept(words, &path("reports").join(name), &path("reports"));
-            }
-        }
-        for (_, words, endings) in BY_ENDING {
-            for ending in endings {
-                let there = path("there").with_extension(ending);
-                assert_kept(words, &there, &there);
+            for there in names.iter().map(|name| path(name)) {
+                fs::write(&there, "mine").unwrap();
+                let error = run(words).expect_err(words).to_string();
+                let right =
+                    format!("{} is there already: choose another name, or have --force replace it", there.display());
+                assert_eq!(error, right, "{words}");
+                assert_eq!(fs::read_to_string(&there).unwrap(), "mine", "{words}");
+                fs::remove_file(there).unwrap();
             }
         }
         // With `--force` it does, and an empty file holds no work.
         let table = path("plan.csv");
         fs::write(&table, "mine").unwrap();
-        run_with("plan --force --out", folder.path(), &table).expect("it is told to");
+        run("plan --force --out DIR/plan.csv").expect("it is told to");
         assert!(fs::read_to_string(&table).unwrap().contains("plot,replication"));
         fs::write(&table, "").unwrap();
-        run_with("plan --out", folder.path(), &table).expect("nothing is lost");
+        run("plan --out DIR/plan.csv").expect("nothing is lost");
         let report = path("reports/report.html");
         fs::write(&report, "mine").unwrap();
-        run_with("merge DIR/trial.part --brief --force --out", folder.path(), &path("reports")).expect("it is told to");
+        run("merge DIR/trial.part --brief --force --out DIR/reports").expect("it is told to");
         assert!(fs::read_to_string(&report).unwrap().contains("<svg"));
     }
 
     #[test]
     fn every_command_s_help_has_examples_that_are_well_formed() {
-        for (name, command) in subcommands(&grammar(), "weeder") {
+        for (name, command) in commands() {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             let lines = help.lines().map(|line| line.trim_start().trim_start_matches("Example: "));
             // Text behind a pipe, `&&` or some blanks is not part of the command.
-            let examples = lines.filter(|line| line.starts_with(&name)).map(|line| {
+            let examples = lines.filter(|line| line.starts_with(&format!("weeder {name}"))).map(|line| {
                 let end = ["  ", " |", " >", " &&"].into_iter().filter_map(|end| line.find(end)).min();
                 &line[..end.unwrap_or(line.len())]
             });
             let mut seen = 0;
             for example in examples {
                 let words = shlex::split(example).expect("its quotes are balanced");
-                if let Err(error) = parse(words.into_iter().map(OsString::from).collect()) {
+                if let Err(error) = parse::<Arguments>(words.into_iter().map(OsString::from).collect()) {
                     panic!("{example}: {error}");
                 }
                 seen += 1;
             }
-            assert!(seen > 0, "the help of `{name}` has no example");
+            assert!(seen > 0, "the help of `weeder {name}` has no example");
         }
     }
 }

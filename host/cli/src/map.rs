@@ -1,6 +1,6 @@
 //! `weeder map`: shows logs with a satellite receiver on a map, and summarises them.
 
-use crate::destination::{FileName, Replace};
+use crate::destination::{OutName, Replace};
 use crate::numbers::number_within;
 use crate::output::{print, say, tell};
 use crate::receiver::AntennaArguments;
@@ -16,7 +16,6 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It writes GeoJSON (WGS84) for QGIS: a point for each plant, weed, swing, alarm and label.\n\
@@ -32,13 +31,13 @@ pub struct Arguments {
     logs: Vec<PathBuf>,
     /// The map.
     #[arg(long, short, value_name = "FILE.geojson")]
-    out: FileName,
+    out: OutName,
     /// Also draw it.
     #[arg(long, value_name = "FILE.svg")]
-    svg: Option<FileName>,
+    svg: Option<OutName>,
     /// Write the counts as a table, with a line for each record.
     #[arg(long, value_name = "FILE.csv")]
-    table: Option<FileName>,
+    table: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Row spacing in mm, 50 to 5000, for the area.
@@ -58,14 +57,11 @@ pub struct Arguments {
 }
 
 /// Reads the records, writes the map, and prints the count.
-///
-/// # Errors
-/// If a record cannot be read, or a file not be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
-    let out = arguments.out.check(replace)?;
-    let svg = arguments.svg.as_ref().map(|svg| svg.check(replace)).transpose()?;
-    let table = arguments.table.as_ref().map(|table| table.check(replace)).transpose()?;
+    let out = arguments.out.file(replace)?;
+    let svg = arguments.svg.as_ref().map(|svg| svg.file(replace)).transpose()?;
+    let table = arguments.table.as_ref().map(|table| table.file(replace)).transpose()?;
     let stand = Stand { row_spacing_mm: arguments.row_spacing, spacing_mm: arguments.spacing };
     let mut jobs = Vec::new();
     for path in &arguments.logs {

@@ -9,15 +9,15 @@ mod plain;
 mod terminal;
 mod view;
 
-use crate::finding::Finding;
 use crate::ports::Ports;
+use crate::program::Finding;
 use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
 use link::row_names::ALL;
+use link::rows::Rows;
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Keys:\n  \
@@ -69,10 +69,15 @@ fn row(name: &str, names: &[String]) -> Result<Option<usize>, String> {
     }
 }
 
+/// Sends a command to a row. `hold` comes before all waiting commands.
+fn send(rows: &Rows, row: usize, command: &str) {
+    match command {
+        "hold" => rows.hold(row),
+        _ => rows.command(row, command),
+    }
+}
+
 /// Watches until the user quits.
-///
-/// # Errors
-/// If there is no Uno to begin with, or terminal or log fail.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let chosen = arguments.ports.choose()?;
     let logs = arguments.log.as_deref().map(|out| Logs::open(out, &chosen)).transpose()?;

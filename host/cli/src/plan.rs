@@ -1,6 +1,6 @@
 //! `weeder plan`: creates a randomised plan of a field trial, as a table to fill in.
 
-use crate::destination::{FileName, Replace};
+use crate::destination::{OutName, Replace};
 use crate::numbers::{number_within, whole_within};
 use crate::output::{self, print, say};
 use anyhow::Result;
@@ -9,7 +9,6 @@ use experiments::plan::Plan;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use experiments::table::distinct;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -37,17 +36,14 @@ pub struct Arguments {
     seed: u64,
     /// Write the table into this file instead of printing it.
     #[arg(long, value_name = "FILE.csv")]
-    out: Option<FileName>,
+    out: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
 }
 
 /// Creates the plan and prints or writes it.
-///
-/// # Errors
-/// If the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = arguments.out.as_ref().map(|out| out.check(arguments.replace)).transpose()?;
+    let out = arguments.out.as_ref().map(|out| out.file(arguments.replace)).transpose()?;
     let plan = Plan {
         speeds_km_h: distinct(arguments.speeds.clone()),
         spacings_cm: distinct(arguments.spacings.clone()),

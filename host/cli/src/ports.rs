@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use etcetera::BaseStrategy;
 use link::Link;
-use link::row_names::{Board, Names, Row, plugged, wrong_with};
+use link::row_names::{Board, Names, Plugged, Row, plugged, wrong_with};
 use link::rows::Opener;
 use std::collections::HashSet;
 use std::panic::resume_unwind;
@@ -189,16 +189,16 @@ fn end_of(port: &str) -> String {
     Path::new(port).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// The Unos that control no row with a name.
+pub fn unnamed<'a>(names: &'a Names, unos: &'a [Plugged]) -> impl Iterator<Item = &'a Plugged> {
+    let has = |row: &Row, uno: &Plugged| row.board == uno.board || row.board == Board::Port(uno.port.clone());
+    unos.iter().filter(move |uno| !names.rows().iter().any(|row| has(row, uno)))
+}
+
 /// Every row with a name, and every other Uno.
 fn every_row(names: &Names) -> Result<Vec<Row>> {
-    let mut rows = names.rows().to_vec();
-    let have_ports: Vec<Option<String>> = rows.iter().map(|row| row.board.port().ok()).collect();
-    for uno in plugged()? {
-        let is_named = rows.iter().any(|row| row.board == uno.board) || have_ports.contains(&Some(uno.port.clone()));
-        if !is_named {
-            rows.push(Row { name: end_of(&uno.port), board: uno.board });
-        }
-    }
+    let (mut rows, unos) = (names.rows().to_vec(), plugged()?);
+    rows.extend(unnamed(names, &unos).map(|uno| Row { name: end_of(&uno.port), board: uno.board.clone() }));
     ensure!(
         !rows.is_empty(),
         "there is no Uno at any USB port, and {} names no row: plug them in, or name their ports by --port",
@@ -261,9 +261,6 @@ impl Chosen {
     }
 
     /// The row of this name.
-    ///
-    /// # Errors
-    /// If there is none.
     pub fn find(&self, name: &str) -> Result<usize> {
         let found = self.rows.iter().position(|row| row.name == name);
         found.with_context(|| format!("there is no row {name}: there are {}", self.names().join(", ")))
@@ -282,39 +279,40 @@ impl Chosen {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<(Option<String>, String), String> {
-        named(text).map(|Named { name, port }| (name, port))
+    /// The rows at these ports, with the names in a file.
+    fn choose(ports: &[&str], file: &Path) -> Result<Chosen> {
+        let port = ports.iter().map(|text| named(text).unwrap()).collect();
+        Ports { port, all: false, names: NamesFile { rows_file: Some(file.to_owned()) } }.choose()
+    }
+
+    fn at(port: &str) -> Board {
+        Board::Port(port.to_owned())
     }
 
     #[test]
     fn a_row_has_the_name_that_is_given_or_the_end_of_its_port_s() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let no_names = NamesFile { rows_file: Some(file.path().to_owned()) };
         for (text, name, port) in [
             ("/dev/ttyACM0", "ttyACM0", "/dev/ttyACM0"),
             ("uno", "uno", "uno"),
             ("left=/dev/ttyACM0", "left", "/dev/ttyACM0"),
             ("row 3 = left=COM3", "row 3", " left=COM3"),
         ] {
-            let row = row(&named(text).unwrap(), &no_names).unwrap();
-            assert_eq!((row.name.as_str(), row.board), (name, Board::Port(port.to_owned())), "{text}");
+            let row = choose(&[text], file.path()).unwrap().rows.remove(0);
+            assert_eq!((row.name.as_str(), row.board), (name, at(port)), "{text}");
         }
-        assert_eq!(read("/dev/serial/by-id/a=b").unwrap().1, "/dev/serial/by-id/a=b");
+        assert_eq!(named("/dev/serial/by-id/a=b").unwrap().port, "/dev/serial/by-id/a=b");
     }
 
     #[test]
     fn a_row_without_a_name_or_a_port_is_refused_with_what_would_be_right() {
         for text in ["", "=", "left="] {
-            assert!(read(text).unwrap_err().contains("as left=/dev/ttyACM0"), "{text}");
+            assert!(named(text).unwrap_err().contains("as left=/dev/ttyACM0"), "{text}");
         }
-        assert!(read("all=COM3").unwrap_err().contains("`all` means every row"));
-        let long = named("/dev/serial/by-id/usb-Arduino__www.arduino.cc__0043-if00").unwrap();
-        assert!(
-            row(&long, &NamesFile { rows_file: None })
-                .unwrap_err()
-                .to_string()
-                .contains("put one before it, as left=/dev/")
-        );
+        assert!(named("all=COM3").unwrap_err().contains("`all` means every row"));
+        let long = "/dev/serial/by-id/usb-Arduino__www.arduino.cc__0043-if00";
+        let error = choose(&[long], Path::new("no-such.toml")).err().unwrap().to_string();
+        assert!(error.contains("put one before it, as left=/dev/"), "{error}");
     }
 
     #[test]
@@ -322,30 +320,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("rows.toml");
         let mut names = Names::read(&file).unwrap();
-        names.name("left", Board::SerialNumber("A1".to_owned())).unwrap();
+        let left = Board::SerialNumber("A1".to_owned());
+        names.name("left", left.clone()).unwrap();
         names.write().unwrap();
-        let ports = |words: &[&str]| Ports {
-            port: words.iter().map(|text| named(text).unwrap()).collect(),
-            all: false,
-            names: NamesFile { rows_file: Some(file.clone()) },
-        };
-        let chosen = ports(&["left", "./left2", "hedge=right"]).choose().unwrap();
+        let chosen = choose(&["left", "./left2", "hedge=right"], &file).unwrap();
         let boards: Vec<(&str, &Board)> = chosen.rows.iter().map(|row| (row.name.as_str(), &row.board)).collect();
-        let port = |text: &str| Board::Port(text.to_owned());
-        assert_eq!(
-            boards,
-            [("left", &Board::SerialNumber("A1".to_owned())), ("left2", &port("./left2")), ("hedge", &port("right"))]
-        );
+        assert_eq!(boards, [("left", &left), ("left2", &at("./left2")), ("hedge", &at("right"))]);
         assert_eq!(chosen.under_name(0, "lost"), "left: lost");
-        let one = ports(&["./left"]).choose().unwrap();
-        assert_eq!((one.rows[0].board.clone(), one.under_name(0, "lost")), (port("./left"), "lost".to_owned()));
-    }
-
-    #[test]
-    fn two_rows_of_one_name_are_refused() {
-        let port = ["a/uno", "b/uno"].map(|text| named(text).unwrap()).to_vec();
-        let ports = Ports { port, all: false, names: NamesFile { rows_file: None } };
-        let error = ports.choose().err().unwrap().to_string();
-        assert!(error.starts_with("two machines are called uno: name them"), "{error}");
+        let one = choose(&["./left"], &file).unwrap();
+        assert_eq!((&one.rows[0].board, one.under_name(0, "lost").as_str()), (&at("./left"), "lost"));
     }
 }

@@ -95,7 +95,7 @@ impl GpsArguments {
             ),
         };
         let (mut recorder, mut lines) = Recorder::new(&antenna);
-        let source = Source::open(port, self.gps_baud)?;
+        let source = open(port, self.gps_baud)?;
         lines.extend(recorder.found(0, port));
         let gps = Gps { row, port: port.clone(), baud: self.gps_baud, source: Some(source), retry_at: None, recorder };
         Ok(Some((gps, lines)))
@@ -109,7 +109,7 @@ pub struct Gps {
     port: String,
     baud: u32,
     /// `None` while it is lost.
-    source: Option<Source>,
+    source: Option<Box<dyn Read + Send>>,
     retry_at: Option<Instant>,
     recorder: Recorder,
 }
@@ -128,11 +128,16 @@ impl Gps {
             }
             self.retry_at = Some(now + RETRY);
             // The reason for a failure was reported when it was lost.
-            self.source = Source::open(&self.port, self.baud).ok();
+            self.source = open(&self.port, self.baud).ok();
             return if self.source.is_some() { self.recorder.found(time_ms, &self.port) } else { Lines::new() };
         };
         let mut bytes = [0; 4096];
-        match source.read(&mut bytes, now) {
+        let read = match source.read(&mut bytes) {
+            Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
+            read => read,
+        };
+        match read {
             Ok(count) => self.recorder.take(time_ms, &bytes[..count]),
             Err(error) => {
                 self.source = None;
@@ -152,41 +157,21 @@ impl Gps {
     }
 }
 
-/// The source of the lines.
-enum Source {
-    Port(Box<dyn Read + Send>),
-    File(Paced),
-}
-
-impl Source {
-    fn open(name: &str, baud: u32) -> Result<Self> {
-        let path = Path::new(name);
-        if path.metadata().is_ok_and(|there| there.is_file()) {
-            let text = fs::read(path)?;
-            return Ok(Self::File(Paced::new(&String::from_utf8_lossy(&text), Instant::now())));
-        }
-        Ok(Self::Port(link::listen(name, baud).map_err(|error| match error {
-            LinkError::Absent(port) => {
-                anyhow!("there is no port {port} for --gps: plug the receiver in, and name its port")
-            }
-            LinkError::Busy(port) => {
-                anyhow!("{port} is in use: end the other program that reads the receiver, such as gpsd")
-            }
-            other => other.into(),
-        })?))
+/// Opens a port, or the file that replaces it.
+fn open(name: &str, baud: u32) -> Result<Box<dyn Read + Send>> {
+    let path = Path::new(name);
+    if path.metadata().is_ok_and(|there| there.is_file()) {
+        return Ok(Box::new(Paced::new(&String::from_utf8_lossy(&fs::read(path)?))));
     }
-
-    /// The number of bytes received.
-    fn read(&mut self, bytes: &mut [u8], now: Instant) -> io::Result<usize> {
-        match self {
-            Self::Port(port) => match port.read(bytes) {
-                Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
-                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
-                read => read,
-            },
-            Self::File(file) => Ok(file.read(bytes, now)),
+    link::listen(name, baud).map_err(|error| match error {
+        LinkError::Absent(port) => {
+            anyhow!("there is no port {port} for --gps: plug the receiver in, and name its port")
         }
-    }
+        LinkError::Busy(port) => {
+            anyhow!("{port} is in use: end the other program that reads the receiver, such as gpsd")
+        }
+        other => other.into(),
+    })
 }
 
 /// The lines of a file, each at its due time.
@@ -197,7 +182,7 @@ struct Paced {
 }
 
 impl Paced {
-    fn new(text: &str, began: Instant) -> Self {
+    fn new(text: &str) -> Self {
         let (mut due_ms, mut last_ms) = (0, None::<i64>);
         let line = |line: &str| {
             if let Line::Report(report) = Line::parse(line)
@@ -209,12 +194,12 @@ impl Paced {
             }
             (due_ms, format!("{line}\n").into_bytes())
         };
-        Self { began, lines: text.lines().map(line).collect() }
+        Self { began: Instant::now(), lines: text.lines().map(line).collect() }
     }
 
-    fn read(&mut self, bytes: &mut [u8], now: Instant) -> usize {
+    /// The lines that are due after this time, as far as there is room for them.
+    fn read_due(&mut self, elapsed: Duration, bytes: &mut [u8]) -> usize {
         let mut count = 0;
-        let elapsed = now.saturating_duration_since(self.began);
         while let Some((due_ms, line)) = self.lines.front()
             && Duration::from_millis(*due_ms) <= elapsed
             && count + line.len() <= bytes.len()
@@ -227,6 +212,16 @@ impl Paced {
     }
 }
 
+impl Read for Paced {
+    /// Times out, as a port does, if no line is due.
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        match self.read_due(self.began.elapsed(), bytes) {
+            0 => Err(ErrorKind::TimedOut.into()),
+            count => Ok(count),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -234,11 +229,10 @@ mod tests {
     #[test]
     fn a_file_is_read_at_the_pace_of_its_times_over_midnight_too() {
         let lines = ["$GPRMC,235959.00,V,,,,,,,311226,,,N*79", "noise", "$GPRMC,000000.50,V,,,,,,,010127,,,N*7D"];
-        let began = Instant::now();
-        let mut file = Paced::new(&lines.join("\r\n"), began);
+        let mut file = Paced::new(&lines.join("\r\n"));
         let mut at = |ms| {
             let mut bytes = [0; 4096];
-            let count = file.read(&mut bytes, began + Duration::from_millis(ms));
+            let count = file.read_due(Duration::from_millis(ms), &mut bytes);
             String::from_utf8_lossy(&bytes[..count]).lines().count()
         };
         assert_eq!([at(0), at(1499), at(1500), at(9999)], [2, 0, 1, 0]);

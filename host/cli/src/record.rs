@@ -1,7 +1,7 @@
 //! `weeder record`: logs the machine's output to a file, or each row's to its own file.
 
 use crate::ctrl_c;
-use crate::destination::{FolderName, Replace};
+use crate::destination::{OutName, Replace};
 use crate::output::tell;
 use crate::ports::{Chosen, Ports};
 use crate::receiver::GpsArguments;
@@ -11,14 +11,13 @@ use gps::recorder::Lines;
 use link::log::{LogError, LogWriter};
 use link::rows::{Rows, What};
 use link::session::Happening;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Time between two checks whether to end.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It records plants, swings and alarms, and the status ten times a second, until Ctrl-C.\n\
@@ -41,16 +40,13 @@ pub struct Arguments {
 }
 
 /// Records until Ctrl-C.
-///
-/// # Errors
-/// If there is no Uno or no receiver to begin with, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let chosen = arguments.ports.choose()?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
     let mut gps = match gps {
         Some((receiver, lines)) => {
-            logs.lines_at(receiver.row, |_| lines)?;
+            logs.lines_at(receiver.row, logs.now_ms(receiver.row), &lines)?;
             Some(receiver)
         }
         None => None,
@@ -60,11 +56,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     tell!("Recording into {}, Ctrl-C ends it", arguments.out.display());
     while !stop.load(Ordering::Relaxed) {
         if let Some(gps) = &mut gps {
-            let mut said = Vec::new();
-            let written = logs.lines_at(gps.row, |time_ms| {
-                said = gps.turn(time_ms, Instant::now());
-                said.clone()
-            });
+            let time_ms = logs.now_ms(gps.row);
+            let said = gps.turn(time_ms, Instant::now());
+            let written = logs.lines_at(gps.row, time_ms, &said);
             logs.go_on_after(written, gps.row, &chosen)?;
             for (_, line) in said.iter().filter(|(kind, _)| kind.is_for_the_operator()) {
                 tell!("Receiver: {line}");
@@ -124,17 +118,25 @@ struct Log {
     is_written: bool,
 }
 
+impl Log {
+    /// Writes, unless it has failed before.
+    fn write(&mut self, work: impl FnOnce(&mut LogWriter) -> Result<(), LogError>) -> Result<(), LogError> {
+        if !self.is_written {
+            return Ok(());
+        }
+        work(&mut self.writer).inspect_err(|_| self.is_written = false)
+    }
+}
+
 impl Logs {
     /// Opens them all, so that their times begin together.
     ///
     /// # Errors
     /// If one cannot be written, or is something else.
-    pub fn open(out: &std::path::Path, chosen: &Chosen) -> Result<Self> {
+    pub fn open(out: &Path, chosen: &Chosen) -> Result<Self> {
         if chosen.are_several {
-            let folder = FolderName::from(out.as_os_str().to_owned());
-            // An existing log is continued.
-            folder.check([""; 0], Replace::default())?;
-            folder.make()?;
+            // An existing log is continued, so no name is checked.
+            OutName::from(out.as_os_str().to_owned()).folder([""; 0], Replace::default())?.make()?;
         }
         let path = |row| if chosen.are_several { Chosen::file_in(out, row, "csv") } else { out.to_owned() };
         let paths = chosen.rows.iter().map(path);
@@ -147,29 +149,20 @@ impl Logs {
     /// # Errors
     /// At the first failure of a log.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
-        match self.logs.get_mut(row) {
-            Some(log) if log.is_written => log.writer.write(happening).inspect_err(|_| log.is_written = false),
-            _ => Ok(()),
-        }
+        self.logs[row].write(|writer| writer.write(happening))
     }
 
     /// The time of a row's line written now, in milliseconds.
     fn now_ms(&self, row: usize) -> u64 {
-        self.logs.get(row).map_or(0, |log| log.writer.now_ms())
+        self.logs[row].writer.now_ms()
     }
 
-    /// Writes the lines that `lines` returns for the present time into a row's log, as [`Logs::write`].
+    /// Writes lines of this time into a row's log, as [`Logs::write`].
     ///
     /// # Errors
     /// At the first failure of a log.
-    fn lines_at(&mut self, row: usize, lines: impl FnOnce(u64) -> Lines) -> Result<(), LogError> {
-        let Some(log) = self.logs.get_mut(row) else { return Ok(()) };
-        let time_ms = log.writer.now_ms();
-        let lines = lines(time_ms);
-        if !log.is_written {
-            return Ok(());
-        }
-        log.writer.lines_at(time_ms, &lines).inspect_err(|_| log.is_written = false)
+    fn lines_at(&mut self, row: usize, time_ms: u64, lines: &Lines) -> Result<(), LogError> {
+        self.logs[row].write(|writer| writer.lines_at(time_ms, lines))
     }
 
     /// Reports a log that could not be written. The other rows' logs continue.
@@ -184,10 +177,7 @@ impl Logs {
         Ok(())
     }
 
-    /// Says what is in them.
-    ///
-    /// # Errors
-    /// If one could not be written.
+    /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.logs {
             tell!("{} lines were added: {} has {} now", writer.added(), path.display(), writer.lines());
@@ -195,10 +185,7 @@ impl Logs {
         self.check()
     }
 
-    /// Checks that all logs are complete.
-    ///
-    /// # Errors
-    /// If one could not be written.
+    /// Fails if one could not be written.
     pub fn check(&self) -> Result<()> {
         match self.logs.iter().find(|log| !log.is_written) {
             Some(log) => bail!("{} is not whole: it could not be written", log.path.display()),

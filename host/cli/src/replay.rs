@@ -1,7 +1,7 @@
 //! `weeder replay`: repeats the decisions of a log on the PC.
 
-use crate::finding::Finding;
 use crate::output::say;
+use crate::program::Finding;
 use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
@@ -9,7 +9,6 @@ use link::{log, replay};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It shows the first difference between log and replay, and the status is then 1.\n\
@@ -24,9 +23,6 @@ pub struct Arguments {
 }
 
 /// Replays, and prints on what log and replay agree.
-///
-/// # Errors
-/// If the log cannot be read or replayed.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let name = arguments.log.display();
     let replayed = replay::replay(&log::read(&arguments.log)?).with_context(|| format!("{name} cannot be replayed"))?;
@@ -57,5 +53,5 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             None => say!("The decisions of {name} are those of this version")?,
         }
     }
-    Ok(if difference.is_none() { Finding::Good } else { Finding::Bad })
+    Ok(Finding::of(difference.is_none()))
 }

@@ -1,14 +1,13 @@
 //! `weeder rows`: lists the Unos and the rows that they control, and finds them again at other ports.
 
 use crate::output::say;
-use crate::ports::NamesFile;
+use crate::ports::{NamesFile, unnamed};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use link::row_names::{Board, Names, Plugged, plugged};
 use serde_json::{Value, json};
 
-/// The arguments.
 #[derive(Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -56,9 +55,6 @@ enum Action {
 }
 
 /// Lists, names or forgets.
-///
-/// # Errors
-/// If the file, a name or a port is wrong.
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.action {
         None => list(&arguments.file.read()?, arguments.json),
@@ -121,11 +117,12 @@ fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<
     };
     let rows = names.rows().iter();
     let rows = rows.map(|row| Line { name: Some(row.name.clone()), port: now(&row.board), board: row.board.clone() });
-    let is_row = |uno: &&Plugged| {
-        names.rows().iter().any(|row| row.board == uno.board || row.board == Board::Port(uno.port.clone()))
-    };
-    let others = unos.iter().filter(|uno| !is_row(uno));
-    rows.chain(others.map(|uno| Line { name: None, port: Some(uno.port.clone()), board: uno.board.clone() })).collect()
+    rows.chain(unnamed(names, unos).map(|uno| Line {
+        name: None,
+        port: Some(uno.port.clone()),
+        board: uno.board.clone(),
+    }))
+    .collect()
 }
 
 /// A board's identification, in words.

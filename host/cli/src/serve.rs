@@ -18,7 +18,6 @@ use trial::firmware;
 /// The default TCP port.
 const HTTP_PORT: u16 = 8866;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 At this computer, the page may do the same as `weeder monitor`. In the network (--lan), it needs the
@@ -55,9 +54,6 @@ pub struct Arguments {
 }
 
 /// Serves until Ctrl-C.
-///
-/// # Errors
-/// If there is no page, two machines have a name, or an address cannot be bound.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let page = match (&arguments.page, Page::inside()) {
         (Some(folder), _) => Page::read(folder)?,

@@ -21,7 +21,6 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 It goes through the steps of docs/set-up.md. Enter accepts, s skips a step, q stops.
@@ -54,9 +53,6 @@ const POLL: Duration = Duration::from_millis(200);
 const ROLLED_TICKS: u32 = 500;
 
 /// Leads through the steps.
-///
-/// # Errors
-/// If file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.simulated {
         return say!("{}", simulated::table()?);

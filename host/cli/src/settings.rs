@@ -1,21 +1,21 @@
 //! `weeder settings`: saves the machine's settings to a file, compares them, and sends them to a machine.
 
-use crate::destination::{FileName, FolderName, Replace};
-use crate::finding::Finding;
+use crate::destination::{OutFolder, OutName, Replace};
 use crate::output::say;
 use crate::ports::{Chosen, Ports};
+use crate::program::Finding;
 use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::conditions::Conditions;
+use link::row_names::Row;
 use link::settings::{self, Setting, Settings, name, unit};
 use link::settings_file;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     weeder settings pull machine.toml           write the machine's settings into a file\n  \
@@ -36,7 +36,7 @@ enum Action {
     Pull {
         /// The file; with several rows, a folder with a file for each row.
         #[arg(value_name = "FILE.toml|FOLDER", required_unless_present = "json")]
-        file: Option<FileName>,
+        file: Option<OutName>,
         #[command(flatten)]
         replace: Replace,
         /// Also print them as JSON.
@@ -81,9 +81,6 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
 }
 
 /// Pulls, pushes or compares.
-///
-/// # Errors
-/// If file or machine cannot be used; each says what would be right.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     match &arguments.action {
         Action::Pull { file, replace, json, ports } => pull(file.as_ref(), *replace, *json, &ports.choose()?),
@@ -92,93 +89,72 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
 }
 
-fn pull(file: Option<&FileName>, replace: Replace, json: bool, chosen: &Chosen) -> Result<Finding> {
-    let folder = file.filter(|_| chosen.are_several).map(FolderName::from);
-    match (&folder, file) {
-        (Some(folder), _) => {
-            let names = chosen.rows.iter().map(|row| Chosen::name_in(row, "toml"));
-            folder.check(names, replace).map(|_| ())?;
-        }
-        (None, Some(file)) => file.check(replace).map(|_| ())?,
-        (None, None) => {}
-    }
+fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -> Result<Finding> {
+    let names = chosen.rows.iter().map(|row| Chosen::name_in(row, "toml"));
+    let folder = match file {
+        Some(file) if chosen.are_several => Some(file.folder(names, replace)?),
+        Some(file) => file.file(replace).map(|_| None)?,
+        None => None,
+    };
+    let path = |row: &Row| match file?.path() {
+        folder if chosen.are_several => Some(Chosen::file_in(folder, row, "toml")),
+        file => Some(file.to_owned()),
+    };
     let pulled = chosen.each(|_, link| Ok(settings::read(link)?));
-    let mut written = Vec::new();
-    for (place, (row, pulled)) in chosen.rows.iter().zip(pulled).enumerate() {
-        let path = match (&folder, file) {
-            (Some(folder), _) => Some(Chosen::file_in(folder.path(), row, "toml")),
-            (None, file) => file.map(|file| file.path().to_owned()),
-        };
-        written.push(pulled.and_then(|settings| {
-            if let Some(path) = path {
-                if let Some(folder) = &folder {
-                    folder.make()?;
-                }
-                settings_file::write(&path, &settings)?;
-                if !json {
-                    let text = format!("The machine's settings are in {}", path.display());
-                    say!("{}", chosen.under_name(place, &text))?;
-                }
-            }
-            Ok(settings)
-        }));
-    }
-    if json && chosen.has_answer(&written) {
-        say!("{:#}", chosen.in_json(&written, as_json))?;
-    }
-    chosen.check(written)?;
+    let write = |(row, pulled): (&Row, Result<Settings>)| {
+        let settings = pulled?;
+        folder.as_ref().map_or(Ok(()), OutFolder::make)?;
+        path(row).map_or(Ok(()), |path| settings_file::write(&path, &settings))?;
+        Ok(settings)
+    };
+    let written = chosen.rows.iter().zip(pulled).map(write).collect();
+    chosen.show(written, json, as_json, |place, _| {
+        let path = path(&chosen.rows[place]).unwrap_or_default();
+        chosen.under_name(place, &format!("The machine's settings are in {}", path.display()))
+    })?;
     Ok(Finding::Good)
 }
 
 fn push(file: &Path, save: bool, json: bool, chosen: &Chosen) -> Result<Finding> {
     let wanted = chosen.wanted(file)?;
-    let pushed = chosen.each(|row, link| Ok(settings::push(link, &wanted[&row.name], save)?));
-    let pushed: Vec<Result<Vec<String>>> =
-        pushed.into_iter().map(|set| Ok(set?.into_iter().map(name).collect())).collect();
-    if json && chosen.has_answer(&pushed) {
-        say!("{:#}", chosen.in_json(&pushed, |set| json!({ "set": set, "saved": save })))?;
-    }
-    for (place, set) in pushed.iter().enumerate().filter(|_| !json) {
-        let Ok(set) = set else { continue };
+    let pushed = chosen.each(|row, link| {
+        Ok(settings::push(link, &wanted[&row.name], save)?.into_iter().map(name).collect::<Vec<_>>())
+    });
+    let in_json = |set: &Vec<String>| json!({ "set": set, "saved": save });
+    chosen.show(pushed, json, in_json, |place, set| {
         let text = match set.as_slice() {
             [] => "The machine has these settings already".to_owned(),
             set => format!("Set: {}", set.join(", ")),
         };
-        say!("{}", chosen.under_name(place, &text))?;
         let saved = match save {
             true => "All settings are saved",
             false => "Not saved: the next reset takes them back, and on most Unos opening the port is one",
         };
-        say!("{}", chosen.under_name(place, saved))?;
-    }
-    chosen.check(pushed)?;
+        format!("{}\n{}", chosen.under_name(place, &text), chosen.under_name(place, saved))
+    })?;
     Ok(Finding::Good)
 }
 
 fn diff(file: &Path, json: bool, chosen: &Chosen) -> Result<Finding> {
     let wanted = chosen.wanted(file)?;
     let found = chosen.each(|row, link| Ok(differences(&wanted[&row.name], &settings::read(link)?)));
-    if json && chosen.has_answer(&found) {
-        let differing = |&(setting, file, machine): &(Setting, u16, u16)| json!({ "setting": name(setting), "file": value(setting, file), "machine": value(setting, machine) });
-        say!("{:#}", chosen.in_json(&found, |differences| Value::from_iter(differences.iter().map(differing))))?;
-    }
-    for (place, differences) in found.iter().enumerate().filter(|_| !json) {
-        match differences {
-            Ok(differences) if differences.is_empty() => {
-                let text = format!("The machine has the settings of {}", chosen.file_of(place, file).display());
-                say!("{}", chosen.under_name(place, &text))?;
-            }
-            Ok(differences) if chosen.are_several => {
-                let file = chosen.file_of(place, file);
-                say!("{}\n{}", chosen.under_name(place, &format!("not as in {}", file.display())), table(differences))?;
-            }
-            Ok(differences) => say!("{}", table(differences))?,
-            Err(_) => {}
-        }
-    }
     let differs = found.iter().flatten().any(|differences| !differences.is_empty());
-    chosen.check(found)?;
-    Ok(if differs { Finding::Bad } else { Finding::Good })
+    let in_json = |differences: &Vec<Difference>| {
+        let of_one = |&(setting, file, machine): &Difference| json!({ "setting": name(setting), "file": value(setting, file), "machine": value(setting, machine) });
+        differences.iter().map(of_one).collect()
+    };
+    chosen.show(found, json, in_json, |place, differences| {
+        let file = chosen.file_of(place, file);
+        if differences.is_empty() {
+            chosen.under_name(place, &format!("The machine has the settings of {}", file.display()))
+        } else if chosen.are_several {
+            let head = chosen.under_name(place, &format!("not as in {}", file.display()));
+            format!("{head}\n{}", table(differences))
+        } else {
+            table(differences).to_string()
+        }
+    })?;
+    Ok(Finding::of(!differs))
 }
 
 impl Chosen {
@@ -200,18 +176,30 @@ impl Chosen {
         }
     }
 
-    /// Whether there is a result to print. If the only row has failed, there is only its error.
-    fn has_answer<T>(&self, done: &[Result<T>]) -> bool {
-        self.are_several || done.iter().all(Result::is_ok)
-    }
-
-    /// The only row's value, or each row's by its name. A failed row has `null`.
-    fn in_json<T>(&self, done: &[Result<T>], value: impl Fn(&T) -> Value) -> Value {
-        let value = |done: &Result<T>| done.as_ref().map_or(Value::Null, &value);
-        match done {
-            [only] if !self.are_several => value(only),
-            _ => Value::Object(Map::from_iter(self.names().into_iter().zip(done.iter().map(value)))),
+    /// Prints the rows' results, each in words, or all in JSON: the only row's value, or each row's by its name. A failed
+    /// row has `null`, but if the only row has failed, there is only its error.
+    ///
+    /// # Errors
+    /// If a row failed, or the results cannot be printed.
+    fn show<T>(
+        &self,
+        done: Vec<Result<T>>,
+        json: bool,
+        value: impl Fn(&T) -> Value,
+        words: impl Fn(usize, &T) -> String,
+    ) -> Result<()> {
+        if json {
+            let value = |done: &Result<T>| done.as_ref().map_or(Value::Null, &value);
+            match done.as_slice() {
+                [only] if !self.are_several => only.as_ref().map_or(Ok(()), |_| say!("{:#}", value(only)))?,
+                all => say!("{:#}", Value::from_iter(self.names().into_iter().zip(all.iter().map(value))))?,
+            }
+        } else {
+            for (place, done) in done.iter().enumerate() {
+                done.as_ref().map_or(Ok(()), |done| say!("{}", words(place, done)))?;
+            }
         }
+        self.check(done)
     }
 }
 
@@ -237,13 +225,15 @@ fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
     Ok(wanted)
 }
 
-/// Settings that the machine has otherwise than the file: with the file's value and the machine's.
-fn differences(wanted: &[(Setting, u16)], found: &Settings) -> Vec<(Setting, u16, u16)> {
+/// A setting that the machine has otherwise than the file: with the file's value and the machine's.
+type Difference = (Setting, u16, u16);
+
+fn differences(wanted: &[(Setting, u16)], found: &Settings) -> Vec<Difference> {
     let with_found = wanted.iter().map(|&(setting, value)| (setting, value, found.get(setting)));
     with_found.filter(|(_, file, machine)| file != machine).collect()
 }
 
-fn table(differences: &[(Setting, u16, u16)]) -> Table {
+fn table(differences: &[Difference]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header(["setting", "file", "machine", "unit"]);
     for &(setting, file, machine) in differences {
@@ -254,7 +244,7 @@ fn table(differences: &[(Setting, u16, u16)]) -> Table {
 }
 
 fn as_json(settings: &Settings) -> Value {
-    Value::Object(Map::from_iter(Setting::all().map(|setting| (name(setting), value(setting, settings.get(setting))))))
+    Setting::all().map(|setting| (name(setting), value(setting, settings.get(setting)))).collect()
 }
 
 /// A setting's value in JSON, as in the file.

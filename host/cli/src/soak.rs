@@ -1,11 +1,11 @@
 //! `weeder soak`: hours of the decisions and minutes of the real firmware, with random faults.
 
-use crate::destination::{FileName, Replace};
-use crate::finding::Finding;
+use crate::destination::{OutName, Replace};
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::part::{self, Part};
-use crate::progress::Progress;
+use crate::program::Finding;
+use crate::progress::{Show, with_bar};
 use anyhow::{Result, ensure};
 use clap::Args;
 use experiments::shard::{Numbered, Shard};
@@ -19,7 +19,6 @@ use trial::firmware;
 /// The name of the command in its parts.
 pub const COMMAND: &str = "soak";
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -49,7 +48,7 @@ pub struct Arguments {
     shard: Option<Shard>,
     /// The file for --shard.
     #[arg(long, value_name = "FILE", requires = "shard")]
-    out: Option<FileName>,
+    out: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Print JSON instead of words.
@@ -75,22 +74,14 @@ impl Study {
 }
 
 /// Runs it and prints what it has shown, or writes a part of it.
-///
-/// # Errors
-/// If nothing is asked for, or the firmware cannot be built or run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { hours, uno_minutes, seed, faults, json, .. } = arguments;
     ensure!(
         hours > 0 || uno_minutes > 0,
         "with --hours 0 and --uno-minutes 0 nothing is tried: one of them has to be above 0"
     );
-    let part = arguments.shard.zip(arguments.out.as_ref());
-    let part = part.map(|(shard, out)| Part::new(shard, out, arguments.replace)).transpose()?;
-    let elf = match &arguments.elf {
-        _ if uno_minutes == 0 => None,
-        Some(path) => Some(path.clone()),
-        None => Some(firmware::build()?),
-    };
+    let part = Part::asked(arguments.shard, arguments.out.as_ref(), arguments.replace)?;
+    let elf = (uno_minutes > 0).then(|| arguments.elf.clone().map_or_else(firmware::build, Ok)).transpose()?;
     let firmware = elf.as_deref().map(part::check_sum).transpose()?;
     let study = Study { seed, faults, hours, uno_minutes, firmware };
     if let Some(part) = part {
@@ -98,13 +89,10 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
     let mut stages = Vec::new();
     if hours > 0 {
-        stages
-            .push(Stage::of(DECISIONS, json, |bar| soak::hours(study.plan(), hours.into(), |share| bar.show(share)))?);
+        stages.push(Stage::of(DECISIONS, json, |show| soak::hours(study.plan(), hours.into(), show))?);
     }
     if let Some(elf) = &elf {
-        stages.push(Stage::of(FIRMWARE, json, |bar| {
-            soak::minutes(study.plan(), uno_minutes.into(), elf, |share| bar.show(share))
-        })?);
+        stages.push(Stage::of(FIRMWARE, json, |show| soak::minutes(study.plan(), uno_minutes.into(), elf, show))?);
     }
     conclude(&study, &stages, json)
 }
@@ -113,28 +101,25 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 fn write_part(study: &Study, elf: Option<&Path>, part: Part) -> Result<Finding> {
     let hours = u64::from(study.hours);
     let all = hours + u64::from(study.uno_minutes);
-    let numbers = part.shard().numbers(all);
+    let numbers = part.shard.numbers(all);
     let count = numbers.len() as f64;
-    let bar = Progress::new("soaking");
-    let mut tallies = Vec::new();
-    for (number, begun) in numbers.zip(0..) {
-        let show = |share: f64| bar.show((f64::from(begun) + share) / count);
-        let outcome = match elf {
-            Some(elf) if number >= hours => soak::minute(study.plan(), number - hours, elf, show)?,
-            _ => soak::hour(study.plan(), number, show)?,
+    let tallies = with_bar("soaking", |show| {
+        let tally = |(number, begun)| {
+            let show = |share: f64| show((f64::from(begun) + share) / count);
+            let outcome = match elf {
+                Some(elf) if number >= hours => soak::minute(study.plan(), number - hours, elf, show)?,
+                _ => soak::hour(study.plan(), number, show)?,
+            };
+            show(1.0);
+            Ok(Numbered { number, outcome })
         };
-        show(1.0);
-        tallies.push(Numbered { number, outcome });
-    }
-    bar.finish();
+        numbers.zip(0..).map(tally).collect::<Result<Vec<_>>>()
+    })?;
     part.write(COMMAND, all, study, tallies)?;
     Ok(Finding::Good)
 }
 
 /// Prints the results of all hours and minutes, which may come from several machines.
-///
-/// # Errors
-/// If it cannot be printed.
 pub fn merge(study: &Study, mut tallies: Vec<Tally>, json: bool) -> Result<Finding> {
     let minutes = tallies.split_off((study.hours as usize).min(tallies.len()));
     let mut stages = Vec::new();
@@ -158,7 +143,7 @@ fn conclude(study: &Study, stages: &[Stage], json: bool) -> Result<Finding> {
     } else if !is_good {
         say!("To see it again: weeder soak --seed {seed} --faults {faults}")?;
     }
-    Ok(if is_good { Finding::Good } else { Finding::Bad })
+    Ok(Finding::of(is_good))
 }
 
 /// A stage's name for programs, and for people.
@@ -175,12 +160,9 @@ struct Stage {
 
 impl Stage {
     /// Runs it with a progress bar, and prints its result, unless the output is JSON.
-    fn of(title: Title, json: bool, work: impl FnOnce(&Progress) -> Result<Tally, SoakError>) -> Result<Self> {
+    fn of(title: Title, json: bool, work: impl FnOnce(Show) -> Result<Tally, SoakError>) -> Result<Self> {
         let began = Instant::now();
-        let bar = Progress::new(title.1);
-        let tally = work(&bar);
-        bar.finish();
-        let stage = Self { title, tally: tally? };
+        let stage = Self { title, tally: with_bar(title.1, work)? };
         stage.say(json)?;
         let took_s = began.elapsed().as_secs_f64();
         tell!("Pace        {took_s:.1} s, {:.0} times real time", stage.tally.seconds / took_s);

@@ -1,10 +1,10 @@
 //! `weeder sweep`: a result of the simulated trial against one or two of its parameters.
 
-use crate::destination::{FileName, OutFile, Replace};
+use crate::destination::{OutFile, OutName, Replace};
 use crate::numbers::{number_within, whole_within};
 use crate::output::{print, say};
-use crate::part::Part;
-use crate::progress::Progress;
+use crate::part::{Part, Shown};
+use crate::progress::with_bar;
 use crate::source::{self, offering};
 use anyhow::Result;
 use clap::Args;
@@ -25,7 +25,7 @@ use trial::report::number_table;
 pub const COMMAND: &str = "sweep";
 
 /// The default result.
-pub const RESULT: &str = RESULTS[0];
+const RESULT: &str = RESULTS[0];
 
 /// The examples in the help.
 const EXAMPLES: &str = "\
@@ -84,7 +84,6 @@ fn controller() -> impl TypedValueParser<Value = Treatment> {
     })
 }
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = format!("{EXAMPLES} `weeder sweep --help` lists them all."), after_long_help = long_help())]
 pub struct Arguments {
@@ -114,7 +113,7 @@ pub struct Arguments {
     seed: u64,
     /// Also write all results of all points to this file; with --shard, the part.
     #[arg(long, value_name = "FILE.csv")]
-    out: Option<FileName>,
+    out: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Compute only the points of this shard, the Ith of N, and write them to the file of --out.
@@ -125,28 +124,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// How to show a sweep's points.
-pub struct Shown {
-    /// The output file.
-    pub out: Option<FileName>,
-    /// Whether to replace existing files.
-    pub replace: Replace,
-    /// Whether to print JSON.
-    pub json: bool,
-    /// The result to show, if there are two axes.
-    pub result: String,
-}
-
-impl Shown {
-    fn out(&self) -> Result<Option<OutFile<'_>>> {
-        self.out.as_ref().map(|out| out.check(self.replace)).transpose()
-    }
-}
-
 /// Runs it and prints the result, or writes a part of it.
-///
-/// # Errors
-/// If an axis or the field is wrong, or the file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let &Arguments { ref out, replace, json, ref result, .. } = arguments;
     let sweep = Sweep {
@@ -158,37 +136,29 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         spacing_cm: arguments.spacing,
         seed: arguments.seed,
     };
-    if let Some((shard, out)) = arguments.shard.zip(out.as_ref()) {
-        let part = Part::new(shard, out, replace)?;
-        let bar = Progress::new("sweeping");
-        let outcomes = sweep.run_shard(shard, |share| bar.show(share))?;
-        bar.finish();
+    if let Some(part) = Part::asked(arguments.shard, out.as_ref(), replace)? {
+        let outcomes = with_bar("sweeping", |show| sweep.run_shard(part.shard, show))?;
         return part.write(COMMAND, sweep.size(), &sweep, outcomes);
     }
-    let shown = Shown { out: out.clone(), replace, json, result: result.clone() };
-    let out = shown.out()?;
-    let bar = Progress::new("sweeping");
-    let points = sweep.run(|share| bar.show(share))?;
-    bar.finish();
-    show(&sweep, &points, &shown, out.as_ref())
+    let shown = Shown { out: out.clone(), replace, json, brief: false, result: Some(result.clone()) };
+    let out = shown.file()?;
+    let points = with_bar("sweeping", |show| sweep.run(show))?;
+    show(&sweep, &points, &shown, out)
 }
 
 /// Prints the result of all points' plots, from this or other machines.
-///
-/// # Errors
-/// If the file cannot be written.
 pub fn merge(sweep: &Sweep, outcomes: &[PlotOutcome], shown: &Shown) -> Result<()> {
-    let out = shown.out()?;
-    show(sweep, &sweep.points(outcomes)?, shown, out.as_ref())
+    let out = shown.file()?;
+    show(sweep, &sweep.points(outcomes)?, shown, out)
 }
 
-fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<&OutFile>) -> Result<()> {
+fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<OutFile>) -> Result<()> {
     let printed = match shown.json {
         true => say!("{:#}", in_json(sweep, points)),
-        false => print(format_args!("{}", in_words(&shown.result, sweep, points))),
+        false => print(format_args!("{}", in_words(shown.result.as_deref().unwrap_or(RESULT), sweep, points))),
     };
     if let Some(out) = out {
-        write(out, sweep, points)?;
+        write(&out, sweep, points)?;
         if !shown.json {
             say!("Written: {}", out.path().display())?;
         }

@@ -1,8 +1,7 @@
 //! `weeder train`: trains an example table from labelled detections, and reports how well it separates plants from
 //! weeds.
 
-use crate::destination::{FileName, OutFile, Replace};
-use crate::finding::Finding;
+use crate::destination::{OutFile, OutName, Replace, write_if_asked};
 use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::source::{self, offering};
@@ -18,7 +17,6 @@ use link::examples::CAPACITY;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// The arguments.
 #[derive(Args)]
 #[command(group = ArgGroup::new("objects").required(true).args(["files", "synthetic"]), after_help = "\
 Examples:
@@ -42,7 +40,7 @@ pub struct Arguments {
     seed: u64,
     /// Write the table as Rust source for the firmware (.rs), or as examples (.csv).
     #[arg(long, value_name = "FILE.rs|FILE.csv")]
-    out: Option<FileName>,
+    out: Option<OutName>,
     /// Examples that vote: 1 to 15, or `auto` for the best number.
     #[arg(long, value_name = "auto|N", default_value = "auto", value_parser = votes)]
     k: Votes,
@@ -59,7 +57,7 @@ pub struct Arguments {
     beside: bool,
     /// Draw the table's decisions.
     #[arg(long, value_name = "FILE.svg")]
-    picture: Option<FileName>,
+    picture: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Print JSON instead of words.
@@ -95,13 +93,10 @@ fn votes(text: &str) -> Result<Votes, String> {
 }
 
 /// Trains, and prints the result.
-///
-/// # Errors
-/// If a file or its contents are wrong, or the table would not fit.
-pub fn run(arguments: &Arguments) -> Result<Finding> {
+pub fn run(arguments: &Arguments) -> Result<()> {
     let replace = arguments.replace;
     let table = arguments.out.as_ref().map(|out| destination(out, replace)).transpose()?;
-    let picture = arguments.picture.as_ref().map(|picture| picture.check(replace)).transpose()?;
+    let picture = arguments.picture.as_ref().map(|picture| picture.file(replace)).transpose()?;
     let objects = arguments.objects()?;
     if arguments.beside {
         return beside(arguments, table.as_ref(), &objects);
@@ -114,23 +109,15 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         true => say!("{:#}", in_json(&training, &objects, another_field.as_ref())),
         false => report(&training, &objects, another_field.as_ref()),
     };
-    if let Some(table) = &table {
-        match is_rust(table.path()) {
-            true => table.write(|to| to.write_all(listing::rust(&training, &arguments.command()).as_bytes()))?,
-            false => table.write(|to| listing::write_csv(&training.kept, to))?,
-        }
-        if !arguments.json {
-            say!("Table       {}", table.path().display())?;
-        }
-    }
-    if let Some(picture) = &picture {
-        picture.write(|to| svg::write(to, &regions::draw(&training, &objects)))?;
-        if !arguments.json {
-            say!("Picture     {}", picture.path().display())?;
-        }
-    }
-    printed?;
-    Ok(Finding::Good)
+    let is_rust = table.as_ref().is_some_and(|table| is_rust(table.path()));
+    write_if_asked(table.as_ref(), "Table", arguments.json, |to| match is_rust {
+        true => Ok(to.write_all(listing::rust(&training, &arguments.command()).as_bytes())?),
+        false => listing::write_csv(&training.kept, to),
+    })?;
+    write_if_asked(picture.as_ref(), "Picture", arguments.json, |to| {
+        svg::write(to, &regions::draw(&training, &objects))
+    })?;
+    printed
 }
 
 impl Arguments {
@@ -165,7 +152,7 @@ impl Arguments {
 }
 
 /// Chooses the examples to teach in addition to the built-in table, and prints the result.
-fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) -> Result<Finding> {
+fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) -> Result<()> {
     if table.is_some_and(|table| is_rust(table.path())) {
         bail!("examples to teach beside the built-in table are written as CSV (.csv)");
     }
@@ -186,14 +173,8 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
             chosen.len()
         ),
     };
-    if let Some(table) = table {
-        table.write(|to| listing::write_csv(&chosen, to))?;
-        if !arguments.json {
-            say!("Table       {}", table.path().display())?;
-        }
-    }
-    printed?;
-    Ok(Finding::Good)
+    write_if_asked(table, "Table", arguments.json, |to| listing::write_csv(&chosen, to))?;
+    printed
 }
 
 /// The report of a training. `another_field` has the seed of another field and the classification of its detections.
@@ -241,9 +222,9 @@ fn is_rust(table: &Path) -> bool {
 }
 
 /// The table's file, if the ending of its name selects a format.
-fn destination(name: &FileName, replace: Replace) -> Result<OutFile<'_>> {
+fn destination(name: &OutName, replace: Replace) -> Result<OutFile> {
     let path = name.path();
     let has_format = is_rust(path) || path.extension().is_some_and(|ending| ending == "csv");
     ensure!(has_format, "{}: a table is written as Rust (.rs) or as CSV (.csv)", path.display());
-    name.check(replace)
+    name.file(replace)
 }

@@ -1,12 +1,12 @@
 //! `weeder trial`: the paper's experiment in a simulated field, with its report.
 
-use crate::destination::{FileName, FolderName, OutFolder, Replace};
+use crate::destination::{OutFolder, OutName, Replace};
 use crate::examples;
-use crate::finding::Finding;
 use crate::numbers::{number_within, whole_within};
 use crate::output::{say, tell};
-use crate::part::{self, Part};
-use crate::progress::Progress;
+use crate::part::{self, Part, Shown};
+use crate::program::Finding;
+use crate::progress::with_bar;
 use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Command, FromArgMatches, ValueEnum};
@@ -36,7 +36,6 @@ pub const COMMAND: &str = "trial";
 /// Most plants of a trial, roughly: counts are limited to four billion.
 const MOST_PLANTS: f64 = 2e9;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -88,7 +87,7 @@ pub struct Arguments {
     /// Write report.html, trial.csv and controllers.csv into this folder, and create it if needed; with --shard, the
     /// part to this file.
     #[arg(long, value_name = "FOLDER")]
-    out: Option<FolderName>,
+    out: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Weed only the plots of this shard, the Ith of N, and write the result to the file of --out.
@@ -196,37 +195,16 @@ pub struct PlotPart {
     picture: Option<String>,
 }
 
-/// How to show a trial.
-pub struct Shown {
-    /// The report's folder.
-    pub out: Option<FolderName>,
-    /// Whether to replace existing files.
-    pub replace: Replace,
-    /// Whether to print JSON.
-    pub json: bool,
-    /// Whether to show only the most important results.
-    pub brief: bool,
-}
-
 /// The files of a report.
 const REPORT: [&str; 3] = ["report.html", "trial.csv", "controllers.csv"];
 
-impl Shown {
-    fn folder(&self) -> Result<Option<OutFolder<'_>>> {
-        self.out.as_ref().map(|out| out.check(REPORT, self.replace)).transpose()
-    }
-}
-
 /// Runs it and prints the result, or writes a part of it.
-///
-/// # Errors
-/// If the field is wrong, the firmware cannot be built or run, or a file cannot be written.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let &Arguments { replace, json, brief, .. } = arguments;
-    let file = arguments.out.as_ref().map(FileName::from);
-    let part = arguments.shard.zip(file.as_ref()).map(|(shard, file)| Part::new(shard, file, replace)).transpose()?;
-    let shown = Shown { out: arguments.out.clone().filter(|_| part.is_none()), replace, json, brief };
-    let folder = shown.folder()?;
+    let part = Part::asked(arguments.shard, arguments.out.as_ref(), replace)?;
+    let out = arguments.out.clone().filter(|_| part.is_none());
+    let shown = Shown { out, replace, json, brief, result: None };
+    let folder = shown.folder(REPORT)?;
     let experiment = Experiment {
         speeds_km_h: distinct(arguments.speeds.clone()),
         spacings_cm: distinct(arguments.spacings.clone()),
@@ -241,10 +219,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         plants <= MOST_PLANTS,
         "this trial has some {plants:.0} plants, but has to have at most {MOST_PLANTS}: ask for fewer or shorter rows, or fewer replications"
     );
-    let engine = match (arguments.engine, &arguments.elf) {
-        (EngineName::Native, _) => Engine::Native,
-        (EngineName::Uno, Some(path)) => Engine::Uno(path.clone()),
-        (EngineName::Uno, None) => Engine::Uno(firmware::build()?),
+    let engine = match arguments.engine {
+        EngineName::Native => Engine::Native,
+        EngineName::Uno => Engine::Uno(arguments.elf.clone().map_or_else(firmware::build, Ok)?),
     };
     let firmware = match &engine {
         Engine::Native => None,
@@ -252,10 +229,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     };
     let (field, words) = (arguments.field.clone(), arguments.words()?);
     let study = Study { experiment, engine: arguments.engine, firmware, field, words };
-    let (bar, began) = (Progress::new("weeding"), Instant::now());
+    let began = Instant::now();
     if let Some(part) = part {
-        let plots = study.experiment.run_shard(part.shard(), &engine, |share| bar.show(share))?;
-        bar.finish();
+        let plots = with_bar("weeding", |show| study.experiment.run_shard(part.shard, &engine, show))?;
         let with_picture = |Numbered { number, outcome: by_controller }| {
             let picture = if number == 0 { picture_of(&study.experiment, &engine)? } else { None };
             Ok(Numbered { number, outcome: PlotPart { by_controller, picture } })
@@ -264,8 +240,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         part.write(COMMAND, study.experiment.size(), &study, plots)?;
         return Ok(Finding::Good);
     }
-    let outcomes = study.experiment.run(&engine, |share| bar.show(share))?;
-    bar.finish();
+    let outcomes = with_bar("weeding", |show| study.experiment.run(&engine, show))?;
     if !json && !brief {
         let worked_s: f64 = outcomes.iter().map(|outcome| outcome.moved_s).sum();
         let took_s = began.elapsed().as_secs_f64();
@@ -275,11 +250,8 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
 }
 
 /// Prints the result of all plots, from this or other machines.
-///
-/// # Errors
-/// If a file cannot be written.
 pub fn merge(study: Study, mut plots: Vec<PlotPart>, shown: &Shown) -> Result<Finding> {
-    let folder = shown.folder()?;
+    let folder = shown.folder(REPORT)?;
     let picture = plots.first_mut().and_then(|plot| plot.picture.take());
     let outcomes: Vec<PlotOutcome> = plots.into_iter().flat_map(|plot| plot.by_controller).collect();
     show(&study, &outcomes, shown, folder.as_ref(), || Ok(picture))
@@ -322,7 +294,7 @@ fn show(
         }
     }
     printed?;
-    Ok(if damaged == 0 && alarms == 0 { Finding::Good } else { Finding::Bad })
+    Ok(Finding::of(damaged == 0 && alarms == 0))
 }
 
 /// The differences between the paper's controller here and in the paper, at the paper's speeds.
@@ -366,8 +338,8 @@ const COLUMNS: [Column; 12] = [
     ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
     ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
     ("rows with\nan alarm", |total| total.alarms.to_string(), &[Plants]),
-    ("row ground\nweeded, %", |total| weeded(total), &[Brief, Ground]),
-    ("most\nlost to, %", |total| most_lost(total), &[Brief, Ground]),
+    ("row ground\nweeded, %", weeded, &[Brief, Ground]),
+    ("most\nlost to, %", most_lost, &[Brief, Ground]),
     ("with all\nmargins\nkept at\nmost, %", |total| format!("{:.1}", 100.0 * total.weedable_share), &[Ground]),
     ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.undamaged_share), &[Ground]),
     ("weeds\ngone in\nrow, %", |total| gone(total.effect.in_row), &[Brief, Ground]),

@@ -17,7 +17,6 @@ use trial::receiver::{ReceiverSetup, Trouble};
 use uno::FileError;
 use uno::hex::Bootloader;
 
-/// The arguments.
 #[derive(Args)]
 #[command(after_help = "\
 The firmware runs as on a real Uno, with a simulated machine that rolls along the row repeatedly.
@@ -100,15 +99,12 @@ fn bootloader(name: &Path) -> Result<Bootloader, FileError> {
 }
 
 /// Runs until Ctrl-C, or until it is asked to end by SIGTERM or SIGHUP.
-///
-/// # Errors
-/// If a file is wrong, no pseudo terminal is to be had, or the firmware crashes.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bootloader = arguments.bootloader.as_deref().map(bootloader).transpose()?;
     let count = arguments.rows;
     let rows = (0..count as u64).map(|number| arguments.course.nth_row(number)).collect::<Result<Vec<_>>>()?;
     let conditions = arguments.course.conditions_of(&arguments.course.field)?;
-    let courses = Course::of_rows(rows, arguments.course.machine(&conditions), mm_s(arguments.course.speed))
+    let courses = Course::of_rows(rows, conditions.machine(arguments.course.seed), mm_s(arguments.course.speed))
         .into_iter()
         .map(|course| course.slipping(conditions.ground.slip_percent / 100.0))
         .collect::<Vec<_>>();

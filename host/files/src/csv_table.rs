@@ -145,61 +145,51 @@ impl Line<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::error::Error;
 
     /// The values of the column `place_mm` with their lines, or the error for a file with this text.
-    fn read(text: &str) -> Result<Vec<(u64, i16)>, String> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("table.csv");
-        fs::write(&path, text).unwrap();
-        let values = CsvTable::read(&path, &["place_mm"]).and_then(|table| {
+    fn read(text: impl AsRef<[u8]>) -> Result<Vec<(u64, i16)>, String> {
+        let table = CsvTable::parse(Path::new("table.csv"), text.as_ref().to_owned(), &["place_mm"]);
+        let values = table.and_then(|table| {
             table.lines().map(|line| Ok((line.number, line.value("place_mm", "a whole number")?))).collect()
         });
-        values.map_err(|error: FileError| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
+        values.map_err(|error: FileError| error.to_string())
     }
 
     #[test]
     fn lines_are_counted_alike_however_they_end() {
         let text = "# measured in May\nplace_mm,width_mm\n\n7,1\n# a gap\n\n8,1\n";
         for end in ["\n", "\r\n", "\r"] {
-            assert_eq!(read(&text.replace('\n', end)), Ok(vec![(4, 7), (7, 8)]), "{end:?}");
+            assert_eq!(read(text.replace('\n', end)), Ok(vec![(4, 7), (7, 8)]), "{end:?}");
             let wrong = "table.csv, line 8: place_mm is `far`: it has to be a whole number";
-            assert_eq!(read(&format!("{text}far,1").replace('\n', end)), Err(wrong.to_owned()), "{end:?}");
+            assert_eq!(read(format!("{text}far,1").replace('\n', end)), Err(wrong.to_owned()), "{end:?}");
             let short = "table.csv, line 8: fields: 1, where the header has 2: each line has one field a column";
-            assert_eq!(read(&format!("{text}9").replace('\n', end)), Err(short.to_owned()), "{end:?}");
+            assert_eq!(read(format!("{text}9").replace('\n', end)), Err(short.to_owned()), "{end:?}");
         }
     }
 
     #[test]
-    fn a_missing_column_is_named_with_the_header_s_line() {
-        let wrong = "table.csv, line 2: the column `place_mm` is missing: the header has to name place_mm";
-        assert_eq!(read("# measured in May\nwidth_mm\n7\n"), Err(wrong.to_owned()));
-        assert!(read("").unwrap_err().starts_with("table.csv, line 1: the column `place_mm` is missing"));
-    }
-
-    #[test]
-    fn a_column_that_stands_there_twice_is_refused() {
-        let wrong = "table.csv, line 1: the column `place_mm` occurs twice: each column needs its own name";
-        assert_eq!(read("place_mm,width_mm,place_mm\n7,1,8\n"), Err(wrong.to_owned()));
+    fn a_wrong_table_is_refused_with_the_line_and_what_would_be_right() {
+        let missing = "the column `place_mm` is missing: the header has to name place_mm";
+        for (text, line, problem) in [
+            ("# measured in May\nwidth_mm\n7\n", 2, missing),
+            ("", 1, missing),
+            ("place_mm;width_mm\n7;1\n", 1, &format!("{missing}; fields are separated by commas, not by semicolons")),
+            (
+                "place_mm,width_mm,place_mm\n7,1,8\n",
+                1,
+                "the column `place_mm` occurs twice: each column needs its own name",
+            ),
+            ("place_mm,width_mm\n7,1\n# 5\" pot\n8,\"1\n9,1\n", 4, UNCLOSED),
+            ("place_mm,width_mm\n7,1\n\n8,\"1\n9,1\n10,1\n\"11,1", 4, UNCLOSED),
+            ("\"place_mm,width_mm\n7,1\n", 1, UNCLOSED),
+            ("place_mm,\"width_mm\n7,1\n", 1, UNCLOSED),
+        ] {
+            assert_eq!(read(text), Err(format!("table.csv, line {line}: {problem}")), "{text:?}");
+        }
+        let no_text = "table.csv, line 1: this is not text: a table is a CSV file in UTF-8";
+        assert_eq!(read(b"place_mm\n\xFF\n"), Err(no_text.to_owned()));
         assert_eq!(read("place_mm,width_mm,width_mm\n7,1,8\n"), Ok(vec![(2, 7)]), "it is not read");
-    }
-
-    #[test]
-    fn an_open_quotation_mark_is_named_with_its_own_line() {
-        for text in
-            ["place_mm,width_mm\n7,1\n# 5\" pot\n8,\"1\n9,1\n", "place_mm,width_mm\n7,1\n\n8,\"1\n9,1\n10,1\n\"11,1"]
-        {
-            assert_eq!(read(text), Err(format!("table.csv, line 4: {UNCLOSED}")), "{text:?}");
-        }
-        assert_eq!(read("\"place_mm,width_mm\n7,1\n"), Err(format!("table.csv, line 1: {UNCLOSED}")));
-        assert_eq!(read("place_mm,\"width_mm\n7,1\n"), Err(format!("table.csv, line 1: {UNCLOSED}")));
         assert_eq!(read("place_mm,pot\n7,\"5\"\", clay\"\n8,5\" clay\n"), Ok(vec![(2, 7), (3, 8)]));
-    }
-
-    #[test]
-    fn semicolons_between_the_fields_are_noticed() {
-        let said = read("place_mm;width_mm\n7;1\n").unwrap_err();
-        assert!(said.ends_with("; fields are separated by commas, not by semicolons"), "{said}");
     }
 
     #[test]
@@ -212,20 +202,5 @@ mod tests {
         }
         assert!(read("place_mm,width_mm\nok\n7,1\n").unwrap_err().starts_with("table.csv, line 2: fields: 1"));
         assert!(read("place_mm,width_mm\nok\n").unwrap_err().starts_with("table.csv, line 1: no line is below"));
-    }
-
-    #[test]
-    fn the_system_s_error_for_a_missing_file_is_printed_once() {
-        let error = CsvTable::read(Path::new("no/such/table.csv"), &[]).err().unwrap();
-        assert_eq!(error.to_string(), "no/such/table.csv cannot be read");
-        assert!(error.source().is_some());
-    }
-
-    #[test]
-    fn a_file_that_is_no_text_is_refused() {
-        let mut file = tempfile::NamedTempFile::new().unwrap();
-        std::io::Write::write_all(&mut file, b"place_mm\n\xFF\n").unwrap();
-        let error = CsvTable::read(file.path(), &["place_mm"]).err().unwrap().to_string();
-        assert!(error.ends_with("this is not text: a table is a CSV file in UTF-8"), "{error}");
     }
 }

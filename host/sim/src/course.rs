@@ -5,7 +5,6 @@ use crate::source;
 use anyhow::{Result, ensure};
 use clap::Args;
 use field::conditions::Conditions;
-use field::machine::Machine;
 use field::planting::Planting;
 use field::row::Row;
 use files::csv_table;
@@ -32,7 +31,7 @@ pub struct CourseArguments {
     weeds: Option<usize>,
     /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
-    seed: u64,
+    pub seed: u64,
     /// Distance from the beam back to the tool in mm, 100 to 2000. Default: the field's, 400.
     #[arg(long, value_parser = whole_within(100..=2000_u32))]
     beam_to_tool: Option<u32>,
@@ -57,18 +56,10 @@ const SPACING_SCATTER: f64 = 0.08;
 const CANOPY_SCATTER: f64 = 0.15;
 
 impl CourseArguments {
-    /// The row, read or grown.
+    /// The row of this number, read or grown. Each random row has other plants.
     ///
     /// # Errors
     /// If the file is wrong, or the numbers make no row.
-    pub fn row(&self) -> Result<Row> {
-        self.nth_row(0)
-    }
-
-    /// A neighbouring row. A random row has other plants.
-    ///
-    /// # Errors
-    /// As [`CourseArguments::row`].
     pub fn nth_row(&self, number: u64) -> Result<Row> {
         let seed = self.seed.wrapping_add(number);
         if let Some(path) = &self.row {
@@ -111,10 +102,5 @@ impl CourseArguments {
             conditions.set("machine.beam_to_tool_mm", beam_to_tool_mm.into())?;
         }
         Ok(conditions)
-    }
-
-    /// The machine in a field. The row's seed selects its random deviations.
-    pub fn machine(&self, conditions: &Conditions) -> Machine {
-        conditions.machine(self.seed)
     }
 }

@@ -9,7 +9,8 @@
 //! So no command replaces a file without [`Replace`], the option `--force`. A test in `main.rs` checks every argument
 //! that names an output.
 
-use anyhow::{Context, Result, bail, ensure};
+use crate::output::say;
+use anyhow::{Context, Error, Result, bail, ensure};
 use clap::Args;
 use files::whole_file;
 use std::ffi::OsString;
@@ -28,34 +29,18 @@ pub struct Replace {
     force: bool,
 }
 
-/// A file name as typed.
+/// The name of an output file or folder, as typed.
 #[derive(Clone, Debug)]
-pub struct FileName(PathBuf);
-
-/// A folder name as typed.
-#[derive(Clone, Debug)]
-pub struct FolderName(PathBuf);
-
-impl From<OsString> for FileName {
-    fn from(name: OsString) -> Self {
-        Self(name.into())
-    }
-}
-
-impl From<OsString> for FolderName {
-    fn from(name: OsString) -> Self {
-        Self(name.into())
-    }
-}
+pub struct OutName(PathBuf);
 
 /// A file that was writable when it was checked.
 #[derive(Debug)]
-pub struct OutFile<'a>(&'a Path);
+pub struct OutFile(PathBuf);
 
 /// A folder in which these files were writable when it was checked. It may not exist yet.
 #[derive(Debug)]
-pub struct OutFolder<'a> {
-    folder: &'a Path,
+pub struct OutFolder {
+    folder: PathBuf,
     names: Vec<String>,
 }
 
@@ -72,65 +57,29 @@ impl Replace {
     }
 }
 
-impl FileName {
-    /// Checks that it can be written without losing a file.
+impl From<OsString> for OutName {
+    fn from(name: OsString) -> Self {
+        Self(name.into())
+    }
+}
+
+impl OutName {
+    /// Checks that a file of this name can be written without losing a file.
     ///
     /// # Errors
     /// If it could not, and why.
-    pub fn check(&self, replace: Replace) -> Result<OutFile<'_>> {
+    pub fn file(&self, replace: Replace) -> Result<OutFile> {
         ensure!(!self.0.is_dir(), "{} is a folder: name a file", self.0.display());
         replace.check(&self.0)?;
         whole_file::check(&self.0).with_context(|| cannot_be_written(&self.0))?;
-        Ok(OutFile(&self.0))
+        Ok(OutFile(self.0.clone()))
     }
 
-    /// The name.
-    pub fn path(&self) -> &Path {
-        &self.0
-    }
-}
-
-impl From<&FolderName> for FileName {
-    fn from(name: &FolderName) -> Self {
-        Self(name.0.clone())
-    }
-}
-
-impl From<&FileName> for FolderName {
-    fn from(name: &FileName) -> Self {
-        Self(name.0.clone())
-    }
-}
-
-impl OutFile<'_> {
-    /// Writes it whole, or leaves what was there.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub fn write<E>(&self, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
-    where
-        E: From<io::Error>,
-        Result<(), E>: Context<(), E>,
-    {
-        whole_file::write(self.0, contents).with_context(|| cannot_be_written(self.0))
-    }
-
-    /// The name.
-    pub fn path(&self) -> &Path {
-        self.0
-    }
-}
-
-impl FolderName {
-    /// Checks that files of these names can be written there without losing a file.
+    /// Checks that files of these names can be written into a folder of this name without losing a file.
     ///
     /// # Errors
     /// If they could not, and why.
-    pub fn check<N: Into<String>>(
-        &self,
-        names: impl IntoIterator<Item = N>,
-        replace: Replace,
-    ) -> Result<OutFolder<'_>> {
+    pub fn folder<N: Into<String>>(&self, names: impl IntoIterator<Item = N>, replace: Replace) -> Result<OutFolder> {
         let folder = &self.0;
         ensure!(!folder.exists() || folder.is_dir(), "{} is a file: name a folder", folder.display());
         let ending = folder.extension().and_then(|ending| ending.to_str());
@@ -144,44 +93,77 @@ impl FolderName {
             ensure!(!path.is_dir(), "{} is a folder, and a file would take its place", path.display());
             replace.check(&path)?;
         }
-        Ok(OutFolder { folder, names })
+        Ok(OutFolder { folder: folder.clone(), names })
     }
 
     /// The name.
     pub fn path(&self) -> &Path {
         &self.0
     }
+}
 
+impl OutFile {
+    /// Writes it whole, or leaves what was there.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write<E>(&self, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
+    where
+        E: From<io::Error> + Into<Error>,
+    {
+        whole_file::write(&self.0, contents).map_err(|error| error.into().context(cannot_be_written(&self.0)))
+    }
+
+    /// The name.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl OutFolder {
     /// Makes the folder if necessary.
     ///
     /// # Errors
     /// If it cannot be made.
     pub fn make(&self) -> Result<()> {
-        fs::create_dir_all(&self.0).with_context(|| format!("the folder {} cannot be made", self.0.display()))
+        fs::create_dir_all(&self.folder).with_context(|| format!("the folder {} cannot be made", self.folder.display()))
     }
-}
 
-impl OutFolder<'_> {
     /// Writes a whole file there, or leaves the old file. Makes the folder if necessary.
     ///
     /// # Errors
     /// If folder or file cannot be written, or this name was not checked.
     pub fn write<E>(&self, name: &str, contents: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<()>
     where
-        E: From<io::Error>,
-        Result<(), E>: Context<(), E>,
+        E: From<io::Error> + Into<Error>,
     {
         ensure!(self.names.iter().any(|checked| checked == name), "{name} was not checked before it was written");
-        let folder = self.folder;
-        fs::create_dir_all(folder).with_context(|| format!("the folder {} cannot be made", folder.display()))?;
-        let path = folder.join(name);
-        whole_file::write(&path, contents).with_context(|| cannot_be_written(&path))
+        self.make()?;
+        OutFile(self.folder.join(name)).write(contents)
     }
 
     /// The name.
     pub fn path(&self) -> &Path {
-        self.folder
+        &self.folder
     }
+}
+
+/// Writes a file that the user asked for, and prints its name behind a title, unless the output is JSON.
+///
+/// # Errors
+/// If it cannot be written, or its name not be printed.
+pub fn write_if_asked<E>(
+    file: Option<&OutFile>,
+    title: &str,
+    json: bool,
+    contents: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+) -> Result<()>
+where
+    E: From<io::Error> + Into<Error>,
+{
+    let Some(file) = file else { return Ok(()) };
+    file.write(contents)?;
+    if json { Ok(()) } else { say!("{title:<12}{}", file.path().display()) }
 }
 
 fn cannot_be_written(path: &Path) -> String {

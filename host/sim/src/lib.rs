@@ -8,9 +8,9 @@
 
 pub mod course;
 pub mod destination;
-pub mod finding;
 pub mod numbers;
 pub mod output;
+pub mod program;
 pub mod progress;
 pub mod row;
 pub mod source;

@@ -1,7 +1,7 @@
 //! `cargo sim`: `weeder sim` without the other commands.
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use sim::{finding, numbers, row};
+use clap::{Parser, Subcommand};
+use sim::{program, row};
 use std::process::ExitCode;
 
 /// Weeds a simulated row with the intra-row weeder's firmware.
@@ -23,9 +23,5 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let found = numbers::with_negative_numbers(Arguments::command()).get_matches();
-    match Arguments::from_arg_matches(&found) {
-        Ok(Arguments { command: Command::Sim(arguments) }) => finding::exit(row::run(&arguments)),
-        Err(error) => error.exit(),
-    }
+    program::main(|Arguments { command: Command::Sim(arguments) }| row::run(&arguments))
 }

@@ -4,7 +4,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::process;
-use std::sync::{Mutex, Once, PoisonError};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 /// Steps of a full bar.
 const STEPS: u64 = 1000;
@@ -15,36 +15,27 @@ const INTERRUPTED: i32 = 130;
 /// The bar on the terminal.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// A bar on standard error, if that is a terminal.
-pub struct Progress(ProgressBar);
+/// Shows the share done.
+pub type Show<'a> = &'a (dyn Fn(f64) + Sync);
 
-impl Progress {
-    /// An empty bar behind a text.
-    pub fn new(words: &'static str) -> Self {
-        let bar = ProgressBar::new(STEPS).with_message(words);
-        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar:.green} {percent:>3} %, {eta} to go") {
-            bar.set_style(style);
-        }
-        if !bar.is_hidden() {
-            *shown() = Some(bar.clone());
-            clear_when_interrupted();
-        }
-        Self(bar)
+/// Shows a bar behind a text during the work, if standard error is a terminal. The work tells the share done, from 0
+/// to 1.
+pub fn with_bar<T>(words: &'static str, work: impl FnOnce(Show) -> T) -> T {
+    let bar = ProgressBar::new(STEPS).with_message(words);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar:.green} {percent:>3} %, {eta} to go") {
+        bar.set_style(style);
     }
-
-    /// Shows the share done, from 0 to 1.
-    pub fn show(&self, share: f64) {
-        self.0.set_position((share * STEPS as f64) as u64);
+    if !bar.is_hidden() {
+        *shown() = Some(bar.clone());
+        clear_when_interrupted();
     }
-
-    /// Takes the bar away.
-    pub fn finish(self) {
-        *shown() = None;
-        self.0.finish_and_clear();
-    }
+    let done = work(&|share| bar.set_position((share * STEPS as f64) as u64));
+    *shown() = None;
+    bar.finish_and_clear();
+    done
 }
 
-fn shown() -> std::sync::MutexGuard<'static, Option<ProgressBar>> {
+fn shown() -> MutexGuard<'static, Option<ProgressBar>> {
     SHOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

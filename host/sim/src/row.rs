@@ -1,10 +1,10 @@
 //! `weeder sim`: the real firmware on a virtual Uno, on a simulated row or on a recording of a real encoder.
 
 use crate::course::CourseArguments;
-use crate::destination::{FileName, FolderName, OutFile, OutFolder, Replace};
-use crate::finding::Finding;
+use crate::destination::{OutFile, OutFolder, OutName, Replace, write_if_asked};
 use crate::output::{print, say};
-use crate::progress::Progress;
+use crate::program::Finding;
+use crate::progress::with_bar;
 use crate::source;
 use anyhow::Result;
 use clap::Args;
@@ -40,10 +40,10 @@ pub struct Arguments {
     paper: bool,
     /// Write tables (CSV), a picture and an animation of the row into this folder, and create it if needed.
     #[arg(long, value_name = "FOLDER")]
-    out: Option<FolderName>,
+    out: Option<OutName>,
     /// Write the levels on the virtual Uno's pins, for PulseView or GTKWave.
     #[arg(long, value_name = "FILE.vcd")]
-    vcd: Option<FileName>,
+    vcd: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
     /// Run this ELF instead of building the firmware of this repository.
@@ -79,8 +79,8 @@ const REPORT: [&str; 5] = ["row.svg", "weeding.svg", "row.csv", "plants.csv", "w
 /// If an argument or a file is wrong, or the firmware cannot be run.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let replace = arguments.replace;
-    let folder = arguments.out.as_ref().map(|out| out.check(REPORT, replace)).transpose()?;
-    let vcd = arguments.vcd.as_ref().map(|vcd| vcd.check(replace)).transpose()?;
+    let folder = arguments.out.as_ref().map(|out| out.folder(REPORT, replace)).transpose()?;
+    let vcd = arguments.vcd.as_ref().map(|vcd| vcd.file(replace)).transpose()?;
     match (&arguments.capture, &arguments.channel_a, &arguments.channel_b) {
         (Some(path), Some(a), Some(b)) => {
             let mut channels = vec![(wiring::ENCODER_A, a.as_str()), (wiring::ENCODER_B, b.as_str())];
@@ -88,16 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             let capture = Capture::read(path, &channels)?;
             play(arguments, &capture, vcd.as_ref())
         }
-        _ => weed(arguments, arguments.course.row()?, folder.as_ref(), vcd.as_ref()),
-    }
-}
-
-impl Arguments {
-    fn firmware(&self) -> Result<PathBuf> {
-        match &self.elf {
-            Some(path) => Ok(path.clone()),
-            None => Ok(firmware::build()?),
-        }
+        _ => weed(arguments, arguments.course.nth_row(0)?, folder.as_ref(), vcd.as_ref()),
     }
 }
 
@@ -105,18 +96,16 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     let course = &arguments.course;
     let conditions = course.conditions_of(if arguments.paper { "paper" } else { &course.field })?;
     let mut trial =
-        Trial::at_speed(row, course.machine(&conditions), conditions.timing(), mm_s(arguments.course.speed));
+        Trial::at_speed(row, conditions.machine(course.seed), conditions.timing(), mm_s(arguments.course.speed));
     trial.settings = conditions.firmware_settings();
     trial.motion = trial.motion.with_slip(|| conditions.ground.slip_percent / 100.0);
-    let elf = arguments.firmware()?;
+    let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     if !arguments.json {
         let manner = if arguments.paper { ", swings as in the paper" } else { "" };
         let introduction = report::introduction(&trial.row, &trial.machine, &trial.motion);
         say!("{introduction} at {} km/h{manner}", arguments.course.speed)?;
     }
-    let bar = Progress::new("weeding");
-    let outcome = trial::run(&trial, &elf, |share| bar.show(share))?;
-    bar.finish();
+    let outcome = with_bar("weeding", |show| trial::run(&trial, &elf, show))?;
 
     let totals = report::totals(&trial, &outcome);
     let printed = if arguments.json {
@@ -135,7 +124,7 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     }
     write_waveform(arguments, vcd, &outcome.changes)?;
     printed?;
-    if outcome.judgement.count(Verdict::Damaged) == 0 { Ok(Finding::Good) } else { Ok(Finding::Bad) }
+    Ok(Finding::of(outcome.judgement.count(Verdict::Damaged) == 0))
 }
 
 fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome, speed_mm_s: f64) -> Result<()> {
@@ -149,9 +138,7 @@ fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome, speed_mm_s
 }
 
 fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinChange]) -> Result<()> {
-    let Some(vcd) = vcd else { return Ok(()) };
-    vcd.write(|to| waveform::write(to, &wiring::WIRES, changes.iter().copied()))?;
-    if arguments.json { Ok(()) } else { say!("Waveform    {}", vcd.path().display()) }
+    write_if_asked(vcd, "Waveform", arguments.json, |to| waveform::write(to, &wiring::WIRES, changes.iter().copied()))
 }
 
 /// The result for the row, with the names of the CSV tables.
@@ -177,10 +164,8 @@ fn in_json(arguments: &Arguments, trial: &Trial, outcome: &Outcome) -> Value {
 }
 
 fn play(arguments: &Arguments, capture: &Capture, vcd: Option<&OutFile>) -> Result<Finding> {
-    let elf = arguments.firmware()?;
-    let bar = Progress::new("playing");
-    let played = replay(capture, &elf, |share| bar.show(share))?;
-    bar.finish();
+    let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
+    let played = with_bar("playing", |show| replay(capture, &elf, show))?;
     let Counted { net_ticks, lowest_ticks, highest_ticks, lost_ticks } = played.counted;
     let printed = match arguments.json {
         true => say!(

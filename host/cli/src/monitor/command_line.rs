@@ -14,30 +14,18 @@ const HISTORY: usize = 100;
 /// A line that is being typed. All characters are printable ASCII, one byte each.
 #[derive(Clone, Debug, Default)]
 pub struct CommandLine {
-    text: String,
-    cursor: usize,
+    /// The characters typed.
+    pub text: String,
+    /// Number of characters before the cursor.
+    pub cursor: usize,
     history: Vec<String>,
     /// The shown line of the history, counted from the newest. `None` for a new line.
     browsed: Option<usize>,
-    candidates: Vec<String>,
+    /// The possible completions after Tab.
+    pub candidates: Vec<String>,
 }
 
 impl CommandLine {
-    /// The characters typed.
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-
-    /// Number of characters before the cursor.
-    pub fn cursor(&self) -> usize {
-        self.cursor
-    }
-
-    /// The possible completions after Tab.
-    pub fn candidates(&self) -> &[String] {
-        &self.candidates
-    }
-
     /// Clears the line.
     pub fn clear(&mut self) {
         self.show(None, String::new());
@@ -152,7 +140,7 @@ mod tests {
         typed(&mut line, "d!");
         line.key(KeyCode::Left.into());
         line.key(KeyCode::Delete.into());
-        assert_eq!((line.text(), line.cursor()), (" hold", 5));
+        assert_eq!((line.text.as_str(), line.cursor), (" hold", 5));
         assert_eq!(line.key(KeyCode::Enter.into()).as_deref(), Some("hold"));
         assert_eq!(line.key(KeyCode::Enter.into()), None, "the line is empty again");
     }
@@ -166,7 +154,7 @@ mod tests {
         }
         let mut shown = |code: KeyCode| {
             line.key(code.into());
-            line.text().to_owned()
+            line.text.clone()
         };
         assert_eq!([shown(KeyCode::Up), shown(KeyCode::Up), shown(KeyCode::Up)], ["get k", "status", "status"]);
         assert_eq!([shown(KeyCode::Down), shown(KeyCode::Down), shown(KeyCode::Down)], ["get k", "", ""]);
@@ -177,15 +165,15 @@ mod tests {
         let mut line = CommandLine::default();
         typed(&mut line, "set lea");
         line.key(KeyCode::Tab.into());
-        assert_eq!(line.text(), "set lead_");
-        assert_eq!(line.candidates(), ["set lead_out_ms", "set lead_in_ms"]);
+        assert_eq!(line.text, "set lead_");
+        assert_eq!(line.candidates, ["set lead_out_ms", "set lead_in_ms"]);
         typed(&mut line, "o");
-        assert!(line.candidates().is_empty());
+        assert!(line.candidates.is_empty());
         line.key(KeyCode::Tab.into());
-        assert_eq!((line.text(), line.cursor()), ("set lead_out_ms ", 16));
+        assert_eq!((line.text.as_str(), line.cursor), ("set lead_out_ms ", 16));
         typed(&mut line, "xyz");
         line.key(KeyCode::Tab.into());
-        assert_eq!(line.text(), "set lead_out_ms xyz");
+        assert_eq!(line.text, "set lead_out_ms xyz");
     }
 
     #[test]
@@ -193,24 +181,24 @@ mod tests {
         let mut line = CommandLine::default();
         typed(&mut line, "row3: set lead_o");
         line.key(KeyCode::Tab.into());
-        assert_eq!(line.text(), "row3: set lead_out_ms ");
+        assert_eq!(line.text, "row3: set lead_out_ms ");
         typed(&mut line, &"x".repeat(200));
-        assert_eq!(line.text().len(), "row3: ".len() + COMMAND_LENGTH);
+        assert_eq!(line.text.len(), "row3: ".len() + COMMAND_LENGTH);
         line.clear();
-        assert_eq!((line.text(), line.cursor()), ("", 0));
+        assert_eq!((line.text.as_str(), line.cursor), ("", 0));
         typed(&mut line, "set servo");
         line.key(KeyCode::Tab.into());
-        assert!(!line.candidates().is_empty());
+        assert!(!line.candidates.is_empty());
         line.clear();
-        assert!(line.candidates().is_empty());
+        assert!(line.candidates.is_empty());
     }
 
     #[test]
     fn invalid_lines_are_not_typed() {
         let mut line = CommandLine::default();
         typed(&mut line, "h\u{e4}ld\u{1b}");
-        assert_eq!(line.text(), "hld");
+        assert_eq!(line.text, "hld");
         typed(&mut line, &"x".repeat(200));
-        assert_eq!(line.text().len(), COMMAND_LENGTH);
+        assert_eq!(line.text.len(), COMMAND_LENGTH);
     }
 }

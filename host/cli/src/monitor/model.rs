@@ -57,11 +57,8 @@ pub enum Answer {
 pub struct RowModel {
     /// The operator's name for it.
     pub name: String,
-    /// Whether it is there.
     pub connection: Connection,
-    /// Its last status.
     pub status: Status,
-    /// Its settings.
     pub settings: Settings,
     /// The last objects, the newest first.
     pub objects: VecDeque<Seen>,
@@ -69,7 +66,6 @@ pub struct RowModel {
     pub zones: VecDeque<Seen>,
     /// Advice for the operator.
     pub advice: Option<String>,
-    /// The state of the last command.
     pub answer: Answer,
     /// The measurements since the start, and the last step that was shown.
     set_up: SetUp,
@@ -90,7 +86,6 @@ pub struct Model {
     pub hold: Option<Hold>,
     /// Typed lines, answers and events, the newest last.
     pub lines: VecDeque<String>,
-    /// The line being typed.
     pub line: CommandLine,
     /// Whether to ring the bell.
     rings: bool,
@@ -114,12 +109,10 @@ impl Model {
         std::mem::take(&mut self.rings)
     }
 
-    /// Whether there are several rows.
     pub fn are_several(&self) -> bool {
         self.rows.len() > 1
     }
 
-    /// The rows' names.
     pub fn names(&self) -> Vec<String> {
         self.rows.iter().map(|row| row.name.clone()).collect()
     }
@@ -168,15 +161,10 @@ impl Model {
         match heard.what {
             What::Happened(happening) => self.update(heard.row, happening),
             What::Answered { refusal, .. } => {
-                let answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
-                if let Some(row) = self.rows.get_mut(heard.row) {
-                    row.answer = answer;
-                }
+                self.rows[heard.row].answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
             }
             What::NotTyped { command, why } => {
-                if let Some(row) = self.rows.get_mut(heard.row) {
-                    row.answer = Answer::Refused;
-                }
+                self.rows[heard.row].answer = Answer::Refused;
                 self.say_of(heard.row, &format!("-- `{command}` was not typed: {why}"));
             }
         }
@@ -198,25 +186,25 @@ impl Model {
             Happening::Status(..) | Happening::Settings(..) | Happening::Examples(_) => None,
         };
         if let Happening::Answer(line) = &happening
-            && let Some(head) = self.rows.get_mut(number).and_then(|row| row.heading.before(line))
+            && let Some(head) = self.rows[number].heading.before(line)
         {
             self.say_of(number, &format!("-- {head}"));
         }
         if let Some(said) = said {
             self.say_of(number, &said);
         }
-        let Some(row) = self.rows.get_mut(number) else { return };
+        let row = &mut self.rows[number];
         self.rings |= match &happening {
             Happening::Event(EventLine::Alarm { .. }, _) => true,
             Happening::Lost(_) => row.is_there(),
             _ => false,
         };
         row.update(happening);
-        if let Some(step) = row.take_step() {
+        let (step, warning) = (row.take_step(), row.take_warning());
+        if let Some(step) = step {
             self.say_of(number, &format!("-- next, {step}"));
         }
-        let Some(row) = self.rows.get_mut(number) else { return };
-        if let Some(warning) = row.take_warning() {
+        if let Some(warning) = warning {
             self.say_of(number, &format!("-- warning: {warning}"));
         }
     }
@@ -231,9 +219,9 @@ impl Model {
 
     /// Adds a line of a row, with its name if there are several.
     fn say_of(&mut self, number: usize, line: &str) {
-        match self.rows.get(number) {
-            Some(row) if self.are_several() => self.say(format!("{}: {line}", row.name)),
-            _ => self.say(line.to_owned()),
+        match self.are_several() {
+            true => self.say(format!("{}: {line}", self.rows[number].name)),
+            false => self.say(line.to_owned()),
         }
     }
 }
@@ -274,7 +262,6 @@ impl RowModel {
         step.filter(|_| before != self.step && !goes_on)
     }
 
-    /// Whether the Uno is there.
     pub fn is_there(&self) -> bool {
         matches!(self.connection, Connection::Up(_))
     }
@@ -314,8 +301,8 @@ impl RowModel {
         } else if self.status.mode == Mode::Alarm {
             self.advice = None;
         }
-        let tool = status.position.wrapping_sub(self.settings.ticks(Setting::BeamToToolMm).0);
         let behind = self.settings.ticks(Setting::BeamToToolMm).0;
+        let tool = status.position.wrapping_sub(behind);
         self.zones.retain(|seen| seen.leading.wrapping_add(seen.width).wrapping_sub(tool) > -behind);
         self.status = status;
     }

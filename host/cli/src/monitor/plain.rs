@@ -4,10 +4,10 @@
 //! the row's name. A `hold` to all goes to all rows at the same moment, and its result includes the time of the last
 //! row.
 
-use super::addressed;
-use crate::finding::Finding;
+use super::{addressed, send};
 use crate::output::tell;
 use crate::ports::Chosen;
+use crate::program::Finding;
 use crate::record::Logs;
 use anyhow::{Error, Result, ensure};
 use link::examples::Heading;
@@ -121,10 +121,7 @@ impl Talk<'_> {
                 continue;
             }
             (standing.unanswered, standing.statuses) = (standing.unanswered + 1, 0);
-            match command {
-                "hold" => self.rows.hold(row),
-                _ => self.rows.command(row, command),
-            }
+            send(self.rows, row, command);
         }
         self.report_hold(output)
     }
@@ -135,6 +132,7 @@ impl Talk<'_> {
         if let (Some(logs), What::Happened(happening)) = (&mut self.logs, &heard.what) {
             logs.write(row, happening)?;
         }
+        let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
         match &heard.what {
             What::Happened(Happening::Connected { .. }) => standing.is_there = true,
             What::Happened(Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_)) => {}
@@ -146,14 +144,14 @@ impl Talk<'_> {
                 ensure!(self.chosen.are_several || was_idle && !ended, "{why}");
                 tell!("{}", self.chosen.under_name(row, why));
             }
-            What::Happened(Happening::Event(_, line)) => writeln!(output, "{}", self.chosen.under_name(row, line))?,
+            What::Happened(Happening::Event(_, line)) => print(line)?,
             What::Happened(Happening::Answer(line)) => {
                 standing.statuses = 0;
                 // The lines on standard output are the machine's own.
                 if let Some(head) = standing.heading.before(line) {
                     tell!("{}", self.chosen.under_name(row, head));
                 }
-                writeln!(output, "{}", self.chosen.under_name(row, line))?;
+                print(line)?;
             }
             What::Answered { refusal, .. } => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
@@ -164,11 +162,7 @@ impl Talk<'_> {
             What::NotTyped { command, why } => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
                 standing.has_failed = true;
-                writeln!(
-                    output,
-                    "{}",
-                    self.chosen.under_name(row, &format!("error: `{command}` was not typed: {why}"))
-                )?;
+                print(&format!("error: `{command}` was not typed: {why}"))?;
             }
         }
         if let Some(hold) = &mut self.hold {

@@ -1,7 +1,7 @@
 //! The monitor on a terminal: keys go in, the screen comes out.
 
 use super::model::{Model, RowModel};
-use super::{addressed, view};
+use super::{addressed, send, view};
 use crate::record::Logs;
 use anyhow::{Context, Result};
 use link::rows::{Hold, Rows, What};
@@ -70,25 +70,13 @@ fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
         KeyCode::PageDown => model.choose(true),
         _ => {
             let Some(line) = model.line.key(key) else { return };
-            let (to, command) = match addressed(&line, &model.names(), model.target) {
-                Ok(meant) => meant,
-                Err(why) => {
-                    model.say(format!("-- {why}; nothing was sent"));
-                    return;
-                }
-            };
-            match command {
-                "" => return,
-                "hold" if to.is_none() => {
-                    hold_all(model, rows);
-                    return;
-                }
-                _ => model.sent(to, command),
-            }
-            for row in model.targets(to) {
-                match command {
-                    "hold" => rows.hold(row),
-                    _ => rows.command(row, command),
+            match addressed(&line, &model.names(), model.target) {
+                Err(why) => model.say(format!("-- {why}; nothing was sent")),
+                Ok((_, "")) => {}
+                Ok((None, "hold")) => hold_all(model, rows),
+                Ok((to, command)) => {
+                    model.sent(to, command);
+                    model.targets(to).into_iter().for_each(|row| send(rows, row, command));
                 }
             }
         }
@@ -112,9 +100,17 @@ fn ends(key: KeyEvent) -> bool {
 mod tests {
     use super::*;
     use crate::monitor::model::Answer;
+    use link::rows::Opener;
     use link::session::Happening;
     use link::settings::Settings;
     use link::{EventLine, LinkError};
+
+    /// Rows that are not there.
+    fn absent<const COUNT: usize>(names: [&str; COUNT]) -> (Rows, Model) {
+        let opener = |_| -> Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
+        let (rows, _) = Rows::open(names.map(opener).into());
+        (rows, Model::new(names.map(str::to_owned).into()))
+    }
 
     fn typed(model: &mut Model, rows: &Rows, text: &str) {
         for character in text.chars() {
@@ -124,9 +120,7 @@ mod tests {
 
     #[test]
     fn one_key_holds_all_rows_during_typing_and_for_every_chosen_row() {
-        let opener = || -> link::rows::Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
-        let (rows, _) = Rows::open(vec![opener(), opener()]);
-        let mut model = Model::new(vec!["left".to_owned(), "right".to_owned()]);
+        let (rows, mut model) = absent(["left", "right"]);
         take_key(&mut model, &rows, KeyCode::PageDown.into());
         typed(&mut model, &rows, "set k");
         assert!(model.hold.is_none());
@@ -135,7 +129,11 @@ mod tests {
             model.hold.as_ref().map(|hold| hold.summary(&model.names())).as_deref(),
             Some("HOLD 0 of 2; NOT THERE: left, right")
         );
-        assert_eq!((model.line.text(), model.target), ("", Some(0)), "it does not stand before the next command");
+        assert_eq!(
+            (model.line.text.as_str(), model.target),
+            ("", Some(0)),
+            "it does not stand before the next command"
+        );
         // The word `hold`, typed to all rows, does the same.
         (model.hold, model.target) = (None, None);
         typed(&mut model, &rows, "hold");
@@ -171,9 +169,7 @@ mod tests {
 
     #[test]
     fn a_row_s_name_before_a_colon_has_the_command_go_to_that_row_alone() {
-        let opener = || -> link::rows::Opener { Box::new(|| Err(LinkError::Absent("it".to_owned()))) };
-        let (rows, _) = Rows::open((0..3).map(|_| opener()).collect());
-        let mut model = Model::new(["row1", "row2", "row3"].map(str::to_owned).to_vec());
+        let (rows, mut model) = absent(["row1", "row2", "row3"]);
         let mut enter = |text: &str| {
             typed(&mut model, &rows, text);
             take_key(&mut model, &rows, KeyCode::Enter.into());

@@ -12,7 +12,7 @@ use link::settings::Setting;
 use link::{Class, Mode};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Position, Rect};
-use ratatui::style::{Color, Style, Stylize};
+use ratatui::style::{Color, Modifier, Style, Stylize};
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 
@@ -32,12 +32,17 @@ fn draw_top(left: Line, frame: &mut Frame, area: Rect) {
     let width = HOLD_KEY.len() as u16;
     let [left_area, key] = Layout::horizontal([Constraint::Min(0), Constraint::Length(width)]).areas(area);
     frame.render_widget(left, left_area);
-    frame.render_widget(Line::raw(HOLD_KEY).style(hold_style()), key);
+    frame.render_widget(Line::raw(HOLD_KEY).style(HOLD_STYLE), key);
 }
 
 /// The style of the key for HOLD.
-fn hold_style() -> Style {
-    Style::new().fg(Color::White).bg(Color::Red).bold()
+const HOLD_STYLE: Style = bold(Color::White).bg(Color::Red);
+
+/// The style of an alarm, or of a machine that is not there.
+const URGENT: Style = bold(Color::Red);
+
+const fn bold(colour: Color) -> Style {
+    Style::new().fg(colour).add_modifier(Modifier::BOLD)
 }
 
 /// The colour of a state.
@@ -123,16 +128,16 @@ fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
 fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect) {
     let prompt = format!("{to}> ");
     // A line has at most 80 characters.
-    let column = (area.x + (prompt.chars().count() + model.line.cursor()) as u16).min(area.right().saturating_sub(1));
-    frame.render_widget(Line::from(vec![prompt.bold(), model.line.text().into()]), area);
+    let column = (area.x + (prompt.chars().count() + model.line.cursor) as u16).min(area.right().saturating_sub(1));
+    frame.render_widget(Line::from(vec![prompt.bold(), model.line.text.as_str().into()]), area);
     frame.set_cursor_position(Position::new(column, area.y));
-    let candidates = model.line.candidates();
+    let candidates = &model.line.candidates;
     let text = if !candidates.is_empty() {
         let last = |line: &String| line.rsplit(' ').next().unwrap_or_default().to_owned();
         Line::raw(candidates.iter().map(last).collect::<Vec<_>>().join("  ")).dim()
     } else if let Some(hold) = &model.hold {
         let colour = if hold.is_obeyed() { Color::Green } else { Color::Red };
-        Line::raw(hold.summary(&model.names())).style(Style::new().fg(colour).bold())
+        Line::raw(hold.summary(&model.names())).style(bold(colour))
     } else if model.are_several() {
         Line::raw("PgUp, PgDn: to whom; Tab completes, Up and Down go through the history, Ctrl-C ends").dim()
     } else {

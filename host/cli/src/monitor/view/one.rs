@@ -1,12 +1,14 @@
 //! The screen of one row: its machine, the ground between beam and tool, its detections, and its console. A small
 //! screen shows only the state and the ground, in a few lines.
 
-use super::{HOLD_KEY, colour, draw_line, draw_said, draw_top, ground, hold_style, last_lines, tool_column};
+use super::{
+    HOLD_KEY, HOLD_STYLE, URGENT, bold, colour, draw_line, draw_said, draw_top, ground, last_lines, tool_column,
+};
 use crate::monitor::model::{Connection, Model, RowModel, Seen};
 use link::names;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::{Color, Style, Stylize};
+use ratatui::style::Stylize;
 use ratatui::text::{Line, Span, Text};
 use ratatui::widgets::{Block, Paragraph, Row, Table, Wrap};
 
@@ -34,7 +36,7 @@ fn state(row: &RowModel) -> Line<'static> {
     let reason = status.reason.as_deref().map_or_else(String::new, |reason| format!(" for {reason}"));
     Line::from(vec![
         Span::raw("state "),
-        Span::styled(format!("{:<8}", status.mode.name()), Style::new().fg(colour(status.mode)).bold()),
+        Span::styled(format!("{:<8}", status.mode.name()), bold(colour(status.mode))),
         Span::raw(format!("tool {}{reason}", if status.tool_out { "out" } else { "in" })),
     ])
 }
@@ -67,17 +69,12 @@ fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
     let (ground, speed) = (take(2), take(1));
     let [top, advice, ground, speed, said, line, hint] =
         Layout::vertical([top, advice, ground, speed, Constraint::Length(left), line, hint]).areas(area);
-    match row.connection {
-        Connection::Up(_) => draw_top(state(row), frame, top),
-        Connection::Down(_) => {
-            draw_top(Line::styled("NO WEEDER", Style::new().fg(Color::Red).bold()), frame, top);
-        }
-    }
-    let style = Style::new().fg(Color::Red).bold();
-    frame.render_widget(Paragraph::new(urgent.unwrap_or_default()).style(style).wrap(Wrap { trim: true }), advice);
+    let state = if row.is_there() { state(row) } else { Line::styled("NO WEEDER", URGENT) };
+    draw_top(state, frame, top);
+    frame.render_widget(Paragraph::new(urgent.unwrap_or_default()).style(URGENT).wrap(Wrap { trim: true }), advice);
     let columns = usize::from(ground.width);
-    frame
-        .render_widget(Text::from(vec![self::ground(row, columns).green().into(), marks(row, columns).into()]), ground);
+    let lines = vec![self::ground(row, columns).green().into(), marks(row, columns).into()];
+    frame.render_widget(Text::from(lines), ground);
     frame.render_widget(Line::raw(speed_and_place(row)), speed);
     frame.render_widget(last_lines(model, said.height), said);
     draw_line(model, "", frame, line, hint);
@@ -97,7 +94,7 @@ fn draw_all(model: &Model, row: &RowModel, frame: &mut Frame) {
     draw_machine(row, frame, machine);
     draw_ground(row, frame, ground);
     if let Some(text) = &row.advice {
-        frame.render_widget(Line::styled(text.as_str(), Style::new().fg(Color::Red).bold()), advice);
+        frame.render_widget(Line::styled(text.as_str(), URGENT), advice);
     }
     draw_objects(row, frame, objects);
     draw_said(model, frame, said);
@@ -115,7 +112,7 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
         true => format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.zones, status.unseen_mm),
         false => speed_and_place(row),
     };
-    let key = Line::styled(format!(" {HOLD_KEY} "), hold_style()).right_aligned();
+    let key = Line::styled(format!(" {HOLD_KEY} "), HOLD_STYLE).right_aligned();
     let block = Block::bordered().title(title).title(key);
     frame.render_widget(Paragraph::new(vec![state(row), second.into()]).block(block), area);
 }

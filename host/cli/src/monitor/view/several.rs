@@ -2,12 +2,12 @@
 //! tool, and the state of the last command. If there is not room for all, rows that are lost or in alarm come first,
 //! and the rest are counted by state.
 
-use super::{colour, draw_line, draw_said, draw_top, ground, last_lines};
+use super::{URGENT, bold, colour, draw_line, draw_said, draw_top, ground, last_lines};
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
 use link::{Mode, advice};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::{Color, Style, Stylize};
+use ratatui::style::{Style, Stylize};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
@@ -38,8 +38,7 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     draw_top(counted(rows), frame, top);
     draw_list(model, rows, frame, list);
     if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice.as_ref()?))) {
-        let style = Style::new().fg(Color::Red).bold();
-        frame.render_widget(Line::styled(format!("{}: {text}", row.name), style), advice);
+        frame.render_widget(Line::styled(format!("{}: {text}", row.name), URGENT), advice);
     }
     if is_roomy {
         draw_said(model, frame, said);
@@ -50,52 +49,30 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     draw_line(model, to, frame, line, hint);
 }
 
-/// How a row is, the worst first.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Is {
-    Lost,
-    Alarm,
-    Work,
-    Hold,
+/// The state of a row; `None` for a lost one.
+fn state(row: &RowModel) -> Option<Mode> {
+    row.is_there().then_some(row.status.mode)
 }
 
-impl Is {
-    const ALL: [Self; 4] = [Self::Lost, Self::Alarm, Self::Work, Self::Hold];
-
-    fn of(row: &RowModel) -> Self {
-        match (row.is_there(), row.status.mode) {
-            (false, _) => Self::Lost,
-            (true, Mode::Alarm) => Self::Alarm,
-            (true, Mode::Work) => Self::Work,
-            (true, Mode::Hold) => Self::Hold,
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Lost => "LOST",
-            Self::Alarm => "ALARM",
-            Self::Work => "work",
-            Self::Hold => "hold",
-        }
-    }
-
-    fn style(self) -> Style {
-        let colour = match self {
-            Self::Lost | Self::Alarm => Color::Red,
-            Self::Work => colour(Mode::Work),
-            Self::Hold => colour(Mode::Hold),
-        };
-        Style::new().fg(colour).bold()
+fn name(state: Option<Mode>) -> &'static str {
+    match state {
+        None => "LOST",
+        Some(Mode::Alarm) => "ALARM",
+        Some(Mode::Work) => "work",
+        Some(Mode::Hold) => "hold",
     }
 }
 
-/// How many rows are how.
+fn style(state: Option<Mode>) -> Style {
+    state.map_or(URGENT, |mode| bold(colour(mode)))
+}
+
+/// How many rows are in each state, the worst first.
 fn counts<'a>(rows: impl Iterator<Item = &'a RowModel> + Clone) -> Vec<Span<'static>> {
-    let count = |is: Is| rows.clone().filter(|row| Is::of(row) == is).count();
-    let counts = Is::ALL.map(|is| (is, count(is)));
+    let count = |of| rows.clone().filter(|row| state(row) == of).count();
+    let counts = [None, Some(Mode::Alarm), Some(Mode::Work), Some(Mode::Hold)].map(|state| (state, count(state)));
     let counts = counts.into_iter().filter(|&(_, count)| count > 0);
-    counts.map(|(is, count)| Span::styled(format!("{count} {} ", is.name()), is.style())).collect()
+    counts.map(|(state, count)| Span::styled(format!("{count} {} ", name(state)), style(state))).collect()
 }
 
 fn counted(rows: &[RowModel]) -> Line<'static> {
@@ -107,7 +84,7 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     if room < rows.len() {
         // If all rows fit, they keep their order, so that each is easy to find.
-        let is_urgent = |row: usize| matches!(Is::of(&rows[row]), Is::Lost | Is::Alarm);
+        let is_urgent = |row: usize| matches!(state(&rows[row]), None | Some(Mode::Alarm));
         order.sort_by_key(|&row| (!is_urgent(row), model.target != Some(row)));
     }
     let shown = if room < rows.len() { room.saturating_sub(1) } else { room };
@@ -125,7 +102,7 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
 
 /// A row's line.
 fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'static> {
-    let is = Is::of(row);
+    let mode = state(row);
     let mark = match row.answer {
         Answer::None => ' ',
         Answer::Waiting => '?',
@@ -135,11 +112,11 @@ fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'sta
     let shown: String = row.name.chars().take(name).collect();
     let shown = Span::raw(format!("{shown:<name$} "));
     let shown = if is_target { shown.reversed() } else { shown };
-    let state = Span::styled(format!("{:<5} ", is.name()), is.style());
+    let state = Span::styled(format!("{:<5} ", self::name(mode)), style(mode));
     let room = usize::from(columns).saturating_sub(name + 13);
     let (tool, rest) = match (&row.connection, row.status.alarm) {
-        (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), Is::Lost.style())),
-        (Connection::Up(_), Some(alarm)) => ("out", Span::styled(advice::name(alarm), Is::Alarm.style())),
+        (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), style(mode))),
+        (Connection::Up(_), Some(alarm)) => ("out", Span::styled(advice::name(alarm), URGENT)),
         (Connection::Up(_), None) => {
             (if row.status.tool_out { "out" } else { "in " }, Span::raw(ground(row, room)).green())
         }

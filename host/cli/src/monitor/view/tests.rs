@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::monitor::model::RowModel;
+use link::ConsoleLine;
 use link::rows::{Heard, Hold, What};
 use link::session::Happening;
 use link::settings::{Setting, Settings};
-use link::{EventLine, Status};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
@@ -41,13 +41,18 @@ fn tell(model: &mut Model, row: usize, lines: &[&str]) {
         let line = (*line).to_owned();
         model.update(
             row,
-            match (Status::parse(&line), EventLine::parse(&line)) {
-                (Some(status), _) => Happening::Status(status, line),
-                (None, Some(event)) => Happening::Event(event, line),
-                (None, None) => Happening::Answer(line),
+            match ConsoleLine::parse(&line) {
+                ConsoleLine::Status(status) => Happening::Status(status, line),
+                ConsoleLine::Event(event) => Happening::Event(event, line),
+                _ => Happening::Answer(line),
             },
         );
     }
+}
+
+/// The console's lines that begin so.
+fn said<'a>(model: &'a Model, begin: &str) -> Vec<&'a String> {
+    model.lines.iter().filter(|line| line.starts_with(begin)).collect()
 }
 
 /// A plant 150 mm wide that began 250 mm ahead of the tool, a weed, and the plant before them.
@@ -71,14 +76,11 @@ fn zones_move_toward_the_tool() {
 #[test]
 fn the_next_measurement_is_named_once_calibration_has_begun() {
     let timed = "calibrated lead_out_ms=158 lead_in_ms=52 set=yes";
-    let told = |model: &Model| model.lines.iter().filter(|line| line.starts_with("-- next, ")).cloned().collect();
     let mut model = machine(&["state is=hold"]);
-    let none: Vec<String> = told(&model);
-    assert_eq!(none, [""; 0]);
+    assert_eq!(said(&model, "-- next, "), [""; 0]);
     tell(&mut model, 0, &[timed, timed]);
-    let lines: Vec<String> = told(&model);
     assert_eq!(
-        lines,
+        said(&model, "-- next, "),
         [
             "-- next, time the servo: `calibrate servo` (1 of 2 done)",
             "-- next, measure 10 m: `calibrate start`, roll, `calibrate 10000` (0 of 3 done)",
@@ -94,9 +96,8 @@ fn a_margin_that_nothing_was_measured_for_is_warned_of_once() {
     settings.set(Setting::MarginMm, 13).expect("it is in its range");
     model.update(0, Happening::Settings(settings.clone(), Vec::new()));
     model.update(0, Happening::Settings(settings, Vec::new()));
-    let warnings: Vec<&String> = model.lines.iter().filter(|line| line.starts_with("-- warning: ")).collect();
     assert_eq!(
-        warnings,
+        said(&model, "-- warning: "),
         ["-- warning: margin_mm 13 is not measured: time the servo and measure the wheel first; 50 is safe"]
     );
 }
@@ -174,9 +175,8 @@ fn numbers_that_no_machine_gives_are_drawn_as_far_as_they_go() {
 #[test]
 fn a_screen_too_small_for_all_of_it_is_drawn_as_far_as_it_goes() {
     let model = machine(&ROW);
-    for (width, height) in [(1, 1), (3, 40), (80, 2), (10, 10)] {
-        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| draw(&model, frame)).unwrap();
+    for (columns, lines) in [(1, 1), (3, 40), (80, 2), (10, 10)] {
+        screen_of(&model, columns, lines);
     }
 }
 
