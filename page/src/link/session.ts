@@ -55,6 +55,9 @@ export type Happening =
 /** The machine refused a command: the problem, and what would be right. */
 export class Refused extends Error {}
 
+/** Whether an error is the refusal of a command that the machine takes with `force`. */
+export const mayForce = (error: unknown): boolean => error instanceof Refused && error.message.includes("force");
+
 /** No machine answers, and what to do. */
 export class NoMachine extends Error {}
 

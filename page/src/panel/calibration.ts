@@ -2,9 +2,9 @@
 
 import type { Parts } from "../dom.ts";
 import type { EventLine } from "../link/console_line.ts";
-import { read } from "../link/grammar.ts";
-import { type Ask, Refused } from "../link/session.ts";
-import { type Plain, quantity, say, told } from "../words/words.ts";
+import { settingsOf } from "../link/grammar.ts";
+import { type Ask, mayForce } from "../link/session.ts";
+import { type Plain, quantity, say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** The servo's two positions. */
@@ -32,10 +32,7 @@ export class Calibration {
                 void this.#do("servo-said", `set servo_${place}_us ${value}`, done);
             });
         }
-        for (const [name, by] of [
-            ["servo-less", -10],
-            ["servo-more", 10],
-        ] as const)
+        for (const [name, by] of Object.entries({ "servo-less": -10, "servo-more": 10 }))
             parts.button(name, () => {
                 pulse.value = String(pulse.valueAsNumber + by);
                 void this.#byHand(pulse.value);
@@ -77,23 +74,20 @@ export class Calibration {
     }
 
     async #begin(): Promise<void> {
-        if (!(await this.#do("wheel-said", "calibrate start", () => say("rollOn")))) return;
-        this.#from = this.machine.status?.position;
+        const error = await this.#do("wheel-said", "calibrate start", () => say("rollOn"));
+        if (!error) this.#from = this.machine.status?.position;
     }
 
     async #end(force: string): Promise<void> {
-        const force_ = this.parts.get("wheel-force", HTMLButtonElement);
-        force_.hidden = true;
+        const insist = this.parts.html("wheel-force");
+        insist.hidden = true;
         const distance = this.parts.get("wheel-mm", HTMLInputElement).value;
-        try {
-            const said = (await this.ask(`calibrate ${distance}${force}`)).map(read);
-            const measured = said.find((said) => said.is === "setting");
-            const counts = () => (measured ? `${say("countsPerMetre", { count: measured.value })} ` : "");
-            this.parts.say("wheel-said", () => `${counts()}${say("notSavedYet")}`);
-        } catch (error) {
-            this.parts.say("wheel-said", () => told(error));
-            force_.hidden = !(error instanceof Refused && error.message.includes("force"));
-        }
+        const error = await this.#do("wheel-said", `calibrate ${distance}${force}`, (lines) => {
+            const [measured] = settingsOf(lines);
+            const counts = measured ? `${say("countsPerMetre", { count: measured.value })} ` : "";
+            return `${counts}${say("notSavedYet")}`;
+        });
+        insist.hidden = !mayForce(error);
     }
 
     async #move(place: Place): Promise<void> {
@@ -109,12 +103,12 @@ export class Calibration {
     async #leads(): Promise<void> {
         for (const name of ["lead_out_ms", "lead_in_ms"]) {
             const { value } = this.parts.get(name, HTMLInputElement);
-            if (!(await this.#do("servo-said", `set ${name} ${value}`, () => say("bothSet")))) return;
+            if (await this.#do("servo-said", `set ${name} ${value}`, () => say("bothSet"))) return;
         }
     }
 
-    /** Types a command and shows its result. Returns whether it succeeded. */
-    #do(said: string, command: string, done: () => string): Promise<boolean> {
+    /** Types a command and shows its result. Returns the error, if any. */
+    #do(said: string, command: string, done: (answer: string[]) => string): Promise<unknown> {
         return this.parts.attempt(said, this.ask(command), done);
     }
 }

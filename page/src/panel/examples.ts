@@ -2,8 +2,8 @@
 
 import { make, type Parts } from "../dom.ts";
 import { read } from "../link/grammar.ts";
-import { type Ask, Refused } from "../link/session.ts";
-import { quantity, say, show, told } from "../words/words.ts";
+import { type Ask, mayForce } from "../link/session.ts";
+import { quantity, say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** Number of slots for taught examples. */
@@ -66,20 +66,15 @@ export class Examples {
     }
 
     async #teach(label: Label, force: string): Promise<void> {
-        this.#refused = undefined;
-        try {
-            await this.ask(`label ${label}${force}`);
-            this.parts.say("teach-said", () => say(label === "plant" ? "taughtPlant" : "taughtWeed"));
-        } catch (error) {
-            this.parts.say("teach-said", () => told(error));
-            if (error instanceof Refused && error.message.includes("force")) this.#refused = label;
-        }
-        const insist = this.parts.get("teach-force", HTMLButtonElement);
-        insist.hidden = this.#refused === undefined;
-        show(insist, () => say((this.#refused ?? label) === "plant" ? "isPlant" : "isWeed"));
+        const isPlant = label === "plant";
+        const taught = () => say(isPlant ? "taughtPlant" : "taughtWeed");
+        const error = await this.parts.attempt("teach-said", this.ask(`label ${label}${force}`), taught);
+        this.#refused = mayForce(error) ? label : undefined;
+        this.parts.html("teach-force").hidden = this.#refused === undefined;
+        this.parts.say("teach-force", () => say(isPlant ? "isPlant" : "isWeed"));
     }
 
-    #forget(which: string): Promise<boolean> {
+    #forget(which: string): Promise<unknown> {
         return this.parts.attempt("teach-said", this.ask(`forget ${which}`));
     }
 

@@ -33,9 +33,7 @@ export class SettingsForm {
         parts.button("settings-save-file", () =>
             download("machine.toml", write(machine.settings, machine.help), "application/toml"),
         );
-        const file = parts.get("settings-file", HTMLInputElement);
-        parts.button("settings-open-file", () => file.click());
-        file.addEventListener("change", () => void this.#open(file));
+        parts.files("settings-open-file", "settings-file", ([file]) => file && void this.#open(file));
     }
 
     /** Shows the present values. The operator's changes stay. */
@@ -128,7 +126,7 @@ export class SettingsForm {
     }
 
     async #take(command: string, done: Plain): Promise<void> {
-        if (await this.parts.attempt("settings-said", this.ask(command), () => say(done))) this.#undo();
+        if (!(await this.parts.attempt("settings-said", this.ask(command), () => say(done)))) this.#undo();
     }
 
     /**
@@ -150,35 +148,26 @@ export class SettingsForm {
             } catch (error) {
                 this.#problems.set(name, reason(error));
             }
-        let isSaved = false;
         const { size } = this.#problems;
+        const saved = () => say("savedForGood");
+        const notSaved = (error: unknown) => say("notSavedWhy", { why: told(error) });
         if (size > 0) this.#say(() => say("refused", { count: size, all: steps.length }));
-        else
-            try {
-                await this.ask("save");
-                isSaved = true;
-                this.#say(() => say("savedForGood"));
-            } catch (error) {
-                this.#say(() => say("notSavedWhy", { why: told(error) }));
-            }
+        const isSaved = size === 0 && !(await this.parts.attempt("settings-said", this.ask("save"), saved, notSaved));
         this.show();
         return isSaved;
     }
 
-    async #open(file: HTMLInputElement): Promise<void> {
-        const chosen = file.files?.[0];
-        file.value = "";
-        if (!chosen) return;
+    async #open(opened: File): Promise<void> {
+        const file = opened.name;
         try {
-            const values = parse(await chosen.text(), this.machine.settings);
+            const values = parse(await opened.text(), this.machine.settings);
             for (const [name, value] of values) this.#wanted.set(name, value);
             this.show();
             const { size: count } = this.#wanted;
-            const file = chosen.name;
             this.#say(() => (count === 0 ? say("fileSame", { file }) : say("fileDiffers", { file, count })));
         } catch (error) {
             if (!(error instanceof SettingsFileError)) throw error;
-            this.#say(() => `${chosen.name}, ${told(error)}`);
+            this.#say(() => `${file}, ${told(error)}`);
         }
     }
 }
