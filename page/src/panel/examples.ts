@@ -1,6 +1,6 @@
 // Teaching: two buttons label the last detection. Below are the taught examples.
 
-import { make, type Parts } from "../dom.ts";
+import { make, makeButton, type Parts } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import { type Ask, mayForce } from "../link/session.ts";
 import { quantity, say } from "../words/words.ts";
@@ -50,10 +50,8 @@ export class Examples {
         this.parts.write("examples-count", say("places", { count: field.length, all: PLACES }));
         this.parts.html("examples-list").replaceChildren(
             ...field.map(({ number, label }) => {
-                const forget = make("button", "needs-change", say("forget"));
-                forget.type = "button";
+                const forget = makeButton("needs-change", () => this.#forget(String(number)), say("forget"));
                 forget.ariaLabel = say("forgetOne", { number });
-                forget.addEventListener("click", () => void this.#forget(String(number)));
                 return make(
                     "li",
                     "across",

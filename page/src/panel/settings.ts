@@ -1,11 +1,11 @@
 // The machine's settings as a form: name, help, unit, range, and the current and saved values. One button sends and
 // saves them. They can be saved to a file and loaded from one.
 
-import { download, make, type Parts } from "../dom.ts";
+import { make, type Parts } from "../dom.ts";
 import type { Setting } from "../link/console_line.ts";
 import { steps as order } from "../link/grammar.ts";
 import type { Ask } from "../link/session.ts";
-import { parse, range, SettingsFileError, write } from "../link/settings_file.ts";
+import { parse, range, SettingsFileError, save } from "../link/settings_file.ts";
 import { type Plain, reason, say, settingHelp, told } from "../words/words.ts";
 import { type Machine, sentence } from "./machine.ts";
 
@@ -30,9 +30,7 @@ export class SettingsForm {
         parts.button("settings-read", () => void this.#take("get", "areMachines"));
         parts.button("settings-defaults", () => void this.#take("defaults", "defaultsInUse"));
         parts.button("settings-revert", () => void this.#take("revert", "savedInUse"));
-        parts.button("settings-save-file", () =>
-            download("machine.toml", write(machine.settings, machine.help), "application/toml"),
-        );
+        parts.button("settings-save-file", () => save(machine.settings, machine.help));
         parts.files("settings-open-file", "settings-file", ([file]) => file && void this.#open(file));
     }
 

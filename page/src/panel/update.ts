@@ -2,9 +2,9 @@
 // it. A button then restores the settings that the new firmware has lost.
 
 import { ask as askRust } from "../core.ts";
-import { download, type Parts } from "../dom.ts";
+import type { Parts } from "../dom.ts";
 import type { Happening } from "../link/session.ts";
-import { write } from "../link/settings_file.ts";
+import { save } from "../link/settings_file.ts";
 import { chosen, keep } from "../preferences.ts";
 import { say } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
@@ -29,7 +29,7 @@ export class Update {
     ) {
         parts.button("update-go", () => {
             const { settings, help } = panel.machine;
-            download("machine.toml", write(settings, help), "application/toml");
+            save(settings, help);
             keep(KEPT, JSON.stringify(settings.map(({ name, value }) => [name, value])));
             void flash();
         });
