@@ -39,7 +39,7 @@ function whyNotOpened(error: unknown): PortError {
     if (name === "InvalidStateError") return new PortError(english("portOpen"));
     if (name !== "NetworkError") return new PortError(english("portRefused", { text: message }));
     const isLinux = /Linux/.test(navigator.userAgent) && !/Android/.test(navigator.userAgent);
-    return new PortError(english(isLinux ? "portTakenLinux" : "portTaken"));
+    return new PortError(english("portTaken", { or: english(isLinux ? "noPermission" : "driverHangs") }));
 }
 
 export class SerialLine {

@@ -5,7 +5,7 @@
 // After every start of the Uno it asks for version, settings and examples, and turns the events on. `hold` does not wait. A
 // session ends with its wire.
 
-import { reason } from "../words/words.ts";
+import { english, reason } from "../words/words.ts";
 import type { EventLine, Line, Setting } from "./console_line.ts";
 import { isEvent, read, settingsOf } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
@@ -125,7 +125,7 @@ export class Session implements Link {
     async hold(): Promise<void> {
         const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
         this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
-        for (const { failed } of dropped) failed(new Refused("hold came first, so this was not sent"));
+        for (const { failed } of dropped) failed(new Refused(english("holdFirst")));
         await this.#ask("hold", true, (question) => this.#send(question));
     }
 
@@ -160,7 +160,7 @@ export class Session implements Link {
         take: (question: Question) => unknown = (question) => this.#waiting.push(question),
     ): Promise<string[]> {
         return new Promise((done, failed) => {
-            if (this.#ended) failed(new NoMachine("no machine is connected"));
+            if (this.#ended) failed(new NoMachine(english("noneConnected")));
             else take({ command, isTyped, since: this.#now, answer: [], done, failed });
         });
     }
@@ -221,8 +221,7 @@ export class Session implements Link {
 
     async #settings(): Promise<Setting[]> {
         const settings = settingsOf(await this.#ask("get", false));
-        if (settings.length === 0)
-            throw new NoMachine("the firmware shows no settings: flash this page's, and try again");
+        if (settings.length === 0) throw new NoMachine(english("noSettings"));
         return settings;
     }
 
@@ -240,11 +239,9 @@ export class Session implements Link {
     #whyNoAnswer(): string {
         const strange = [...this.#strange];
         const unreadable = strange.filter((character) => character === "\u{fffd}").length;
-        if (strange.length === 0)
-            return "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first";
-        if (unreadable * 4 > strange.length)
-            return "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again";
-        return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
+        if (strange.length === 0) return english("nothingAnswers");
+        if (unreadable * 4 > strange.length) return english("noText");
+        return english("otherDevice", { text: this.#strange.trim().slice(0, 60) });
     }
 
     #take(line: string): void {
@@ -252,7 +249,7 @@ export class Session implements Link {
         const said = read(line);
         if (said.is === "greeting") {
             // Pending commands will not be answered.
-            this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
+            this.#beginAgain(new NoMachine(english("resetWhileAsked")), english("wasReset"));
             this.onHappening({ is: "started", line });
             return;
         }

@@ -30,7 +30,6 @@ export class Connection {
         parts.button("connect", () => void this.#attempt(() => this.#choose()));
         parts.button("disconnect", () => void this.disconnect());
         const why = whyNoSerial();
-        parts.html("no-serial").hidden = why === undefined;
         parts.say("no-serial", () => told(why ?? ""));
         parts.get("connect", HTMLButtonElement).disabled = why !== undefined;
         if (why !== undefined) return;

@@ -64,12 +64,14 @@ export class Examples {
     }
 
     async #teach(label: Label, force: string): Promise<void> {
-        const isPlant = label === "plant";
-        const taught = () => say(isPlant ? "taughtPlant" : "taughtWeed");
+        const taught = () => {
+            const what = say(label === "plant" ? "wasPlant" : "wasWeed");
+            return say("taughtThat", { what: `${what.charAt(0).toLowerCase()}${what.slice(1)}` });
+        };
         const error = await this.parts.attempt("teach-said", this.ask(`label ${label}${force}`), taught);
         this.#refused = mayForce(error) ? label : undefined;
         this.parts.html("teach-force").hidden = this.#refused === undefined;
-        this.parts.say("teach-force", () => say(isPlant ? "isPlant" : "isWeed"));
+        this.parts.say("teach-force", () => say("isClass", { class: say(label) }));
     }
 
     #forget(which: string): Promise<unknown> {

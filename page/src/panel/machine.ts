@@ -24,7 +24,7 @@ const REASONS: Readonly<Record<string, Plain>> = {
     too_fast: "reasonTooFast",
     encoder_doubtful: "reasonEncoder",
 };
-const STATES = { none: "stateNone", hold: "stateHold", work: "stateWork", alarm: "stateAlarm" } as const;
+const STATES = { none: "stateNone", hold: "hold", work: "stateWork", alarm: "stateAlarm" } as const;
 
 export class Machine {
     /** The firmware's version, if the machine is connected. */
@@ -160,7 +160,8 @@ export class Machine {
 
     /** The same in a word for the operator. */
     get stateWord(): string {
-        return say(STATES[this.state]);
+        // A button has one of them in capitals.
+        return say(STATES[this.state]).toLowerCase();
     }
 
     /**
