@@ -13,7 +13,7 @@ const TURN_MS = 20;
 /** Fills an element with the machines' panels, and returns these. */
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
-    const all = make("section", "overview");
+    const all = make("section", "overview stack");
     inLanguage(() => {
         all.ariaLabel = say("allRows");
     });
@@ -51,9 +51,9 @@ function overview(into: HTMLElement, names: readonly string[], holdAll: () => Pr
     const states = names.map(() => make("span", "overview-state"));
     const rows = states.map((state, row) => {
         const link = makeButton("", () => into.parentElement?.children[row + 1]?.scrollIntoView(), names[row] ?? "");
-        return make("li", "", link, state);
+        return make("li", "stack", link, state);
     });
-    const said = make("p", "overview-said");
+    const said = make("p", "");
     said.role = "status";
     const hold = makeButton("hold-all", () => {
         show(said, () => say("waitingForAll"));
@@ -63,7 +63,7 @@ function overview(into: HTMLElement, names: readonly string[], holdAll: () => Pr
         );
     });
     show(hold, () => say("holdAll"));
-    into.append(make("ul", "", ...rows), make("div", "hold-bar", said, hold));
+    into.append(make("ul", "stack", ...rows), make("div", "hold-bar stack", said, hold));
     return (panels: readonly Panel[]) => {
         for (const [row, state] of states.entries()) {
             const machine = panels[row]?.machine;
