@@ -30,16 +30,9 @@ export class Examples {
     /** Shows the last object. */
     show(): void {
         const [last] = this.machine.objects;
-        this.parts.write(
-            "last-object",
-            last
-                ? say("lastObject", {
-                      class: say(last.class),
-                      width: quantity(this.machine.widthMm(last), "millimeter"),
-                      count: last.votes,
-                  })
-                : say("nothingSeen"),
-        );
+        const width = quantity(last ? this.machine.widthMm(last) : 0, "millimeter");
+        const seen = last && say("lastObject", { class: say(last.class), width, count: last.votes });
+        this.parts.write("last-object", seen ?? say("nothingSeen"));
     }
 
     /** Shows the examples as they are known. */

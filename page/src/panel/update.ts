@@ -78,15 +78,14 @@ export class Update {
         this.parts.html("update").hidden = !isOther;
         if (isOther) {
             const { gone, added } = this.#changes();
-            const tables = () => [
-                ...(gone.length > 0 ? [say("settingsGone", { names: gone.join(", ") })] : []),
-                ...(added.length > 0 ? [say("settingsAdded", { names: added.join(", ") })] : []),
-                ...(gone.length + added.length > 0 ? [say("settingsLost")] : []),
+            const said = () => [
+                say("otherFirmware", { theirs: version, ours: this.#own.version }),
+                gone.length > 0 && say("settingsGone", { names: gone.join(", ") }),
+                added.length > 0 && say("settingsAdded", { names: added.join(", ") }),
+                gone.length + added.length > 0 && say("settingsLost"),
+                say("settingsToFile"),
             ];
-            const versions = { theirs: version, ours: this.#own.version };
-            this.parts.say("update-said", () =>
-                [say("otherFirmware", versions), ...tables(), say("settingsToFile")].join(" "),
-            );
+            this.parts.say("update-said", () => said().filter(Boolean).join(" "));
         }
         const kept = this.#kept();
         this.parts.html("restore").hidden = version === undefined || isOther || kept.length === 0;
