@@ -78,7 +78,6 @@ export function make<Name extends keyof HTMLElementTagNameMap>(
     return element;
 }
 
-/** A new button. */
 export function makeButton(className: string, use: () => void, text = ""): HTMLButtonElement {
     const button = make("button", className, text);
     button.type = "button";
@@ -86,7 +85,6 @@ export function makeButton(className: string, use: () => void, text = ""): HTMLB
     return button;
 }
 
-/** Sets attributes of an element. */
 export function set(element: Element, attributes: Readonly<Record<string, string | number>>): void {
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
 }

@@ -27,7 +27,6 @@ export const BOARDS: readonly Board[] = [
 /** An error of flashing, and what to do. */
 export class FlashError extends Error {}
 
-/** The progress. */
 export interface Progress {
     readonly phase: "waiting" | "writing" | "verifying";
     /** From 0 to 1. */

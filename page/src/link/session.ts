@@ -7,7 +7,7 @@
 
 import { english, reason } from "../words/words.ts";
 import type { EventLine, Line, Setting } from "./console_line.ts";
-import { isEvent, read, settingsOf } from "./grammar.ts";
+import { isEvent, linesOf, read } from "./grammar.ts";
 import { LineReader } from "./lines.ts";
 
 /** Types a command, and returns its answer without the `ok`. Throws `Refused` if the machine refuses it. */
@@ -15,7 +15,6 @@ export type Ask = (command: string) => Promise<string[]>;
 
 /** A serial line to a machine. */
 export interface Wire {
-    /** Gets the received text. */
     onText: (text: string) => void;
     /** Gets the reason when the line is lost. Never called after `close`. */
     onEnd: (why: string) => void;
@@ -34,7 +33,6 @@ const BOOT_MS = 3000;
 /** Further tries from the beginning, after missing or damaged answers. */
 const TRIES = 2;
 
-/** Something that happened. */
 export type Happening =
     /** The firmware has started; its greeting has the reason. */
     | { is: "started"; line: string }
@@ -202,25 +200,20 @@ export class Session implements Link {
         await this.#ask("status", false);
         const help = new Map<string, string>();
         for (const { name } of settings)
-            for (const line of await this.#ask(`help ${name}`, false)) {
-                const said = read(line);
-                if (said.is === "help") help.set(said.name, said.help);
-            }
+            for (const said of linesOf("help", await this.#ask(`help ${name}`, false))) help.set(said.name, said.help);
         this.onHappening({ is: "help", help });
     }
 
     async #version(): Promise<string> {
         // Ends an earlier half line. Its answer belongs to no question.
         this.#wire.send("\n");
-        for (const line of await this.#ask("version", false)) {
-            const said = read(line);
-            if (said.is === "version") return said.version;
-        }
-        throw new NoMachine(this.#whyNoAnswer());
+        const [said] = linesOf("version", await this.#ask("version", false));
+        if (!said) throw new NoMachine(this.#whyNoAnswer());
+        return said.version;
     }
 
     async #settings(): Promise<Setting[]> {
-        const settings = settingsOf(await this.#ask("get", false));
+        const settings = linesOf("setting", await this.#ask("get", false));
         if (settings.length === 0) throw new NoMachine(english("noSettings"));
         return settings;
     }

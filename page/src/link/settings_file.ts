@@ -11,7 +11,6 @@ export class SettingsFileError extends Error {}
 /** How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder. */
 const OLD_MERGE_GAP = "merge_gap_ticks";
 
-/** The range of a setting. */
 export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
     if (isSwitched) return english("rangeSwitched", { usual: String(usual === 1) });
     return english("range", { least, greatest: `${greatest}${unit && ` ${unit}`}`, usual });

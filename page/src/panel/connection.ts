@@ -17,7 +17,6 @@ export class Connection {
     /** Called after the port was closed, so that the operator can flash the machine. */
     onFlash: () => void = () => {};
     #port: SerialPort | undefined;
-    /** Whether the port is open. */
     #isOpen = false;
     #isBusy = false;
     /** Keeps a phone's screen on while a machine is connected. */
@@ -71,7 +70,6 @@ export class Connection {
         this.#show();
     }
 
-    /** Closes the port. */
     async disconnect(): Promise<void> {
         this.#port = undefined;
         if (!this.#isOpen) return;

@@ -1,7 +1,7 @@
 // Teaching: two buttons label the last detection. Below are the taught examples.
 
 import { make, makeButton, type Parts } from "../dom.ts";
-import { read } from "../link/grammar.ts";
+import { linesOf } from "../link/grammar.ts";
 import { type Ask, mayForce } from "../link/session.ts";
 import { quantity, say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
@@ -37,20 +37,13 @@ export class Examples {
 
     /** Shows the examples as they are known. */
     showExamples(): void {
-        const field = this.machine.examples
-            .map(read)
-            .flatMap((said) => (said.is === "example" && said.fromField ? [said] : []));
+        const field = linesOf("example", this.machine.examples).filter(({ fromField }) => fromField);
         this.parts.write("examples-count", say("places", { count: field.length, all: PLACES }));
         this.parts.html("examples-list").replaceChildren(
             ...field.map(({ number, label }) => {
                 const forget = makeButton("needs-change", () => this.#forget(String(number)), say("forget"));
                 forget.ariaLabel = say("forgetOne", { number });
-                return make(
-                    "li",
-                    "across",
-                    make("span", "", `${number}: ${label === "plant" || label === "weed" ? say(label) : label}`),
-                    forget,
-                );
+                return make("li", "across", make("span", "", `${number}: ${say(label)}`), forget);
             }),
         );
         this.parts.get("examples-forget", HTMLButtonElement).disabled = field.length === 0;

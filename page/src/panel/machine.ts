@@ -39,7 +39,6 @@ export class Machine {
     toolOut = true;
     /** The latched alarm's name. */
     alarm: string | undefined;
-    /** The last warning's name. */
     warning: string | undefined;
     status: Line<"status"> | undefined;
     /** When the status came. */
@@ -153,7 +152,6 @@ export class Machine {
         [this.#lost, this.#mayWeedOn] = [why, false];
     }
 
-    /** The machine's state. */
     get state(): Mode | "none" {
         return this.version === undefined ? "none" : this.mode;
     }

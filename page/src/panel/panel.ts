@@ -110,7 +110,6 @@ export class Panel {
         this.#link = link;
     }
 
-    /** Disconnects the machine. */
     async disconnect(): Promise<void> {
         await this.#link?.close?.();
         this.#link = undefined;

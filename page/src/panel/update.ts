@@ -9,7 +9,6 @@ import { chosen, keep } from "../preferences.ts";
 import { say } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
 
-/** The firmware of this page. */
 interface Firmware {
     readonly version: string;
     readonly settings: readonly string[];
@@ -40,7 +39,6 @@ export class Update {
         });
     }
 
-    /** Takes an event of the machine. */
     take({ is }: Happening): void {
         if (is === "connected" && this.#isOwn && !this.#isLost()) keep(KEPT, "");
         if (is === "connected") this.parts.write("restore-said", "");

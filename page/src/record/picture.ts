@@ -106,7 +106,6 @@ interface Answer<Said> {
     readonly tables: readonly Float64Array[];
 }
 
-/** The question was cancelled. */
 export class Cancelled extends Error {}
 
 /** How work goes on: `progress` gets its share that is done, from 0 to 1, and `cancel` ends it. */

@@ -202,7 +202,6 @@ export class RecordView {
         if (isWhole) this.parts.say("log-replayed", () => results.map((result) => result()).join(" "));
     }
 
-    /** Draws the map of all logs. */
     async #map(): Promise<void> {
         const files = this.#rows.map(({ file }) => file);
         const words = {
