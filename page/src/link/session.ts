@@ -8,7 +8,6 @@
 import { english, reason } from "../words/words.ts";
 import type { EventLine, Line, Setting } from "./console_line.ts";
 import { isEvent, linesOf, read } from "./grammar.ts";
-import { LineReader } from "./lines.ts";
 
 /** Types a command, and returns its answer without the `ok`. Throws `Refused` if the machine refuses it. */
 export type Ask = (command: string) => Promise<string[]>;
@@ -70,6 +69,29 @@ export interface Link {
     turn?(now: number): void;
     /** Closes the wire, if this link has one. */
     close?(): Promise<void>;
+}
+
+/** The longest line: 256 characters. The firmware's own lines are shorter than 128. */
+const LINE = /[^\r\n]{256}|[^\r\n]+(?=[\r\n])/g;
+
+/**
+ * Splits received text into lines. Any input is accepted. A line ends with CR, LF or both, or when it is longer than any
+ * line of the firmware. A character that is not printable ASCII becomes U+FFFD. Empty lines are dropped.
+ */
+export class LineReader {
+    #partial = "";
+
+    /** Takes received text, and returns the complete lines. */
+    take(text: string): string[] {
+        const received = this.#partial + text.replaceAll(/[^ -~\r\n]/g, "\u{fffd}");
+        let end = 0;
+        const lines = [...received.matchAll(LINE)].map((found) => {
+            end = found.index + found[0].length;
+            return found[0];
+        });
+        this.#partial = received.slice(end).replace(/^[\r\n]+/, "");
+        return lines;
+    }
 }
 
 interface Question {

@@ -241,9 +241,7 @@ export class Panel {
                 body(which).hidden = which !== chosen;
             }
         };
-        for (const which of TABS) {
-            tab(which).hidden = body(which).hidden = !tabs.includes(which);
-        }
+        for (const which of TABS) tab(which).hidden = body(which).hidden = !tabs.includes(which);
         for (const [index, which] of tabs.entries()) {
             tab(which).id = `${name}-tab-${which}`;
             body(which).id = `${name}-body-${which}`;

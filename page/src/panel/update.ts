@@ -40,7 +40,9 @@ export class Update {
     }
 
     take({ is }: Happening): void {
-        if (is === "connected" && this.#isOwn && !this.#isLost()) keep(KEPT, "");
+        // Without saved ones, its firmware has another table, or none were ever saved.
+        const hasSaved = this.panel.machine.settings.some(({ saved }) => saved !== undefined);
+        if (is === "connected" && this.#isOwn && hasSaved) keep(KEPT, "");
         if (is === "connected") this.parts.write("restore-said", "");
         if (["connected", "lost", "settings", "event"].includes(is)) this.#show();
     }
@@ -58,11 +60,6 @@ export class Update {
     get #isOwn(): boolean {
         const { gone, added } = this.#changes();
         return this.panel.machine.version === this.#own.version && gone.length + added.length === 0;
-    }
-
-    /** Whether the machine has no saved settings: its firmware has another table, or none were ever saved. */
-    #isLost(): boolean {
-        return this.panel.machine.settings.every(({ saved }) => saved === undefined);
     }
 
     /** The stored settings that differ from the machine's. */
