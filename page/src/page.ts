@@ -7,7 +7,7 @@ import { make, Parts } from "./dom.ts";
 import { Flasher } from "./flasher/flasher.ts";
 import { keepFocus } from "./focus.ts";
 import { isServed } from "./link/served.ts";
-import { Session, type Wire } from "./link/session.ts";
+import { Session } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
@@ -64,16 +64,12 @@ page.say("unchecked", () => say("unchecked"));
 const trial = new Trial(hex, Date.now(), machineSetUp());
 const drawing = new Drawing(page.get("drawing", SVGSVGElement), trial);
 const trialPanel = new Panel(page.html("try-panel"), "try");
-const wire: Wire = {
-    onText: () => {},
-    onEnd: () => {},
-    send: (text) => trial.uno.send(text),
-    close: async () => {},
-};
-trial.onText = (text) => wire.onText(text);
 /** The chip's time. Timeouts use it, so that a slow or paused trial causes no timeout. */
 const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
-trialPanel.connect(new Session(wire, trialMs(), true), trialMs());
+const wire = { send: (text: string) => trial.uno.send(text), close: async () => {} };
+const session = new Session(wire, trialMs(), true);
+trial.onText = (text) => session.receive(text);
+trialPanel.connect(session, trialMs());
 trialPanel.onHappening = (happening) => {
     trial.take(happening);
     // A board without saved settings raises an alarm. Then this machine's settings are sent and saved.

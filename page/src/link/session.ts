@@ -12,11 +12,8 @@ import { isEvent, linesOf, read } from "./grammar.ts";
 /** Types a command, and returns its answer without the `ok`. Throws `Refused` if the machine refuses it. */
 export type Ask = (command: string) => Promise<string[]>;
 
-/** A serial line to a machine. */
+/** A serial line to a machine. Its owner passes what it receives to the session. */
 export interface Wire {
-    onText: (text: string) => void;
-    /** Gets the reason when the line is lost. Never called after `close`. */
-    onEnd: (why: string) => void;
     send(text: string): void;
     close(): Promise<void>;
 }
@@ -108,7 +105,6 @@ export class Session implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Whether the machine has answered with version, settings and examples. */
     #isReady = false;
-    readonly #wire: Wire;
     readonly #lines = new LineReader();
     /** Typed commands without an answer, in the order of the answers. */
     #asked: Question[] = [];
@@ -127,14 +123,18 @@ export class Session implements Link {
     #strange = "";
 
     /** `resets` says whether opening the wire resets the Uno. */
-    constructor(wire: Wire, now: number, resets: boolean) {
-        this.#wire = wire;
+    constructor(
+        private readonly wire: Wire,
+        now: number,
+        resets: boolean,
+    ) {
         [this.#now, this.#turnedAt] = [now, now];
         this.#greetingBy = resets ? now + BOOT_MS : now;
-        wire.onText = (text) => {
-            for (const line of this.#lines.take(text)) this.#take(line);
-        };
-        wire.onEnd = (why) => this.#end(why);
+    }
+
+    /** Takes received text. */
+    receive(text: string): void {
+        for (const line of this.#lines.take(text)) this.#take(line);
     }
 
     ask(command: string): Promise<string[]> {
@@ -169,8 +169,8 @@ export class Session implements Link {
     }
 
     async close(): Promise<void> {
-        this.#end("No machine is connected.", true);
-        await this.#wire.close();
+        this.end("No machine is connected.", true);
+        await this.wire.close();
     }
 
     /** `take` sends the question or queues it. */
@@ -188,7 +188,7 @@ export class Session implements Link {
     #send(question: Question): void {
         this.#asked.push(question);
         if (question.isTyped) this.onHappening({ is: "command", line: question.command });
-        this.#wire.send(`${question.command}\n`);
+        this.wire.send(`${question.command}\n`);
     }
 
     /** Asks for version, settings and examples. Tries again if an answer is lost, to a busy computer or noise on the wire. */
@@ -203,7 +203,7 @@ export class Session implements Link {
             } catch (error) {
                 if (this.#ended || beginning !== this.#beginnings) return;
                 if (tries === TRIES) {
-                    this.#end(reason(error));
+                    this.end(reason(error));
                     return;
                 }
             }
@@ -228,7 +228,7 @@ export class Session implements Link {
 
     async #version(): Promise<string> {
         // Ends an earlier half line. Its answer belongs to no question.
-        this.#wire.send("\n");
+        this.wire.send("\n");
         const [said] = linesOf("version", await this.#ask("version", false));
         if (!said) throw new NoMachine(this.#whyNoAnswer());
         return said.version;
@@ -310,13 +310,14 @@ export class Session implements Link {
         if (/^\s*events\b/.test(command)) await this.#ask("events on", false);
     }
 
-    #end(why: string, isWanted = false): void {
+    /** Ends with the wire: it is lost, or the operator wants to close it. */
+    end(why: string, isWanted = false): void {
         if (this.#ended) return;
         this.#ended = true;
         this.#isReady = false;
         const error = new NoMachine(why);
         for (const { failed } of [...this.#asked.splice(0), ...this.#waiting.splice(0)]) failed(error);
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
-        void this.#wire.close();
+        void this.wire.close();
     }
 }

@@ -2,16 +2,13 @@
 // plugged in again, it is connected automatically.
 
 import type { Parts } from "../dom.ts";
-import { choosePort, PortError, SerialLine, whyNoSerial, wireOf } from "../link/serial.ts";
-import { Session } from "../link/session.ts";
+import { choosePort, PortError, SerialLine, sessionOver, whyNoSerial } from "../link/serial.ts";
 import { english, say, told } from "../words/words.ts";
-import type { Panel } from "./panel.ts";
+import { type Panel, TURN_MS } from "./panel.ts";
 import { Update } from "./update.ts";
 
 /** The firmware's rate. */
 const BAUD = 115_200;
-/** Time between two turns. */
-const TURN_MS = 20;
 
 export class Connection {
     /** Called after the port was closed, so that the operator can flash the machine. */
@@ -63,7 +60,7 @@ export class Connection {
             const line = await SerialLine.open(port, BAUD);
             [this.#port, this.#isOpen] = [port, true];
             const now = performance.now();
-            this.panel.connect(new Session(wireOf(line), now, true), now);
+            this.panel.connect(sessionOver(line, now), now);
             this.#say(() => say("waitingForAnswer"));
         });
         this.#isBusy = false;

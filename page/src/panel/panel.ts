@@ -20,6 +20,9 @@ import { drawStrip } from "./strip.ts";
 /** At a machine's own port. */
 const EVERYTHING: Allowed = { mayStart: true, mayChange: true };
 
+/** Time between two turns of a real machine's panel. */
+export const TURN_MS = 20;
+
 /** How long a reason must last before a screen reader says it. A state is said at once. */
 const LASTING_MS = 1000;
 

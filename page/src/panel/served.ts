@@ -5,10 +5,7 @@ import { make, makeButton } from "../dom.ts";
 import { type HeldAll, Served } from "../link/served.ts";
 import { inLanguage, quantity, say, show, told } from "../words/words.ts";
 import { fault } from "./machine.ts";
-import { Panel } from "./panel.ts";
-
-/** Time between two turns. */
-const TURN_MS = 20;
+import { Panel, TURN_MS } from "./panel.ts";
 
 /** Fills an element with the machines' panels, and returns these. */
 export async function showServed(into: HTMLElement): Promise<Panel[]> {

@@ -255,7 +255,7 @@ export class RecordView {
             ...shown.worked.near(fromMm, toMm).map(({ startMm, endMm }) => bar("worked", startMm, endMm, AT.track, 10)),
             draw("path", {
                 fill: "none",
-                stroke: "var(--steel)",
+                stroke: "var(--ink)",
                 "stroke-width": 1.5,
                 d: speedLine(shown.speeds.near(fromMm - BESIDE_MM, toMm + BESIDE_MM), shown.fastestMmS, x),
             }),
