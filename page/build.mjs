@@ -19,6 +19,7 @@ const here = fileURLToPath(new URL(".", import.meta.url));
 process.chdir(here);
 
 const target = process.env.CARGO_TARGET_DIR ?? "../target";
+mkdirSync("build", { recursive: true });
 
 /** The firmware as a HEX file. `weeder hex` refuses a firmware with unproved bounds. */
 function firmware() {
@@ -27,7 +28,6 @@ function firmware() {
         console.error(`${elf} is not there: run \`cargo firmware\` first`);
         process.exit(1);
     }
-    mkdirSync("build", { recursive: true });
     const [command, ...words] = process.env.WEEDER
         ? [process.env.WEEDER]
         : ["cargo", "run", "--quiet", "--package", "weeder-cli", "--"];
@@ -64,9 +64,8 @@ function faults() {
     const manual = readFileSync("../docs/faults.md", "utf8");
     const rows = manual.matchAll(/^\| `((?:\d-\d )?(\w+))`[^|]*\| ([^|]*) \|$/gm);
     const faults = [...rows].map(([, title, name, advice]) => ({ name, title, advice }));
-    mkdirSync("build", { recursive: true });
     writeFileSync("build/faults.json", JSON.stringify(faults));
-    return "build/faults.json";
+    return resolve("build/faults.json");
 }
 
 /** Replaces the names behind `$` in the page's HTML by the English texts. */
@@ -98,22 +97,18 @@ const common = {
     // time.
     mainFields: ["module", "main"],
     alias: {
-        "packed.hex": packed(firmware()),
-        "page.wasm": packed(rust()),
+        "firmware.deflated": packed(firmware()),
+        "rust.deflated": packed(rust()),
         "log-worker.js": await logWorker(),
-        "faults.json": resolve(faults()),
+        "faults.json": faults(),
     },
     loader: { ".txt": "text", ".deflated": "binary" },
 };
 
-await build({
-    bundle: true,
-    mainFields: ["module", "main"],
-    entryPoints: ["src/uno/lockstep.ts"],
-    outfile: "build/lockstep.mjs",
-    platform: "node",
-    format: "esm",
-});
+/** @type {import("esbuild").BuildOptions} */
+const forNode = { ...common, platform: "node", format: "esm" };
+
+await build({ ...forNode, entryPoints: ["src/uno/lockstep.ts"], outfile: "build/lockstep.mjs" });
 
 const what = process.argv[2];
 if (what === "page") {
@@ -146,14 +141,12 @@ if (what === "page") {
     rmSync("build/tests", { recursive: true, force: true });
     const entryPoints = readdirSync("tests").filter((name) => name.endsWith(".test.ts"));
     await build({
-        ...common,
+        ...forNode,
         entryPoints: entryPoints.map((name) => join("tests", name)),
         outdir: "build/tests",
         outExtension: { ".js": ".mjs" },
         inject: ["tests/ready.ts"],
-        platform: "node",
         external: ["playwright-core"],
-        format: "esm",
         sourcemap: "inline",
     });
 } else {

@@ -1,6 +1,6 @@
 // The files that build.mjs includes: the firmware and the project's Rust, compressed, the worker that reads logs, and
 // the manual's alarms and warnings.
-declare module "packed.hex" {
+declare module "*.deflated" {
     const packed: Uint8Array<ArrayBuffer>;
     export default packed;
 }
@@ -8,11 +8,6 @@ declare module "packed.hex" {
 declare module "log-worker.js" {
     const code: string;
     export default code;
-}
-
-declare module "page.wasm" {
-    const packed: Uint8Array<ArrayBuffer>;
-    export default packed;
 }
 
 declare module "faults.json" {

@@ -1,8 +1,8 @@
 // The compressed parts of the page: the project's own Rust, and the firmware. start.ts waits for them. The page is
 // smaller this way: the Base64 of compressed data is shorter than the data.
 
-import packedHex from "packed.hex";
-import packedRust from "page.wasm";
+import packedHex from "firmware.deflated";
+import packedRust from "rust.deflated";
 import { Rust } from "./rust.ts";
 
 /** The Rust's module: for workers, and for further instances with their own state. */

@@ -1,12 +1,16 @@
-// The page's elements, by their names in `data-part` in index.html, each checked for its type.
+// The page's elements, by their names in index.html, each checked for its type.
 
 import { show, told } from "./words/words.ts";
 
 export class Parts {
-    constructor(readonly root: HTMLElement) {}
+    /** `attribute` has the names. */
+    constructor(
+        readonly root: HTMLElement,
+        private readonly attribute: "data-part" | "id" = "data-part",
+    ) {}
 
     get<Kind extends Element>(name: string, kind: new () => Kind): Kind {
-        const element = this.root.querySelector(`[data-part="${name}"]`);
+        const element = this.root.querySelector(`[${this.attribute}="${name}"]`);
         if (!(element instanceof kind)) throw new Error(`there is no ${kind.name} called ${name} in the page`);
         return element;
     }
@@ -21,6 +25,17 @@ export class Parts {
         return button;
     }
 
+    /** Lets a button open files with a file input. */
+    files(button: string, input: string, use: (files: readonly File[]) => void): void {
+        const field = this.get(input, HTMLInputElement);
+        this.button(button, () => field.click());
+        field.addEventListener("change", () => {
+            const files = [...(field.files ?? [])];
+            field.value = "";
+            if (files.length > 0) use(files);
+        });
+    }
+
     /** Replaces an element's text. */
     write(name: string, text: string): void {
         const element = this.html(name);
@@ -33,15 +48,20 @@ export class Parts {
         show(this.html(name), text);
     }
 
-    /** Waits for work, and shows that it is done, or its error. Returns whether it is done. */
-    async attempt(name: string, work: Promise<unknown>, done?: () => string): Promise<boolean> {
+    /** Waits for work, and shows that it is done, or its error. Returns the error, if any. */
+    async attempt<Result>(
+        name: string,
+        work: Promise<Result>,
+        done?: (result: Result) => string,
+        failed: (error: unknown) => string = told,
+    ): Promise<unknown> {
         try {
-            await work;
-            if (done) this.say(name, done);
-            return true;
+            const result = await work;
+            if (done) this.say(name, () => done(result));
+            return undefined;
         } catch (error) {
-            this.say(name, () => told(error));
-            return false;
+            this.say(name, () => failed(error));
+            return error;
         }
     }
 }
@@ -58,7 +78,13 @@ export function make<Name extends keyof HTMLElementTagNameMap>(
     return element;
 }
 
-/** Sets attributes of an element. */
+export function makeButton(className: string, use: () => void, text = ""): HTMLButtonElement {
+    const button = make("button", className, text);
+    button.type = "button";
+    button.addEventListener("click", use);
+    return button;
+}
+
 export function set(element: Element, attributes: Readonly<Record<string, string | number>>): void {
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
 }

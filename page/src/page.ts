@@ -3,16 +3,17 @@
 
 import { makeInstallable } from "./app/install.ts";
 import { hex } from "./core.ts";
-import { Parts } from "./dom.ts";
+import { make, Parts } from "./dom.ts";
 import { Flasher } from "./flasher/flasher.ts";
 import { keepFocus } from "./focus.ts";
 import { isServed } from "./link/served.ts";
-import { Session, type Wire } from "./link/session.ts";
+import { Session } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
 import { chosen, isStill, keep } from "./preferences.ts";
 import { RecordView } from "./record/record.ts";
+import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
 import { Drawing } from "./try/drawing.ts";
 import { inWords } from "./try/outcome.ts";
@@ -44,23 +45,13 @@ const PACE_S = 1;
 /** The views, by their sections and the address behind #. */
 const VIEWS = ["try", "work", "flash", "record"] as const;
 
-function find<Kind extends Element>(id: string, kind: new () => Kind): Kind {
-    const element = document.getElementById(id);
-    if (!(element instanceof kind)) throw new Error(`the page has no ${kind.name} #${id}`);
-    return element;
-}
-
-/** Replaces an element's text. */
-function write(id: string, text: string): void {
-    const element = find(id, HTMLElement);
-    if (element.textContent !== text) element.textContent = text;
-}
+const page = new Parts(document.body, "id");
 
 translate(document.body);
 inLanguage(() => {
     document.documentElement.lang = language();
 });
-const languages = find("language", HTMLSelectElement);
+const languages = page.get("language", HTMLSelectElement);
 for (const [code, { name }] of Object.entries(LANGUAGES)) {
     const option = new Option(name, code);
     option.lang = code;
@@ -68,21 +59,17 @@ for (const [code, { name }] of Object.entries(LANGUAGES)) {
 }
 languages.value = language();
 languages.addEventListener("change", () => speak(languages.value as Code));
-show(find("unchecked", HTMLElement), () => say("unchecked"));
+page.say("unchecked", () => say("unchecked"));
 
 const trial = new Trial(hex, Date.now(), machineSetUp());
-const drawing = new Drawing(find("drawing", SVGSVGElement), trial);
-const trialPanel = new Panel(find("try-panel", HTMLElement), "try");
-const wire: Wire = {
-    onText: () => {},
-    onEnd: () => {},
-    send: (text) => trial.uno.send(text),
-    close: async () => {},
-};
-trial.onText = (text) => wire.onText(text);
+const drawing = new Drawing(page.get("drawing", SVGSVGElement), trial);
+const trialPanel = new Panel(page.html("try-panel"), "try");
 /** The chip's time. Timeouts use it, so that a slow or paused trial causes no timeout. */
 const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
-trialPanel.connect(new Session(wire, trialMs(), true), trialMs());
+const wire = { send: (text: string) => trial.uno.send(text), close: async () => {} };
+const session = new Session(wire, trialMs(), true);
+trial.onText = (text) => session.receive(text);
+trialPanel.connect(session, trialMs());
 trialPanel.onHappening = (happening) => {
     trial.take(happening);
     // A board without saved settings raises an alarm. Then this machine's settings are sent and saved.
@@ -94,19 +81,19 @@ trialPanel.onHappening = (happening) => {
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
-new RecordView(new Parts(find("view-record", HTMLElement)));
+new RecordView(new Parts(page.html("view-record")));
 
 /** The panels of real machines. */
 let workPanels: Panel[] = [];
-const flasher = new Flasher(new Parts(find("view-flash", HTMLElement)), hex);
+const flasher = new Flasher(new Parts(page.html("view-flash")), hex);
 if (isServed()) void workServed();
 else workHere();
 
 /** The machine at this computer's own port. */
 function workHere(): void {
-    const panel = new Panel(find("work-panel", HTMLElement), "work");
+    const panel = new Panel(page.html("work-panel"), "work");
     workPanels = [panel];
-    const connection = new Connection(new Parts(find("connection", HTMLElement)), panel);
+    const connection = new Connection(new Parts(page.html("connection")), panel);
     connection.onFlash = () => {
         location.hash = "#flash";
     };
@@ -119,13 +106,13 @@ function workHere(): void {
 
 /** The machines at the ports of the computer that serves this page. */
 async function workServed(): Promise<void> {
-    const served = find("served", HTMLElement);
+    const served = page.html("served");
     served.hidden = false;
-    for (const id of ["connection", "work-panel"]) find(id, HTMLElement).hidden = true;
+    for (const id of ["connection", "work-panel"]) page.html(id).hidden = true;
     try {
         workPanels = await showServed(served);
     } catch (error) {
-        const said = document.createElement("p");
+        const said = make("p", "");
         show(said, () => say("noMachinesList", { why: told(error) }));
         served.append(said);
     }
@@ -135,7 +122,7 @@ async function workServed(): Promise<void> {
 function choose(): void {
     const shown = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
     const focused = document.activeElement;
-    for (const view of VIEWS) find(`view-${view}`, HTMLElement).hidden = view !== shown;
+    for (const view of VIEWS) page.html(`view-${view}`).hidden = view !== shown;
     for (const link of document.querySelectorAll<HTMLElement>("nav a")) {
         const isShown = link.getAttribute("href") === `#${shown}`;
         link.ariaCurrent = isShown ? "page" : null;
@@ -148,31 +135,33 @@ choose();
 keepFocus();
 
 void makeInstallable((load) => {
-    find("newer", HTMLElement).hidden = false;
-    button("load-newer", load);
+    page.html("newer").hidden = false;
+    page.button("load-newer", load);
 });
 
 /** The key for HOLD, for every shown machine. */
 globalThis.addEventListener("keydown", ({ key }) => {
     if (key !== "Escape") return;
-    if (!find("view-try", HTMLElement).hidden) trialPanel.hold();
+    if (!page.html("view-try").hidden) trialPanel.hold();
     else for (const panel of workPanels) panel.hold();
 });
 
 /** Light or dark as in the system, or always light, for sunlight. */
-const light = find("light", HTMLButtonElement);
+const light = page.button("light", () => {
+    const on = light.ariaPressed !== "true";
+    keep("light", on ? "on" : "off");
+    lighten(on);
+});
 function lighten(on: boolean): void {
     light.ariaPressed = String(on);
     document.documentElement.classList.toggle("light", on);
 }
 lighten(chosen("light") === "on");
-light.addEventListener("click", () => {
-    const on = light.ariaPressed !== "true";
-    keep("light", on ? "on" : "off");
-    lighten(on);
-});
 
-const sound = find("sound", HTMLButtonElement);
+const sound = page.button("sound", () => {
+    turn(!isOn());
+    showSound();
+});
 function showSound(): void {
     sound.ariaPressed = String(isOn());
     sound.classList.toggle("waiting", isWaiting());
@@ -180,77 +169,53 @@ function showSound(): void {
 }
 inLanguage(showSound);
 wakeOnTouch(showSound);
-sound.addEventListener("click", () => {
-    turn(!isOn());
-    showSound();
-});
 
-/** Shows a slider's value beside it and applies it, now and after each move. */
-function slider(id: string, shown: (value: number) => string, use: (value: number) => void): void {
-    const [input, output] = [find(id, HTMLInputElement), find(`${id}-is`, HTMLOutputElement)];
+// A browser may remember an earlier state.
+for (const form of ["drive", "bench"]) page.get(form, HTMLFormElement).reset();
+// Under reduced motion the machine stands until the operator drives it.
+if (isStill()) page.get("speed", HTMLInputElement).value = "0";
+
+/** Shows a slider's value beside it, in a text if there is one, and makes its change, now and after each move. */
+function slider(id: string, unit: string, digits: number, change: (value: number) => Change, text?: "ofGaps"): void {
+    const [input, output] = [page.get(id, HTMLInputElement), page.get(`${id}-is`, HTMLOutputElement)];
     const apply = () => {
-        output.value = shown(input.valueAsNumber);
-        use(input.valueAsNumber);
+        const share = quantity(input.valueAsNumber, unit, digits);
+        output.value = text ? say(text, { share }) : share;
+        trial.machine.change(change(input.valueAsNumber));
     };
     input.addEventListener("input", apply);
     inLanguage(apply);
 }
+slider("speed", "kilometer-per-hour", 1, (speedKmH) => ({ speedKmH }));
+slider("spacing", "millimeter", 0, (spacingMm) => ({ spacingMm }));
+slider("weeds", "percent", 0, (share) => ({ weedShare: share / 100 }), "ofGaps");
+slider("slip", "percent", 0, (slip) => ({ slip: slip / 100 }));
 
-function toggle(id: string, use: (on: boolean) => void): void {
-    const input = find(id, HTMLInputElement);
-    // A browser may remember the earlier state.
-    input.checked = false;
+function toggle(id: string, use: (on: boolean) => void): HTMLInputElement {
+    const input = page.get(id, HTMLInputElement);
     input.addEventListener("change", () => use(input.checked));
+    return input;
 }
-
-function button(id: string, use: () => void): void {
-    find(id, HTMLButtonElement).addEventListener("click", use);
-}
-
-for (const form of ["drive", "bench"]) find(form, HTMLFormElement).reset();
-// Under reduced motion the machine stands until the operator drives it.
-if (isStill()) find("speed", HTMLInputElement).value = "0";
-slider(
-    "speed",
-    (speed) => quantity(speed, "kilometer-per-hour", 1),
-    (speedKmH) => trial.machine.change({ speedKmH }),
-);
-slider(
-    "spacing",
-    (spacing) => quantity(spacing, "millimeter"),
-    (spacingMm) => trial.machine.change({ spacingMm }),
-);
-slider(
-    "weeds",
-    (share) => say("ofGaps", { share: quantity(share, "percent") }),
-    (share) => trial.machine.change({ weedShare: share / 100 }),
-);
-slider(
-    "slip",
-    (slip) => quantity(slip, "percent"),
-    (slip) => trial.machine.change({ slip: slip / 100 }),
-);
-toggle("switch", (on) => trial.work(on));
+const workSwitch = toggle("switch", (on) => trial.work(on));
 toggle("torn", (beamWireTorn) => trial.machine.change({ beamWireTorn }));
 toggle("dead", (encoderDead) => trial.machine.change({ encoderDead }));
-button("brown-out", () => trial.uno.reset("brown-out"));
-button("press-reset", () => trial.uno.reset("external"));
+page.button("brown-out", () => trial.uno.reset("brown-out"));
+page.button("press-reset", () => trial.uno.reset("external"));
 
-const time = find("time", HTMLSelectElement);
-const workSwitch = find("switch", HTMLInputElement);
-const lamp = find("lamp", HTMLElement);
-const hint = find("hint", HTMLElement);
-const outcome = find("outcome", HTMLElement);
+const time = page.get("time", HTMLSelectElement);
+const lamp = page.html("lamp");
+const hint = page.html("hint");
+const outcome = page.html("outcome");
 
 function showTrial(): void {
     const { machine } = trial;
     trialPanel.show();
-    write("true-tool", say(machine.isWeeding ? "toolIn" : machine.isClear ? "toolOut" : "swings"));
+    page.write("true-tool", say(machine.isWeeding ? "toolIn" : machine.isClear ? "toolOut" : "swings"));
     lamp.classList.toggle("lit", trial.isLampLit);
     lamp.ariaLabel = say(trial.isLampLit ? "lampLit" : "lampDark");
     const { totals } = trial.outcome;
-    write("outcome", inWords(totals));
-    write("why", trial.why);
+    page.write("outcome", inWords(totals));
+    page.write("why", trial.why);
     outcome.classList.toggle("damaged", totals.plants.damaged > 0);
     hint.hidden = !(workSwitch.checked && trialPanel.machine.mode !== "work");
     if (isStill() && performance.now() - drawnMs < STILL_MS) return;
@@ -267,16 +232,16 @@ function frame(nowMs: number): void {
     const outsideS = Math.min(Math.max((nowMs - lastMs) / 1000, 0), LONGEST_FRAME_S);
     lastMs = nowMs;
     // A hidden trial is paused.
-    if (!find("view-try", HTMLElement).hidden) {
+    if (!page.html("view-try").hidden) {
         passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
         passed.outsideS += outsideS;
         if (passed.outsideS > PACE_S) {
-            write("pace", `${number(passed.chipS / passed.outsideS, 2)} x`);
+            page.write("pace", `${number(passed.chipS / passed.outsideS, 2)} x`);
             passed.chipS = passed.outsideS = 0;
         }
         trialPanel.turn(trialMs());
         showTrial();
-    } else if (!find("view-work", HTMLElement).hidden) for (const panel of workPanels) panel.show();
+    } else if (!page.html("view-work").hidden) for (const panel of workPanels) panel.show();
     requestAnimationFrame(frame);
 }
 

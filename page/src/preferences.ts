@@ -16,7 +16,6 @@ export function chosen(name: string): string | undefined {
     }
 }
 
-/** Stores a choice. */
 export function keep(name: string, value: string): void {
     now.set(name, value);
     try {

@@ -48,7 +48,6 @@ let context: AudioContext | undefined;
 let busyUntilS = 0;
 const lastMs: Partial<Record<Signal, number>> = {};
 
-/** Whether signals are on. */
 export const isOn = (): boolean => chosen("sound") !== "off";
 
 /** Whether signals are on, but the browser plays none before the page is touched. */

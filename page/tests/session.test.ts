@@ -27,8 +27,6 @@ class Connected {
         this.#operator.ask("start now");
         let lines = 0;
         const wire: Wire = {
-            onText: () => {},
-            onEnd: () => {},
             send: (text) => {
                 if (text.trim() === "") {
                     uno.send(text);
@@ -38,8 +36,8 @@ class Connected {
             },
             close: async () => {},
         };
-        uno.onByte = (byte) => wire.onText(String.fromCharCode(byte));
         this.session = new Session(wire, this.nowMs, false);
+        uno.onByte = (byte) => this.session.receive(String.fromCharCode(byte));
         this.session.onHappening = (happening) => this.happened.push(happening);
     }
 

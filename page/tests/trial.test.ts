@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { hex } from "../src/core.ts";
 import { isEvent, read } from "../src/link/grammar.ts";
-import { LineReader } from "../src/link/lines.ts";
+import { LineReader } from "../src/link/session.ts";
 import { inWords } from "../src/try/outcome.ts";
 import { Trial } from "../src/try/trial.ts";
 

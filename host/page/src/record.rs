@@ -135,7 +135,9 @@ impl Picture {
     }
 
     fn take_event(&mut self, event: &EventLine, line: &str, time_ms: u64) {
-        let trouble = |name: &str, mm: f64, is_warning: bool| json!({ "name": name, "mm": mm, "timeMs": time_ms, "isWarning": is_warning });
+        let name = Values(line).text("name").unwrap_or_default();
+        let trouble =
+            |mm: f64, is_warning: bool| json!({ "name": name, "mm": mm, "timeMs": time_ms, "isWarning": is_warning });
         let ground = &mut self.ground;
         match *event {
             EventLine::Detection { class, position, delay, hold, .. } => {
@@ -158,13 +160,11 @@ impl Picture {
                 self.changes.push((ground.tool_mm(position), out));
             }
             EventLine::Alarm { position, .. } => {
-                let (name, mm) = (Values(line).text("name").unwrap_or_default(), ground.tool_mm(position));
-                self.alarms.push(trouble(name, mm, false));
+                let mm = ground.tool_mm(position);
+                self.alarms.push(trouble(mm, false));
                 self.changes.push((mm, true));
             }
-            EventLine::Warning { .. } => {
-                self.alarms.push(trouble(Values(line).text("name").unwrap_or_default(), self.here_mm, true));
-            }
+            EventLine::Warning { .. } => self.alarms.push(trouble(self.here_mm, true)),
             // An alarm puts the tool out, and a start may let it in: the swing reports it.
             _ => {}
         }

@@ -80,8 +80,9 @@ pub struct Kept {
     stem_zone_mm: u32,
 }
 
-/// The verdict on a plant, or whether a weed was cut.
-#[derive(Clone, Copy, Serialize)]
+/// The verdict on a plant, or whether a weed was cut. Of two passes the greater one counts: the worse verdict on a
+/// plant, and the better one on a weed.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(untagged)]
 enum Fate {
     Plant(Verdict),
@@ -95,8 +96,7 @@ struct Trial {
     faults: Faults,
     /// The first thing without a verdict, or to be judged again.
     next: usize,
-    /// The verdicts by number in the row. If the tool passes again, a plant keeps the worse verdict and a weed the
-    /// better one.
+    /// The verdicts by number in the row.
     fates: Vec<Option<Fate>>,
     /// Start time of the recorded motion.
     from_s: f64,
@@ -192,9 +192,7 @@ impl Kept {
 pub fn roll(cycle: f64) {
     let _ = with(|trial| {
         let changes = trial.rolling.roll_until(cycle as u64);
-        let numbers = |change: &uno::PinChange| {
-            [change.cycle as f64, f64::from(change.pin.number()), f64::from(u8::from(change.high))]
-        };
+        let numbers = |change: &uno::PinChange| [change.cycle as f64, change.pin.number().into(), change.high.into()];
         put(CHANGES, changes.iter().flat_map(numbers).collect());
         let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
         trial.sowing.sow(&mut trial.rolling.row, until_mm);
@@ -225,9 +223,9 @@ impl Trial {
             rolling.speed_mm_s(),
             degrees,
             across_mm,
-            f64::from(u8::from(is_clear)),
-            f64::from(u8::from(across_mm < machine.tool_width_mm / 2.0)),
-            f64::from(u8::from(rolling.is_beam_broken())),
+            f64::from(is_clear),
+            f64::from(across_mm < machine.tool_width_mm / 2.0),
+            f64::from(rolling.is_beam_broken()),
             rolling.ticks() as f64,
             rolling.ground_mm_a_tick(),
             rolling.commands as f64,
@@ -238,12 +236,8 @@ impl Trial {
     /// Writes the newly sown things into their table.
     fn tell_sown(&mut self) {
         let Self { rolling, told, .. } = self;
-        let kind = |kind: Kind| if kind == Kind::Plant { 0.0 } else { 1.0 };
-        let sown = rolling.row[*told..]
-            .iter()
-            .flat_map(|thing| [kind(thing.kind), thing.position_mm, thing.width_mm])
-            .collect();
-        put(SOWN, sown);
+        let numbers = |thing: &Thing| [f64::from(thing.kind == Kind::Weed), thing.position_mm, thing.width_mm];
+        put(SOWN, rolling.row[*told..].iter().flat_map(numbers).collect());
         *told = rolling.row.len();
     }
 
@@ -275,11 +269,7 @@ impl Trial {
                 Kind::Plant => plants.next().map(Fate::Plant),
                 Kind::Weed => weeds.next().map(Fate::Weed),
             };
-            let fate = match (now, self.fates[number]) {
-                (Some(Fate::Plant(now)), Some(Fate::Plant(before))) => Some(Fate::Plant(now.max(before))),
-                (Some(Fate::Weed(now)), Some(Fate::Weed(before))) => Some(Fate::Weed(now || before)),
-                (now, before) => now.or(before),
-            };
+            let fate = now.max(self.fates[number]);
             self.fates[number] = fate;
             judged.extend(fate.map(|fate| (number, fate)));
         }

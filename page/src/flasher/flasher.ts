@@ -40,7 +40,6 @@ export class Flasher {
         const why = whyNoSerial();
         const start = parts.button("flash", () => void this.#start(choice.value));
         start.disabled = why !== undefined;
-        parts.html("no-serial").hidden = why === undefined;
         parts.say("no-serial", () => told(why ?? ""));
         globalThis.addEventListener("beforeunload", (event) => {
             if (this.#isBusy) event.preventDefault();

@@ -27,7 +27,6 @@ export const BOARDS: readonly Board[] = [
 /** An error of flashing, and what to do. */
 export class FlashError extends Error {}
 
-/** The progress. */
 export interface Progress {
     readonly phase: "waiting" | "writing" | "verifying";
     /** From 0 to 1. */
@@ -101,18 +100,12 @@ export class Bootloader {
         for (let at = 0; at < image.length; at += PAGE_BYTES) {
             onProgress({ phase: "writing", share: at / image.length });
             const page = image.subarray(at, at + PAGE_BYTES);
-            await this.#patiently(async () => {
-                await this.#load(at);
-                await this.#command([PROGRAM_PAGE, 0, page.length, FLASH, ...page], 0);
-            });
+            await this.#onPage(at, [PROGRAM_PAGE, 0, page.length, FLASH, ...page], 0);
         }
         for (let at = 0; at < image.length; at += PAGE_BYTES) {
             onProgress({ phase: "verifying", share: at / image.length });
             const page = image.subarray(at, at + PAGE_BYTES);
-            const found = await this.#patiently(async () => {
-                await this.#load(at);
-                return this.#command([READ_PAGE, 0, page.length, FLASH], page.length);
-            });
+            const found = await this.#onPage(at, [READ_PAGE, 0, page.length, FLASH], page.length);
             const wrong = page.findIndex((byte, index) => byte !== found[index]);
             if (wrong >= 0)
                 throw new FlashError(
@@ -157,11 +150,13 @@ export class Bootloader {
         return false;
     }
 
-    /** Runs repeatable work, and repeats it after a lost byte. */
-    async #patiently<Result>(work: () => Promise<Result>): Promise<Result> {
+    /** Sends a command for the page at an address, as `#command`. Repeats it after a lost byte. */
+    async #onPage(at: number, bytes: number[], answerBytes: number): Promise<number[]> {
+        const words = at / 2;
         for (let tries = 1; ; tries++)
             try {
-                return await work();
+                await this.#command([LOAD_ADDRESS, words % 256, Math.floor(words / 256)], 0);
+                return await this.#command(bytes, answerBytes);
             } catch (error) {
                 if (!(error instanceof FlashError) || tries === TRIES) throw error;
                 // Optiboot starts the firmware after an invalid command.
@@ -186,11 +181,6 @@ export class Bootloader {
         const found = signature.map((byte) => byte.toString(16).padStart(2, "0")).join("");
         if (found === SIGNATURE) return;
         throw new FlashError(english("otherChip", { chip: OTHERS[found] ?? found }));
-    }
-
-    async #load(at: number): Promise<void> {
-        const words = at / 2;
-        await this.#command([LOAD_ADDRESS, words % 256, Math.floor(words / 256)], 0);
     }
 
     /** Sends a command and returns the data of its answer. */

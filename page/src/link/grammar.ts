@@ -4,21 +4,20 @@
 // Commands are composed where they are typed. Their words are in the firmware's help.
 
 import { ask } from "../core.ts";
-import type { ConsoleLine, EventLine, Setting } from "./console_line.ts";
+import type { ConsoleLine, EventLine, Line, Setting } from "./console_line.ts";
 
 /** Whether it is an event, and not a part of an answer. */
 export function isEvent(said: ConsoleLine): said is EventLine {
     return "isEvent" in said;
 }
 
-/** Reads a line. */
 export function read(line: string): ConsoleLine {
     return ask<ConsoleLine>({ read: line });
 }
 
-/** The settings that the lines of an answer to `get` show. */
-export function settingsOf(lines: readonly string[]): Setting[] {
-    return lines.map(read).flatMap((said) => (said.is === "setting" ? [said] : []));
+/** Those of the lines that have this name, read. */
+export function linesOf<Name extends ConsoleLine["is"]>(name: Name, lines: readonly string[]): Line<Name>[] {
+    return lines.map(read).filter((said): said is Line<Name> => said.is === name);
 }
 
 /** The order in which values can be sent, or why they cannot be at all. */

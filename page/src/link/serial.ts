@@ -5,7 +5,7 @@
 
 import { english } from "../words/words.ts";
 import { isServed } from "./served.ts";
-import type { Wire } from "./session.ts";
+import { Session } from "./session.ts";
 
 /** An error of a port, and what to do. */
 export class PortError extends Error {}
@@ -39,7 +39,7 @@ function whyNotOpened(error: unknown): PortError {
     if (name === "InvalidStateError") return new PortError(english("portOpen"));
     if (name !== "NetworkError") return new PortError(english("portRefused", { text: message }));
     const isLinux = /Linux/.test(navigator.userAgent) && !/Android/.test(navigator.userAgent);
-    return new PortError(english(isLinux ? "portTakenLinux" : "portTaken"));
+    return new PortError(english("portTaken", { or: english(isLinux ? "noPermission" : "driverHangs") }));
 }
 
 export class SerialLine {
@@ -135,20 +135,16 @@ export class SerialLine {
     }
 }
 
-/** A serial line as a session's wire. */
-export function wireOf(line: SerialLine): Wire {
+/** A session over a serial line. */
+export function sessionOver(line: SerialLine, now: number): Session {
     const encoder = new TextEncoder();
-    const wire: Wire = {
-        onText: () => {},
-        onEnd: () => {},
-        // A lost line has reported its error.
-        send: (text) => void line.write(encoder.encode(text)).catch(() => {}),
-        close: () => line.close(),
-    };
+    // A lost line has reported its error.
+    const send = (text: string) => void line.write(encoder.encode(text)).catch(() => {});
+    const session = new Session({ send, close: () => line.close() }, now, true);
     // A byte is one character: the input may be noise, which is no valid UTF-8.
-    line.onBytes = (bytes) => wire.onText(String.fromCharCode(...bytes));
-    line.onEnd = ({ message }) => wire.onEnd(message);
-    return wire;
+    line.onBytes = (bytes) => session.receive(String.fromCharCode(...bytes));
+    line.onEnd = ({ message }) => session.end(message);
+    return session;
 }
 
 export function wait(ms: number): Promise<void> {

@@ -5,7 +5,7 @@
 // page asks again until it answers.
 
 import { english } from "../words/words.ts";
-import { isEvent, read, settingsOf } from "./grammar.ts";
+import { isEvent, linesOf, read } from "./grammar.ts";
 import { type Happening, type Link, NoMachine, Refused } from "./session.ts";
 
 /** Silence after which the computer counts as lost: it sends a message twice a second. */
@@ -157,7 +157,7 @@ export class ServedMachine implements Link {
         switch (message.is) {
             case "there":
                 this.#there = new AbortController();
-                this.onHappening({ ...message, is: "connected", settings: settingsOf(message.settings) });
+                this.onHappening({ ...message, is: "connected", settings: linesOf("setting", message.settings) });
                 this.onHappening({ is: "help", help: new Map(Object.entries(message.help)) });
                 if (message.status !== undefined) this.#read(message.status);
                 break;
@@ -165,7 +165,7 @@ export class ServedMachine implements Link {
                 this.#lose(message.why);
                 break;
             case "settings":
-                this.onHappening({ is: "settings", settings: settingsOf(message.said) });
+                this.onHappening({ is: "settings", settings: linesOf("setting", message.said) });
                 break;
             case "examples":
                 this.onHappening({ is: "examples", examples: message.said });

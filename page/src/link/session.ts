@@ -5,20 +5,15 @@
 // After every start of the Uno it asks for version, settings and examples, and turns the events on. `hold` does not wait. A
 // session ends with its wire.
 
-import { reason } from "../words/words.ts";
+import { english, reason } from "../words/words.ts";
 import type { EventLine, Line, Setting } from "./console_line.ts";
-import { isEvent, read, settingsOf } from "./grammar.ts";
-import { LineReader } from "./lines.ts";
+import { isEvent, linesOf, read } from "./grammar.ts";
 
 /** Types a command, and returns its answer without the `ok`. Throws `Refused` if the machine refuses it. */
 export type Ask = (command: string) => Promise<string[]>;
 
-/** A serial line to a machine. */
+/** A serial line to a machine. Its owner passes what it receives to the session. */
 export interface Wire {
-    /** Gets the received text. */
-    onText: (text: string) => void;
-    /** Gets the reason when the line is lost. Never called after `close`. */
-    onEnd: (why: string) => void;
     send(text: string): void;
     close(): Promise<void>;
 }
@@ -34,7 +29,6 @@ const BOOT_MS = 3000;
 /** Further tries from the beginning, after missing or damaged answers. */
 const TRIES = 2;
 
-/** Something that happened. */
 export type Happening =
     /** The firmware has started; its greeting has the reason. */
     | { is: "started"; line: string }
@@ -55,6 +49,9 @@ export type Happening =
 /** The machine refused a command: the problem, and what would be right. */
 export class Refused extends Error {}
 
+/** Whether an error is the refusal of a command that the machine takes with `force`. */
+export const mayForce = (error: unknown): boolean => error instanceof Refused && error.message.includes("force");
+
 /** No machine answers, and what to do. */
 export class NoMachine extends Error {}
 
@@ -71,6 +68,29 @@ export interface Link {
     close?(): Promise<void>;
 }
 
+/** The longest line: 256 characters. The firmware's own lines are shorter than 128. */
+const LINE = /[^\r\n]{256}|[^\r\n]+(?=[\r\n])/g;
+
+/**
+ * Splits received text into lines. Any input is accepted. A line ends with CR, LF or both, or when it is longer than any
+ * line of the firmware. A character that is not printable ASCII becomes U+FFFD. Empty lines are dropped.
+ */
+export class LineReader {
+    #partial = "";
+
+    /** Takes received text, and returns the complete lines. */
+    take(text: string): string[] {
+        const received = this.#partial + text.replaceAll(/[^ -~\r\n]/g, "\u{fffd}");
+        let end = 0;
+        const lines = [...received.matchAll(LINE)].map((found) => {
+            end = found.index + found[0].length;
+            return found[0];
+        });
+        this.#partial = received.slice(end).replace(/^[\r\n]+/, "");
+        return lines;
+    }
+}
+
 interface Question {
     readonly command: string;
     /** Whether the operator typed it. */
@@ -85,7 +105,6 @@ export class Session implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Whether the machine has answered with version, settings and examples. */
     #isReady = false;
-    readonly #wire: Wire;
     readonly #lines = new LineReader();
     /** Typed commands without an answer, in the order of the answers. */
     #asked: Question[] = [];
@@ -104,14 +123,18 @@ export class Session implements Link {
     #strange = "";
 
     /** `resets` says whether opening the wire resets the Uno. */
-    constructor(wire: Wire, now: number, resets: boolean) {
-        this.#wire = wire;
+    constructor(
+        private readonly wire: Wire,
+        now: number,
+        resets: boolean,
+    ) {
         [this.#now, this.#turnedAt] = [now, now];
         this.#greetingBy = resets ? now + BOOT_MS : now;
-        wire.onText = (text) => {
-            for (const line of this.#lines.take(text)) this.#take(line);
-        };
-        wire.onEnd = (why) => this.#end(why);
+    }
+
+    /** Takes received text. */
+    receive(text: string): void {
+        for (const line of this.#lines.take(text)) this.#take(line);
     }
 
     ask(command: string): Promise<string[]> {
@@ -122,7 +145,7 @@ export class Session implements Link {
     async hold(): Promise<void> {
         const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
         this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
-        for (const { failed } of dropped) failed(new Refused("hold came first, so this was not sent"));
+        for (const { failed } of dropped) failed(new Refused(english("holdFirst")));
         await this.#ask("hold", true, (question) => this.#send(question));
     }
 
@@ -146,8 +169,8 @@ export class Session implements Link {
     }
 
     async close(): Promise<void> {
-        this.#end("No machine is connected.", true);
-        await this.#wire.close();
+        this.end("No machine is connected.", true);
+        await this.wire.close();
     }
 
     /** `take` sends the question or queues it. */
@@ -157,7 +180,7 @@ export class Session implements Link {
         take: (question: Question) => unknown = (question) => this.#waiting.push(question),
     ): Promise<string[]> {
         return new Promise((done, failed) => {
-            if (this.#ended) failed(new NoMachine("no machine is connected"));
+            if (this.#ended) failed(new NoMachine(english("noneConnected")));
             else take({ command, isTyped, since: this.#now, answer: [], done, failed });
         });
     }
@@ -165,7 +188,7 @@ export class Session implements Link {
     #send(question: Question): void {
         this.#asked.push(question);
         if (question.isTyped) this.onHappening({ is: "command", line: question.command });
-        this.#wire.send(`${question.command}\n`);
+        this.wire.send(`${question.command}\n`);
     }
 
     /** Asks for version, settings and examples. Tries again if an answer is lost, to a busy computer or noise on the wire. */
@@ -180,7 +203,7 @@ export class Session implements Link {
             } catch (error) {
                 if (this.#ended || beginning !== this.#beginnings) return;
                 if (tries === TRIES) {
-                    this.#end(reason(error));
+                    this.end(reason(error));
                     return;
                 }
             }
@@ -199,27 +222,21 @@ export class Session implements Link {
         await this.#ask("status", false);
         const help = new Map<string, string>();
         for (const { name } of settings)
-            for (const line of await this.#ask(`help ${name}`, false)) {
-                const said = read(line);
-                if (said.is === "help") help.set(said.name, said.help);
-            }
+            for (const said of linesOf("help", await this.#ask(`help ${name}`, false))) help.set(said.name, said.help);
         this.onHappening({ is: "help", help });
     }
 
     async #version(): Promise<string> {
         // Ends an earlier half line. Its answer belongs to no question.
-        this.#wire.send("\n");
-        for (const line of await this.#ask("version", false)) {
-            const said = read(line);
-            if (said.is === "version") return said.version;
-        }
-        throw new NoMachine(this.#whyNoAnswer());
+        this.wire.send("\n");
+        const [said] = linesOf("version", await this.#ask("version", false));
+        if (!said) throw new NoMachine(this.#whyNoAnswer());
+        return said.version;
     }
 
     async #settings(): Promise<Setting[]> {
-        const settings = settingsOf(await this.#ask("get", false));
-        if (settings.length === 0)
-            throw new NoMachine("the firmware shows no settings: flash this page's, and try again");
+        const settings = linesOf("setting", await this.#ask("get", false));
+        if (settings.length === 0) throw new NoMachine(english("noSettings"));
         return settings;
     }
 
@@ -237,11 +254,9 @@ export class Session implements Link {
     #whyNoAnswer(): string {
         const strange = [...this.#strange];
         const unreadable = strange.filter((character) => character === "\u{fffd}").length;
-        if (strange.length === 0)
-            return "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first";
-        if (unreadable * 4 > strange.length)
-            return "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again";
-        return `it is not the weeder's firmware that answers, but \u201c${this.#strange.trim().slice(0, 60)}\u201d: choose another port, or flash this one`;
+        if (strange.length === 0) return english("nothingAnswers");
+        if (unreadable * 4 > strange.length) return english("noText");
+        return english("otherDevice", { text: this.#strange.trim().slice(0, 60) });
     }
 
     #take(line: string): void {
@@ -249,7 +264,7 @@ export class Session implements Link {
         const said = read(line);
         if (said.is === "greeting") {
             // Pending commands will not be answered.
-            this.#beginAgain(new NoMachine("the Uno was reset while it was asked"), "the Uno was reset");
+            this.#beginAgain(new NoMachine(english("resetWhileAsked")), english("wasReset"));
             this.onHappening({ is: "started", line });
             return;
         }
@@ -295,13 +310,14 @@ export class Session implements Link {
         if (/^\s*events\b/.test(command)) await this.#ask("events on", false);
     }
 
-    #end(why: string, isWanted = false): void {
+    /** Ends with the wire: it is lost, or the operator wants to close it. */
+    end(why: string, isWanted = false): void {
         if (this.#ended) return;
         this.#ended = true;
         this.#isReady = false;
         const error = new NoMachine(why);
         for (const { failed } of [...this.#asked.splice(0), ...this.#waiting.splice(0)]) failed(error);
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
-        void this.#wire.close();
+        void this.wire.close();
     }
 }

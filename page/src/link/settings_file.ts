@@ -1,6 +1,7 @@
 // Settings as the TOML file of `weeder settings`: help, range and unit are above each value. Settings that a file does
 // not name are not changed. The parser accepts keys with values, and comments.
 
+import { download } from "../dom.ts";
 import { english } from "../words/words.ts";
 import type { Setting } from "./console_line.ts";
 
@@ -10,14 +11,13 @@ export class SettingsFileError extends Error {}
 /** How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder. */
 const OLD_MERGE_GAP = "merge_gap_ticks";
 
-/** The range of a setting. */
 export function range({ isSwitched, least, greatest, unit, default: usual }: Setting): string {
     if (isSwitched) return english("rangeSwitched", { usual: String(usual === 1) });
     return english("range", { least, greatest: `${greatest}${unit && ` ${unit}`}`, usual });
 }
 
-/** Writes these settings as a file. */
-export function write(settings: readonly Setting[], help: ReadonlyMap<string, string>): string {
+/** Hands the operator these settings as a file. */
+export function save(settings: readonly Setting[], help: ReadonlyMap<string, string>): void {
     const head =
         "# Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.\n" +
         "# Settings that are not named here are not changed.\n";
@@ -25,7 +25,7 @@ export function write(settings: readonly Setting[], help: ReadonlyMap<string, st
         const value = setting.isSwitched ? setting.value === 1 : setting.value;
         return `\n# ${help.get(setting.name) ?? ""}\n# ${range(setting)}\n${setting.name} = ${value}\n`;
     });
-    return head + entries.join("");
+    download("machine.toml", head + entries.join(""), "application/toml");
 }
 
 /** The values that a file names, by the names of settings. Throws a SettingsFileError. */

@@ -2,13 +2,10 @@
 
 import type { Parts } from "../dom.ts";
 import type { EventLine } from "../link/console_line.ts";
-import { read } from "../link/grammar.ts";
-import { type Ask, Refused } from "../link/session.ts";
-import { type Plain, quantity, say, told } from "../words/words.ts";
+import { linesOf } from "../link/grammar.ts";
+import { type Ask, mayForce } from "../link/session.ts";
+import { type Plain, quantity, say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
-
-/** The servo's two positions. */
-type Place = "in" | "out";
 
 export class Calibration {
     /** The position at the stretch's beginning. */
@@ -24,23 +21,24 @@ export class Calibration {
         parts.button("wheel-force", () => void this.#end(" force"));
         parts.button("wheel-save", () => void this.#do("wheel-said", "save", () => say("isSavedNow")));
         const pulse = parts.get("servo-pulse", HTMLInputElement);
+        const drive = (to: string, us: number) => {
+            pulse.value = String(us);
+            void this.#do("servo-said", `servo ${to}`, () => say("toolHas", { pulse: String(us) }));
+        };
         for (const place of ["in", "out"] as const) {
-            parts.button(`servo-${place}`, () => void this.#move(place));
+            parts.button(`servo-${place}`, () => drive(place, machine.setting(`servo_${place}_us`)));
             parts.button(`servo-${place}-is`, () => {
                 const { value } = pulse;
                 const done = () => say(place === "in" ? "pulseIn" : "pulseOut", { pulse: value });
                 void this.#do("servo-said", `set servo_${place}_us ${value}`, done);
             });
         }
-        for (const [name, by] of [
-            ["servo-less", -10],
-            ["servo-more", 10],
-        ] as const)
+        for (const [name, by] of Object.entries({ "servo-less": -10, "servo-more": 10 }))
             parts.button(name, () => {
-                pulse.value = String(pulse.valueAsNumber + by);
-                void this.#byHand(pulse.value);
+                const us = pulse.valueAsNumber + by;
+                drive(String(us), us);
             });
-        pulse.addEventListener("change", () => void this.#byHand(pulse.value));
+        pulse.addEventListener("change", () => drive(pulse.value, pulse.valueAsNumber));
         parts.button("servo-time", () => void this.#do("servo-said", "calibrate servo", () => say("swingsSix")));
         parts.button("servo-leads", () => void this.#leads());
         parts.button("servo-save", () => void this.#do("servo-said", "save", () => say("isSavedNow")));
@@ -57,7 +55,6 @@ export class Calibration {
         );
     }
 
-    /** The settings have changed. */
     showSettings(): void {
         this.parts.get("servo-pulse", HTMLInputElement).value ||= String(this.machine.setting("servo_out_us"));
         for (const name of ["lead_out_ms", "lead_in_ms"]) {
@@ -77,44 +74,31 @@ export class Calibration {
     }
 
     async #begin(): Promise<void> {
-        if (!(await this.#do("wheel-said", "calibrate start", () => say("rollOn")))) return;
-        this.#from = this.machine.status?.position;
+        const error = await this.#do("wheel-said", "calibrate start", () => say("rollOn"));
+        if (!error) this.#from = this.machine.status?.position;
     }
 
     async #end(force: string): Promise<void> {
-        const force_ = this.parts.get("wheel-force", HTMLButtonElement);
-        force_.hidden = true;
+        const insist = this.parts.html("wheel-force");
+        insist.hidden = true;
         const distance = this.parts.get("wheel-mm", HTMLInputElement).value;
-        try {
-            const said = (await this.ask(`calibrate ${distance}${force}`)).map(read);
-            const measured = said.find((said) => said.is === "setting");
-            const counts = () => (measured ? `${say("countsPerMetre", { count: measured.value })} ` : "");
-            this.parts.say("wheel-said", () => `${counts()}${say("notSavedYet")}`);
-        } catch (error) {
-            this.parts.say("wheel-said", () => told(error));
-            force_.hidden = !(error instanceof Refused && error.message.includes("force"));
-        }
-    }
-
-    async #move(place: Place): Promise<void> {
-        const pulse = this.machine.setting(`servo_${place}_us`);
-        this.parts.get("servo-pulse", HTMLInputElement).value = String(pulse);
-        await this.#do("servo-said", `servo ${place}`, () => say("toolHas", { pulse: String(pulse) }));
-    }
-
-    async #byHand(pulse: string): Promise<void> {
-        await this.#do("servo-said", `servo ${pulse}`, () => say("toolHas", { pulse }));
+        const error = await this.#do("wheel-said", `calibrate ${distance}${force}`, (lines) => {
+            const [measured] = linesOf("setting", lines);
+            const counts = measured ? `${say("countsPerMetre", { count: measured.value })} ` : "";
+            return `${counts}${say("notSavedYet")}`;
+        });
+        insist.hidden = !mayForce(error);
     }
 
     async #leads(): Promise<void> {
         for (const name of ["lead_out_ms", "lead_in_ms"]) {
             const { value } = this.parts.get(name, HTMLInputElement);
-            if (!(await this.#do("servo-said", `set ${name} ${value}`, () => say("bothSet")))) return;
+            if (await this.#do("servo-said", `set ${name} ${value}`, () => say("bothSet"))) return;
         }
     }
 
-    /** Types a command and shows its result. Returns whether it succeeded. */
-    #do(said: string, command: string, done: () => string): Promise<boolean> {
+    /** Types a command and shows its result. Returns the error, if any. */
+    #do(said: string, command: string, done: (answer: string[]) => string): Promise<unknown> {
         return this.parts.attempt(said, this.ask(command), done);
     }
 }

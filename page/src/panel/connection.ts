@@ -2,22 +2,18 @@
 // plugged in again, it is connected automatically.
 
 import type { Parts } from "../dom.ts";
-import { choosePort, PortError, SerialLine, whyNoSerial, wireOf } from "../link/serial.ts";
-import { Session } from "../link/session.ts";
+import { choosePort, PortError, SerialLine, sessionOver, whyNoSerial } from "../link/serial.ts";
 import { english, say, told } from "../words/words.ts";
-import type { Panel } from "./panel.ts";
+import { type Panel, TURN_MS } from "./panel.ts";
 import { Update } from "./update.ts";
 
 /** The firmware's rate. */
 const BAUD = 115_200;
-/** Time between two turns. */
-const TURN_MS = 20;
 
 export class Connection {
     /** Called after the port was closed, so that the operator can flash the machine. */
     onFlash: () => void = () => {};
     #port: SerialPort | undefined;
-    /** Whether the port is open. */
     #isOpen = false;
     #isBusy = false;
     /** Keeps a phone's screen on while a machine is connected. */
@@ -30,7 +26,6 @@ export class Connection {
         parts.button("connect", () => void this.#attempt(() => this.#choose()));
         parts.button("disconnect", () => void this.disconnect());
         const why = whyNoSerial();
-        parts.html("no-serial").hidden = why === undefined;
         parts.say("no-serial", () => told(why ?? ""));
         parts.get("connect", HTMLButtonElement).disabled = why !== undefined;
         if (why !== undefined) return;
@@ -65,14 +60,13 @@ export class Connection {
             const line = await SerialLine.open(port, BAUD);
             [this.#port, this.#isOpen] = [port, true];
             const now = performance.now();
-            this.panel.connect(new Session(wireOf(line), now, true), now);
+            this.panel.connect(sessionOver(line, now), now);
             this.#say(() => say("waitingForAnswer"));
         });
         this.#isBusy = false;
         this.#show();
     }
 
-    /** Closes the port. */
     async disconnect(): Promise<void> {
         this.#port = undefined;
         if (!this.#isOpen) return;

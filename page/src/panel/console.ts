@@ -36,13 +36,11 @@ export class Console {
         });
     }
 
-    /** Adds a line of this kind. */
     add(line: string, kind: "typed" | "error" | "happened" | ""): void {
         this.#waiting.push(make("div", kind, line));
         if (this.#waiting.length > LINES) this.#waiting.shift();
     }
 
-    /** Shows the new lines. */
     show(): void {
         if (this.#waiting.length === 0) return;
         const said = this.#said;

@@ -1,9 +1,9 @@
 // Teaching: two buttons label the last detection. Below are the taught examples.
 
-import { make, type Parts } from "../dom.ts";
-import { read } from "../link/grammar.ts";
-import { type Ask, Refused } from "../link/session.ts";
-import { quantity, say, show, told } from "../words/words.ts";
+import { make, makeButton, type Parts } from "../dom.ts";
+import { linesOf } from "../link/grammar.ts";
+import { type Ask, mayForce } from "../link/session.ts";
+import { quantity, say } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** Number of slots for taught examples. */
@@ -30,56 +30,37 @@ export class Examples {
     /** Shows the last object. */
     show(): void {
         const [last] = this.machine.objects;
-        this.parts.write(
-            "last-object",
-            last
-                ? say("lastObject", {
-                      class: say(last.class),
-                      width: quantity(this.machine.widthMm(last), "millimeter"),
-                      count: last.votes,
-                  })
-                : say("nothingSeen"),
-        );
+        const width = quantity(last ? this.machine.widthMm(last) : 0, "millimeter");
+        const seen = last && say("lastObject", { class: say(last.class), width, count: last.votes });
+        this.parts.write("last-object", seen ?? say("nothingSeen"));
     }
 
     /** Shows the examples as they are known. */
     showExamples(): void {
-        const field = this.machine.examples
-            .map(read)
-            .flatMap((said) => (said.is === "example" && said.fromField ? [said] : []));
+        const field = linesOf("example", this.machine.examples).filter(({ fromField }) => fromField);
         this.parts.write("examples-count", say("places", { count: field.length, all: PLACES }));
         this.parts.html("examples-list").replaceChildren(
             ...field.map(({ number, label }) => {
-                const forget = make("button", "needs-change", say("forget"));
-                forget.type = "button";
+                const forget = makeButton("needs-change", () => this.#forget(String(number)), say("forget"));
                 forget.ariaLabel = say("forgetOne", { number });
-                forget.addEventListener("click", () => void this.#forget(String(number)));
-                return make(
-                    "li",
-                    "across",
-                    make("span", "", `${number}: ${label === "plant" || label === "weed" ? say(label) : label}`),
-                    forget,
-                );
+                return make("li", "across", make("span", "", `${number}: ${say(label)}`), forget);
             }),
         );
         this.parts.get("examples-forget", HTMLButtonElement).disabled = field.length === 0;
     }
 
     async #teach(label: Label, force: string): Promise<void> {
-        this.#refused = undefined;
-        try {
-            await this.ask(`label ${label}${force}`);
-            this.parts.say("teach-said", () => say(label === "plant" ? "taughtPlant" : "taughtWeed"));
-        } catch (error) {
-            this.parts.say("teach-said", () => told(error));
-            if (error instanceof Refused && error.message.includes("force")) this.#refused = label;
-        }
-        const insist = this.parts.get("teach-force", HTMLButtonElement);
-        insist.hidden = this.#refused === undefined;
-        show(insist, () => say((this.#refused ?? label) === "plant" ? "isPlant" : "isWeed"));
+        const taught = () => {
+            const what = say(label === "plant" ? "wasPlant" : "wasWeed");
+            return say("taughtThat", { what: `${what.charAt(0).toLowerCase()}${what.slice(1)}` });
+        };
+        const error = await this.parts.attempt("teach-said", this.ask(`label ${label}${force}`), taught);
+        this.#refused = mayForce(error) ? label : undefined;
+        this.parts.html("teach-force").hidden = this.#refused === undefined;
+        this.parts.say("teach-force", () => say("isClass", { class: say(label) }));
     }
 
-    #forget(which: string): Promise<boolean> {
+    #forget(which: string): Promise<unknown> {
         return this.parts.attempt("teach-said", this.ask(`forget ${which}`));
     }
 

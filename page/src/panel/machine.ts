@@ -24,7 +24,7 @@ const REASONS: Readonly<Record<string, Plain>> = {
     too_fast: "reasonTooFast",
     encoder_doubtful: "reasonEncoder",
 };
-const STATES = { none: "stateNone", hold: "stateHold", work: "stateWork", alarm: "stateAlarm" } as const;
+const STATES = { none: "stateNone", hold: "hold", work: "stateWork", alarm: "stateAlarm" } as const;
 
 export class Machine {
     /** The firmware's version, if the machine is connected. */
@@ -39,7 +39,6 @@ export class Machine {
     toolOut = true;
     /** The latched alarm's name. */
     alarm: string | undefined;
-    /** The last warning's name. */
     warning: string | undefined;
     status: Line<"status"> | undefined;
     /** When the status came. */
@@ -153,14 +152,14 @@ export class Machine {
         [this.#lost, this.#mayWeedOn] = [why, false];
     }
 
-    /** The machine's state. */
     get state(): Mode | "none" {
         return this.version === undefined ? "none" : this.mode;
     }
 
     /** The same in a word for the operator. */
     get stateWord(): string {
-        return say(STATES[this.state]);
+        // A button has one of them in capitals.
+        return say(STATES[this.state]).toLowerCase();
     }
 
     /**

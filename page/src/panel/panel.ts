@@ -20,6 +20,9 @@ import { drawStrip } from "./strip.ts";
 /** At a machine's own port. */
 const EVERYTHING: Allowed = { mayStart: true, mayChange: true };
 
+/** Time between two turns of a real machine's panel. */
+export const TURN_MS = 20;
+
 /** How long a reason must last before a screen reader says it. A state is said at once. */
 const LASTING_MS = 1000;
 
@@ -53,8 +56,7 @@ export class Panel {
      */
     constructor(into: HTMLElement, name: string, allowed = EVERYTHING, row = "") {
         this.#row = row === "" ? "" : `${row}: `;
-        const template = document.getElementById("panel");
-        if (!(template instanceof HTMLTemplateElement)) throw new Error("the page has no template #panel");
+        const template = new Parts(document.body, "id").get("panel", HTMLTemplateElement);
         into.append(template.content.cloneNode(true));
         translate(into);
         const parts = new Parts(into);
@@ -67,8 +69,7 @@ export class Panel {
         this.#examples = new Examples(parts, this.machine, ask);
         this.#strip = parts.get("strip", SVGSVGElement);
         parts.button("hold", () => this.hold());
-        parts.button("start", () => void ask("start").catch((error) => this.#say(error)));
-        parts.button("clear", () => void ask("clear").catch((error) => this.#say(error)));
+        for (const command of ["start", "clear"]) parts.button(command, () => this.#drive(ask(command)));
         parts.button("log-save", () => download("weeder-log.csv", this.#log.text(), "text/csv"));
         parts.button("log-clear", () => {
             this.#log = new Log();
@@ -99,10 +100,7 @@ export class Panel {
         const link = this.#link;
         if (!link || this.machine.version === undefined) return;
         this.#isHolding = this.machine.mode === "work";
-        link.hold().then(
-            () => signal("held"),
-            (error) => this.#say(error),
-        );
+        this.#drive(link.hold().then(() => signal("held")));
     }
 
     /** Talks to this machine from now on. */
@@ -115,7 +113,6 @@ export class Panel {
         this.#link = link;
     }
 
-    /** Disconnects the machine. */
     async disconnect(): Promise<void> {
         await this.#link?.close?.();
         this.#link = undefined;
@@ -233,8 +230,9 @@ export class Panel {
         if (isOther || nowMs - this.#heard.sinceMs > LASTING_MS) this.#parts.write("heard", this.#row + heard);
     }
 
-    #say(error: unknown): void {
-        this.#parts.say("drive-said", () => sentence(told(error)));
+    /** Shows the error of such a command. */
+    #drive(command: Promise<unknown>): void {
+        void this.#parts.attempt("drive-said", command, undefined, (error) => sentence(told(error)));
     }
 
     #wireTabs(name: string, tabs: readonly (typeof TABS)[number][]): void {
@@ -246,9 +244,7 @@ export class Panel {
                 body(which).hidden = which !== chosen;
             }
         };
-        for (const which of TABS) {
-            tab(which).hidden = body(which).hidden = !tabs.includes(which);
-        }
+        for (const which of TABS) tab(which).hidden = body(which).hidden = !tabs.includes(which);
         for (const [index, which] of tabs.entries()) {
             tab(which).id = `${name}-tab-${which}`;
             body(which).id = `${name}-body-${which}`;

@@ -1,19 +1,16 @@
 // The machines at the ports of `weeder serve`, side by side: a panel with its name for each. If there are several, an
-// overview is above them.
+// overview is above them: the state of each, and one HOLD for all, with the time until the last one has obeyed.
 
-import { make } from "../dom.ts";
-import { Served } from "../link/served.ts";
-import { inLanguage, say } from "../words/words.ts";
-import { overview } from "./overview.ts";
-import { Panel } from "./panel.ts";
-
-/** Time between two turns. */
-const TURN_MS = 20;
+import { make, makeButton } from "../dom.ts";
+import { type HeldAll, Served } from "../link/served.ts";
+import { inLanguage, quantity, say, show, told } from "../words/words.ts";
+import { fault } from "./machine.ts";
+import { Panel, TURN_MS } from "./panel.ts";
 
 /** Fills an element with the machines' panels, and returns these. */
 export async function showServed(into: HTMLElement): Promise<Panel[]> {
     const served = await Served.open();
-    const all = make("section", "overview");
+    const all = make("section", "overview stack");
     inLanguage(() => {
         all.ariaLabel = say("allRows");
     });
@@ -44,4 +41,47 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
     }, TURN_MS);
     served.listen();
     return panels;
+}
+
+/** Fills an element with the overview. A row's name leads to its panel. Returns a function that shows the changes. */
+function overview(into: HTMLElement, names: readonly string[], holdAll: () => Promise<HeldAll>) {
+    const states = names.map(() => make("span", "overview-state"));
+    const rows = states.map((state, row) => {
+        const link = makeButton("", () => into.parentElement?.children[row + 1]?.scrollIntoView(), names[row] ?? "");
+        return make("li", "stack", link, state);
+    });
+    const said = make("p", "");
+    said.role = "status";
+    const hold = makeButton("hold-all", () => {
+        show(said, () => say("waitingForAll"));
+        holdAll().then(
+            (held) => show(said, () => inWords(held)),
+            (error) => show(said, () => say("holdFailed", { why: told(error) })),
+        );
+    });
+    show(hold, () => say("holdAll"));
+    into.append(make("ul", "stack", ...rows), make("div", "hold-bar stack", said, hold));
+    return (panels: readonly Panel[]) => {
+        for (const [row, state] of states.entries()) {
+            const machine = panels[row]?.machine;
+            if (!machine) continue;
+            const { alarm, stateWord: word } = machine;
+            const text = machine.state === "alarm" && alarm !== undefined ? `${word} ${fault(alarm).title}` : word;
+            if (state.textContent !== text) state.textContent = text;
+            if (state.dataset.state !== machine.state) state.dataset.state = machine.state;
+        }
+    };
+}
+
+/** The result of a HOLD to all. Machines that have not obeyed come first. */
+function inWords({ machines, lastMs }: HeldAll): string {
+    const failed = machines.filter(({ error }) => error !== null);
+    const obeyed = machines.length - failed.length;
+    const not = failed.map(({ name, error }) => say("notObeyed", { name, why: told(error ?? "") })).join("; ");
+    const all = machines.length;
+    const have =
+        lastMs === null
+            ? say("obeyed", { obeyed, all })
+            : say("obeyedAfter", { obeyed, all, time: quantity(lastMs, "millisecond") });
+    return `${not === "" ? "" : `${not}. `}${have}`;
 }

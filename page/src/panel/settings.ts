@@ -1,11 +1,11 @@
 // The machine's settings as a form: name, help, unit, range, and the current and saved values. One button sends and
 // saves them. They can be saved to a file and loaded from one.
 
-import { download, make, type Parts } from "../dom.ts";
+import { make, type Parts } from "../dom.ts";
 import type { Setting } from "../link/console_line.ts";
 import { steps as order } from "../link/grammar.ts";
 import type { Ask } from "../link/session.ts";
-import { parse, range, SettingsFileError, write } from "../link/settings_file.ts";
+import { parse, range, SettingsFileError, save } from "../link/settings_file.ts";
 import { type Plain, reason, say, settingHelp, told } from "../words/words.ts";
 import { type Machine, sentence } from "./machine.ts";
 
@@ -30,12 +30,8 @@ export class SettingsForm {
         parts.button("settings-read", () => void this.#take("get", "areMachines"));
         parts.button("settings-defaults", () => void this.#take("defaults", "defaultsInUse"));
         parts.button("settings-revert", () => void this.#take("revert", "savedInUse"));
-        parts.button("settings-save-file", () =>
-            download("machine.toml", write(machine.settings, machine.help), "application/toml"),
-        );
-        const file = parts.get("settings-file", HTMLInputElement);
-        parts.button("settings-open-file", () => file.click());
-        file.addEventListener("change", () => void this.#open(file));
+        parts.button("settings-save-file", () => save(machine.settings, machine.help));
+        parts.files("settings-open-file", "settings-file", ([file]) => file && void this.#open(file));
     }
 
     /** Shows the present values. The operator's changes stay. */
@@ -128,7 +124,7 @@ export class SettingsForm {
     }
 
     async #take(command: string, done: Plain): Promise<void> {
-        if (await this.parts.attempt("settings-said", this.ask(command), () => say(done))) this.#undo();
+        if (!(await this.parts.attempt("settings-said", this.ask(command), () => say(done)))) this.#undo();
     }
 
     /**
@@ -150,35 +146,26 @@ export class SettingsForm {
             } catch (error) {
                 this.#problems.set(name, reason(error));
             }
-        let isSaved = false;
         const { size } = this.#problems;
+        const saved = () => say("savedForGood");
+        const notSaved = (error: unknown) => say("notSavedWhy", { why: told(error) });
         if (size > 0) this.#say(() => say("refused", { count: size, all: steps.length }));
-        else
-            try {
-                await this.ask("save");
-                isSaved = true;
-                this.#say(() => say("savedForGood"));
-            } catch (error) {
-                this.#say(() => say("notSavedWhy", { why: told(error) }));
-            }
+        const isSaved = size === 0 && !(await this.parts.attempt("settings-said", this.ask("save"), saved, notSaved));
         this.show();
         return isSaved;
     }
 
-    async #open(file: HTMLInputElement): Promise<void> {
-        const chosen = file.files?.[0];
-        file.value = "";
-        if (!chosen) return;
+    async #open(opened: File): Promise<void> {
+        const file = opened.name;
         try {
-            const values = parse(await chosen.text(), this.machine.settings);
+            const values = parse(await opened.text(), this.machine.settings);
             for (const [name, value] of values) this.#wanted.set(name, value);
             this.show();
             const { size: count } = this.#wanted;
-            const file = chosen.name;
             this.#say(() => (count === 0 ? say("fileSame", { file }) : say("fileDiffers", { file, count })));
         } catch (error) {
             if (!(error instanceof SettingsFileError)) throw error;
-            this.#say(() => `${chosen.name}, ${told(error)}`);
+            this.#say(() => `${file}, ${told(error)}`);
         }
     }
 }

@@ -49,7 +49,7 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
     const toolY = machine.toolOut ? height * 0.1 : height * 0.4;
     svg.setAttribute("viewBox", `${left} 0 ${length} ${height}`);
     svg.replaceChildren(
-        draw("rect", { fill: "var(--frame)", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
+        draw("rect", { fill: "var(--pale)", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
         ...(machine.version === undefined || unseenMm <= 0 ? [] : bar({ fill: "var(--rule)" }, left, unseenMm, 0.12)),
         ...(machine.version === undefined ? [] : zones),
         draw("line", {
@@ -61,8 +61,8 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
             "stroke-width": length / 150,
         }),
         draw("path", {
-            fill: machine.toolOut ? "none" : "var(--steel)",
-            stroke: "var(--steel)",
+            fill: machine.toolOut ? "none" : "var(--ink)",
+            stroke: "var(--ink)",
             d: `M${-length * 0.025} ${toolY}h${length * 0.05}l${-length * 0.025} ${height * 0.26}z`,
             "stroke-width": length / 200,
         }),

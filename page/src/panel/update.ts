@@ -2,14 +2,13 @@
 // it. A button then restores the settings that the new firmware has lost.
 
 import { ask as askRust } from "../core.ts";
-import { download, type Parts } from "../dom.ts";
+import type { Parts } from "../dom.ts";
 import type { Happening } from "../link/session.ts";
-import { write } from "../link/settings_file.ts";
+import { save } from "../link/settings_file.ts";
 import { chosen, keep } from "../preferences.ts";
 import { say } from "../words/words.ts";
 import type { Panel } from "./panel.ts";
 
-/** The firmware of this page. */
 interface Firmware {
     readonly version: string;
     readonly settings: readonly string[];
@@ -29,7 +28,7 @@ export class Update {
     ) {
         parts.button("update-go", () => {
             const { settings, help } = panel.machine;
-            download("machine.toml", write(settings, help), "application/toml");
+            save(settings, help);
             keep(KEPT, JSON.stringify(settings.map(({ name, value }) => [name, value])));
             void flash();
         });
@@ -40,9 +39,10 @@ export class Update {
         });
     }
 
-    /** Takes an event of the machine. */
     take({ is }: Happening): void {
-        if (is === "connected" && this.#isOwn && !this.#isLost()) keep(KEPT, "");
+        // Without saved ones, its firmware has another table, or none were ever saved.
+        const hasSaved = this.panel.machine.settings.some(({ saved }) => saved !== undefined);
+        if (is === "connected" && this.#isOwn && hasSaved) keep(KEPT, "");
         if (is === "connected") this.parts.write("restore-said", "");
         if (["connected", "lost", "settings", "event"].includes(is)) this.#show();
     }
@@ -62,11 +62,6 @@ export class Update {
         return this.panel.machine.version === this.#own.version && gone.length + added.length === 0;
     }
 
-    /** Whether the machine has no saved settings: its firmware has another table, or none were ever saved. */
-    #isLost(): boolean {
-        return this.panel.machine.settings.every(({ saved }) => saved === undefined);
-    }
-
     /** The stored settings that differ from the machine's. */
     #kept(): [string, number][] {
         return JSON.parse(chosen(KEPT) || "[]");
@@ -78,15 +73,14 @@ export class Update {
         this.parts.html("update").hidden = !isOther;
         if (isOther) {
             const { gone, added } = this.#changes();
-            const tables = () => [
-                ...(gone.length > 0 ? [say("settingsGone", { names: gone.join(", ") })] : []),
-                ...(added.length > 0 ? [say("settingsAdded", { names: added.join(", ") })] : []),
-                ...(gone.length + added.length > 0 ? [say("settingsLost")] : []),
+            const said = () => [
+                say("otherFirmware", { theirs: version, ours: this.#own.version }),
+                gone.length > 0 && say("settingsGone", { names: gone.join(", ") }),
+                added.length > 0 && say("settingsAdded", { names: added.join(", ") }),
+                gone.length + added.length > 0 && say("settingsLost"),
+                say("settingsToFile"),
             ];
-            const versions = { theirs: version, ours: this.#own.version };
-            this.parts.say("update-said", () =>
-                [say("otherFirmware", versions), ...tables(), say("settingsToFile")].join(" "),
-            );
+            this.parts.say("update-said", () => said().filter(Boolean).join(" "));
         }
         const kept = this.#kept();
         this.parts.html("restore").hidden = version === undefined || isOther || kept.length === 0;

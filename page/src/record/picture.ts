@@ -8,27 +8,15 @@ import code from "log-worker.js";
 import { module } from "../core.ts";
 import type { Asked, Told } from "./worker.ts";
 
-/** A detection: its canopy's ends, and its keep-out zone. */
-export interface Found {
-    readonly class: "plant" | "weed" | "unknown";
-    readonly fromMm: number;
-    readonly toMm: number;
-    readonly zoneMm: number;
-    readonly zoneEndMm: number;
-}
-
+/** The columns of a detection: its class (0 plant, 1 weed, 2 unknown), its canopy's ends, and its keep-out zone. */
+const OBJECT = ["class", "fromMm", "toMm", "zoneMm", "zoneEndMm"] as const;
 /** The machine's speed at a position and a time, negative backwards. */
-export interface Speed {
-    readonly mm: number;
-    readonly timeMs: number;
-    readonly mmS: number;
-}
-
+const SPEED = ["mm", "timeMs", "mmS"] as const;
 /** Ground with the tool in the row. */
-export interface Worked {
-    readonly startMm: number;
-    readonly endMm: number;
-}
+const WORKED = ["startMm", "endMm"] as const;
+
+type Row<Columns extends readonly string[]> = Readonly<Record<Columns[number], number>>;
+export type Speed = Row<typeof SPEED>;
 
 export interface Trouble {
     readonly name: string;
@@ -62,25 +50,24 @@ interface Head {
 }
 
 /** Rows of numbers in the log's order. */
-export class Table<Row> {
+export class Table<Columns extends readonly string[]> {
     /** The columns from `first` to before `end` are the positions of a row, in mm. */
     constructor(
         private readonly values: Float64Array,
-        private readonly columns: number,
+        private readonly columns: Columns,
         private readonly first: number,
         private readonly end: number,
-        private readonly make: (values: Float64Array) => Row,
     ) {}
 
     get length(): number {
-        return this.values.length / this.columns;
+        return this.values.length / this.columns.length;
     }
 
     /** The rows on this ground. */
-    near(fromMm: number, toMm: number): Row[] {
+    near(fromMm: number, toMm: number): Row<Columns>[] {
         const { values, columns, first, end } = this;
-        const rows: Row[] = [];
-        for (let row = 0; row < values.length; row += columns) {
+        const rows: Row<Columns>[] = [];
+        for (let row = 0; row < values.length; row += columns.length) {
             let [isBefore, isBehind] = [true, true];
             for (let at = row + first; at < row + end; at++) {
                 const mm = values[at] ?? 0;
@@ -93,34 +80,32 @@ export class Table<Row> {
     }
 
     /** The row that begins nearest to a position. */
-    nearest(placeMm: number): Row {
+    nearest(placeMm: number): Row<Columns> {
         const awayMm = (row: number) => Math.abs((this.values[row + this.first] ?? 0) - placeMm);
         let best = 0;
-        for (let row = 0; row < this.values.length; row += this.columns) if (awayMm(row) < awayMm(best)) best = row;
+        for (let row = 0; row < this.values.length; row += this.columns.length)
+            if (awayMm(row) < awayMm(best)) best = row;
         return this.#row(best);
     }
 
-    #row(at: number): Row {
-        return this.make(this.values.subarray(at, at + this.columns));
+    #row(at: number): Row<Columns> {
+        const values = this.columns.map((column, index) => [column, this.values[at + index]]);
+        return Object.fromEntries(values);
     }
 }
 
 export interface Picture extends Head {
-    readonly objects: Table<Found>;
-    readonly speeds: Table<Speed>;
-    readonly worked: Table<Worked>;
+    readonly objects: Table<typeof OBJECT>;
+    readonly speeds: Table<typeof SPEED>;
+    readonly worked: Table<typeof WORKED>;
     readonly fastestMmS: number;
 }
-
-const CLASSES = ["plant", "weed", "unknown"] as const;
-const SPEED_COLUMNS = 3;
 
 interface Answer<Said> {
     readonly said: Said;
     readonly tables: readonly Float64Array[];
 }
 
-/** The question was cancelled. */
 export class Cancelled extends Error {}
 
 /** How work goes on: `progress` gets its share that is done, from 0 to 1, and `cancel` ends it. */
@@ -157,20 +142,14 @@ export async function picture(log: File, work: Work): Promise<Picture | Problem>
     const [objects, speeds, worked] = tables;
     if ("problem" in said || !objects || !speeds || !worked) return said as Problem;
     let fastestMmS = 1;
-    for (let at = 2; at < speeds.length; at += SPEED_COLUMNS)
+    for (let at = SPEED.indexOf("mmS"); at < speeds.length; at += SPEED.length)
         fastestMmS = Math.max(fastestMmS, Math.abs(speeds[at] ?? 0));
     return {
         ...said,
         fastestMmS,
-        objects: new Table(objects, 5, 1, 5, ([kind = 0, fromMm = 0, toMm = 0, zoneMm = 0, zoneEndMm = 0]) => ({
-            class: CLASSES[kind] ?? "unknown",
-            fromMm,
-            toMm,
-            zoneMm,
-            zoneEndMm,
-        })),
-        speeds: new Table(speeds, SPEED_COLUMNS, 0, 1, ([mm = 0, timeMs = 0, mmS = 0]) => ({ mm, timeMs, mmS })),
-        worked: new Table(worked, 2, 0, 2, ([startMm = 0, endMm = 0]) => ({ startMm, endMm })),
+        objects: new Table(objects, OBJECT, 1, 5),
+        speeds: new Table(speeds, SPEED, 0, 1),
+        worked: new Table(worked, WORKED, 0, 2),
     };
 }
 

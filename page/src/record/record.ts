@@ -34,6 +34,10 @@ const BESIDE_MM = 1500;
 /** From here on a duration is shown in minutes, and in hours. */
 const MINUTE_S = 120;
 const HOUR_S = 7200;
+/** The look of a detection, by its class. */
+const CLASSES = ["canopy", "weed", "canopy unknown"];
+/** The legend of the map: see host/gps/src/picture.rs. */
+const MAP_LEGEND = ["mapWeeded", "mapLeft", "plant", "mapKept", "legendWeed", "mapLabel", "stateAlarm"] as const;
 
 /** A log that is shown. */
 interface Row {
@@ -56,13 +60,8 @@ export class RecordView {
 
     constructor(private readonly parts: Parts) {
         this.#place = parts.get("log-place", HTMLInputElement);
-        const file = parts.get("log-file", HTMLInputElement);
-        parts.button("log-open", () => file.click());
-        file.addEventListener("change", () => void this.#open(file));
-        for (const [name, by] of [
-            ["log-back", -STEP],
-            ["log-on", STEP],
-        ] as const)
+        parts.files("log-open", "log-file", (files) => void this.#open(files));
+        for (const [name, by] of Object.entries({ "log-back": -STEP, "log-on": STEP }))
             parts.button(name, () => this.#go(this.#middleMm + by * this.#windowMm));
         parts.button("log-closer", () => this.#zoom(1 / ZOOM));
         parts.button("log-farther", () => this.#zoom(ZOOM));
@@ -89,10 +88,7 @@ export class RecordView {
         onLanguage(() => this.#draw());
     }
 
-    async #open(input: HTMLInputElement): Promise<void> {
-        const files = [...(input.files ?? [])];
-        input.value = "";
-        if (files.length === 0) return;
+    async #open(files: readonly File[]): Promise<void> {
         this.#show([]);
         for (const name of ["log-replayed", "log-alarm", "log-mapped"]) this.parts.write(name, "");
         const texts: (() => string)[] = [];
@@ -206,19 +202,10 @@ export class RecordView {
         if (isWhole) this.parts.say("log-replayed", () => results.map((result) => result()).join(" "));
     }
 
-    /** Draws the map of all logs. */
     async #map(): Promise<void> {
         const files = this.#rows.map(({ file }) => file);
         const words = {
-            legend: [
-                say("mapWeeded"),
-                say("mapLeft"),
-                say("plant"),
-                say("mapKept"),
-                say("legendWeed"),
-                say("mapLabel"),
-                say("stateAlarm"),
-            ],
+            legend: MAP_LEGEND.map((word) => say(word)),
             withoutPlace: say("mapMissing"),
             north: say("north"),
         };
@@ -260,21 +247,15 @@ export class RecordView {
         drawing.setAttribute("viewBox", `0 0 ${clientWidth} ${HEIGHT}`);
         drawing.replaceChildren(
             ...objects
-                .filter((object) => object.class !== "weed")
+                .filter((object) => CLASSES[object.class] !== "weed")
                 .map(({ zoneMm, zoneEndMm }) => bar("window", zoneMm, zoneEndMm, AT.row, row)),
             ...objects.map((object) =>
-                bar(
-                    object.class === "weed" ? "weed" : `canopy ${object.class}`,
-                    object.fromMm,
-                    object.toMm,
-                    AT.row + row / 4,
-                    row / 2,
-                ),
+                bar(CLASSES[object.class] ?? "", object.fromMm, object.toMm, AT.row + row / 4, row / 2),
             ),
             ...shown.worked.near(fromMm, toMm).map(({ startMm, endMm }) => bar("worked", startMm, endMm, AT.track, 10)),
             draw("path", {
                 fill: "none",
-                stroke: "var(--steel)",
+                stroke: "var(--ink)",
                 "stroke-width": 1.5,
                 d: speedLine(shown.speeds.near(fromMm - BESIDE_MM, toMm + BESIDE_MM), shown.fastestMmS, x),
             }),

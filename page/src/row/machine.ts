@@ -54,15 +54,11 @@ export interface Dimensions {
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
 export type Verdict = "kept" | "marginCut" | "damaged";
 
-/** A pin change within a turn. */
+/** A change from now on: `Different` in host/page/src/trial.rs. */
 export type Change =
-    /** The new speed; negative backwards. */
     | { speedKmH: number }
-    /** The share of the wheel's distance that is lost, below 1. */
     | { slip: number }
-    /** The first beam's wire is torn: its pin stays on the pull-up, as over bare ground. */
     | { beamWireTorn: boolean }
-    /** The encoder has failed: its pins keep their levels. */
     | { encoderDead: boolean }
     | { spacingMm: number }
     | { weedShare: number };

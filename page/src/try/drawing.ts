@@ -79,8 +79,8 @@ export class Drawing {
     readonly #things = new Shapes();
     readonly #soil = draw("rect", { fill: "var(--soil)" });
     readonly #beam = draw("line", { stroke: "var(--beam)", y1: -ACROSS_MM.out + 30, y2: ACROSS_MM.other - 10 });
-    readonly #arm = draw("line", { stroke: "var(--steel)", "stroke-width": 11, "stroke-linecap": "round" });
-    readonly #blade = draw("rect", { fill: "var(--steel)", rx: 6 });
+    readonly #arm = draw("line", { stroke: "var(--ink)", "stroke-width": 11, "stroke-linecap": "round" });
+    readonly #blade = draw("rect", { fill: "var(--ink)", rx: 6 });
     readonly #angle = draw("text", { fill: "var(--ink)", "font-size": 30, "text-anchor": "middle" });
 
     constructor(svg: SVGSVGElement, { machine }: Trial) {
@@ -89,13 +89,13 @@ export class Drawing {
         set(this.#track, { "stroke-width": toolWidthMm });
         this.#ground.append(this.#specks.group, this.#track, this.#zones, this.#things.group);
         set(this.#beam, { x1: beamToToolMm, x2: beamToToolMm });
-        const wheel = { fill: "var(--frame)", width: 190, height: 34, rx: 10, x: armMm - 150 };
+        const wheel = { fill: "var(--pale)", width: 190, height: 34, rx: 10, x: armMm - 150 };
         const frameMm = { left: -ACROSS_MM.out + 30, right: ACROSS_MM.other - 10 };
         svg.append(
             this.#soil,
             this.#ground,
             draw("path", {
-                stroke: "var(--frame)",
+                stroke: "var(--pale)",
                 "stroke-width": 9,
                 d: `M${armMm} ${frameMm.left}V${frameMm.right}`,
             }),
@@ -104,7 +104,7 @@ export class Drawing {
             this.#beam,
             this.#arm,
             this.#blade,
-            draw("circle", { fill: "var(--steel)", cx: armMm, r: 15 }),
+            draw("circle", { fill: "var(--ink)", cx: armMm, r: 15 }),
             this.#angle,
         );
     }
@@ -163,13 +163,12 @@ export class Drawing {
             const [thing, verdict] = [machine.things[index], outcome.plants.get(index)];
             if (!thing || !verdict || shape.dataset.verdict === verdict) continue;
             shape.dataset.verdict = verdict;
-            const way = SIGNS[verdict];
             const sign = draw("path", {
                 class: "verdict",
                 fill: "none",
                 stroke: verdict === "damaged" ? "var(--beam)" : "var(--ink)",
                 "stroke-width": verdict === "damaged" ? 11 : 7,
-                d: way,
+                d: SIGNS[verdict],
                 transform: `translate(0 ${thing.widthMm / 2 + 32})`,
             });
             shape.querySelector(".verdict")?.remove();

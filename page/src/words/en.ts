@@ -102,7 +102,6 @@ export const en = {
         // The machine.
         atWork: "At work",
         stateNone: "no machine",
-        stateHold: "hold",
         stateWork: "work",
         stateAlarm: "alarm",
         hold: "HOLD",
@@ -141,10 +140,8 @@ export const en = {
         unknown: "unknown",
         wasPlant: "It was a plant",
         wasWeed: "It was a weed",
-        isPlant: "It is a plant",
-        isWeed: "It is a weed",
-        taughtPlant: "Taught: it was a plant.",
-        taughtWeed: "Taught: it was a weed.",
+        isClass: "It is a {class}",
+        taughtThat: "Taught: {what}.",
         watchOnly:
             "From here the machine is watched and held. It is started, and its alarms are cleared, at the machine itself, or from here where weeder serve was started with --allow-start. Settings, calibration and teaching are for the computer that has its port.",
         watchAndStart:
@@ -327,9 +324,9 @@ export const en = {
         portOpen: "this page has the port open already: disconnect there, then try again",
         portRefused: "the port cannot be opened: the browser says \u201c{text}\u201d",
         portTaken:
-            "the port cannot be opened. Either another program or another tab has it: close the serial monitor, the Arduino IDE, or the other program that talks to the Uno. Or its driver hangs. Then pull the cable, plug it in again and choose the port again.",
-        portTakenLinux:
-            "the port cannot be opened. Either another program or another tab has it: close the serial monitor, the Arduino IDE, or the other program that talks to the Uno. Or you may not open it: `sudo usermod -aG dialout $USER`, then log in again. Then pull the cable, plug it in again and choose the port again.",
+            "the port cannot be opened. Either another program or another tab has it: close the serial monitor, the Arduino IDE, or the other program that talks to the Uno. {or} Then pull the cable, plug it in again and choose the port again.",
+        driverHangs: "Or its driver hangs.",
+        noPermission: "Or you may not open it: `sudo usermod -aG dialout $USER`, then log in again.",
         noPort: "No port was chosen. Where the list has no Uno: plug it in, by a cable that carries data and not power alone.",
         noSerialServed:
             "This page comes from weeder serve, which has the machines' ports itself and flashes nothing; and over plain http a browser gives no page a serial port. To flash, end it and run weeder flash there, or open the page's folder on that computer.",

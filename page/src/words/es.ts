@@ -101,7 +101,6 @@ export const es: Language = {
 
         atWork: "En el trabajo",
         stateNone: "sin máquina",
-        stateHold: "pausa",
         stateWork: "trabajo",
         stateAlarm: "alarma",
         hold: "PAUSA",
@@ -142,10 +141,8 @@ export const es: Language = {
         unknown: "desconocido",
         wasPlant: "Era una planta",
         wasWeed: "Era una maleza",
-        isPlant: "Es una planta",
-        isWeed: "Es una maleza",
-        taughtPlant: "Aprendido: era una planta.",
-        taughtWeed: "Aprendido: era una maleza.",
+        isClass: "Es una {class}",
+        taughtThat: "Aprendido: {what}.",
         watchOnly:
             "Desde aquí la máquina se observa y se pone en pausa. Se inicia, y se borran sus alarmas, en la máquina misma, o desde " +
             "aquí si weeder serve se inició con --allow-start. Los ajustes, la calibración y la enseñanza son del ordenador que tiene su puerto.",
@@ -322,12 +319,10 @@ export const es: Language = {
         portRefused: "el puerto no se puede abrir: el navegador dice «{text}»",
         portTaken:
             "el puerto no se puede abrir. Puede que lo tenga otro programa u otra pestaña: cierre el monitor serie, el IDE de " +
-            "Arduino, o el otro programa que habla con el Uno. O su controlador está colgado. Después saque el cable, enchúfelo " +
-            "otra vez y elija otra vez el puerto.",
-        portTakenLinux:
-            "el puerto no se puede abrir. Puede que lo tenga otro programa u otra pestaña: cierre el monitor serie, el IDE de " +
-            "Arduino, o el otro programa que habla con el Uno. O usted no tiene permiso: `sudo usermod -aG dialout $USER`, y entre " +
-            "de nuevo en su sesión. Después saque el cable, enchúfelo otra vez y elija otra vez el puerto.",
+            "Arduino, o el otro programa que habla con el Uno. {or} Después saque el cable, enchúfelo otra vez y elija otra vez " +
+            "el puerto.",
+        driverHangs: "O su controlador está colgado.",
+        noPermission: "O usted no tiene permiso: `sudo usermod -aG dialout $USER`, y entre de nuevo en su sesión.",
         noPort: "No se eligió ningún puerto. Si en la lista no hay un Uno: enchúfelo, con un cable que lleve datos y no solo corriente.",
         noSerialServed:
             "Esta página viene de weeder serve, que tiene él mismo los puertos de las máquinas y no graba nada; y por http simple " +

@@ -101,7 +101,6 @@ export const fr: Language = {
 
         atWork: "Au travail",
         stateNone: "pas de machine",
-        stateHold: "pause",
         stateWork: "travail",
         stateAlarm: "alarme",
         hold: "PAUSE",
@@ -141,10 +140,8 @@ export const fr: Language = {
         unknown: "inconnu",
         wasPlant: "C'était une plante",
         wasWeed: "C'était une adventice",
-        isPlant: "C'est une plante",
-        isWeed: "C'est une adventice",
-        taughtPlant: "Appris : c'était une plante.",
-        taughtWeed: "Appris : c'était une adventice.",
+        isClass: "C'est une {class}",
+        taughtThat: "Appris : {what}.",
         watchOnly:
             "D'ici, la machine est observée et mise en pause. Elle est démarrée, et ses alarmes sont effacées, à la machine même, ou " +
             "d'ici si weeder serve a été lancé avec --allow-start. Réglages, étalonnage et apprentissage sont pour l'ordinateur qui a son port.",
@@ -320,12 +317,9 @@ export const fr: Language = {
         portRefused: "le port ne s'ouvre pas : le navigateur dit « {text} »",
         portTaken:
             "le port ne s'ouvre pas. Un autre programme ou un autre onglet l'a peut-être : fermez le moniteur série, l'IDE d'Arduino, " +
-            "ou l'autre programme qui parle à l'Uno. Ou son pilote est bloqué. Débranchez ensuite le câble, rebranchez-le et " +
-            "choisissez à nouveau le port.",
-        portTakenLinux:
-            "le port ne s'ouvre pas. Un autre programme ou un autre onglet l'a peut-être : fermez le moniteur série, l'IDE d'Arduino, " +
-            "ou l'autre programme qui parle à l'Uno. Ou vous n'en avez pas le droit : `sudo usermod -aG dialout $USER`, puis " +
-            "reconnectez-vous. Débranchez ensuite le câble, rebranchez-le et choisissez à nouveau le port.",
+            "ou l'autre programme qui parle à l'Uno. {or} Débranchez ensuite le câble, rebranchez-le et choisissez à nouveau le port.",
+        driverHangs: "Ou son pilote est bloqué.",
+        noPermission: "Ou vous n'en avez pas le droit : `sudo usermod -aG dialout $USER`, puis reconnectez-vous.",
         noPort: "Aucun port n'a été choisi. Si la liste n'a pas d'Uno : branchez-le, par un câble qui porte des données et pas seulement le courant.",
         noSerialServed:
             "Cette page vient de weeder serve, qui a lui-même les ports des machines et ne flashe rien ; et par http simple un " +

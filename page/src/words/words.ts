@@ -43,7 +43,6 @@ let table: Language = LANGUAGES[code].table;
 const changes: (() => void)[] = [];
 const formats = new Map<string, Intl.NumberFormat>();
 
-/** The language of the page. */
 export const language = (): Code => code;
 
 /** Chooses a language, and writes all texts again that are not updated continuously. */
