@@ -5,8 +5,10 @@
 //! the tester always [`STEP`] cycles late, so widths and distances are right. Tests of the check use a wrong [`Wiring`]
 //! on purpose.
 
+use crate::plan::INPUTS;
 use crate::second::SecondUno;
 use anyhow::Result;
+use field::wiring;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -24,15 +26,9 @@ const STEPS_TO_RESET: u64 = 64;
 /// The difference of the clocks in parts per million: the weeder's is faster by 0.3 %.
 pub const CLOCK_PPM: i64 = 3000;
 
-/// The tester's pins; the firmware's own are in `tester/src/lines.rs`.
-const TESTER_LINES: [(Line, Pin); 6] = [
-    (Line::EncoderA, Pin::A0),
-    (Line::EncoderB, Pin::A1),
-    (Line::Beam, Pin::A2),
-    (Line::SecondBeam, Pin::A3),
-    (Line::EndSwitch, Pin::A4),
-    (Line::WorkSwitch, Pin::A5),
-];
+/// The tester's pins; the firmware's own are in `tester/src/lines.rs`. Those of its lines are in the order of
+/// [`Line::ALL`].
+const TESTER_LINES: [Pin; 6] = [Pin::A0, Pin::A1, Pin::A2, Pin::A3, Pin::A4, Pin::A5];
 const TESTER_RESET: Pin = Pin::D7;
 const TESTER_LED: Pin = Pin::D6;
 const TESTER_SERVO: Pin = Pin::D8;
@@ -67,12 +63,10 @@ pub struct Wiring {
 impl Wiring {
     /// The correct wiring.
     pub fn right() -> Self {
-        use field::wiring::{BEAM, ENCODER_A, ENCODER_B, END_SWITCH, LED, SECOND_BEAM, SERVO, WORK_SWITCH};
-        let pins = [ENCODER_A, ENCODER_B, BEAM, SECOND_BEAM, END_SWITCH, WORK_SWITCH];
         Self {
-            inputs: Line::ALL.into_iter().zip(pins).map(|(line, pin)| (line, pin, false)).collect(),
+            inputs: INPUTS.map(|(line, pin)| (line, pin, false)).to_vec(),
             has_reset: true,
-            outputs: vec![SERVO, LED],
+            outputs: vec![wiring::SERVO, wiring::LED],
             clock_ppm: CLOCK_PPM,
             from_weeder: Box::new(Some),
             to_weeder: Box::new(Some),
@@ -124,7 +118,7 @@ impl Pair {
     /// # Errors
     /// If an ELF cannot be run.
     pub fn power_up(tester: &Path, weeder: &Path, wiring: Wiring) -> Result<Self> {
-        let weeder_uno = Uno::boot(weeder)?.wired(&field::wiring::WIRES);
+        let weeder_uno = Uno::boot(weeder)?.wired(&wiring::WIRES);
         Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
     }
 
@@ -211,7 +205,7 @@ impl Pair {
             if let (Some(corrupt), WeederUno::Own(weeder)) = (&mut self.wiring.eeprom_at_reset, &mut self.weeder) {
                 let mut eeprom = weeder.eeprom();
                 corrupt(&mut eeprom);
-                *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&field::wiring::WIRES);
+                *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&wiring::WIRES);
             }
             self.shared = (self.tester.cycle(), self.weeder.cycle());
             self.reset_weeder()?;
@@ -278,10 +272,10 @@ impl Pair {
     }
 
     fn carry_to_weeder(&mut self, change: PinChange) {
-        let Some(&(line, _)) = TESTER_LINES.iter().find(|&&(_, pin)| pin == change.pin) else { return };
+        let Some(number) = TESTER_LINES.iter().position(|&pin| pin == change.pin) else { return };
         let Some(change) = (self.wiring.to_weeder)(change) else { return };
         let cycle = self.weeder_cycle(change.cycle);
-        let wires = self.wiring.inputs.iter().filter(|&&(wired, ..)| wired == line);
+        let wires = self.wiring.inputs.iter().filter(|wire| wire.0 == Line::ALL[number]);
         let changes = wires.map(|&(_, pin, inverted)| PinChange { cycle, pin, high: change.high != inverted });
         with!(&mut self.weeder, uno => uno.drive(changes));
     }
@@ -291,7 +285,7 @@ impl Pair {
             if !self.wiring.outputs.contains(&change.pin) {
                 continue;
             }
-            let pin = if change.pin == field::wiring::SERVO { TESTER_SERVO } else { TESTER_LED };
+            let pin = if change.pin == wiring::SERVO { TESTER_SERVO } else { TESTER_LED };
             let change = PinChange { cycle: self.tester_cycle(change.cycle) + STEP, pin, ..change };
             self.tester.drive((self.wiring.from_weeder)(change));
         }

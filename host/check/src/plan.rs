@@ -15,17 +15,19 @@ const TOLERANCE: f64 = 320.0;
 /// The shortest time between two events, in cycles.
 const SHORTEST: u64 = 200;
 
+/// The tester's lines, each with the weeder's pin at its other end.
+pub(crate) const INPUTS: [(Line, Pin); 6] = [
+    (Line::EncoderA, wiring::ENCODER_A),
+    (Line::EncoderB, wiring::ENCODER_B),
+    (Line::Beam, wiring::BEAM),
+    (Line::SecondBeam, wiring::SECOND_BEAM),
+    (Line::EndSwitch, wiring::END_SWITCH),
+    (Line::WorkSwitch, wiring::WORK_SWITCH),
+];
+
 /// The line of a pin of the weeder.
 pub fn line(pin: Pin) -> Option<Line> {
-    match pin {
-        wiring::ENCODER_A => Some(Line::EncoderA),
-        wiring::ENCODER_B => Some(Line::EncoderB),
-        wiring::BEAM => Some(Line::Beam),
-        wiring::SECOND_BEAM => Some(Line::SecondBeam),
-        wiring::END_SWITCH => Some(Line::EndSwitch),
-        wiring::WORK_SWITCH => Some(Line::WorkSwitch),
-        _ => None,
-    }
+    INPUTS.iter().find(|input| input.1 == pin).map(|input| input.0)
 }
 
 /// A plan that is being made: its pieces, and the cycle of its last event.

@@ -65,10 +65,10 @@ pub struct Figure {
 impl Figure {
     /// A figure without limits and with this tolerance, not yet judged. If `measured` is not finite, the event never
     /// came.
-    pub fn new(id: &str, what: &str, unit: &str, measured: f64, tolerance: f64) -> Self {
+    pub fn new(id: impl Into<String>, what: impl Into<String>, unit: &str, measured: f64, tolerance: f64) -> Self {
         Self {
-            id: id.to_owned(),
-            what: what.to_owned(),
+            id: id.into(),
+            what: what.into(),
             unit: unit.to_owned(),
             // JSON has no other numbers.
             measured: measured.is_finite().then_some(measured),
@@ -79,6 +79,11 @@ impl Figure {
             tolerance,
             verdict: Verdict::Pass,
         }
+    }
+
+    /// A figure without a unit or a tolerance.
+    pub fn count(id: impl Into<String>, what: impl Into<String>, measured: f64) -> Self {
+        Self::new(id, what, "", measured, 0.0)
     }
 
     /// The same, right from this value on.
