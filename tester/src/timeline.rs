@@ -12,8 +12,8 @@ use avr_device::{
 };
 use core::cell::RefCell;
 use heapless::Deque;
-use tester_core::message::{QUEUE_PIECES, Record, Step};
-use tester_core::player::{Next, Piece, Player};
+use tester_core::message::{Record, Step};
+use tester_core::player::{Next, Player};
 use tester_core::station::Board;
 
 /// Longest wait set in the compare unit at once, in cycles. It is below half of the timer's range, which separates future from
@@ -34,7 +34,6 @@ const NO_PRESCALER: u8 = 1;
 
 struct Inner {
     player: Player,
-    queue: Deque<Piece, QUEUE_PIECES>,
     /// The compare unit's time, and the cycles from there to the event.
     armed: u16,
     left: u32,
@@ -48,7 +47,6 @@ struct Inner {
 
 static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
     player: Player::new(),
-    queue: Deque::new(),
     armed: 0,
     left: 0,
     overflows: 0,
@@ -69,14 +67,9 @@ impl Tester {
     pub fn new(timer: TC1, lines: Lines) -> Self {
         // SAFETY: normal mode, the next edge is rising.
         timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
-        let tester = Self { timer, lines };
-        tester.enable(CAPTURE | OVERFLOW);
-        tester
-    }
-
-    fn enable(&self, interrupts: u8) {
         // SAFETY: the handlers of all three interrupts are below.
-        self.timer.timsk1().write(|w| unsafe { w.bits(interrupts) });
+        timer.timsk1().write(|w| unsafe { w.bits(CAPTURE | COMPARE | OVERFLOW) });
+        Self { timer, lines }
     }
 
     fn with<R>(&self, change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
@@ -99,44 +92,20 @@ impl Board for Tester {
         self.with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
     }
 
-    fn position(&mut self) -> i32 {
-        self.with(|inner, _| inner.player.position())
-    }
-
-    fn room(&mut self) -> u8 {
-        self.with(|inner, _| (QUEUE_PIECES - inner.queue.len()) as u8)
-    }
-
-    fn push(&mut self, piece: Piece) {
-        self.with(|inner, _| {
-            let _ = inner.queue.push_back(piece);
-        });
-    }
-
-    fn is_playing(&mut self) -> bool {
-        self.with(|inner, _| inner.player.is_playing())
+    fn player<R>(&mut self, access: impl FnOnce(&mut Player) -> R) -> R {
+        self.with(|inner, _| access(&mut inner.player))
     }
 
     fn start(&mut self) -> u32 {
-        self.enable(CAPTURE | COMPARE | OVERFLOW);
         self.with(|inner, timer| {
             let begin = timer.tcnt1().read().bits().wrapping_add(LEAD);
             let time = inner.time(timer, timer.tcnt1().read().bits());
             let time = time.wrapping_add(begin.wrapping_sub(time as u16).into());
             inner.armed = begin;
-            let Inner { player, queue, .. } = inner;
-            let next = player.start(|| queue.pop_front());
+            let next = inner.player.start();
             inner.follow(next, timer);
             time
         })
-    }
-
-    fn stop(&mut self) {
-        self.enable(CAPTURE | OVERFLOW);
-        self.with(|inner, _| {
-            inner.player.stop();
-            inner.queue.clear();
-        });
     }
 
     fn set(&mut self, mask: u8, levels: u8) {
@@ -151,8 +120,9 @@ impl Board for Tester {
     }
 
     fn burst(&mut self, steps: &[Step], run_up: u16, repeats: u16, slower: u8) {
+        let levels = self.player(|player| player.levels());
         let levels = interrupt::free(|_| {
-            let levels = burst::play(steps, run_up, slower, lines::shown());
+            let levels = burst::play(steps, run_up, slower, levels);
             burst::play(steps, repeats, 0, levels)
         });
         self.set(u8::MAX, levels);
@@ -164,10 +134,6 @@ impl Board for Tester {
             // SAFETY: writing 1 clears the flag.
             timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
         });
-    }
-
-    fn levels(&mut self) -> u8 {
-        lines::shown()
     }
 
     fn check_capture(&mut self, width: u16) {
@@ -192,10 +158,7 @@ impl Inner {
         match next {
             Next::After(wait) => self.wait(wait, timer),
             Next::Ended => self.measure(Record::Ended { position: self.player.position() }),
-            Next::Dry => {
-                self.player.stop();
-                self.measure(Record::Dry);
-            }
+            Next::Dry => self.measure(Record::Dry),
         }
     }
 
@@ -217,8 +180,7 @@ impl Inner {
                 self.wait(self.left, timer);
                 continue;
             }
-            let Self { player, queue, .. } = self;
-            let next = player.fire(|| queue.pop_front());
+            let next = self.player.fire();
             lines::show(self.player.levels());
             self.follow(next, timer);
         }

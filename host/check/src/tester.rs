@@ -6,12 +6,11 @@
 
 use crate::error::CheckError;
 use link::Port;
-use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tester_core::frame::{self, Receiver};
-use tester_core::message::{Command, PIECES, PROTOCOL, Record, STEPS, Step};
+use tester_core::message::{Command, Done, PIECES, PROTOCOL, Record, STEPS, Step};
 use tester_core::player::Piece;
 use uno::CYCLES_PER_SECOND;
 
@@ -20,19 +19,6 @@ const READS: usize = 30;
 
 /// Tries of a command. A board that was reset by opening its port needs up to 2 s to start.
 const TRIES: usize = 8;
-
-/// The tester's answers.
-#[derive(Clone, Copy, Debug)]
-pub struct Done {
-    /// Pieces that have room.
-    pub room: u8,
-    /// The time in cycles, modulo 2^32.
-    pub time: u32,
-    /// Counts forward less counts back since the tester's start, without those of bursts.
-    pub position: i32,
-    /// The levels that the lines have, by their bits.
-    pub levels: u8,
-}
 
 /// The result of a plan.
 #[derive(Clone, Debug)]
@@ -53,7 +39,9 @@ pub struct Tester {
     /// The number of the next record; `None` before the first.
     expected: Option<u8>,
     missing: u32,
-    records: VecDeque<Record>,
+    /// Answers to commands, and all other records.
+    answers: Vec<Done>,
+    records: Vec<Record>,
     interrupt: Arc<AtomicBool>,
 }
 
@@ -69,7 +57,8 @@ impl Tester {
             number: 0,
             expected: None,
             missing: 0,
-            records: VecDeque::new(),
+            answers: Vec::new(),
+            records: Vec::new(),
             interrupt: Arc::default(),
         };
         tester.command(&Command::Hello)?;
@@ -100,23 +89,14 @@ impl Tester {
             self.port.flush().map_err(CheckError::TesterGone)?;
             for _ in 0..READS {
                 self.hear()?;
-                let is_answer =
-                    |record: &Record| matches!(record, Record::Done { number, .. } if *number == self.number);
-                if let Some(at) = self.records.iter().position(is_answer)
-                    && let Some(Record::Done { refusal, room, time, position, levels, protocol, .. }) =
-                        self.records.remove(at)
-                {
-                    self.records.retain(|record| !matches!(record, Record::Done { .. }));
-                    return match refusal {
-                        _ if protocol != PROTOCOL => Err(CheckError::Protocol(protocol)),
-                        Some(refusal) => Err(CheckError::Refused(refusal)),
-                        // Records from before the greeting may be missing.
-                        None if self.missing > 0 && *command != Command::Hello => {
-                            Err(CheckError::Missing(self.missing))
-                        }
-                        None => Ok(Done { room, time, position, levels }),
-                    };
-                }
+                let Some(done) = self.answers.drain(..).find(|done| done.number == self.number) else { continue };
+                return match done.refusal {
+                    _ if done.protocol != PROTOCOL => Err(CheckError::Protocol(done.protocol)),
+                    Some(refusal) => Err(CheckError::Refused(refusal)),
+                    // Records from before the greeting may be missing.
+                    None if self.missing > 0 && *command != Command::Hello => Err(CheckError::Missing(self.missing)),
+                    None => Ok(done),
+                };
             }
         }
         Err(CheckError::TesterSilent)
@@ -139,17 +119,18 @@ impl Tester {
             let gap = self.expected.map_or(0, |expected| number.wrapping_sub(expected));
             self.missing += u32::from(gap);
             self.expected = Some(number.wrapping_add(1));
-            if let Record::Lost { pulses } = record {
-                self.missing += u32::from(pulses);
+            match record {
+                Record::Done(done) => self.answers.push(done),
+                Record::Lost { pulses } => self.missing += u32::from(pulses),
+                record => self.records.push(record),
             }
-            self.records.push_back(record);
         }
         Ok(true)
     }
 
     /// All new records, oldest first.
     pub fn take_records(&mut self) -> Vec<Record> {
-        self.records.drain(..).collect()
+        std::mem::take(&mut self.records)
     }
 
     /// Sets lines, by their bits.
