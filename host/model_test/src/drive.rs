@@ -134,16 +134,7 @@ impl<M: Machine> Drive<M> {
         boot: impl FnOnce(&Beginning, &World) -> Result<M, TestCaseError>,
     ) -> Result<Self, TestCaseError> {
         let (beginning, row) = (run.beginning.clone(), run.levels());
-        let world = World {
-            time_us: 0,
-            count: beginning.count.into(),
-            jumps: 0,
-            broken: row[0][0],
-            second_broken: false,
-            switch_on: false,
-            end_switch_on: false,
-            stack_is_low: false,
-        };
+        let world = World { count: beginning.count.into(), broken: row[0][0], ..World::default() };
         let machine = boot(&beginning, &world)?;
         let mut drive = Self {
             scale: scale(machine.settings()),
@@ -332,6 +323,10 @@ impl<M: Machine> Drive<M> {
         let state = self.machine.state();
         // Tests on the bench run only in HOLD.
         self.is_tried &= state == State::Hold;
+        self.check_tool_stuck(state)
+    }
+
+    fn check_tool_stuck(&self, state: State) -> Checked {
         let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
         prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
         Ok(())
@@ -471,19 +466,15 @@ impl<M: Machine> Drive<M> {
     fn turn(&mut self) -> Checked {
         self.turns += 1;
         let before = self.world;
-        let wheel = self.machine.settings().wheel();
-        let merge_gap = self.machine.settings().ticks(Setting::MergeGapMm).0.into();
-        self.model.follow(self.here(), merge_gap, wheel.ticks(1000).0.into());
-        self.model.keep_stems(self.ticks(Setting::StemZoneMm), self.ticks(Setting::SecondBeamMm));
         // A detection below the minimum width is dust, and causes no event.
         let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
+        self.model.follow(self.here(), self.machine.settings(), narrow_mm);
         self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
         self.had_second_beam |= self.ticks(Setting::SecondBeamMm) > 0;
         let spacing = self.ticks(Setting::GuardSpacingMm);
         if spacing > 0 && !self.guard_spacings.contains(&spacing) {
             self.guard_spacings.push(spacing);
         }
-        self.model.leave_narrow(wheel.ticks(narrow_mm).0.into());
 
         self.world.time_us += self.beginning.turn_us;
         let seconds = self.beginning.turn_us as f64 / 1e6;
@@ -599,8 +590,7 @@ impl<M: Machine> Drive<M> {
         if M::IS_OPEN && state != state_before {
             prop_assert!(state != State::Work || self.world.switch_on, "the machine started work by itself");
             prop_assert!(!is_alarm(state_before) || !self.world.switch_on, "{state_before:?} was cleared by itself");
-            let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
-            prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
+            self.check_tool_stuck(state)?;
         }
         prop_assert!(!M::IS_OPEN || !self.world.stack_is_low || is_alarm(state), "a low stack is no alarm");
         let works = if M::IS_OPEN { state == State::Work } else { !self.is_tried };

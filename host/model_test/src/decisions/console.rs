@@ -1,7 +1,6 @@
 //! The console as in the firmware's main loop: a line runs once the one before it is answered.
 
 use super::Weeder;
-use crate::machine::Checked;
 use control::say::{self, Answer, LINE, command::LineBuffer, line::Line};
 use proptest::prelude::*;
 use std::collections::VecDeque;
@@ -52,7 +51,7 @@ impl Console {
             say::write_plot(machine, plot, &mut line);
         }
         let written: String = line.map(char::from).collect();
-        check_length(&written)?;
+        prop_assert!(written.len() <= LINE, "the line {written:?} is too long");
         Ok(written)
     }
 
@@ -60,9 +59,4 @@ impl Console {
     pub(super) fn is_done(&self) -> bool {
         self.typed.is_empty() && self.answer.is_done()
     }
-}
-
-fn check_length(written: &str) -> Checked {
-    prop_assert!(written.len() <= LINE, "the line {written:?} is too long");
-    Ok(())
 }
