@@ -39,9 +39,6 @@ impl Boards {
     }
 
     /// Pulls the weeder's reset for a moment. Returns whether the weeder starts then.
-    ///
-    /// # Errors
-    /// If a port is gone.
     pub fn reset(&mut self) -> Result<bool, CheckError> {
         self.weeder.drain()?;
         self.tester.command(&Command::Reset { pulled: true })?;

@@ -9,11 +9,8 @@ use crate::plan::INPUTS;
 use crate::second::SecondUno;
 use anyhow::Result;
 use field::wiring;
-use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use tester_core::pins::Line;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno};
 
@@ -97,7 +94,7 @@ impl WeederUno {
     }
 }
 
-/// The two boards.
+/// The two boards. Its methods fail if one of them stops.
 pub struct Pair {
     tester: Uno,
     weeder: WeederUno,
@@ -113,39 +110,29 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Powers both up, with an erased EEPROM of the weeder.
-    ///
-    /// # Errors
-    /// If an ELF cannot be run.
-    pub fn power_up(tester: &Path, weeder: &Path, wiring: Wiring) -> Result<Self> {
-        let weeder_uno = Uno::boot(weeder)?.wired(&wiring::WIRES);
-        Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
-    }
-
-    /// The same, but `program` runs the weeder in another simulator.
+    /// Powers both up, with an erased EEPROM of the weeder. `second` is the program of another simulator that runs the
+    /// weeder.
     ///
     /// # Errors
     /// If an ELF cannot be run, or the other simulator.
-    pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self> {
-        let second = SecondUno::power_up(program, weeder)?;
-        Ok(Self::of(Uno::boot(tester)?, WeederUno::Second(second), weeder, Wiring::right()))
-    }
-
-    fn of(tester: Uno, weeder: WeederUno, weeder_elf: &Path, wiring: Wiring) -> Self {
-        let shared = (tester.cycle(), weeder.cycle());
-        let (from_tester, from_weeder) = (VecDeque::new(), VecDeque::new());
-        Self {
+    pub fn power_up(tester: &Path, weeder_elf: &Path, second: Option<&Path>, wiring: Wiring) -> Result<Self> {
+        let tester = Uno::boot(tester)?;
+        let weeder = match second {
+            Some(program) => WeederUno::Second(SecondUno::power_up(program, weeder_elf)?),
+            None => WeederUno::Own(Uno::boot(weeder_elf)?.wired(&wiring::WIRES)),
+        };
+        Ok(Self {
+            shared: (tester.cycle(), weeder.cycle()),
             tester,
             weeder,
             weeder_elf: weeder_elf.to_owned(),
             wiring,
-            shared,
             steps: 0,
             is_reset_pulled: false,
             resets: 0,
-            from_tester,
-            from_weeder,
-        }
+            from_tester: VecDeque::new(),
+            from_weeder: VecDeque::new(),
+        })
     }
 
     fn weeder_cycle(&self, tester_cycle: u64) -> u64 {
@@ -159,9 +146,6 @@ impl Pair {
     }
 
     /// Lets the tester's clock run by this number of cycles, and the weeder's for the same time.
-    ///
-    /// # Errors
-    /// If one of them stops.
     pub fn run_for(&mut self, cycles: u64) -> Result<()> {
         let end = self.tester.cycle() + cycles;
         while self.tester.cycle() < end {
@@ -216,9 +200,6 @@ impl Pair {
     }
 
     /// Resets a board, as opening its port does by the modem line DTR.
-    ///
-    /// # Errors
-    /// If the second simulator has ended.
     pub fn reset(&mut self, side: Side) -> Result<()> {
         self.resets += 1;
         match side {
@@ -299,39 +280,4 @@ pub enum Side {
     Tester,
     /// The weeder.
     Weeder,
-}
-
-/// A port of one of the boards, without a terminal. Both clocks run while it is read, at full speed.
-pub struct PairPort {
-    /// Both boards.
-    pub pair: Rc<RefCell<Pair>>,
-    /// Whose port it is.
-    pub side: Side,
-}
-
-/// Longest time that a read waits for a byte, by the tester's clock.
-const READ_MS: u64 = 20;
-
-impl Read for PairPort {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut pair = self.pair.borrow_mut();
-        for _ in 0..READ_MS {
-            if !pair.received(self.side).is_empty() {
-                return pair.received(self.side).read(buffer);
-            }
-            pair.run_for(CYCLES_PER_SECOND / 1000).map_err(io::Error::other)?;
-        }
-        Err(io::ErrorKind::TimedOut.into())
-    }
-}
-
-impl Write for PairPort {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.pair.borrow_mut().send(self.side, bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }

@@ -9,7 +9,7 @@ use crate::tester::ms;
 use field::conditions::Conditions;
 use field::planting::Planting;
 use field::trial::Trial;
-use field::verdict::{Judgement, Verdict, judge};
+use field::verdict::{Judgement, judge};
 use link::settings::name;
 use tester_core::player::Action;
 use uno::{CYCLES_PER_SECOND, Pulse};
@@ -32,25 +32,6 @@ pub struct Outcome {
     pub lost_counts: i64,
 }
 
-impl Outcome {
-    /// Plants that were damaged.
-    pub fn damaged(&self) -> usize {
-        self.judgement.count(Verdict::Damaged)
-    }
-
-    /// Weeds that were cut.
-    pub fn cut(&self) -> usize {
-        self.judgement.weeds.iter().filter(|weed| weed.cut).count()
-    }
-
-    /// The mean and the largest absolute error of a swing, in counts; 0 without a swing.
-    pub fn swing_errors(&self) -> (f64, f64) {
-        let errors: Vec<f64> = self.judgement.swing_errors_ticks().into_iter().map(f64::abs).collect();
-        let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
-        (mean, errors.iter().copied().fold(0.0, f64::max))
-    }
-}
-
 /// The row of `weeder sim` with this number of plants and tall weeds, at a speed.
 ///
 /// # Errors
@@ -58,15 +39,7 @@ impl Outcome {
 pub fn trial(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Trial, CheckError> {
     let row = |error: &dyn std::fmt::Display| CheckError::Row(error.to_string());
     let conditions = Conditions::preset(FIELD).ok_or_else(|| row(&FIELD))?.map_err(|error| row(&error))?;
-    let planting = Planting {
-        plants,
-        spacing_mm: 500.0,
-        spacing_scatter_mm: 40.0,
-        canopy_mm: 150.0,
-        canopy_scatter_mm: 22.5,
-        weeds,
-        ragged: false,
-    };
+    let planting = Planting { plants, canopy_scatter_mm: 22.5, weeds, ..Planting::default() };
     let stand = planting.grow_with_room(SEED).map_err(|error| row(&error))?;
     let speed = field::motion::mm_s(speed_km_h);
     let mut trial = Trial::at_speed(stand, conditions.machine(SEED), conditions.timing(), speed);

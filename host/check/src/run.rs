@@ -6,10 +6,11 @@ use crate::error::CheckError;
 use crate::rates::Turning;
 use crate::report::{Figure, Report};
 use crate::resets::{Kept, ResetBy, Restart};
-use crate::row;
+use crate::row::{self, Outcome};
 use crate::servo::{self, Steady};
 use crate::tester::Tester;
 use control::alarm::Alarm;
+use field::verdict::Verdict;
 use tester_core::pins::Line;
 
 /// The checks to run.
@@ -215,16 +216,18 @@ fn resets(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
 const SWING_MEAN_TOLERANCE: f64 = 6.0;
 
 /// A row's figures.
-fn of_row(outcome: &row::Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Figure> {
-    let (mean, worst) = outcome.swing_errors();
+fn of_row(outcome: &Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Figure> {
+    let Outcome { judgement, lost_counts } = outcome;
+    let errors = || judgement.swing_errors_ticks().into_iter().map(f64::abs);
+    let mean = errors().sum::<f64>() / errors().count().max(1) as f64;
     let id = |what: &str| format!("row_{speed}_{what}");
     let what = |what: &str| format!("row of {plants} plants and {weeds} weeds at {speed} km/h: {what}");
     let count = |id_part, words, value| Figure::count(id(id_part), what(words), value);
     vec![
-        count("damaged", "plants damaged", outcome.damaged() as f64).at_most(0.0),
-        count("cut", "tall weeds cut", outcome.cut() as f64),
-        count("lost", "counts lost", outcome.lost_counts.abs() as f64).at_most(0.0),
+        count("damaged", "plants damaged", judgement.count(Verdict::Damaged) as f64).at_most(0.0),
+        count("cut", "tall weeds cut", judgement.weeds.iter().filter(|weed| weed.cut).count() as f64),
+        count("lost", "counts lost", lost_counts.abs() as f64).at_most(0.0),
         Figure::new(id("swing_mean"), what("mean error of a swing"), "counts", mean, SWING_MEAN_TOLERANCE),
-        Figure::new(id("swing_worst"), what("largest error of a swing"), "counts", worst, 6.0),
+        Figure::new(id("swing_worst"), what("largest error of a swing"), "counts", errors().fold(0.0, f64::max), 6.0),
     ]
 }

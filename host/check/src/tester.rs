@@ -31,7 +31,7 @@ pub struct Played {
     pub records: Vec<Record>,
 }
 
-/// The tester.
+/// The tester. Its methods fail as [`Tester::command`].
 pub struct Tester {
     port: Box<dyn Port>,
     receiver: Receiver,
@@ -102,20 +102,18 @@ impl Tester {
         Err(CheckError::TesterSilent)
     }
 
-    /// Reads the input, or waits up to 20 ms for it. Returns whether there was any.
-    fn hear(&mut self) -> Result<bool, CheckError> {
+    /// Reads the input, or waits up to 20 ms for it.
+    fn hear(&mut self) -> Result<(), CheckError> {
         let mut bytes = [0; 256];
         let count = match self.port.read(&mut bytes) {
             Ok(0) => return Err(CheckError::TesterGone(io::ErrorKind::UnexpectedEof.into())),
             Ok(count) => count,
-            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
-                return Ok(false);
-            }
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => 0,
             Err(error) => return Err(CheckError::TesterGone(error)),
         };
         for &byte in &bytes[..count] {
             // A damaged record is missed by its number.
-            let Some(Ok((number, record))) = self.receiver.take::<Record>(byte) else { continue };
+            let Some((number, record)) = self.receiver.take::<Record>(byte) else { continue };
             let gap = self.expected.map_or(0, |expected| number.wrapping_sub(expected));
             self.missing += u32::from(gap);
             self.expected = Some(number.wrapping_add(1));
@@ -125,7 +123,7 @@ impl Tester {
                 record => self.records.push(record),
             }
         }
-        Ok(true)
+        Ok(())
     }
 
     /// All new records, oldest first.
@@ -134,17 +132,11 @@ impl Tester {
     }
 
     /// Sets lines, by their bits.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn set(&mut self, mask: u8, levels: u8) -> Result<Done, CheckError> {
         self.command(&Command::Lines { mask, levels })
     }
 
     /// Waits by the tester's clock, in milliseconds up to 60,000. Returns the records since the last call.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn record_for_ms(&mut self, time_ms: u32) -> Result<Vec<Record>, CheckError> {
         let begin = self.command(&Command::Clock)?.time;
         while self.command(&Command::Clock)?.time.wrapping_sub(begin) < ms(time_ms) {
@@ -154,9 +146,6 @@ impl Tester {
     }
 
     /// Starts a plan that has room in the tester as a whole, and returns at once.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn begin(&mut self, plan: &[Piece]) -> Result<(), CheckError> {
         self.command(&Command::Stop)?;
         self.take_records();
@@ -208,9 +197,6 @@ impl Tester {
     }
 
     /// Loads steps into the tester's pattern.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn load(&mut self, steps: &[Step]) -> Result<(), CheckError> {
         for (number, part) in steps.chunks(STEPS).enumerate() {
             let from = (number * STEPS) as u8;

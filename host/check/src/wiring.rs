@@ -23,7 +23,7 @@ const OWN_PULSE: u16 = 16_000;
 /// microseconds.
 const OWN_PULSE_ERROR: u32 = 800;
 
-/// The weeder's console.
+/// The weeder's console. Its methods fail if the port is gone, or the weeder does not answer.
 pub struct Weeder {
     link: Link,
     open: Box<dyn FnMut() -> Result<Link, LinkError>>,
@@ -53,9 +53,6 @@ impl Weeder {
     }
 
     /// Closes the port and opens it again, which resets the board through the modem line DTR.
-    ///
-    /// # Errors
-    /// As [`Weeder::over`].
     pub fn open_again(&mut self) -> Result<(), CheckError> {
         // A port that is open is locked.
         self.link.close();
@@ -64,18 +61,12 @@ impl Weeder {
     }
 
     /// The status.
-    ///
-    /// # Errors
-    /// If it does not answer.
     pub fn status(&mut self) -> Result<Status, CheckError> {
         let lines = self.ask("status")?;
         lines.iter().find_map(|line| Status::parse(line)).ok_or(CheckError::Answer("status"))
     }
 
     /// Takes it to hold, clears its alarm, and restores factory settings without saving them.
-    ///
-    /// # Errors
-    /// If it refuses.
     pub fn to_hold(&mut self) -> Result<(), CheckError> {
         self.ask("plot off")?;
         self.ask("events off")?;
@@ -94,9 +85,6 @@ impl Weeder {
     }
 
     /// Drops the lines that the machine has sent without a question.
-    ///
-    /// # Errors
-    /// If the port is gone.
     pub fn drain(&mut self) -> Result<(), CheckError> {
         while self.next_line()?.is_some() {}
         Ok(())

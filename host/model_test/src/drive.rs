@@ -54,7 +54,7 @@ struct Place {
     fastest: f64,
 }
 
-/// A machine on a row, see the module's documentation.
+/// A machine on a row, see the module's documentation. Its methods fail if a check fails.
 #[derive(Debug)]
 pub struct Drive<M> {
     machine: M,
@@ -184,9 +184,6 @@ impl<M: Machine> Drive<M> {
     }
 
     /// Executes a run, and brings the machine back to work. Returns the number of checked turns.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn go(
         run: &Run,
         boot: impl FnOnce(&Beginning, &World) -> Result<M, TestCaseError>,
@@ -201,9 +198,6 @@ impl<M: Machine> Drive<M> {
     }
 
     /// Carries the machine to the headland of another row, and resets it there.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn enter_row(&mut self, run: &Run, geometry: Geometry, stem_zone: i64) -> Checked {
         self.stop();
         self.row = run.levels();
@@ -216,9 +210,6 @@ impl<M: Machine> Drive<M> {
     }
 
     /// Executes a step, and checks the machine.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn execute(&mut self, step: &Step) -> Checked {
         self.start_step(step)?;
         self.look()
@@ -334,9 +325,6 @@ impl<M: Machine> Drive<M> {
 
     /// Repairs every fault and ends the row. The operator clears the alarm, starts, and drives on until the tool is in. On the
     /// way back through the row there may be more alarms.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn come_back_to_work(&mut self) -> Checked {
         (self.tool_is_stuck, self.world.switch_on, self.bare_from) = (false, false, self.farthest);
         self.stop();

@@ -63,7 +63,7 @@ impl Station {
 
     /// Takes a byte from the computer, and runs the command that it completes. A damaged frame gets no answer.
     pub fn take(&mut self, byte: u8, board: &mut impl Board) {
-        let Some(Ok((number, command))) = self.receiver.take(byte) else { return };
+        let Some((number, command)) = self.receiver.take(byte) else { return };
         let is_repeated = command != Command::Hello && self.last.is_some_and(|(last, _)| last == number);
         let refusal = match self.last {
             Some((_, refusal)) if is_repeated => refusal,
