@@ -41,8 +41,8 @@ struct Inner {
     /// The time of the pulse's beginning.
     rise: Option<u32>,
     measured: Deque<Record, 4>,
+    /// Pulses without room in `measured`.
     lost: u16,
-    is_lost_told: bool,
 }
 
 static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
@@ -53,7 +53,6 @@ static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
     rise: None,
     measured: Deque::new(),
     lost: 0,
-    is_lost_told: true,
 }));
 
 /// The hardware as the loop uses it.
@@ -80,8 +79,8 @@ impl Tester {
     pub fn measured(&self) -> Option<Record> {
         self.with(|inner, _| {
             inner.measured.pop_front().or_else(|| {
-                let is_told = core::mem::replace(&mut inner.is_lost_told, true);
-                (!is_told).then_some(Record::Lost { pulses: inner.lost })
+                let pulses = core::mem::take(&mut inner.lost);
+                (pulses > 0).then_some(Record::Lost { pulses })
             })
         })
     }
@@ -207,7 +206,6 @@ impl Inner {
     fn measure(&mut self, record: Record) {
         if self.measured.push_back(record).is_err() {
             self.lost = self.lost.saturating_add(1);
-            self.is_lost_told = false;
         }
     }
 }

@@ -4,11 +4,10 @@
 //! Each scene begins at work with the tool in, on ground that the weeder takes as seen. Times count from the fault's
 //! edge to the first pulse for out.
 
-use crate::boards::Boards;
-use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo::{self, ORIGIN};
 use crate::tester::ms;
+use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use tester_core::message::{Command, Record};
 use tester_core::pins::{AT_REST, Line};

@@ -1,6 +1,6 @@
 //! The two boards of a check. A port that is not named is found among those of all Unos.
 
-use crate::error::CheckError;
+use crate::CheckError;
 use crate::plan::Plan;
 use crate::tester::{Played, Tester};
 use crate::wiring::Weeder;

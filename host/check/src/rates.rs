@@ -4,8 +4,7 @@
 //! The tester counts cycles between two edges, so a rate is exact by its clock. The weeder is in hold. Busy means that
 //! it prints all its settings meanwhile, and that the beam changes once in 128 counts.
 
-use crate::boards::Boards;
-use crate::error::CheckError;
+use crate::{Boards, CheckError};
 use link::ConsoleLine;
 use tester_core::message::{Command, PATTERN_STEPS, REPEAT_CYCLES, STEP_CYCLES, Step, step_cycles};
 use tester_core::pins::Line;

@@ -3,11 +3,10 @@
 //! `save` writes the EEPROM byte by byte, for some hundred milliseconds. A reset at any moment of that must leave the
 //! old or the new settings. Only `max_width_mm` is changed for this, and restored at the end.
 
-use crate::boards::Boards;
-use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo::{self, ORIGIN};
 use crate::tester::ms;
+use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use control::ground::examples::EXAMPLES;
 use link::examples::{self, Taught};

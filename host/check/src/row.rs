@@ -1,11 +1,10 @@
 //! A row: the weeder weeds it, the tester plays wheel and beam and records the pulses, and the verdict is that of
 //! `weeder sim`.
 
-use crate::boards::Boards;
-use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo::{self, ORIGIN};
 use crate::tester::ms;
+use crate::{Boards, CheckError};
 use field::conditions::Conditions;
 use field::planting::Planting;
 use field::trial::Trial;

@@ -1,14 +1,13 @@
 //! The check, from the wires to the report.
 
 use crate::alarms::SCENES;
-use crate::boards::Boards;
-use crate::error::CheckError;
 use crate::rates::Turning;
 use crate::report::{Figure, Report};
 use crate::resets::{Kept, ResetBy, Restart};
 use crate::row::{self, Outcome};
 use crate::servo::{self, Steady};
 use crate::tester::Tester;
+use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use field::verdict::Verdict;
 use tester_core::pins::Line;

@@ -4,7 +4,7 @@
 //! numbers is an error. The clock of a simulated line runs only while it is read. So times come from the tester, not
 //! from the PC.
 
-use crate::error::CheckError;
+use crate::CheckError;
 use link::Port;
 use std::io;
 use std::sync::Arc;

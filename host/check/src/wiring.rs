@@ -1,13 +1,12 @@
 //! The wires: the tester toggles each line, and the weeder's console shows whether it noticed, and as which input.
 
-use crate::boards::Boards;
-use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo;
+use crate::{Boards, CheckError};
 use link::{Link, LinkError, Mode, Status};
 use std::ops::{Deref, DerefMut};
 use tester_core::message::{Command, Record};
-use tester_core::pins::{AT_REST, Line};
+use tester_core::pins::{AT_REST, Line, WIRES, Wire};
 use tester_core::player::Action;
 
 /// Time for a switch to stop bouncing and for the LED and the curves to follow, in ms.
@@ -105,23 +104,16 @@ impl Weeder {
     }
 }
 
-/// The weeder's possible reactions to a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Seen {
-    Work,
-    Beam,
-    /// The end switch: closed.
-    Out,
+/// The wire of a line.
+fn wire(line: Line) -> &'static Wire {
+    // The first wires are in the order of the lines' bits.
+    &WIRES[line.bit().trailing_zeros() as usize]
 }
 
-impl Seen {
-    fn words(self) -> &'static str {
-        match self {
-            Self::Work => "the work switch (D4)",
-            Self::Beam => "the beam (D8)",
-            Self::Out => "the end switch (D5)",
-        }
-    }
+/// The advice to check the wire of a line.
+fn check_wire(line: Line) -> String {
+    let Wire { tester, weeder, .. } = wire(line);
+    format!("check the wire from {tester} to {weeder}")
 }
 
 /// Distance of the second beam behind the first, in mm, and in counts of the factory settings' wheel.
@@ -146,7 +138,7 @@ impl Boards {
         wrong.extend(self.switch_and_beam_errors()?);
         if !self.measures_slip()? {
             let words = "the weeder measures no slip between the beams";
-            wrong.push(format!("second beam: {words}: check the wire from A3 to D10"));
+            wrong.push(format!("second beam: {words}: {}", check_wire(Line::SecondBeam)));
         }
         let records = self.tester.record_for_ms(1500)?;
         let from_weeder = |from, to| format!("check the wire from {from} of the weeder to {to} of the tester");
@@ -206,10 +198,10 @@ impl Boards {
                 wrong.push("encoder: it counts backward: wires A0 to D2 and A1 to D3 are swapped".to_owned());
             }
             _ => {
-                for (channel, wire, first) in [("A", "A0 to D2", 0), ("B", "A1 to D3", 1)] {
+                for (line, first) in [(Line::EncoderA, 0), (Line::EncoderB, 1)] {
                     if (steps[first], steps[first + 2]) == (0, 0) {
                         let words = "the weeder does not count its steps";
-                        wrong.push(format!("encoder {channel}: {words}: check the wire from {wire}"));
+                        wrong.push(format!("{}: {words}: {}", wire(line).name, check_wire(line)));
                     }
                 }
                 if wrong.is_empty() {
@@ -222,53 +214,50 @@ impl Boards {
 
     fn switch_and_beam_errors(&mut self) -> Result<Vec<String>, CheckError> {
         let mut wrong = Vec::new();
-        let expected = [
-            (Line::WorkSwitch, "work switch", Some(Seen::Work), "A5 to D4"),
-            (Line::Beam, "beam", Some(Seen::Beam), "A2 to D8"),
-            (Line::EndSwitch, "end switch", Some(Seen::Out), "A4 to D5"),
-            (Line::SecondBeam, "second beam", None, "A3 to D10"),
-        ];
         // At rest no beam is broken, and no switch is closed.
         let at_rest = self.noticed(0)?;
-        if at_rest.contains(&Seen::Beam) {
+        if at_rest.contains(&Line::Beam) {
             let words = "it is broken at rest: its line is inverted, or the wire from A2 to D8 is missing";
             wrong.push(format!("beam: {words}"));
         }
-        if at_rest.contains(&Seen::Out) {
-            wrong.push("end switch: it is closed at rest: check the wire from A4 to D5".to_owned());
+        if at_rest.contains(&Line::EndSwitch) {
+            wrong.push(format!("end switch: it is closed at rest: {}", check_wire(Line::EndSwitch)));
         }
-        for (line, name, seen, wire) in expected {
+        for line in [Line::WorkSwitch, Line::Beam, Line::EndSwitch, Line::SecondBeam] {
+            let name = wire(line).name;
             let mut noticed = self.noticed(line.bit())?;
             noticed.retain(|seen| !at_rest.contains(seen));
-            if seen.is_some_and(|seen| !noticed.contains(&seen) && !at_rest.contains(&seen)) {
-                wrong.push(format!("{name}: the weeder does not notice it: check the wire from {wire}"));
+            // The console does not show the second beam's level.
+            if line != Line::SecondBeam && !noticed.contains(&line) && !at_rest.contains(&line) {
+                wrong.push(format!("{name}: the weeder does not notice it: {}", check_wire(line)));
             }
-            for other in noticed.iter().filter(|&other| Some(*other) != seen) {
-                wrong.push(format!("{name}: the weeder takes it for {}: the wires are swapped", other.words()));
+            for other in noticed.into_iter().filter(|other| *other != line).map(wire) {
+                let (other, pin) = (other.name, other.weeder);
+                wrong.push(format!("{name}: the weeder takes it for the {other} ({pin}): the wires are swapped"));
             }
         }
         Ok(wrong)
     }
 
-    /// The weeder's reactions while these lines are low.
-    fn noticed(&mut self, low: u8) -> Result<Vec<Seen>, CheckError> {
+    /// The switches and the beam to which the weeder reacts while these lines are low.
+    fn noticed(&mut self, low: u8) -> Result<Vec<Line>, CheckError> {
         let Self { weeder, tester, .. } = self;
         let mut seen = Vec::new();
         weeder.to_hold()?;
         tester.set(low, 0)?;
         tester.record_for_ms(SETTLE_MS)?;
         if weeder.status()?.mode == Mode::Work {
-            seen.push(Seen::Work);
+            seen.push(Line::WorkSwitch);
         }
         if weeder.beam_is_broken()? {
-            seen.push(Seen::Beam);
+            seen.push(Line::Beam);
         }
         weeder.try_to("hold")?;
         weeder.ask("set end_switch on")?;
         tester.record_for_ms(STUCK_MS)?;
         // In hold the tool is out. An open end switch contradicts that, which is an alarm.
         if weeder.status()?.mode != Mode::Alarm {
-            seen.push(Seen::Out);
+            seen.push(Line::EndSwitch);
         }
         tester.set(low, AT_REST)?;
         tester.record_for_ms(SETTLE_MS)?;

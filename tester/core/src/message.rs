@@ -157,7 +157,7 @@ pub enum Record {
     Dry,
     /// Pulses were lost, because the serial line was too slow.
     Lost {
-        /// Their number since the start.
+        /// Their number since the last such record.
         pulses: u16,
     },
 }
