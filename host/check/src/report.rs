@@ -7,6 +7,7 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::ops::{Bound, RangeBounds};
 
 /// The version of the report's form.
 pub const FORM: u32 = 1;
@@ -86,17 +87,14 @@ impl Figure {
         Self::new(id, what, "", measured, 0.0)
     }
 
-    /// The same, right from this value on.
+    /// The same, right within these limits.
     #[must_use]
-    pub fn at_least(mut self, lowest: f64) -> Self {
-        self.lowest = Some(lowest);
-        self
-    }
-
-    /// The same, right up to this value.
-    #[must_use]
-    pub fn at_most(mut self, highest: f64) -> Self {
-        self.highest = Some(highest);
+    pub fn within(mut self, limits: impl RangeBounds<f64>) -> Self {
+        let limit = |bound| match bound {
+            Bound::Included(&value) | Bound::Excluded(&value) => Some(value),
+            Bound::Unbounded => None,
+        };
+        (self.lowest, self.highest) = (limit(limits.start_bound()), limit(limits.end_bound()));
         self
     }
 
@@ -282,7 +280,7 @@ mod tests {
     use super::*;
 
     fn figure(measured: f64) -> Figure {
-        Figure::new("width", "pulse < width", "us", measured, 1.0).at_least(1499.0).at_most(1505.0)
+        Figure::new("width", "pulse < width", "us", measured, 1.0).within(1499.0..=1505.0)
     }
 
     #[test]

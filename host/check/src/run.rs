@@ -6,7 +6,6 @@ use crate::report::{Figure, Report};
 use crate::resets::{Kept, ResetBy, Restart};
 use crate::row::{self, Outcome};
 use crate::servo::{self, Steady};
-use crate::tester::Tester;
 use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use field::verdict::Verdict;
@@ -61,9 +60,7 @@ fn check(
         return Ok(Report { wires, ..report(vec![]) });
     }
     progress("pulses", 0.1);
-    let steady = pulses(&mut boards.tester, extent)?;
-    boards.clock_ratio = steady.clock_ratio;
-    let mut figures = of_pulses(&steady);
+    let mut figures = pulses(boards, extent)?;
     progress("rates", 0.15);
     figures.extend(rates(boards, extent)?);
     progress("alarms", 0.25);
@@ -80,22 +77,19 @@ fn check(
     Ok(report(figures))
 }
 
-/// The pulses in hold: the clocks' ratio, the width and the spread.
-fn pulses(tester: &mut Tester, extent: Extent) -> Result<Steady, CheckError> {
-    tester.take_records();
-    let records = tester.record_for_ms(extent.pulses_ms())?;
-    servo::steady(&servo::pulses(&records, 0)).ok_or(CheckError::NoPulses)
-}
-
-fn of_pulses(steady: &Steady) -> Vec<Figure> {
-    vec![
-        Figure::new("clock_ratio", "the weeder's clock over the tester's", "", steady.clock_ratio, 0.005)
-            .at_least(0.99)
-            .at_most(1.01),
-        Figure::new("pulse_out_us", "pulse, tool out", "us", steady.width_us, 1.0).at_least(1998.0).at_most(2002.0),
-        Figure::new("pulse_spread_us", "longest less shortest pulse", "us", steady.width_spread_us, 0.5).at_most(1.0),
-        Figure::new("frame_spread_us", "longest less shortest frame", "us", steady.frame_spread_us, 0.5).at_most(1.0),
-    ]
+/// The figures of the pulses in hold. They give the clocks' ratio.
+fn pulses(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError> {
+    boards.tester.take_records();
+    let records = boards.tester.record_for_ms(extent.pulses_ms())?;
+    let Steady { clock_ratio, width_us, width_spread_us, frame_spread_us } =
+        servo::steady(&servo::pulses(&records, 0)).ok_or(CheckError::NoPulses)?;
+    boards.clock_ratio = clock_ratio;
+    Ok(vec![
+        Figure::new("clock_ratio", "the weeder's clock over the tester's", "", clock_ratio, 0.005).within(0.99..=1.01),
+        Figure::new("pulse_out_us", "pulse, tool out", "us", width_us, 1.0).within(1998.0..=2002.0),
+        Figure::new("pulse_spread_us", "longest less shortest pulse", "us", width_spread_us, 0.5).within(..=1.0),
+        Figure::new("frame_spread_us", "longest less shortest frame", "us", frame_spread_us, 0.5).within(..=1.0),
+    ])
 }
 
 /// The rate that `weeder bounds` proves, in counts a second.
@@ -116,19 +110,19 @@ fn rates(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError>
         let what = format!("highest rate without a lost count, {way}, {load}");
         figures.push(
             Figure::new(format!("highest_{way}_{load}"), what, "counts/s", highest.round(), RATE_TOLERANCE)
-                .at_least(PROVED_PER_S)
+                .within(PROVED_PER_S..)
                 .proved(PROVED_PER_S),
         );
         let turning = Turning { cycles: JITTERED_CYCLES, forward, jittered: true, busy };
         let what = format!("counts lost at {}/s {way}, {load}, 30 % jitter", turning.per_s().round());
         // A weeder that has restarted has lost all counts.
         let lost = boards.lost_counts(turning)?.map_or(f64::INFINITY, |lost| lost as f64);
-        figures.push(Figure::count(format!("lost_jitter_{way}_{load}"), what, lost).at_most(0.0).proved(0.0));
+        figures.push(Figure::count(format!("lost_jitter_{way}_{load}"), what, lost).within(..=0.0).proved(0.0));
     }
     for (channel, name) in [(Line::EncoderA, "A"), (Line::EncoderB, "B")] {
         let left = boards.left_by_glitches(channel)?;
         let what = format!("counts left by glitches of channel {name}");
-        figures.push(Figure::count(format!("glitches_{name}"), what, left).at_most(0.0));
+        figures.push(Figure::count(format!("glitches_{name}"), what, left).within(..=0.0));
     }
     Ok(figures)
 }
@@ -146,7 +140,7 @@ fn time(id: impl Into<String>, what: impl Into<String>, value_ms: f64) -> Figure
 
 /// 1 if it is true, and right only then.
 fn truth(id: String, what: String, value: bool) -> Figure {
-    Figure::count(id, what, u8::from(value).into()).at_least(1.0)
+    Figure::count(id, what, u8::from(value).into()).within(1.0..)
 }
 
 /// The figures of alarms, and of commands that take the tool out.
@@ -160,18 +154,18 @@ fn alarms(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
         let code = f64::from(10 * first + second);
         let what = |what: &str| format!("{}: {what}", scene.words);
         figures.extend([
-            time(format!("{name}_out"), what("until the tool is out"), raised.out_ms).at_most(scene.limit_ms),
+            time(format!("{name}_out"), what("until the tool is out"), raised.out_ms).within(..=scene.limit_ms),
             truth(format!("{name}_raised"), what("alarm raised"), raised.is_expected),
-            Figure::count(format!("{name}_code"), what("code of the LED"), raised.code).at_least(code).at_most(code),
+            Figure::count(format!("{name}_code"), what("code of the LED"), raised.code).within(code..=code),
         ]);
     }
     let switch = boards.switch_to_out_ms()?;
     let hold = boards.hold_to_out_ms()?;
     let beam = boards.beam_to_window_ms()?;
     figures.extend([
-        time("switch_out", "work switch opened, until the tool is out", switch).at_most(100.0),
-        time("beam_out", "from a beam's edge to the window: out later than due", beam).at_least(-5.0).at_most(30.0),
-        time("hold_out", "`hold` typed, until the tool is out, computer included", hold).at_most(300.0),
+        time("switch_out", "work switch opened, until the tool is out", switch).within(..=100.0),
+        time("beam_out", "from a beam's edge to the window: out later than due", beam).within(-5.0..=30.0),
+        time("hold_out", "`hold` typed, until the tool is out, computer included", hold).within(..=300.0),
     ]);
     Ok(figures)
 }
@@ -193,7 +187,7 @@ fn resets(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
         let what = |what: &str| format!("{words}: {what}");
         figures.extend([
             Figure::new(format!("reset_{id}_pulse"), what("without a pulse"), "ms", without_pulse_ms, RESET_MS)
-                .at_most(RESET_MS),
+                .within(..=RESET_MS),
             truth(format!("reset_{id}_out"), what("the tool is out behind it"), is_out),
         ]);
     }
@@ -202,9 +196,9 @@ fn resets(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
     let lost = before.lost(&Kept::read(boards)?) as f64;
     let torn = format!("settings torn by {moments} resets while saving");
     figures.extend([
-        Figure::count("save_torn", torn, saves.torn.into()).at_most(0.0),
+        Figure::count("save_torn", torn, saves.torn.into()).within(..=0.0),
         Figure::new("save_new", "of these, new settings kept", "", saves.new.into(), moments.into()),
-        Figure::count("kept", "settings and taught examples lost by all resets", lost).at_most(0.0),
+        Figure::count("kept", "settings and taught examples lost by all resets", lost).within(..=0.0),
     ]);
     Ok(figures)
 }
@@ -223,9 +217,9 @@ fn of_row(outcome: &Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Fig
     let what = |what: &str| format!("row of {plants} plants and {weeds} weeds at {speed} km/h: {what}");
     let count = |id_part, words, value| Figure::count(id(id_part), what(words), value);
     vec![
-        count("damaged", "plants damaged", judgement.count(Verdict::Damaged) as f64).at_most(0.0),
+        count("damaged", "plants damaged", judgement.count(Verdict::Damaged) as f64).within(..=0.0),
         count("cut", "tall weeds cut", judgement.weeds.iter().filter(|weed| weed.cut).count() as f64),
-        count("lost", "counts lost", lost_counts.abs() as f64).at_most(0.0),
+        count("lost", "counts lost", lost_counts.abs() as f64).within(..=0.0),
         Figure::new(id("swing_mean"), what("mean error of a swing"), "counts", mean, SWING_MEAN_TOLERANCE),
         Figure::new(id("swing_worst"), what("largest error of a swing"), "counts", errors().fold(0.0, f64::max), 6.0),
     ]
