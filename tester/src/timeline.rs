@@ -57,7 +57,6 @@ static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
 
 /// The hardware as the loop uses it.
 pub struct Tester {
-    timer: TC1,
     pub lines: Lines,
 }
 
@@ -68,16 +67,12 @@ impl Tester {
         timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
         // SAFETY: the handlers of all three interrupts are below.
         timer.timsk1().write(|w| unsafe { w.bits(CAPTURE | COMPARE | OVERFLOW) });
-        Self { timer, lines }
-    }
-
-    fn with<R>(&self, change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
-        interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &self.timer))
+        Self { lines }
     }
 
     /// The oldest measurement.
     pub fn measured(&self) -> Option<Record> {
-        self.with(|inner, _| {
+        with(|inner, _| {
             inner.measured.pop_front().or_else(|| {
                 let pulses = core::mem::take(&mut inner.lost);
                 (pulses > 0).then_some(Record::Lost { pulses })
@@ -88,15 +83,15 @@ impl Tester {
 
 impl Board for Tester {
     fn now(&mut self) -> u32 {
-        self.with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
+        with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
     }
 
     fn player<R>(&mut self, access: impl FnOnce(&mut Player) -> R) -> R {
-        self.with(|inner, _| access(&mut inner.player))
+        with(|inner, _| access(&mut inner.player))
     }
 
     fn start(&mut self) -> u32 {
-        self.with(|inner, timer| {
+        with(|inner, timer| {
             let begin = timer.tcnt1().read().bits().wrapping_add(LEAD);
             let time = inner.time(timer, timer.tcnt1().read().bits());
             let time = time.wrapping_add(begin.wrapping_sub(time as u16).into());
@@ -108,7 +103,7 @@ impl Board for Tester {
     }
 
     fn set(&mut self, mask: u8, levels: u8) {
-        self.with(|inner, _| {
+        with(|inner, _| {
             inner.player.set(mask, levels);
             lines::show(inner.player.levels());
         });
@@ -126,7 +121,7 @@ impl Board for Tester {
         });
         self.set(u8::MAX, levels);
         // The clock has lost time, so a pulse that has begun is dropped.
-        self.with(|inner, timer| {
+        with(|inner, timer| {
             inner.rise = None;
             // SAFETY: the next edge is rising, and a captured edge is dropped.
             timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
@@ -210,27 +205,27 @@ impl Inner {
     }
 }
 
-/// Runs a change from a handler of this file.
-fn interrupted(change: impl FnOnce(&mut Inner, &TC1)) {
-    // SAFETY: the loop uses the timer only in critical sections, or to write single bytes that no handler writes.
+/// Runs a change from the loop or a handler, without an interrupt meanwhile.
+fn with<R>(change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
+    // SAFETY: once `Tester::new` has started the timer, only this critical section uses it.
     let timer = unsafe { TC1::steal() };
-    interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &timer));
+    interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &timer))
 }
 
 // An edge on the servo's line.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER1_CAPT() {
-    interrupted(Inner::capture);
+    with(Inner::capture);
 }
 
 // An event is due.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER1_COMPA() {
-    interrupted(Inner::fire);
+    with(Inner::fire);
 }
 
 // The counter has overflowed.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER1_OVF() {
-    interrupted(|inner, _| inner.overflows = inner.overflows.wrapping_add(1));
+    with(|inner, _| inner.overflows = inner.overflows.wrapping_add(1));
 }

@@ -640,12 +640,10 @@ impl<M: Machine> Drive<M> {
         let found = (!is_lost).then(|| self.machine.settings().clone());
         // A save that was not acknowledged may be complete, or have no effect.
         let expected = [&self.saving, &self.saved].map(|kept| self.with_leads_of(kept, &found));
-        if is_spoiled || self.saving.is_some() && expected[0] == found {
-            self.saved = found;
-        } else {
+        if !is_spoiled && (self.saving.is_none() || expected[0] != found) {
             prop_assert_eq!(&found, &expected[1], "other settings than were saved");
-            self.saved = found;
         }
+        self.saved = found;
         let examples = self.machine.examples();
         if is_spoiled {
         } else if is_answered {
