@@ -74,8 +74,8 @@ impl Tester {
     pub fn measured(&self) -> Option<Record> {
         with(|inner, _| {
             inner.measured.pop_front().or_else(|| {
-                let pulses = core::mem::take(&mut inner.lost);
-                (pulses > 0).then_some(Record::Lost { pulses })
+                let lost = core::mem::take(&mut inner.lost);
+                (lost > 0).then_some(Record::Lost(lost))
             })
         })
     }
@@ -151,7 +151,7 @@ impl Inner {
     fn follow(&mut self, next: Next, timer: &TC1) {
         match next {
             Next::After(wait) => self.wait(wait, timer),
-            Next::Ended => self.measure(Record::Ended { position: self.player.position() }),
+            Next::Ended => self.measure(Record::Ended(self.player.position())),
             Next::Dry => self.measure(Record::Dry),
         }
     }

@@ -9,8 +9,9 @@ use crate::tester::ms;
 use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use control::ground::examples::EXAMPLES;
+use control::settings::Setting;
 use link::examples::{self, Taught};
-use link::{ConsoleLine, Mode};
+use link::{Mode, settings};
 use tester_core::message::Command;
 
 /// The weeder's rate when it is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as fit
@@ -64,7 +65,7 @@ pub struct Restart {
 /// Data that a reset must not change: the saved settings and the taught examples, as the console shows them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
-    settings: Vec<(String, u16)>,
+    settings: Vec<(Setting, u16)>,
     examples: Vec<(u16, Taught)>,
 }
 
@@ -76,7 +77,7 @@ impl Kept {
     pub fn read(boards: &mut Boards) -> Result<Self, CheckError> {
         boards.reset()?;
         Ok(Self {
-            settings: boards.weeder.ask("get")?.iter().filter_map(|line| shown_setting(line)).collect(),
+            settings: boards.weeder.ask("get")?.iter().filter_map(|line| settings::shown(line)).collect(),
             examples: examples::read(&mut boards.weeder)?,
         })
     }
@@ -195,7 +196,7 @@ impl Boards {
     /// The setting's value.
     fn setting(&mut self) -> Result<u32, CheckError> {
         let lines = self.weeder.ask(&format!("get {SETTING}"))?;
-        let (_, value) = lines.iter().find_map(|line| shown_setting(line)).ok_or(CheckError::Answer("get"))?;
+        let (_, value) = lines.iter().find_map(|line| settings::shown(line)).ok_or(CheckError::Answer("get"))?;
         Ok(value.into())
     }
 
@@ -205,13 +206,5 @@ impl Boards {
         self.weeder.ask("save")?;
         self.tester.record_for_ms(SAVED_MS)?;
         Ok(())
-    }
-}
-
-/// The name and value in a line of `get`.
-fn shown_setting(line: &str) -> Option<(String, u16)> {
-    match ConsoleLine::parse(line) {
-        ConsoleLine::Setting { name, value, .. } => Some((name, value)),
-        _ => None,
     }
 }

@@ -119,7 +119,7 @@ impl Tester {
             self.expected = Some(number.wrapping_add(1));
             match record {
                 Record::Done(done) => self.answers.push(done),
-                Record::Lost { pulses } => self.missing += u32::from(pulses),
+                Record::Lost(pulses) => self.missing += u32::from(pulses),
                 record => self.records.push(record),
             }
         }
@@ -185,8 +185,8 @@ impl Tester {
             }
             for record in self.take_records() {
                 match record {
-                    Record::Started { time } => start = time,
-                    Record::Ended { position } => {
+                    Record::Started(time) => start = time,
+                    Record::Ended(position) => {
                         return Ok(Played { start, ticks: position.wrapping_sub(before), records });
                     }
                     Record::Dry => return Err(CheckError::Dry),

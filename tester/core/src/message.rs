@@ -143,21 +143,12 @@ pub enum Record {
         /// Whether it is lit.
         lit: bool,
     },
-    /// The plan began.
-    Started {
-        /// The time: the first piece's wait counts from here.
-        time: u32,
-    },
-    /// The plan ended.
-    Ended {
-        /// The encoder's position.
-        position: i32,
-    },
+    /// The plan began at this time: the first piece's wait counts from here.
+    Started(u32),
+    /// The plan ended at this position of the encoder.
+    Ended(i32),
     /// The plan stopped, because the next piece came too late.
     Dry,
-    /// Pulses were lost, because the serial line was too slow.
-    Lost {
-        /// Their number since the last such record.
-        pulses: u16,
-    },
+    /// This many pulses were lost since the last such record, because the serial line was too slow.
+    Lost(u16),
 }

@@ -94,7 +94,7 @@ impl Station {
             }
             Command::Start => {
                 let time = board.start();
-                self.record(Record::Started { time });
+                self.record(Record::Started(time));
             }
             Command::Stop => board.player(Player::stop),
             Command::Lines { mask, levels } => board.set(mask, levels),
