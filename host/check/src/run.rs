@@ -1,7 +1,7 @@
 //! The check, from the wires to the report.
 
 use crate::alarms::SCENES;
-use crate::rates::Turning;
+use crate::rates::{PROVED_CYCLES, Turning};
 use crate::report::{Figure, Report};
 use crate::resets::{Kept, ResetBy, Restart};
 use crate::row::{self, Outcome};
@@ -10,6 +10,7 @@ use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use field::verdict::Verdict;
 use tester_core::pins::Line;
+use uno::CYCLES_PER_SECOND;
 
 /// The checks to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,7 +94,7 @@ fn pulses(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError
 }
 
 /// The rate that `weeder bounds` proves, in counts a second.
-const PROVED_PER_S: f64 = 290_909.0;
+const PROVED_PER_S: f64 = (CYCLES_PER_SECOND / PROVED_CYCLES as u64) as f64;
 
 /// With jitter of 30 %, two counts take at least 1.4 times the mean. This number of cycles keeps to the proof.
 const JITTERED_CYCLES: u32 = 79;

@@ -243,15 +243,16 @@ impl<M: Machine> Drive<M> {
             }
             Step::Dust { times, on_second: false } => (0..2 * times).try_for_each(|_| self.edge(!self.world.broken)),
             Step::Dust { times, on_second: true } => {
-                for _ in 0..2 * times {
-                    self.second_edge(!self.world.second_broken);
-                }
+                (0..2 * times).for_each(|_| self.second_edge(!self.world.second_broken));
                 Ok(())
             }
             Step::LoseEdges { turns } if M::IS_OPEN => {
                 self.edges_get_lost = true;
                 self.turns(turns)?;
-                self.find_edges_lost()
+                self.edges_get_lost = false;
+                self.machine.lose_edges(&self.world)?;
+                prop_assert!(is_alarm(self.machine.state()) || self.is_tried, "lost edges are no alarm");
+                Ok(())
             }
             Step::LoseEdges { turns } => {
                 (0..TOO_MANY).try_for_each(|_| self.edge(!self.world.broken))?;
@@ -534,14 +535,6 @@ impl<M: Machine> Drive<M> {
             self.check_weed()?;
         }
         self.model.edge(self.here(), broken, self.blur());
-        Ok(())
-    }
-
-    /// The machine finds that edges were lost.
-    fn find_edges_lost(&mut self) -> Checked {
-        self.edges_get_lost = false;
-        self.machine.lose_edges(&self.world)?;
-        prop_assert!(is_alarm(self.machine.state()) || self.is_tried, "lost edges are no alarm");
         Ok(())
     }
 
