@@ -265,12 +265,13 @@ impl Machine for Decisions {
     fn attend(&mut self) -> Result<Attended, TestCaseError> {
         let mut begun = None;
         // The console runs a line at once if no byte is left to save.
-        if self.console.listens() && self.weeder.carry_on() {
-            while let Some(byte) = self.typed.pop_front() {
+        if !self.typed.is_empty() && self.console.listens() && self.weeder.carry_on() {
+            while self.console.listens()
+                && let Some(byte) = self.typed.pop_front()
+            {
                 if let Some(line) = self.line.take(byte) {
                     self.console.take(line);
                     begun = self.lines.pop_front();
-                    break;
                 }
             }
         }
@@ -294,10 +295,7 @@ impl Machine for Decisions {
     }
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
-        match torn {
-            Some(byte) => self.eeprom.lose_power(byte),
-            None => self.eeprom.reset(),
-        }
+        self.eeprom.reset(torn);
         *self = Self::start(self.eeprom.clone(), self.beginning.clone(), world, cause);
         prop_assert!(self.weeder.tool_out() && self.is_sent_out());
         Ok(())
