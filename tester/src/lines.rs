@@ -62,9 +62,3 @@ pub fn show(levels: u8) {
     // SAFETY: one instruction writes one byte, and each level of port C is valid.
     unsafe { (*PORTC::ptr()).portc().write(|w| w.bits(levels)) };
 }
-
-/// The levels of port C.
-pub fn shown() -> u8 {
-    // SAFETY: reading the port changes nothing.
-    unsafe { (*PORTC::ptr()).portc().read().bits() }
-}

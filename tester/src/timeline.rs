@@ -12,8 +12,8 @@ use avr_device::{
 };
 use core::cell::RefCell;
 use heapless::Deque;
-use tester_core::message::{QUEUE_PIECES, Record, Step};
-use tester_core::player::{Next, Piece, Player};
+use tester_core::message::{Record, Step};
+use tester_core::player::{Next, Player};
 use tester_core::station::Board;
 
 /// Longest wait set in the compare unit at once, in cycles. It is below half of the timer's range, which separates future from
@@ -34,7 +34,6 @@ const NO_PRESCALER: u8 = 1;
 
 struct Inner {
     player: Player,
-    queue: Deque<Piece, QUEUE_PIECES>,
     /// The compare unit's time, and the cycles from there to the event.
     armed: u16,
     left: u32,
@@ -42,25 +41,22 @@ struct Inner {
     /// The time of the pulse's beginning.
     rise: Option<u32>,
     measured: Deque<Record, 4>,
+    /// Pulses without room in `measured`.
     lost: u16,
-    is_lost_told: bool,
 }
 
 static INNER: Mutex<RefCell<Inner>> = Mutex::new(RefCell::new(Inner {
     player: Player::new(),
-    queue: Deque::new(),
     armed: 0,
     left: 0,
     overflows: 0,
     rise: None,
     measured: Deque::new(),
     lost: 0,
-    is_lost_told: true,
 }));
 
 /// The hardware as the loop uses it.
 pub struct Tester {
-    timer: TC1,
     pub lines: Lines,
 }
 
@@ -69,26 +65,17 @@ impl Tester {
     pub fn new(timer: TC1, lines: Lines) -> Self {
         // SAFETY: normal mode, the next edge is rising.
         timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
-        let tester = Self { timer, lines };
-        tester.enable(CAPTURE | OVERFLOW);
-        tester
-    }
-
-    fn enable(&self, interrupts: u8) {
         // SAFETY: the handlers of all three interrupts are below.
-        self.timer.timsk1().write(|w| unsafe { w.bits(interrupts) });
-    }
-
-    fn with<R>(&self, change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
-        interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &self.timer))
+        timer.timsk1().write(|w| unsafe { w.bits(CAPTURE | COMPARE | OVERFLOW) });
+        Self { lines }
     }
 
     /// The oldest measurement.
     pub fn measured(&self) -> Option<Record> {
-        self.with(|inner, _| {
+        with(|inner, _| {
             inner.measured.pop_front().or_else(|| {
-                let is_told = core::mem::replace(&mut inner.is_lost_told, true);
-                (!is_told).then_some(Record::Lost { pulses: inner.lost })
+                let lost = core::mem::take(&mut inner.lost);
+                (lost > 0).then_some(Record::Lost(lost))
             })
         })
     }
@@ -96,51 +83,27 @@ impl Tester {
 
 impl Board for Tester {
     fn now(&mut self) -> u32 {
-        self.with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
+        with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
     }
 
-    fn position(&mut self) -> i32 {
-        self.with(|inner, _| inner.player.position())
-    }
-
-    fn room(&mut self) -> u8 {
-        self.with(|inner, _| (QUEUE_PIECES - inner.queue.len()) as u8)
-    }
-
-    fn push(&mut self, piece: Piece) {
-        self.with(|inner, _| {
-            let _ = inner.queue.push_back(piece);
-        });
-    }
-
-    fn is_playing(&mut self) -> bool {
-        self.with(|inner, _| inner.player.is_playing())
+    fn player<R>(&mut self, access: impl FnOnce(&mut Player) -> R) -> R {
+        with(|inner, _| access(&mut inner.player))
     }
 
     fn start(&mut self) -> u32 {
-        self.enable(CAPTURE | COMPARE | OVERFLOW);
-        self.with(|inner, timer| {
+        with(|inner, timer| {
             let begin = timer.tcnt1().read().bits().wrapping_add(LEAD);
             let time = inner.time(timer, timer.tcnt1().read().bits());
             let time = time.wrapping_add(begin.wrapping_sub(time as u16).into());
             inner.armed = begin;
-            let Inner { player, queue, .. } = inner;
-            let next = player.start(|| queue.pop_front());
+            let next = inner.player.start();
             inner.follow(next, timer);
             time
         })
     }
 
-    fn stop(&mut self) {
-        self.enable(CAPTURE | OVERFLOW);
-        self.with(|inner, _| {
-            inner.player.stop();
-            inner.queue.clear();
-        });
-    }
-
     fn set(&mut self, mask: u8, levels: u8) {
-        self.with(|inner, _| {
+        with(|inner, _| {
             inner.player.set(mask, levels);
             lines::show(inner.player.levels());
         });
@@ -151,23 +114,20 @@ impl Board for Tester {
     }
 
     fn burst(&mut self, steps: &[Step], run_up: u16, repeats: u16, slower: u8) {
+        let levels = self.player(|player| player.levels());
         let levels = interrupt::free(|_| {
-            let levels = burst::play(steps, run_up, slower, lines::shown());
+            let levels = burst::play(steps, run_up, slower, levels);
             burst::play(steps, repeats, 0, levels)
         });
         self.set(u8::MAX, levels);
         // The clock has lost time, so a pulse that has begun is dropped.
-        self.with(|inner, timer| {
+        with(|inner, timer| {
             inner.rise = None;
             // SAFETY: the next edge is rising, and a captured edge is dropped.
             timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
             // SAFETY: writing 1 clears the flag.
             timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
         });
-    }
-
-    fn levels(&mut self) -> u8 {
-        lines::shown()
     }
 
     fn check_capture(&mut self, width: u16) {
@@ -191,11 +151,8 @@ impl Inner {
     fn follow(&mut self, next: Next, timer: &TC1) {
         match next {
             Next::After(wait) => self.wait(wait, timer),
-            Next::Ended => self.measure(Record::Ended { position: self.player.position() }),
-            Next::Dry => {
-                self.player.stop();
-                self.measure(Record::Dry);
-            }
+            Next::Ended => self.measure(Record::Ended(self.player.position())),
+            Next::Dry => self.measure(Record::Dry),
         }
     }
 
@@ -217,8 +174,7 @@ impl Inner {
                 self.wait(self.left, timer);
                 continue;
             }
-            let Self { player, queue, .. } = self;
-            let next = player.fire(|| queue.pop_front());
+            let next = self.player.fire();
             lines::show(self.player.levels());
             self.follow(next, timer);
         }
@@ -245,32 +201,31 @@ impl Inner {
     fn measure(&mut self, record: Record) {
         if self.measured.push_back(record).is_err() {
             self.lost = self.lost.saturating_add(1);
-            self.is_lost_told = false;
         }
     }
 }
 
-/// Runs a change from a handler of this file.
-fn interrupted(change: impl FnOnce(&mut Inner, &TC1)) {
-    // SAFETY: the loop uses the timer only in critical sections, or to write single bytes that no handler writes.
+/// Runs a change from the loop or a handler, without an interrupt meanwhile.
+fn with<R>(change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
+    // SAFETY: once `Tester::new` has started the timer, only this critical section uses it.
     let timer = unsafe { TC1::steal() };
-    interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &timer));
+    interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &timer))
 }
 
 // An edge on the servo's line.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER1_CAPT() {
-    interrupted(Inner::capture);
+    with(Inner::capture);
 }
 
 // An event is due.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER1_COMPA() {
-    interrupted(Inner::fire);
+    with(Inner::fire);
 }
 
 // The counter has overflowed.
 #[avr_device::interrupt(atmega328p)]
 fn TIMER1_OVF() {
-    interrupted(|inner, _| inner.overflows = inner.overflows.wrapping_add(1));
+    with(|inner, _| inner.overflows = inner.overflows.wrapping_add(1));
 }

@@ -4,16 +4,15 @@
 //! Each scene begins at work with the tool in, on ground that the weeder takes as seen. Times count from the fault's
 //! edge to the first pulse for out.
 
-use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo::{self, ORIGIN};
-use crate::tester::{Tester, ms};
-use crate::wiring::{self, Weeder};
+use crate::tester::ms;
+use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use tester_core::message::{Command, Record};
 use tester_core::pins::{AT_REST, Line};
 use tester_core::player::Action;
-use uno::{CYCLES_PER_SECOND, Pulse};
+use uno::CYCLES_PER_SECOND;
 
 /// From the plan's start to the fault, or to the roll before it, in ms.
 const STILL_MS: u32 = 200;
@@ -27,86 +26,83 @@ const COUNTS_PER_S: f64 = 1000.0;
 /// A quarter of a second of the LED, in ms: 2^16 steps of 4 us.
 const QUARTER_MS: f64 = 262.144;
 
-/// A width between the factory settings' in (1500 us) and out (2000 us).
-const MIDDLE_US: f64 = 1750.0;
-
-/// The faults.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scene {
-    /// The beam stays broken while the machine rolls on.
-    BlockedBeam,
-    /// The beam changes every millisecond while the machine rolls on.
-    FlickeringBeam,
-    /// The beam breaks three times, and the encoder is silent.
-    SilentEncoder,
-    /// Channel B stops while the machine rolls on.
-    DeadChannel,
-    /// The end switch closes while the tool is in.
-    EndSwitch,
-}
-
-impl Scene {
-    /// Every scene.
-    pub const ALL: [Self; 5] =
-        [Self::BlockedBeam, Self::FlickeringBeam, Self::SilentEncoder, Self::DeadChannel, Self::EndSwitch];
-
-    /// The expected reaction.
-    pub const fn expected(self) -> Expected {
-        let (alarm, words, limit_ms) = match self {
-            // The tool first goes out for a plant. The alarm comes after `max_width_mm`, 400 mm: 764 counts of the scene.
-            Self::BlockedBeam => (Alarm::BeamBlocked, "blocked beam", 794.0),
-            // 41 edges.
-            Self::FlickeringBeam => (Alarm::BeamFlickers, "flickering beam", 71.0),
-            // Three breaks of 150 ms each and 150 ms between.
-            Self::SilentEncoder => (Alarm::EncoderSilent, "silent encoder", 780.0),
-            // More than 80 edges in 0.5 s.
-            Self::DeadChannel => (Alarm::EncoderChannelDead, "dead encoder channel", 530.0),
-            // `lead_out_ms` of 230 ms, and 100 ms.
-            Self::EndSwitch => (Alarm::ToolStuck, "end switch closed with the tool in", 360.0),
-        };
-        Expected { alarm, words, limit_ms }
-    }
-
-    /// The plan, and the cycle of the fault.
-    fn plan(self) -> (Plan, u64) {
-        let mut plan = Plan::new();
-        plan.at(ms(STILL_MS).into(), Action::Pause);
-        match self {
-            Self::BlockedBeam | Self::DeadChannel => plan.roll(300, COUNTS_PER_S),
-            Self::FlickeringBeam => plan.roll(100, COUNTS_PER_S),
-            Self::SilentEncoder | Self::EndSwitch => {}
-        }
-        let fault = plan.end() + u64::from(ms(if self == Self::EndSwitch { 200 } else { 1 }));
-        match self {
-            Self::BlockedBeam => {
-                plan.at(fault, Action::level(Line::Beam, false));
-                plan.roll(1000, COUNTS_PER_S);
-            }
-            Self::FlickeringBeam => plan.repeat(200, ms(1), Action::Flicker { mask: Line::Beam.bit() }),
-            Self::SilentEncoder => {
-                for edge in 0..6 {
-                    plan.at(fault + u64::from(ms(150 * edge)), Action::level(Line::Beam, edge % 2 == 1));
-                }
-            }
-            Self::DeadChannel => {
-                plan.at(fault, Action::Freeze { mask: Line::EncoderB.bit() });
-                plan.roll(700, COUNTS_PER_S);
-            }
-            Self::EndSwitch => plan.at(fault, Action::level(Line::EndSwitch, false)),
-        }
-        (plan, fault)
-    }
-}
-
-/// The expected reaction to a scene.
-pub struct Expected {
+/// A fault, and the expected reaction.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene {
     /// The alarm.
     pub alarm: Alarm,
     /// The scene's description in the report.
     pub words: &'static str,
     /// The time limit until the tool is out, in ms: the manual's limit, and a frame and a half of the servo.
     pub limit_ms: f64,
+    /// Counts that the machine rolls before the fault, and the time from there to the fault in ms.
+    rolled: i32,
+    wait_ms: u32,
+    /// Adds the fault to a plan, from a cycle on.
+    fault: fn(&mut Plan, u64),
 }
+
+/// Every scene.
+pub const SCENES: [Scene; 5] = [
+    Scene {
+        alarm: Alarm::BeamBlocked,
+        words: "blocked beam",
+        // The tool first goes out for a plant. The alarm comes after `max_width_mm`, 400 mm: 764 counts of the scene.
+        limit_ms: 794.0,
+        rolled: 300,
+        wait_ms: 1,
+        // The beam stays broken while the machine rolls on.
+        fault: |plan, at| {
+            plan.at(at, Action::level(Line::Beam, false));
+            plan.roll(1000, COUNTS_PER_S);
+        },
+    },
+    Scene {
+        alarm: Alarm::BeamFlickers,
+        words: "flickering beam",
+        // 41 edges.
+        limit_ms: 71.0,
+        rolled: 100,
+        wait_ms: 1,
+        // The beam changes every millisecond while the machine rolls on.
+        fault: |plan, _| plan.repeat(200, ms(1), Action::Flicker { mask: Line::Beam.bit() }),
+    },
+    Scene {
+        alarm: Alarm::EncoderSilent,
+        words: "silent encoder",
+        // Three breaks of 150 ms each and 150 ms between.
+        limit_ms: 780.0,
+        rolled: 0,
+        wait_ms: 1,
+        fault: |plan, at| {
+            for edge in 0..6 {
+                plan.at(at + u64::from(ms(150 * edge)), Action::level(Line::Beam, edge % 2 == 1));
+            }
+        },
+    },
+    Scene {
+        alarm: Alarm::EncoderChannelDead,
+        words: "dead encoder channel",
+        // More than 80 edges in 0.5 s.
+        limit_ms: 530.0,
+        rolled: 300,
+        wait_ms: 1,
+        // Channel B stops while the machine rolls on.
+        fault: |plan, at| {
+            plan.at(at, Action::Freeze { mask: Line::EncoderB.bit() });
+            plan.roll(700, COUNTS_PER_S);
+        },
+    },
+    Scene {
+        alarm: Alarm::ToolStuck,
+        words: "end switch closed with the tool in",
+        // `lead_out_ms` of 230 ms, and 100 ms.
+        limit_ms: 360.0,
+        rolled: 0,
+        wait_ms: 200,
+        fault: |plan, at| plan.at(at, Action::level(Line::EndSwitch, false)),
+    },
+];
 
 /// The result of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,114 +115,7 @@ pub struct Raised {
     pub code: f64,
 }
 
-/// Plays a scene. The weeder is in hold afterwards.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn play(scene: Scene, weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<Raised, CheckError> {
-    to_work(weeder, tester, scene == Scene::EndSwitch)?;
-    let (mut plan, fault) = scene.plan();
-    plan.at(fault + u64::from(ms(AFTER_MS)), Action::Pause);
-    let played = tester.play(&plan.finish(), || weeder.drain())?;
-    let status = weeder.status()?;
-    let alarm = scene.expected().alarm;
-    let (first, second) = alarm.code();
-    // The record may begin at any phase: so it must hold a code with the pauses before and after it.
-    let code_ms = f64::from(2 * (2 * u16::from(first + second) + 8) + 10) * QUARTER_MS;
-    let records = tester.record_for_ms(code_ms as u32)?;
-    tester.play(&freed(), || weeder.drain())?;
-    tester.set(AT_REST, AT_REST)?;
-    tester.record_for_ms(STILL_MS)?;
-    weeder.to_hold()?;
-    let out_ms = first_out(&servo::pulses(&played.records, played.start), ORIGIN + fault, clock_ratio);
-    let code = code(&records, clock_ratio).map_or(f64::NAN, |(first, second)| f64::from(10 * first + second));
-    Ok(Raised { out_ms, is_expected: status.alarm == Some(alarm), code })
-}
-
-/// Frees every line of a plan.
-fn freed() -> Vec<tester_core::player::Piece> {
-    let mut plan = Plan::new();
-    plan.at(u64::from(ms(1)), Action::Freeze { mask: 0 });
-    plan.finish()
-}
-
-/// Puts the weeder to work with the tool in, and with the end switch if `has_end_switch` is set.
-fn to_work(weeder: &mut Weeder, tester: &mut Tester, has_end_switch: bool) -> Result<(), CheckError> {
-    // The weeder's memory of an earlier scene or burst, such as a wheel that stopped suddenly, counts toward some
-    // alarms. A reset clears it.
-    wiring::reset(weeder, tester)?;
-    weeder.to_hold()?;
-    let end_switch = Line::EndSwitch.bit();
-    if has_end_switch {
-        tester.set(end_switch, 0)?;
-        tester.record_for_ms(STILL_MS)?;
-        weeder.ask("set end_switch on")?;
-    }
-    weeder.ask("start now")?;
-    tester.set(end_switch, end_switch)?;
-    tester.record_for_ms(2 * STILL_MS)?;
-    Ok(())
-}
-
-/// From a moment to the beginning of the next pulse for out, in ms; infinite without one, and NaN if the tool was out
-/// before.
-fn first_out(pulses: &[Pulse], moment: u64, clock_ratio: f64) -> f64 {
-    let is_out = |pulse: &&Pulse| pulse.width_us() * clock_ratio > MIDDLE_US;
-    let behind = pulses.iter().position(|pulse| pulse.rise >= moment).unwrap_or(pulses.len());
-    // If the tool was already out, the pulse does not show the reaction to the fault.
-    if pulses[..behind].last().is_none_or(|last| is_out(&last)) {
-        return f64::NAN;
-    }
-    let first = pulses[behind..].iter().find(is_out).map(|pulse| (pulse.rise - moment) as f64);
-    first.map_or(f64::INFINITY, |cycles| cycles * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio)
-}
-
-/// The LED's code between two pauses, if there is one.
-fn code(records: &[Record], clock_ratio: f64) -> Option<(u8, u8)> {
-    let lit = |record: &Record| match *record {
-        Record::Led { time, lit: true } => Some(time),
-        _ => None,
-    };
-    let rises: Vec<u32> = records.iter().filter_map(lit).collect();
-    // From a flash to the next are two quarters. The gap between the digits makes it four, and the pause eight.
-    let gaps = rises.windows(2).map(|two| {
-        let ms = f64::from(two[1].wrapping_sub(two[0])) * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
-        (ms / QUARTER_MS).round() as u32
-    });
-    let mut digits = [0_u8; 2];
-    let (mut digit, mut is_begun) = (0, false);
-    for gap in gaps {
-        if is_begun {
-            *digits.get_mut(digit)? += 1;
-        }
-        match gap {
-            2 => {}
-            4 => digit += 1,
-            8 if is_begun => return (digit == 1).then_some((digits[0], digits[1])),
-            8 => (is_begun, digit) = (true, 0),
-            _ => return None,
-        }
-    }
-    None
-}
-
-/// From the work switch's opening to the first pulse for out, in ms.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn switch_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
-    tester.set(Line::WorkSwitch.bit(), 0)?;
-    // `start now` at work would skip the unseen ground, so `to_work` first goes to hold.
-    to_work(weeder, tester, false)?;
-    let mut plan = Plan::new();
-    plan.at(u64::from(ms(2 * STILL_MS)), Action::level(Line::WorkSwitch, true));
-    let opened = plan.end();
-    plan.at(opened + u64::from(ms(AFTER_MS)), Action::Pause);
-    let played = tester.play(&plan.finish(), || weeder.drain())?;
-    Ok(first_out(&servo::pulses(&played.records, played.start), ORIGIN + opened, clock_ratio))
-}
-
-/// The machine for [`beam_to_window_ms`]: beam and tool 100 mm apart, a margin of 50 mm, and no lead.
+/// The machine for [`Boards::beam_to_window_ms`]: beam and tool 100 mm apart, a margin of 50 mm, and no lead.
 const NEAR_MACHINE: [&str; 4] = ["top_speed_mm_s 200", "lead_out_ms 0", "margin_mm 50", "beam_to_tool_mm 100"];
 
 /// From the beam's edge to the keep-out zone: 50 mm in counts of the factory settings' wheel, 400 mm and 2400 counts
@@ -236,44 +125,132 @@ const WINDOW_COUNTS: f64 = 50.0 * 2400.0 / (std::f64::consts::PI * 400.0);
 /// Counts a second there: 0.1 m/s.
 const SLOW_COUNTS_PER_S: f64 = 191.0;
 
-/// From the moment that a keep-out zone is due at the tool to the first pulse for out, in ms; negative if the pulse
-/// comes first. The zone follows from the beam's edge, half a second before.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn beam_to_window_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
-    weeder.to_hold()?;
-    for setting in NEAR_MACHINE {
-        weeder.ask(&format!("set {setting}"))?;
+impl Boards {
+    /// Plays a scene. The weeder is in hold afterwards.
+    pub fn play_scene(&mut self, scene: &Scene) -> Result<Raised, CheckError> {
+        self.set_to_work(scene.alarm == Alarm::ToolStuck)?;
+        let mut plan = Plan::new();
+        plan.at(ms(STILL_MS).into(), Action::Pause);
+        plan.roll(scene.rolled, COUNTS_PER_S);
+        let fault = plan.end() + u64::from(ms(scene.wait_ms));
+        (scene.fault)(&mut plan, fault);
+        plan.at(fault + u64::from(ms(AFTER_MS)), Action::Pause);
+        let played = self.play(plan)?;
+        let status = self.weeder.status()?;
+        let (first, second) = scene.alarm.code();
+        // The record may begin at any phase: so it must hold a code with the pauses before and after it.
+        let code_ms = f64::from(2 * (2 * u16::from(first + second) + 8) + 10) * QUARTER_MS;
+        let records = self.tester.record_for_ms(code_ms as u32)?;
+        let mut free = Plan::new();
+        free.at(ms(1).into(), Action::Freeze { mask: 0 });
+        self.play(free)?;
+        self.tester.set(AT_REST, AT_REST)?;
+        self.tester.record_for_ms(STILL_MS)?;
+        self.weeder.to_hold()?;
+        Ok(Raised {
+            out_ms: self.first_out_ms(&played.records, played.start, fault),
+            is_expected: status.alarm == Some(scene.alarm),
+            code: code(&records, self.clock_ratio).map_or(f64::NAN, |(first, second)| f64::from(10 * first + second)),
+        })
     }
-    weeder.ask("start now")?;
-    tester.record_for_ms(2 * STILL_MS)?;
-    let mut plan = Plan::new();
-    plan.roll(100, SLOW_COUNTS_PER_S);
-    plan.at(plan.end(), Action::level(Line::Beam, false));
-    let edge = plan.end();
-    plan.roll(150, SLOW_COUNTS_PER_S);
-    plan.at(plan.end(), Action::level(Line::Beam, true));
-    let played = tester.play(&plan.finish(), || weeder.drain())?;
-    weeder.to_hold()?;
-    let out_ms = first_out(&servo::pulses(&played.records, played.start), ORIGIN + edge, clock_ratio);
-    Ok(out_ms - WINDOW_COUNTS * 1000.0 / SLOW_COUNTS_PER_S * clock_ratio)
+
+    /// Puts the weeder to work with the tool in, and with the end switch if `has_end_switch` is set.
+    fn set_to_work(&mut self, has_end_switch: bool) -> Result<(), CheckError> {
+        // The weeder's memory of an earlier scene or burst, such as a wheel that stopped suddenly, counts toward some
+        // alarms. A reset clears it.
+        self.reset()?;
+        self.weeder.to_hold()?;
+        let end_switch = Line::EndSwitch.bit();
+        if has_end_switch {
+            self.tester.set(end_switch, 0)?;
+            self.tester.record_for_ms(STILL_MS)?;
+            self.weeder.ask("set end_switch on")?;
+        }
+        self.weeder.ask("start now")?;
+        self.tester.set(end_switch, end_switch)?;
+        self.tester.record_for_ms(2 * STILL_MS)?;
+        Ok(())
+    }
+
+    /// From a moment to the beginning of the next pulse for out, in ms; infinite without one, and NaN if the tool was
+    /// out before. The moment counts in cycles from `start`.
+    fn first_out_ms(&self, records: &[Record], start: u32, moment: u64) -> f64 {
+        let (pulses, moment) = (servo::pulses(records, start), ORIGIN + moment);
+        let (before, behind) = pulses.split_at(pulses.partition_point(|pulse| pulse.rise < moment));
+        // If the tool was already out, the pulse does not show the reaction to the fault.
+        if before.last().is_none_or(|last| self.is_out(last)) {
+            return f64::NAN;
+        }
+        let first = behind.iter().find(|pulse| self.is_out(pulse));
+        first.map_or(f64::INFINITY, |pulse| self.weeder_ms(pulse.rise - moment))
+    }
+
+    /// From the work switch's opening to the first pulse for out, in ms.
+    pub fn switch_to_out_ms(&mut self) -> Result<f64, CheckError> {
+        self.tester.set(Line::WorkSwitch.bit(), 0)?;
+        // `start now` at work would skip the unseen ground, so `set_to_work` first goes to hold.
+        self.set_to_work(false)?;
+        let mut plan = Plan::new();
+        plan.at(u64::from(ms(2 * STILL_MS)), Action::level(Line::WorkSwitch, true));
+        let opened = plan.end();
+        plan.at(opened + u64::from(ms(AFTER_MS)), Action::Pause);
+        let played = self.play(plan)?;
+        Ok(self.first_out_ms(&played.records, played.start, opened))
+    }
+
+    /// From the moment that a keep-out zone is due at the tool to the first pulse for out, in ms; negative if the pulse
+    /// comes first. The zone follows from the beam's edge, half a second before.
+    pub fn beam_to_window_ms(&mut self) -> Result<f64, CheckError> {
+        self.weeder.to_hold()?;
+        for setting in NEAR_MACHINE {
+            self.weeder.ask(&format!("set {setting}"))?;
+        }
+        self.weeder.ask("start now")?;
+        self.tester.record_for_ms(2 * STILL_MS)?;
+        let mut plan = Plan::new();
+        plan.roll(100, SLOW_COUNTS_PER_S);
+        plan.at(plan.end(), Action::level(Line::Beam, false));
+        let edge = plan.end();
+        plan.roll(150, SLOW_COUNTS_PER_S);
+        plan.at(plan.end(), Action::level(Line::Beam, true));
+        let played = self.play(plan)?;
+        self.weeder.to_hold()?;
+        let out_ms = self.first_out_ms(&played.records, played.start, edge);
+        Ok(out_ms - WINDOW_COUNTS * 1000.0 / SLOW_COUNTS_PER_S * self.clock_ratio)
+    }
+
+    /// From typing `hold` to the first pulse for out, in ms. This includes the delays of the computer and of the serial
+    /// lines.
+    pub fn hold_to_out_ms(&mut self) -> Result<f64, CheckError> {
+        self.set_to_work(false)?;
+        let mut records = self.tester.record_for_ms(STILL_MS)?;
+        let typed = self.tester.command(&Command::Clock)?.time;
+        self.weeder.send("hold")?;
+        records.extend(self.tester.record_for_ms(AFTER_MS)?);
+        self.weeder.drain()?;
+        self.weeder.to_hold()?;
+        Ok(self.first_out_ms(&records, typed, 0))
+    }
 }
 
-/// From typing `hold` to the first pulse for out, in ms. This includes the delays of the computer and of the serial
-/// lines.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn hold_to_out_ms(weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<f64, CheckError> {
-    to_work(weeder, tester, false)?;
-    let mut records = tester.record_for_ms(STILL_MS)?;
-    let typed = tester.command(&Command::Clock)?.time;
-    weeder.send("hold")?;
-    records.extend(tester.record_for_ms(AFTER_MS)?);
-    weeder.drain()?;
-    weeder.to_hold()?;
-    Ok(first_out(&servo::pulses(&records, typed), ORIGIN, clock_ratio))
+/// The LED's code between two pauses, if there is one. `clock_ratio` is the weeder's clock over the tester's.
+fn code(records: &[Record], clock_ratio: f64) -> Option<(u8, u8)> {
+    let lit = |record: &Record| match *record {
+        Record::Led { time, lit: true } => Some(time),
+        _ => None,
+    };
+    let rises: Vec<u32> = records.iter().filter_map(lit).collect();
+    let gap = |two: &[u32]| {
+        let ms = f64::from(two[1].wrapping_sub(two[0])) * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
+        (ms / QUARTER_MS).round() as u32
+    };
+    let gaps: Vec<u32> = rises.windows(2).map(gap).collect();
+    // From a flash to the next are two quarters. The gap between the digits makes it four, and the pause eight.
+    let mut codes = gaps.split(|&gap| gap == 8).skip(1);
+    let (code, _behind_the_pause) = (codes.next()?, codes.next()?);
+    let (first, second) = code.split_at(code.iter().position(|&gap| gap == 4)?);
+    let is_code = first.iter().chain(&second[1..]).all(|&gap| gap == 2);
+    is_code.then_some((first.len() as u8 + 1, second.len() as u8))
 }
 
 #[cfg(test)]

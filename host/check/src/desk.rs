@@ -6,7 +6,6 @@ use crate::pair::{Pair, Side, Wiring};
 use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use uno::CYCLES_PER_SECOND;
 use uno::pty::Pty;
@@ -19,8 +18,9 @@ const STOPPED: &str = "the virtual Unos do not run";
 
 /// Two virtual Unos. Dropped, they stop.
 pub struct Desk {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<Result<()>>>,
+    /// Their thread ends when this is dropped.
+    alive: Arc<()>,
+    thread: JoinHandle<Result<()>>,
     tester: PathBuf,
     weeder: PathBuf,
 }
@@ -33,17 +33,14 @@ impl Desk {
     pub fn start(tester_elf: &Path, weeder_elf: &Path, second: Option<&Path>) -> Result<Self> {
         let (tester_pty, weeder_pty) = (Pty::open()?, Pty::open()?);
         let (tester, weeder) = (tester_pty.path().to_owned(), weeder_pty.path().to_owned());
-        let stop = Arc::new(AtomicBool::new(false));
-        let is_to_stop = Arc::clone(&stop);
+        let alive = Arc::new(());
+        let is_alive = Arc::downgrade(&alive);
         let elves = (tester_elf.to_owned(), weeder_elf.to_owned());
         let second = second.map(Path::to_owned);
         let run = move || {
-            let mut pair = match second {
-                Some(program) => Pair::with_second_simulator(&elves.0, &elves.1, &program)?,
-                None => Pair::power_up(&elves.0, &elves.1, Wiring::right())?,
-            };
+            let mut pair = Pair::power_up(&elves.0, &elves.1, second.as_deref(), Wiring::right())?;
             let mut ptys = [(Side::Tester, tester_pty), (Side::Weeder, weeder_pty)];
-            while !is_to_stop.load(Ordering::Relaxed) {
+            while is_alive.strong_count() > 0 {
                 for (side, pty) in &mut ptys {
                     take_turn(&mut pair, *side, pty)?;
                 }
@@ -52,7 +49,7 @@ impl Desk {
             Ok(())
         };
         let thread = thread::Builder::new().name("desk".to_owned()).spawn(run).context(STOPPED)?;
-        Ok(Self { stop, thread: Some(thread), tester, weeder })
+        Ok(Self { alive, thread, tester, weeder })
     }
 
     /// The tester's port.
@@ -69,16 +66,9 @@ impl Desk {
     ///
     /// # Errors
     /// If one of them had stopped already.
-    pub fn stop(mut self) -> Result<()> {
-        self.stop.store(true, Ordering::Relaxed);
-        let panicked = |_| Err(anyhow!("{STOPPED}: the thread panicked"));
-        self.thread.take().map_or(Ok(()), |thread| thread.join().unwrap_or_else(panicked))
-    }
-}
-
-impl Drop for Desk {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
+    pub fn stop(self) -> Result<()> {
+        drop(self.alive);
+        self.thread.join().unwrap_or_else(|_| Err(anyhow!("{STOPPED}: the thread panicked")))
     }
 }
 

@@ -1,21 +1,20 @@
 //! Checks a real board by a second one, the tester.
 //!
-//! [`mod@run`] runs the whole check. [`wiring`] finds missing and swapped wires. [`servo`] measures pulses and the
-//! clocks' ratio. [`rates`] turns the encoder at its highest rates. [`alarms`] plays faults. [`resets`] resets the
-//! weeder at work and during a save. [`row`] lets it weed a row. [`report`] lists measured, simulated and proved
-//! figures side by side.
+//! [`mod@run`] runs the whole check of two [`boards`]. [`wiring`] finds missing and swapped wires. [`servo`] measures
+//! pulses and the clocks' ratio. [`rates`] turns the encoder at its highest rates. [`alarms`] plays faults. [`resets`]
+//! resets the weeder at work and during a save. [`row`] lets it weed a row. [`report`] lists measured, simulated and
+//! proved figures side by side.
 //!
-//! [`ports`] finds both boards. [`tester`] talks to the tester, and `link` to the weeder. [`plan`] turns levels at
-//! cycles into a plan. [`pair`] replaces the boards by two virtual Unos, wired to each other. [`second`] replaces one
-//! of them by another simulator's, [`desk`] connects them to ports, and [`drawing`] draws the wires.
+//! [`tester`] talks to the tester, and `link` to the weeder. [`plan`] turns levels at cycles into a plan. [`pair`]
+//! replaces the boards by two virtual Unos, wired to each other. [`second`] replaces one of them by another
+//! simulator's, [`desk`] connects them to ports, and [`drawing`] draws the wires.
 
 pub mod alarms;
+pub mod boards;
 pub mod desk;
 pub mod drawing;
-pub mod error;
 pub mod pair;
 pub mod plan;
-pub mod ports;
 pub mod rates;
 pub mod report;
 pub mod resets;
@@ -26,4 +25,61 @@ pub mod servo;
 pub mod tester;
 pub mod wiring;
 
-pub use self::error::CheckError;
+pub use self::boards::Boards;
+
+use link::LinkError;
+use link::examples::ExamplesError;
+use std::io;
+use tester_core::message::{PROTOCOL, Refusal};
+use thiserror::Error;
+
+/// Why a check could not go on.
+#[derive(Debug, Error)]
+pub enum CheckError {
+    /// The weeder's console gave an unexpected answer.
+    #[error("the weeder")]
+    Weeder(#[from] LinkError),
+    /// The weeder's answer lacks a part.
+    #[error("the weeder's answer to `{0}` is not understood: flash the firmware that belongs to this command")]
+    Answer(&'static str),
+    /// The weeder's examples cannot be read or taught.
+    #[error("the weeder's examples")]
+    Examples(#[from] ExamplesError),
+    /// The user has interrupted the check.
+    #[error("interrupted: the weeder has its saved settings and examples again")]
+    Interrupted,
+    /// The tester's port cannot be opened.
+    #[error("the tester")]
+    TesterPort(#[source] LinkError),
+    /// No Uno is the board that is looked for.
+    #[error(
+        "no {0} answers at an Uno's port (looked at: {1}): connect and flash both boards, or name them by --port and --tester"
+    )]
+    NotFound(&'static str, String),
+    /// The tester does not answer.
+    #[error(
+        "the tester does not answer: flash it with the tester's firmware, and check that --port and --tester are not swapped"
+    )]
+    TesterSilent,
+    /// The tester's port is gone.
+    #[error("the tester's port is gone")]
+    TesterGone(#[source] io::Error),
+    /// The tester has another protocol.
+    #[error("the tester has version {0} of the protocol, and this command has {PROTOCOL}: flash the tester again")]
+    Protocol(u8),
+    /// The tester refused a command.
+    #[error("the tester refused a command ({0:?}): this is a defect of the check")]
+    Refused(Refusal),
+    /// Records of the tester are missing.
+    #[error("{0} records of the tester are missing: use a shorter cable, or another USB port")]
+    Missing(u32),
+    /// The plan did not reach the tester in time.
+    #[error("the plan reached the tester too late: close other programs, or use another USB port")]
+    Dry,
+    /// The servo's line has fallen silent.
+    #[error("the servo's pulses have stopped: check the wire from D9 of the weeder to D8 of the tester")]
+    NoPulses,
+    /// The row or machine cannot be made.
+    #[error("the simulated row cannot be made: {0}")]
+    Row(String),
+}

@@ -5,13 +5,12 @@
 //! the tester always [`STEP`] cycles late, so widths and distances are right. Tests of the check use a wrong [`Wiring`]
 //! on purpose.
 
+use crate::plan::INPUTS;
 use crate::second::SecondUno;
 use anyhow::Result;
-use std::cell::RefCell;
+use field::wiring;
 use std::collections::VecDeque;
-use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use tester_core::pins::Line;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno};
 
@@ -24,15 +23,9 @@ const STEPS_TO_RESET: u64 = 64;
 /// The difference of the clocks in parts per million: the weeder's is faster by 0.3 %.
 pub const CLOCK_PPM: i64 = 3000;
 
-/// The tester's pins; the firmware's own are in `tester/src/lines.rs`.
-const TESTER_LINES: [(Line, Pin); 6] = [
-    (Line::EncoderA, Pin::A0),
-    (Line::EncoderB, Pin::A1),
-    (Line::Beam, Pin::A2),
-    (Line::SecondBeam, Pin::A3),
-    (Line::EndSwitch, Pin::A4),
-    (Line::WorkSwitch, Pin::A5),
-];
+/// The tester's pins; the firmware's own are in `tester/src/lines.rs`. Those of its lines are in the order of
+/// [`Line::ALL`].
+const TESTER_LINES: [Pin; 6] = [Pin::A0, Pin::A1, Pin::A2, Pin::A3, Pin::A4, Pin::A5];
 const TESTER_RESET: Pin = Pin::D7;
 const TESTER_LED: Pin = Pin::D6;
 const TESTER_SERVO: Pin = Pin::D8;
@@ -67,12 +60,10 @@ pub struct Wiring {
 impl Wiring {
     /// The correct wiring.
     pub fn right() -> Self {
-        use field::wiring::{BEAM, ENCODER_A, ENCODER_B, END_SWITCH, LED, SECOND_BEAM, SERVO, WORK_SWITCH};
-        let pins = [ENCODER_A, ENCODER_B, BEAM, SECOND_BEAM, END_SWITCH, WORK_SWITCH];
         Self {
-            inputs: Line::ALL.into_iter().zip(pins).map(|(line, pin)| (line, pin, false)).collect(),
+            inputs: INPUTS.map(|(line, pin)| (line, pin, false)).to_vec(),
             has_reset: true,
-            outputs: vec![SERVO, LED],
+            outputs: vec![wiring::SERVO, wiring::LED],
             clock_ppm: CLOCK_PPM,
             from_weeder: Box::new(Some),
             to_weeder: Box::new(Some),
@@ -103,7 +94,7 @@ impl WeederUno {
     }
 }
 
-/// The two boards.
+/// The two boards. Its methods fail if one of them stops.
 pub struct Pair {
     tester: Uno,
     weeder: WeederUno,
@@ -119,39 +110,29 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Powers both up, with an erased EEPROM of the weeder.
-    ///
-    /// # Errors
-    /// If an ELF cannot be run.
-    pub fn power_up(tester: &Path, weeder: &Path, wiring: Wiring) -> Result<Self> {
-        let weeder_uno = Uno::boot(weeder)?.wired(&field::wiring::WIRES);
-        Ok(Self::of(Uno::boot(tester)?, WeederUno::Own(weeder_uno), weeder, wiring))
-    }
-
-    /// The same, but `program` runs the weeder in another simulator.
+    /// Powers both up, with an erased EEPROM of the weeder. `second` is the program of another simulator that runs the
+    /// weeder.
     ///
     /// # Errors
     /// If an ELF cannot be run, or the other simulator.
-    pub fn with_second_simulator(tester: &Path, weeder: &Path, program: &Path) -> Result<Self> {
-        let second = SecondUno::power_up(program, weeder)?;
-        Ok(Self::of(Uno::boot(tester)?, WeederUno::Second(second), weeder, Wiring::right()))
-    }
-
-    fn of(tester: Uno, weeder: WeederUno, weeder_elf: &Path, wiring: Wiring) -> Self {
-        let shared = (tester.cycle(), weeder.cycle());
-        let (from_tester, from_weeder) = (VecDeque::new(), VecDeque::new());
-        Self {
+    pub fn power_up(tester: &Path, weeder_elf: &Path, second: Option<&Path>, wiring: Wiring) -> Result<Self> {
+        let tester = Uno::boot(tester)?;
+        let weeder = match second {
+            Some(program) => WeederUno::Second(SecondUno::power_up(program, weeder_elf)?),
+            None => WeederUno::Own(Uno::boot(weeder_elf)?.wired(&wiring::WIRES)),
+        };
+        Ok(Self {
+            shared: (tester.cycle(), weeder.cycle()),
             tester,
             weeder,
             weeder_elf: weeder_elf.to_owned(),
             wiring,
-            shared,
             steps: 0,
             is_reset_pulled: false,
             resets: 0,
-            from_tester,
-            from_weeder,
-        }
+            from_tester: VecDeque::new(),
+            from_weeder: VecDeque::new(),
+        })
     }
 
     fn weeder_cycle(&self, tester_cycle: u64) -> u64 {
@@ -165,9 +146,6 @@ impl Pair {
     }
 
     /// Lets the tester's clock run by this number of cycles, and the weeder's for the same time.
-    ///
-    /// # Errors
-    /// If one of them stops.
     pub fn run_for(&mut self, cycles: u64) -> Result<()> {
         let end = self.tester.cycle() + cycles;
         while self.tester.cycle() < end {
@@ -211,7 +189,7 @@ impl Pair {
             if let (Some(corrupt), WeederUno::Own(weeder)) = (&mut self.wiring.eeprom_at_reset, &mut self.weeder) {
                 let mut eeprom = weeder.eeprom();
                 corrupt(&mut eeprom);
-                *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&field::wiring::WIRES);
+                *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&wiring::WIRES);
             }
             self.shared = (self.tester.cycle(), self.weeder.cycle());
             self.reset_weeder()?;
@@ -222,9 +200,6 @@ impl Pair {
     }
 
     /// Resets a board, as opening its port does by the modem line DTR.
-    ///
-    /// # Errors
-    /// If the second simulator has ended.
     pub fn reset(&mut self, side: Side) -> Result<()> {
         self.resets += 1;
         match side {
@@ -278,10 +253,10 @@ impl Pair {
     }
 
     fn carry_to_weeder(&mut self, change: PinChange) {
-        let Some(&(line, _)) = TESTER_LINES.iter().find(|&&(_, pin)| pin == change.pin) else { return };
+        let Some(number) = TESTER_LINES.iter().position(|&pin| pin == change.pin) else { return };
         let Some(change) = (self.wiring.to_weeder)(change) else { return };
         let cycle = self.weeder_cycle(change.cycle);
-        let wires = self.wiring.inputs.iter().filter(|&&(wired, ..)| wired == line);
+        let wires = self.wiring.inputs.iter().filter(|wire| wire.0 == Line::ALL[number]);
         let changes = wires.map(|&(_, pin, inverted)| PinChange { cycle, pin, high: change.high != inverted });
         with!(&mut self.weeder, uno => uno.drive(changes));
     }
@@ -291,7 +266,7 @@ impl Pair {
             if !self.wiring.outputs.contains(&change.pin) {
                 continue;
             }
-            let pin = if change.pin == field::wiring::SERVO { TESTER_SERVO } else { TESTER_LED };
+            let pin = if change.pin == wiring::SERVO { TESTER_SERVO } else { TESTER_LED };
             let change = PinChange { cycle: self.tester_cycle(change.cycle) + STEP, pin, ..change };
             self.tester.drive((self.wiring.from_weeder)(change));
         }
@@ -305,39 +280,4 @@ pub enum Side {
     Tester,
     /// The weeder.
     Weeder,
-}
-
-/// A port of one of the boards, without a terminal. Both clocks run while it is read, at full speed.
-pub struct PairPort {
-    /// Both boards.
-    pub pair: Rc<RefCell<Pair>>,
-    /// Whose port it is.
-    pub side: Side,
-}
-
-/// Longest time that a read waits for a byte, by the tester's clock.
-const READ_MS: u64 = 20;
-
-impl Read for PairPort {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut pair = self.pair.borrow_mut();
-        for _ in 0..READ_MS {
-            if !pair.received(self.side).is_empty() {
-                return pair.received(self.side).read(buffer);
-            }
-            pair.run_for(CYCLES_PER_SECOND / 1000).map_err(io::Error::other)?;
-        }
-        Err(io::ErrorKind::TimedOut.into())
-    }
-}
-
-impl Write for PairPort {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.pair.borrow_mut().send(self.side, bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }

@@ -15,17 +15,19 @@ const TOLERANCE: f64 = 320.0;
 /// The shortest time between two events, in cycles.
 const SHORTEST: u64 = 200;
 
+/// The tester's lines, each with the weeder's pin at its other end.
+pub(crate) const INPUTS: [(Line, Pin); 6] = [
+    (Line::EncoderA, wiring::ENCODER_A),
+    (Line::EncoderB, wiring::ENCODER_B),
+    (Line::Beam, wiring::BEAM),
+    (Line::SecondBeam, wiring::SECOND_BEAM),
+    (Line::EndSwitch, wiring::END_SWITCH),
+    (Line::WorkSwitch, wiring::WORK_SWITCH),
+];
+
 /// The line of a pin of the weeder.
 pub fn line(pin: Pin) -> Option<Line> {
-    match pin {
-        wiring::ENCODER_A => Some(Line::EncoderA),
-        wiring::ENCODER_B => Some(Line::EncoderB),
-        wiring::BEAM => Some(Line::Beam),
-        wiring::SECOND_BEAM => Some(Line::SecondBeam),
-        wiring::END_SWITCH => Some(Line::EndSwitch),
-        wiring::WORK_SWITCH => Some(Line::WorkSwitch),
-        _ => None,
-    }
+    INPUTS.iter().find(|input| input.1 == pin).map(|input| input.0)
 }
 
 /// A plan that is being made: its pieces, and the cycle of its last event.
@@ -43,9 +45,7 @@ impl Plan {
 
     /// Adds an event at a cycle, or as soon after the previous one as possible.
     pub fn at(&mut self, cycle: u64, action: Action) {
-        let cycle = cycle.max(self.last + SHORTEST);
-        self.pieces.push(Piece { wait: (cycle - self.last) as u32, count: 1, action });
-        self.last = cycle;
+        self.repeat(1, cycle.saturating_sub(self.last).max(SHORTEST) as u32, action);
     }
 
     /// Adds counts at a rate, from the last event on.
@@ -55,8 +55,7 @@ impl Plan {
         let mut left = counts.unsigned_abs();
         while left > 0 {
             let count = left.min(255);
-            self.pieces.push(Piece { wait, count: count as u8, action });
-            self.last += u64::from(wait) * u64::from(count);
+            self.repeat(count as u8, wait, action);
             left -= count;
         }
     }
@@ -84,8 +83,7 @@ impl Plan {
         while !rest.is_empty() {
             let (length, wait) = self.even(rest);
             let count = length.min(255);
-            self.pieces.push(Piece { wait, count: count as u8, action });
-            self.last += u64::from(wait) * count as u64;
+            self.repeat(count as u8, wait, action);
             rest = &rest[count..];
         }
     }
@@ -111,11 +109,8 @@ impl Plan {
     /// Adds changes of the weeder's pins, `offset` cycles later, in the order of time.
     pub fn follow(&mut self, changes: &[PinChange], offset: u64) {
         let (mut a, mut b) = (false, false);
-        let mut run: (Vec<u64>, Option<Action>) = (Vec::new(), None);
-        for change in changes {
-            let Some(line) = line(change.pin) else { continue };
-            let cycle = change.cycle + offset;
-            let action = match line {
+        let mut action_of = |change: &PinChange| {
+            let action = match line(change.pin)? {
                 Line::EncoderA if a != change.high => {
                     a = change.high;
                     if a == b { Action::Backward } else { Action::Forward }
@@ -124,25 +119,20 @@ impl Plan {
                     b = change.high;
                     if a == b { Action::Forward } else { Action::Backward }
                 }
-                Line::EncoderA | Line::EncoderB => continue,
+                Line::EncoderA | Line::EncoderB => return None,
                 line => Action::level(line, change.high),
             };
-            let is_count = matches!(action, Action::Forward | Action::Backward);
-            if let Some(running) = run.1
-                && running != action
-            {
-                self.counts(&run.0, running);
-                run = (Vec::new(), None);
-            }
-            if is_count {
-                run.0.push(cycle);
-                run.1 = Some(action);
+            Some((change.cycle + offset, action))
+        };
+        let events: Vec<_> = changes.iter().filter_map(&mut action_of).collect();
+        for same in events.chunk_by(|one, next| one.1 == next.1) {
+            let action = same[0].1;
+            let cycles: Vec<u64> = same.iter().map(|event| event.0).collect();
+            if matches!(action, Action::Forward | Action::Backward) {
+                self.counts(&cycles, action);
             } else {
-                self.at(cycle, action);
+                cycles.into_iter().for_each(|cycle| self.at(cycle, action));
             }
-        }
-        if let Some(running) = run.1 {
-            self.counts(&run.0, running);
         }
     }
 }

@@ -4,9 +4,7 @@
 //! The tester counts cycles between two edges, so a rate is exact by its clock. The weeder is in hold. Busy means that
 //! it prints all its settings meanwhile, and that the beam changes once in 128 counts.
 
-use crate::error::CheckError;
-use crate::tester::Tester;
-use crate::wiring::Weeder;
+use crate::{Boards, CheckError};
 use link::ConsoleLine;
 use tester_core::message::{Command, PATTERN_STEPS, REPEAT_CYCLES, STEP_CYCLES, Step, step_cycles};
 use tester_core::pins::Line;
@@ -24,7 +22,7 @@ const SLOWER: u8 = 115;
 /// Cycles between two counts at the rate that `weeder bounds` proves: 290,909 a second.
 pub const PROVED_CYCLES: u32 = 55;
 
-/// Greatest shortening in [`highest`], in cycles. Every handler takes longer than the rest.
+/// Greatest shortening in [`Boards::highest_rate`], in cycles. Every handler takes longer than the rest.
 const SHORTER_CYCLES: u32 = 42;
 
 /// Jitter: how early or late an edge comes, as a share of the time between two. It stands for a worn or eccentric
@@ -81,93 +79,81 @@ impl Turning {
     }
 }
 
-/// Lost counts: the counts that were made less the weeder's. `None` if it has restarted.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn lost(turning: Turning, weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<i64>, CheckError> {
-    weeder.to_hold()?;
-    let before = weeder.status()?.position;
-    let levels = tester.command(&Command::Clock)?.levels;
-    tester.load(&turning.pattern(levels))?;
-    weeder.drain()?;
-    if turning.busy {
-        weeder.send("get")?;
-    }
-    let (run_up, repeats) = (RUN_UP_COUNTS / PATTERN_STEPS as u32, COUNTS / PATTERN_STEPS as u32);
-    let burst =
-        Command::Burst { steps: PATTERN_STEPS as u8, run_up: run_up as u16, slower: SLOWER, repeats: repeats as u16 };
-    tester.command(&burst)?;
-    tester.set(Line::Beam.bit(), Line::Beam.bit())?;
-    tester.record_for_ms(SETTLE_MS)?;
-    if turning.busy {
-        for _ in 0..ANSWER_READS {
-            match weeder.next_line()?.map(|line| ConsoleLine::parse(&line)) {
-                Some(ConsoleLine::End { error: None }) => break,
-                Some(ConsoleLine::Greeting { .. }) => return Ok(None),
-                _ => {}
-            }
-        }
-    }
-    weeder.drain()?;
-    let made = i64::from((run_up + repeats) * PATTERN_STEPS as u32) * if turning.forward { 1 } else { -1 };
-    let counted = i64::from(weeder.status()?.position.wrapping_sub(before));
-    Ok(Some((made - counted).abs()))
-}
-
-/// The highest rate at which no count is lost, in counts a second. `None` if counts are lost at the proved rate.
-///
-/// The search goes up from the proved rate, in the steps that the tester can make.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn highest(forward: bool, busy: bool, weeder: &mut Weeder, tester: &mut Tester) -> Result<Option<f64>, CheckError> {
-    let mut highest = None;
-    for shorter in (0..=SHORTER_CYCLES).step_by(STEP_CYCLES as usize) {
-        let turning = Turning { cycles: PROVED_CYCLES - shorter, forward, jittered: false, busy };
-        match lost(turning, weeder, tester)? {
-            Some(0) => highest = Some(turning.per_s()),
-            Some(_) => break,
-            None => {
-                weeder.drain()?;
-                break;
-            }
-        }
-    }
-    Ok(highest)
-}
-
 /// Lengths of glitches in cycles, from 0.8 us to longer than both handlers of the encoder together.
 const GLITCH_CYCLES: [u32; 8] = [13, 16, 22, 31, 43, 55, 79, 121];
 
 /// How often the pattern of 64 glitches is played for each length.
 const GLITCH_REPEATS: u16 = 4;
 
-/// Counts that remain after glitches of a channel: the level changes and changes back, for each length. Returns the sum
-/// over all lengths.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn left_by_glitches(channel: Line, weeder: &mut Weeder, tester: &mut Tester) -> Result<f64, CheckError> {
-    weeder.to_hold()?;
-    let mut left = 0;
-    for cycles in GLITCH_CYCLES {
-        let toggle = channel.bit();
-        let short = Step { delay: ((cycles - step_cycles(0)) / STEP_CYCLES) as u8, toggle };
-        let pattern = [Step { delay: u8::MAX, toggle }, short].repeat(PATTERN_STEPS / 2);
-        tester.load(&pattern)?;
+impl Boards {
+    /// Lost counts: the counts that were made less the weeder's. `None` if it has restarted.
+    pub fn lost_counts(&mut self, turning: Turning) -> Result<Option<i64>, CheckError> {
+        let Self { weeder, tester, .. } = self;
+        weeder.to_hold()?;
         let before = weeder.status()?.position;
+        let levels = tester.command(&Command::Clock)?.levels;
+        tester.load(&turning.pattern(levels))?;
         weeder.drain()?;
-        tester.command(&Command::Burst {
-            steps: PATTERN_STEPS as u8,
-            run_up: 0,
-            slower: 0,
-            repeats: GLITCH_REPEATS,
-        })?;
+        if turning.busy {
+            weeder.send("get")?;
+        }
+        let [run_up, repeats] = [RUN_UP_COUNTS, COUNTS].map(|counts| (counts / PATTERN_STEPS as u32) as u16);
+        tester.command(&Command::Burst { steps: PATTERN_STEPS as u8, run_up, slower: SLOWER, repeats })?;
+        tester.set(Line::Beam.bit(), Line::Beam.bit())?;
         tester.record_for_ms(SETTLE_MS)?;
-        left += i64::from(weeder.status()?.position.wrapping_sub(before)).abs();
+        if turning.busy {
+            for _ in 0..ANSWER_READS {
+                match weeder.next_line()?.map(|line| ConsoleLine::parse(&line)) {
+                    Some(ConsoleLine::End { error: None }) => break,
+                    Some(ConsoleLine::Greeting { .. }) => {
+                        weeder.drain()?;
+                        return Ok(None);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        weeder.drain()?;
+        let made = i64::from(run_up + repeats) * PATTERN_STEPS as i64 * if turning.forward { 1 } else { -1 };
+        let counted = i64::from(weeder.status()?.position.wrapping_sub(before));
+        Ok(Some((made - counted).abs()))
     }
-    Ok(left as f64)
+
+    /// The highest rate at which no count is lost, in counts a second. `None` if counts are lost at the proved rate.
+    ///
+    /// The search goes up from the proved rate, in the steps that the tester can make.
+    pub fn highest_rate(&mut self, forward: bool, busy: bool) -> Result<Option<f64>, CheckError> {
+        let mut highest = None;
+        for shorter in (0..=SHORTER_CYCLES).step_by(STEP_CYCLES as usize) {
+            let turning = Turning { cycles: PROVED_CYCLES - shorter, forward, jittered: false, busy };
+            if self.lost_counts(turning)? != Some(0) {
+                break;
+            }
+            highest = Some(turning.per_s());
+        }
+        Ok(highest)
+    }
+
+    /// Counts that remain after glitches of a channel: the level changes and changes back, for each length. Returns the
+    /// sum over all lengths.
+    pub fn left_by_glitches(&mut self, channel: Line) -> Result<f64, CheckError> {
+        let Self { weeder, tester, .. } = self;
+        weeder.to_hold()?;
+        let mut left = 0;
+        for cycles in GLITCH_CYCLES {
+            let toggle = channel.bit();
+            let short = Step { delay: ((cycles - step_cycles(0)) / STEP_CYCLES) as u8, toggle };
+            let pattern = [Step { delay: u8::MAX, toggle }, short].repeat(PATTERN_STEPS / 2);
+            tester.load(&pattern)?;
+            let before = weeder.status()?.position;
+            weeder.drain()?;
+            let steps = PATTERN_STEPS as u8;
+            tester.command(&Command::Burst { steps, run_up: 0, slower: 0, repeats: GLITCH_REPEATS })?;
+            tester.record_for_ms(SETTLE_MS)?;
+            left += i64::from(weeder.status()?.position.wrapping_sub(before)).abs();
+        }
+        Ok(left as f64)
+    }
 }
 
 #[cfg(test)]

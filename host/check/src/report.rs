@@ -7,6 +7,7 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::ops::{Bound, RangeBounds};
 
 /// The version of the report's form.
 pub const FORM: u32 = 1;
@@ -65,10 +66,10 @@ pub struct Figure {
 impl Figure {
     /// A figure without limits and with this tolerance, not yet judged. If `measured` is not finite, the event never
     /// came.
-    pub fn new(id: &str, what: &str, unit: &str, measured: f64, tolerance: f64) -> Self {
+    pub fn new(id: impl Into<String>, what: impl Into<String>, unit: &str, measured: f64, tolerance: f64) -> Self {
         Self {
-            id: id.to_owned(),
-            what: what.to_owned(),
+            id: id.into(),
+            what: what.into(),
             unit: unit.to_owned(),
             // JSON has no other numbers.
             measured: measured.is_finite().then_some(measured),
@@ -81,17 +82,19 @@ impl Figure {
         }
     }
 
-    /// The same, right from this value on.
-    #[must_use]
-    pub fn at_least(mut self, lowest: f64) -> Self {
-        self.lowest = Some(lowest);
-        self
+    /// A figure without a unit or a tolerance.
+    pub fn count(id: impl Into<String>, what: impl Into<String>, measured: f64) -> Self {
+        Self::new(id, what, "", measured, 0.0)
     }
 
-    /// The same, right up to this value.
+    /// The same, right within these limits.
     #[must_use]
-    pub fn at_most(mut self, highest: f64) -> Self {
-        self.highest = Some(highest);
+    pub fn within(mut self, limits: impl RangeBounds<f64>) -> Self {
+        let limit = |bound| match bound {
+            Bound::Included(&value) | Bound::Excluded(&value) => Some(value),
+            Bound::Unbounded => None,
+        };
+        (self.lowest, self.highest) = (limit(limits.start_bound()), limit(limits.end_bound()));
         self
     }
 
@@ -277,7 +280,7 @@ mod tests {
     use super::*;
 
     fn figure(measured: f64) -> Figure {
-        Figure::new("width", "pulse < width", "us", measured, 1.0).at_least(1499.0).at_most(1505.0)
+        Figure::new("width", "pulse < width", "us", measured, 1.0).within(1499.0..=1505.0)
     }
 
     #[test]

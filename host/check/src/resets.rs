@@ -3,17 +3,16 @@
 //! `save` writes the EEPROM byte by byte, for some hundred milliseconds. A reset at any moment of that must leave the
 //! old or the new settings. Only `max_width_mm` is changed for this, and restored at the end.
 
-use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo::{self, ORIGIN};
-use crate::tester::{Tester, ms};
-use crate::wiring::{self, Weeder, reset};
+use crate::tester::ms;
+use crate::{Boards, CheckError};
 use control::alarm::Alarm;
 use control::ground::examples::EXAMPLES;
+use control::settings::Setting;
 use link::examples::{self, Taught};
-use link::{ConsoleLine, Mode};
+use link::{Mode, settings};
 use tester_core::message::Command;
-use uno::{CYCLES_PER_SECOND, Pulse};
 
 /// The weeder's rate when it is reset at work: 1.9 km/h with the factory settings' wheel, for as many counts as fit
 /// into the tester.
@@ -63,62 +62,10 @@ pub struct Restart {
     pub is_out: bool,
 }
 
-/// Resets the weeder, if possible at work, while it rolls with the tool in.
-///
-/// # Errors
-/// If a board does not answer.
-pub fn restart(
-    reset_by: ResetBy,
-    weeder: &mut Weeder,
-    tester: &mut Tester,
-    clock_ratio: f64,
-    is_simulated: bool,
-) -> Result<Restart, CheckError> {
-    weeder.to_hold()?;
-    if reset_by != ResetBy::Watchdog {
-        weeder.ask("start now")?;
-        let mut plan = Plan::new();
-        plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
-        tester.begin(&plan.finish())?;
-    }
-    let mut records = tester.record_for_ms(300)?;
-    let reset = tester.command(&Command::Clock)?.time;
-    match reset_by {
-        ResetBy::Pin => {
-            tester.command(&Command::Reset { pulled: true })?;
-            records.extend(tester.record_for_ms(PULLED_MS)?);
-            tester.command(&Command::Reset { pulled: false })?;
-        }
-        ResetBy::Port => weeder.open_again()?,
-        ResetBy::Watchdog => weeder.send("test watchdog")?,
-    }
-    records.extend(tester.record_for_ms(if is_simulated { SIMULATED_START_MS } else { START_MS })?);
-    let ended = tester.command(&Command::Clock)?.time;
-    if reset_by != ResetBy::Port && !weeder.greeting()? {
-        // If the weeder does not restart, the check still goes on.
-        wiring::reset(weeder, tester)?;
-    }
-    tester.command(&Command::Stop)?;
-    let status = weeder.status()?;
-    let pulses = servo::pulses(&records, reset);
-    // During the reset, pulses are missing. A running machine has one every 20 ms.
-    let gap = |number: &usize| pulses[number + 1].rise - pulses[*number].fall;
-    let longest = (0..pulses.len().saturating_sub(1)).max_by_key(gap);
-    let again = ORIGIN + u64::from(ended.wrapping_sub(reset).saturating_sub(ms(AGAIN_MS)));
-    let longest = longest.filter(|_| pulses.last().is_some_and(|last| last.rise > again));
-    let in_ms = |cycles: u64| cycles as f64 * 1000.0 / CYCLES_PER_SECOND as f64 * clock_ratio;
-    let is_wide = |pulse: &Pulse| pulse.width_us() * clock_ratio > 1750.0;
-    let stays_out = longest.is_some_and(|number| pulses[number + 1..].iter().all(is_wide));
-    Ok(Restart {
-        without_pulse_ms: longest.map_or(f64::INFINITY, |number| in_ms(gap(&number))),
-        is_out: stays_out && status.mode != Mode::Work && status.tool_out,
-    })
-}
-
 /// Data that a reset must not change: the saved settings and the taught examples, as the console shows them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
-    settings: Vec<(String, u16)>,
+    settings: Vec<(Setting, u16)>,
     examples: Vec<(u16, Taught)>,
 }
 
@@ -127,15 +74,11 @@ impl Kept {
     ///
     /// # Errors
     /// If a board does not answer, or the weeder was built with other examples than this program.
-    pub fn read(weeder: &mut Weeder, tester: &mut Tester) -> Result<Self, CheckError> {
-        reset(weeder, tester)?;
-        let setting = |line: &String| match ConsoleLine::parse(line) {
-            ConsoleLine::Setting { name, value, .. } => Some((name, value)),
-            _ => None,
-        };
+    pub fn read(boards: &mut Boards) -> Result<Self, CheckError> {
+        boards.reset()?;
         Ok(Self {
-            settings: weeder.ask("get")?.iter().filter_map(setting).collect(),
-            examples: examples::read(weeder)?,
+            settings: boards.weeder.ask("get")?.iter().filter_map(|line| settings::shown(line)).collect(),
+            examples: examples::read(&mut boards.weeder)?,
         })
     }
 
@@ -147,29 +90,6 @@ impl Kept {
     }
 }
 
-/// Runs a trial while the weeder has at least one taught example, so that one can be lost. If it has none, one is
-/// taught and then forgotten.
-///
-/// # Errors
-/// The errors of the trial, or if the weeder refuses the example or does not forget it.
-pub fn with_an_example<T>(
-    weeder: &mut Weeder,
-    tester: &mut Tester,
-    try_it: impl FnOnce(&mut Weeder, &mut Tester) -> Result<T, CheckError>,
-) -> Result<T, CheckError> {
-    weeder.to_hold()?;
-    let is_taught = examples::read(weeder)?.is_empty();
-    if is_taught {
-        examples::push(weeder, &EXAMPLES[..1], false)?;
-    }
-    let tried = try_it(weeder, tester);
-    if is_taught {
-        weeder.to_hold()?;
-        weeder.ask("forget all")?;
-    }
-    tried
-}
-
 /// The results of resets during a save.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Saves {
@@ -179,53 +99,112 @@ pub struct Saves {
     pub new: u32,
 }
 
-/// Saves settings, and pulls the reset at this number of moments, from the command until the save has ended.
-///
-/// # Errors
-/// If a board does not answer, or refuses.
-pub fn while_saving(moments: u32, weeder: &mut Weeder, tester: &mut Tester) -> Result<Saves, CheckError> {
-    reset(weeder, tester)?;
-    let kept = value(weeder)?;
-    save(weeder, tester, kept)?;
-    // The old value is restored, also after an error.
-    let saves = saves(moments, kept, weeder, tester);
-    save(weeder, tester, kept)?;
-    saves
-}
-
-fn saves(moments: u32, kept: u32, weeder: &mut Weeder, tester: &mut Tester) -> Result<Saves, CheckError> {
-    let (mut saved, mut saves) = (kept, Saves::default());
-    for moment in 0..moments {
-        let wanted = if saved == 300 + moment { 299 } else { 300 + moment };
-        weeder.ask(&format!("set {SETTING} {wanted}"))?;
-        let typed = tester.command(&Command::Clock)?.time;
-        weeder.send("save")?;
-        let wait = ms(SAVE_MS) / moments * moment;
-        while tester.command(&Command::Clock)?.time.wrapping_sub(typed) < wait {}
-        reset(weeder, tester)?;
-        let found = value(weeder)?;
-        let is_lost = weeder.status()?.alarm == Some(Alarm::SettingsLost);
-        saves.torn += u32::from(is_lost || (found != saved && found != wanted));
-        saves.new += u32::from(found == wanted);
-        saved = found;
+impl Boards {
+    /// Resets the weeder, if possible at work, while it rolls with the tool in.
+    pub fn restart(&mut self, reset_by: ResetBy, is_simulated: bool) -> Result<Restart, CheckError> {
+        self.weeder.to_hold()?;
+        if reset_by != ResetBy::Watchdog {
+            self.weeder.ask("start now")?;
+            let mut plan = Plan::new();
+            plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
+            self.tester.begin(&plan.finish())?;
+        }
+        let mut records = self.tester.record_for_ms(300)?;
+        let reset = self.tester.command(&Command::Clock)?.time;
+        match reset_by {
+            ResetBy::Pin => {
+                self.tester.command(&Command::Reset { pulled: true })?;
+                records.extend(self.tester.record_for_ms(PULLED_MS)?);
+                self.tester.command(&Command::Reset { pulled: false })?;
+            }
+            ResetBy::Port => self.weeder.open_again()?,
+            ResetBy::Watchdog => self.weeder.send("test watchdog")?,
+        }
+        records.extend(self.tester.record_for_ms(if is_simulated { SIMULATED_START_MS } else { START_MS })?);
+        let ended = self.tester.command(&Command::Clock)?.time;
+        if reset_by != ResetBy::Port && !self.weeder.greeting()? {
+            // If the weeder does not restart, the check still goes on.
+            self.reset()?;
+        }
+        self.tester.command(&Command::Stop)?;
+        let status = self.weeder.status()?;
+        let pulses = servo::pulses(&records, reset);
+        // During the reset, pulses are missing. A running machine has one every 20 ms.
+        let gap = |number: &usize| pulses[number + 1].rise - pulses[*number].fall;
+        let longest = (0..pulses.len().saturating_sub(1)).max_by_key(gap);
+        let again = ORIGIN + u64::from(ended.wrapping_sub(reset).saturating_sub(ms(AGAIN_MS)));
+        let longest = longest.filter(|_| pulses.last().is_some_and(|last| last.rise > again));
+        let stays_out = longest.is_some_and(|number| pulses[number + 1..].iter().all(|pulse| self.is_out(pulse)));
+        Ok(Restart {
+            without_pulse_ms: longest.map_or(f64::INFINITY, |number| self.weeder_ms(gap(&number))),
+            is_out: stays_out && status.mode != Mode::Work && status.tool_out,
+        })
     }
-    Ok(saves)
-}
 
-/// The setting's value.
-fn value(weeder: &mut Weeder) -> Result<u32, CheckError> {
-    let lines = weeder.ask(&format!("get {SETTING}"))?;
-    let value = lines.iter().find_map(|line| match ConsoleLine::parse(line) {
-        ConsoleLine::Setting { value, .. } => Some(value.into()),
-        _ => None,
-    });
-    value.ok_or(CheckError::Answer("get"))
-}
+    /// Runs a trial while the weeder has at least one taught example, so that one can be lost. If it has none, one is
+    /// taught and then forgotten.
+    ///
+    /// # Errors
+    /// The errors of the trial, or if the weeder refuses the example or does not forget it.
+    pub fn with_an_example<T>(
+        &mut self,
+        try_it: impl FnOnce(&mut Self) -> Result<T, CheckError>,
+    ) -> Result<T, CheckError> {
+        self.weeder.to_hold()?;
+        let is_taught = examples::read(&mut self.weeder)?.is_empty();
+        if is_taught {
+            examples::push(&mut self.weeder, &EXAMPLES[..1], false)?;
+        }
+        let tried = try_it(self);
+        if is_taught {
+            self.weeder.to_hold()?;
+            self.weeder.ask("forget all")?;
+        }
+        tried
+    }
 
-/// Saves this value, and waits until it is stored.
-fn save(weeder: &mut Weeder, tester: &mut Tester, value: u32) -> Result<(), CheckError> {
-    weeder.ask(&format!("set {SETTING} {value}"))?;
-    weeder.ask("save")?;
-    tester.record_for_ms(SAVED_MS)?;
-    Ok(())
+    /// Saves settings, and pulls the reset at this number of moments, from the command until the save has ended.
+    pub fn reset_while_saving(&mut self, moments: u32) -> Result<Saves, CheckError> {
+        self.reset()?;
+        let kept = self.setting()?;
+        self.save(kept)?;
+        // The old value is restored, also after an error.
+        let saves = self.saves(moments, kept);
+        self.save(kept)?;
+        saves
+    }
+
+    fn saves(&mut self, moments: u32, kept: u32) -> Result<Saves, CheckError> {
+        let (mut saved, mut saves) = (kept, Saves::default());
+        for moment in 0..moments {
+            let wanted = if saved == 300 + moment { 299 } else { 300 + moment };
+            self.weeder.ask(&format!("set {SETTING} {wanted}"))?;
+            let typed = self.tester.command(&Command::Clock)?.time;
+            self.weeder.send("save")?;
+            let wait = ms(SAVE_MS) / moments * moment;
+            while self.tester.command(&Command::Clock)?.time.wrapping_sub(typed) < wait {}
+            self.reset()?;
+            let found = self.setting()?;
+            let is_lost = self.weeder.status()?.alarm == Some(Alarm::SettingsLost);
+            saves.torn += u32::from(is_lost || (found != saved && found != wanted));
+            saves.new += u32::from(found == wanted);
+            saved = found;
+        }
+        Ok(saves)
+    }
+
+    /// The setting's value.
+    fn setting(&mut self) -> Result<u32, CheckError> {
+        let lines = self.weeder.ask(&format!("get {SETTING}"))?;
+        let (_, value) = lines.iter().find_map(|line| settings::shown(line)).ok_or(CheckError::Answer("get"))?;
+        Ok(value.into())
+    }
+
+    /// Saves this value of the setting, and waits until it is stored.
+    fn save(&mut self, value: u32) -> Result<(), CheckError> {
+        self.weeder.ask(&format!("set {SETTING} {value}"))?;
+        self.weeder.ask("save")?;
+        self.tester.record_for_ms(SAVED_MS)?;
+        Ok(())
+    }
 }

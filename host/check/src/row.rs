@@ -1,15 +1,14 @@
 //! A row: the weeder weeds it, the tester plays wheel and beam and records the pulses, and the verdict is that of
 //! `weeder sim`.
 
-use crate::error::CheckError;
 use crate::plan::Plan;
 use crate::servo::{self, ORIGIN};
-use crate::tester::{Tester, ms};
-use crate::wiring::Weeder;
+use crate::tester::ms;
+use crate::{Boards, CheckError};
 use field::conditions::Conditions;
 use field::planting::Planting;
 use field::trial::Trial;
-use field::verdict::{Judgement, Verdict, judge};
+use field::verdict::{Judgement, judge};
 use link::settings::name;
 use tester_core::player::Action;
 use uno::{CYCLES_PER_SECOND, Pulse};
@@ -32,25 +31,6 @@ pub struct Outcome {
     pub lost_counts: i64,
 }
 
-impl Outcome {
-    /// Plants that were damaged.
-    pub fn damaged(&self) -> usize {
-        self.judgement.count(Verdict::Damaged)
-    }
-
-    /// Weeds that were cut.
-    pub fn cut(&self) -> usize {
-        self.judgement.weeds.iter().filter(|weed| weed.cut).count()
-    }
-
-    /// The mean and the largest absolute error of a swing, in counts; 0 without a swing.
-    pub fn swing_errors(&self) -> (f64, f64) {
-        let errors: Vec<f64> = self.judgement.swing_errors_ticks().into_iter().map(f64::abs).collect();
-        let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
-        (mean, errors.iter().copied().fold(0.0, f64::max))
-    }
-}
-
 /// The row of `weeder sim` with this number of plants and tall weeds, at a speed.
 ///
 /// # Errors
@@ -58,15 +38,7 @@ impl Outcome {
 pub fn trial(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Trial, CheckError> {
     let row = |error: &dyn std::fmt::Display| CheckError::Row(error.to_string());
     let conditions = Conditions::preset(FIELD).ok_or_else(|| row(&FIELD))?.map_err(|error| row(&error))?;
-    let planting = Planting {
-        plants,
-        spacing_mm: 500.0,
-        spacing_scatter_mm: 40.0,
-        canopy_mm: 150.0,
-        canopy_scatter_mm: 22.5,
-        weeds,
-        ragged: false,
-    };
+    let planting = Planting { plants, canopy_scatter_mm: 22.5, weeds, ..Planting::default() };
     let stand = planting.grow_with_room(SEED).map_err(|error| row(&error))?;
     let speed = field::motion::mm_s(speed_km_h);
     let mut trial = Trial::at_speed(stand, conditions.machine(SEED), conditions.timing(), speed);
@@ -78,36 +50,34 @@ pub fn trial(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Trial, Chec
 /// otherwise follow smaller differences.
 const SAME_WIDTH_US: f64 = 1.0;
 
-/// Lets the weeder weed a row. `clock_ratio` is its clock over the tester's. Afterwards it is in hold, with unsaved
-/// settings.
-///
-/// # Errors
-/// If one of the boards does not answer.
-pub fn weed(trial: &Trial, weeder: &mut Weeder, tester: &mut Tester, clock_ratio: f64) -> Result<Outcome, CheckError> {
-    let Trial { row, machine, motion, .. } = trial;
-    weeder.to_hold()?;
-    for (setting, value) in trial.firmware_settings() {
-        weeder.ask(&format!("set {} {value}", name(setting)))?;
+impl Boards {
+    /// Lets the weeder weed a row. Afterwards it is in hold, with unsaved settings.
+    pub fn weed(&mut self, trial: &Trial) -> Result<Outcome, CheckError> {
+        let Trial { row, machine, motion, .. } = trial;
+        self.weeder.to_hold()?;
+        for (setting, value) in trial.firmware_settings() {
+            self.weeder.ask(&format!("set {} {value}", name(setting)))?;
+        }
+        let before = self.weeder.status()?.position;
+        self.weeder.ask("start")?;
+        let mut plan = Plan::new();
+        let begin = u64::from(ms(STILL_MS));
+        plan.follow(&machine.pin_changes(row, motion, 0), begin);
+        plan.at(begin + (motion.duration_s() * CYCLES_PER_SECOND as f64) as u64, Action::Pause);
+        let played = self.play(plan)?;
+        let status = self.weeder.status()?;
+        self.weeder.ask("hold")?;
+        // By the weeder's clock, as its settings are.
+        let corrected = |pulse: Pulse| {
+            let width_us = pulse.width_us() * self.clock_ratio;
+            let mut set_us = [machine.servo.in_us, machine.servo.out_us].into_iter();
+            let width_us = set_us.find(|set| (width_us - set).abs() < SAME_WIDTH_US).unwrap_or(width_us);
+            Pulse { fall: pulse.rise + (width_us * CYCLES_PER_SECOND as f64 / 1e6).round() as u64, ..pulse }
+        };
+        let pulses: Vec<_> = servo::pulses(&played.records, played.start).into_iter().map(corrected).collect();
+        Ok(Outcome {
+            judgement: judge(row, machine, motion, trial.timing, &pulses, ORIGIN + begin),
+            lost_counts: i64::from(played.ticks) - i64::from(status.position.wrapping_sub(before)),
+        })
     }
-    let before = weeder.status()?.position;
-    weeder.ask("start")?;
-    let mut plan = Plan::new();
-    let begin = u64::from(ms(STILL_MS));
-    plan.follow(&machine.pin_changes(row, motion, 0), begin);
-    plan.at(begin + (motion.duration_s() * CYCLES_PER_SECOND as f64) as u64, Action::Pause);
-    let played = tester.play(&plan.finish(), || weeder.drain())?;
-    let status = weeder.status()?;
-    weeder.ask("hold")?;
-    // By the weeder's clock, as its settings are.
-    let corrected = |pulse: Pulse| {
-        let width_us = pulse.width_us() * clock_ratio;
-        let set_us = [machine.servo.in_us, machine.servo.out_us].into_iter();
-        let width_us = set_us.clone().find(|set| (width_us - set).abs() < SAME_WIDTH_US).unwrap_or(width_us);
-        Pulse { fall: pulse.rise + (width_us * CYCLES_PER_SECOND as f64 / 1e6).round() as u64, ..pulse }
-    };
-    let pulses: Vec<_> = servo::pulses(&played.records, played.start).into_iter().map(corrected).collect();
-    Ok(Outcome {
-        judgement: judge(row, machine, motion, trial.timing, &pulses, ORIGIN + begin),
-        lost_counts: i64::from(played.ticks) - i64::from(status.position.wrapping_sub(before)),
-    })
 }

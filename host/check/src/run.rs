@@ -1,15 +1,16 @@
 //! The check, from the wires to the report.
 
-use crate::alarms::{self, Expected, Scene};
-use crate::error::CheckError;
-use crate::rates::{self, Turning};
+use crate::alarms::SCENES;
+use crate::rates::{PROVED_CYCLES, Turning};
 use crate::report::{Figure, Report};
-use crate::resets::{self, Kept, ResetBy};
-use crate::row;
+use crate::resets::{Kept, ResetBy, Restart};
+use crate::row::{self, Outcome};
 use crate::servo::{self, Steady};
-use crate::tester::Tester;
-use crate::wiring::{self, Weeder};
+use crate::{Boards, CheckError};
+use control::alarm::Alarm;
+use field::verdict::Verdict;
 use tester_core::pins::Line;
+use uno::CYCLES_PER_SECOND;
 
 /// The checks to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,103 +39,91 @@ impl Extent {
 /// # Errors
 /// If a board does not answer, or the check is interrupted. Wrong wires are no error: the report has them, and then
 /// nothing else.
-pub fn run(
-    weeder: &mut Weeder,
-    tester: &mut Tester,
-    extent: Extent,
-    progress: impl FnMut(&'static str, f64),
-) -> Result<Report, CheckError> {
-    let report = check(weeder, tester, extent, progress);
-    let reset = wiring::reset(weeder, tester);
+pub fn run(boards: &mut Boards, extent: Extent, progress: impl FnMut(&'static str, f64)) -> Result<Report, CheckError> {
+    let report = check(boards, extent, progress);
+    let reset = boards.reset();
     let report = report?;
     reset?;
     Ok(report)
 }
 
 fn check(
-    weeder: &mut Weeder,
-    tester: &mut Tester,
+    boards: &mut Boards,
     extent: Extent,
     mut progress: impl FnMut(&'static str, f64),
 ) -> Result<Report, CheckError> {
     progress("wires", 0.0);
     let checked = if extent.simulated { "simulated" } else { "boards" };
-    let version = weeder.version().to_owned();
+    let version = boards.weeder.version().to_owned();
     let report = |figures| Report::new(&version, checked, extent.brief, figures);
-    let wires = wiring::look(weeder, tester)?;
+    let wires = boards.wire_errors()?;
     if !wires.is_empty() {
         return Ok(Report { wires, ..report(vec![]) });
     }
-    let mut figures = Vec::new();
     progress("pulses", 0.1);
-    let steady = pulses(tester, extent)?;
-    figures.extend(of_pulses(&steady));
+    let mut figures = pulses(boards, extent)?;
     progress("rates", 0.15);
-    figures.extend(rates(weeder, tester, extent)?);
+    figures.extend(rates(boards, extent)?);
     progress("alarms", 0.25);
-    figures.extend(alarms(weeder, tester, extent, steady.clock_ratio)?);
+    figures.extend(alarms(boards, extent)?);
     progress("resets", 0.4);
-    figures.extend(resets(weeder, tester, extent, steady.clock_ratio)?);
+    figures.extend(boards.with_an_example(|boards| resets(boards, extent))?);
     let (plants, weeds, speeds) = extent.rows();
     for (number, &speed) in speeds.iter().enumerate() {
         progress("rows", 0.6 + 0.4 * number as f64 / speeds.len() as f64);
-        let trial = row::trial(plants, weeds, speed)?;
-        let outcome = row::weed(&trial, weeder, tester, steady.clock_ratio)?;
+        let outcome = boards.weed(&row::trial(plants, weeds, speed)?)?;
         figures.extend(of_row(&outcome, plants, weeds, speed));
     }
     progress("done", 1.0);
     Ok(report(figures))
 }
 
-/// The pulses in hold: the clocks' ratio, the width and the spread.
-fn pulses(tester: &mut Tester, extent: Extent) -> Result<Steady, CheckError> {
-    tester.take_records();
-    let records = tester.record_for_ms(extent.pulses_ms())?;
-    servo::steady(&servo::pulses(&records, 0)).ok_or(CheckError::NoPulses)
-}
-
-fn of_pulses(steady: &Steady) -> Vec<Figure> {
-    vec![
-        Figure::new("clock_ratio", "the weeder's clock over the tester's", "", steady.clock_ratio, 0.005)
-            .at_least(0.99)
-            .at_most(1.01),
-        Figure::new("pulse_out_us", "pulse, tool out", "us", steady.width_us, 1.0).at_least(1998.0).at_most(2002.0),
-        Figure::new("pulse_spread_us", "longest less shortest pulse", "us", steady.width_spread_us, 0.5).at_most(1.0),
-        Figure::new("frame_spread_us", "longest less shortest frame", "us", steady.frame_spread_us, 0.5).at_most(1.0),
-    ]
+/// The figures of the pulses in hold. They give the clocks' ratio.
+fn pulses(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError> {
+    boards.tester.take_records();
+    let records = boards.tester.record_for_ms(extent.pulses_ms())?;
+    let Steady { clock_ratio, width_us, width_spread_us, frame_spread_us } =
+        servo::steady(&servo::pulses(&records, 0)).ok_or(CheckError::NoPulses)?;
+    boards.clock_ratio = clock_ratio;
+    Ok(vec![
+        Figure::new("clock_ratio", "the weeder's clock over the tester's", "", clock_ratio, 0.005).within(0.99..=1.01),
+        Figure::new("pulse_out_us", "pulse, tool out", "us", width_us, 1.0).within(1998.0..=2002.0),
+        Figure::new("pulse_spread_us", "longest less shortest pulse", "us", width_spread_us, 0.5).within(..=1.0),
+        Figure::new("frame_spread_us", "longest less shortest frame", "us", frame_spread_us, 0.5).within(..=1.0),
+    ])
 }
 
 /// The rate that `weeder bounds` proves, in counts a second.
-const PROVED_PER_S: f64 = 290_909.0;
+const PROVED_PER_S: f64 = (CYCLES_PER_SECOND / PROVED_CYCLES as u64) as f64;
 
 /// With jitter of 30 %, two counts take at least 1.4 times the mean. This number of cycles keeps to the proof.
 const JITTERED_CYCLES: u32 = 79;
 
 /// The bursts' figures.
-fn rates(weeder: &mut Weeder, tester: &mut Tester, extent: Extent) -> Result<Vec<Figure>, CheckError> {
+fn rates(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError> {
     let mut figures = Vec::new();
     let all = [(true, true), (true, false), (false, true), (false, false)];
     for &(forward, busy) in if extent.brief { &all[..1] } else { &all[..] } {
         let way = if forward { "forward" } else { "backward" };
         let load = if busy { "busy" } else { "idle" };
         // If no rate passes, counts are lost even at the proved rate.
-        let highest = rates::highest(forward, busy, weeder, tester)?.unwrap_or(f64::INFINITY);
+        let highest = boards.highest_rate(forward, busy)?.unwrap_or(f64::INFINITY);
         let what = format!("highest rate without a lost count, {way}, {load}");
         figures.push(
-            Figure::new(&format!("highest_{way}_{load}"), &what, "counts/s", highest.round(), RATE_TOLERANCE)
-                .at_least(PROVED_PER_S)
+            Figure::new(format!("highest_{way}_{load}"), what, "counts/s", highest.round(), RATE_TOLERANCE)
+                .within(PROVED_PER_S..)
                 .proved(PROVED_PER_S),
         );
         let turning = Turning { cycles: JITTERED_CYCLES, forward, jittered: true, busy };
         let what = format!("counts lost at {}/s {way}, {load}, 30 % jitter", turning.per_s().round());
         // A weeder that has restarted has lost all counts.
-        let lost = rates::lost(turning, weeder, tester)?.map_or(f64::INFINITY, |lost| lost as f64);
-        figures.push(Figure::new(&format!("lost_jitter_{way}_{load}"), &what, "", lost, 0.0).at_most(0.0).proved(0.0));
+        let lost = boards.lost_counts(turning)?.map_or(f64::INFINITY, |lost| lost as f64);
+        figures.push(Figure::count(format!("lost_jitter_{way}_{load}"), what, lost).within(..=0.0).proved(0.0));
     }
     for (channel, name) in [(Line::EncoderA, "A"), (Line::EncoderB, "B")] {
-        let left = rates::left_by_glitches(channel, weeder, tester)?;
+        let left = boards.left_by_glitches(channel)?;
         let what = format!("counts left by glitches of channel {name}");
-        figures.push(Figure::new(&format!("glitches_{name}"), &what, "", left, 0.0).at_most(0.0));
+        figures.push(Figure::count(format!("glitches_{name}"), what, left).within(..=0.0));
     }
     Ok(figures)
 }
@@ -145,82 +134,74 @@ const RATE_TOLERANCE: f64 = 40_000.0;
 /// Tolerance of times: a servo's frame and some turns of the loop, in ms.
 const TIME_TOLERANCE_MS: f64 = 25.0;
 
+/// A time in ms.
+fn time(id: impl Into<String>, what: impl Into<String>, value_ms: f64) -> Figure {
+    Figure::new(id, what, "ms", value_ms, TIME_TOLERANCE_MS)
+}
+
+/// 1 if it is true, and right only then.
+fn truth(id: String, what: String, value: bool) -> Figure {
+    Figure::count(id, what, u8::from(value).into()).within(1.0..)
+}
+
 /// The figures of alarms, and of commands that take the tool out.
-fn alarms(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) -> Result<Vec<Figure>, CheckError> {
+fn alarms(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError> {
     let mut figures = Vec::new();
-    let scenes: &[Scene] = if extent.brief { &[Scene::FlickeringBeam, Scene::DeadChannel] } else { &Scene::ALL };
-    for &scene in scenes {
-        let raised = alarms::play(scene, weeder, tester, ratio)?;
-        let Expected { alarm, words, limit_ms } = scene.expected();
-        let name = alarm.text().to_string();
-        let (first, second) = alarm.code();
+    let in_brief = [Alarm::BeamFlickers, Alarm::EncoderChannelDead];
+    for scene in SCENES.iter().filter(|scene| !extent.brief || in_brief.contains(&scene.alarm)) {
+        let raised = boards.play_scene(scene)?;
+        let name = scene.alarm.text();
+        let (first, second) = scene.alarm.code();
         let code = f64::from(10 * first + second);
-        let what = |what: &str| format!("{words}: {what}");
-        let is_raised = f64::from(u8::from(raised.is_expected));
+        let what = |what: &str| format!("{}: {what}", scene.words);
         figures.extend([
-            Figure::new(&format!("{name}_out"), &what("until the tool is out"), "ms", raised.out_ms, TIME_TOLERANCE_MS)
-                .at_most(limit_ms),
-            Figure::new(&format!("{name}_raised"), &what("alarm raised"), "", is_raised, 0.0).at_least(1.0),
-            Figure::new(&format!("{name}_code"), &what("code of the LED"), "", raised.code, 0.0)
-                .at_least(code)
-                .at_most(code),
+            time(format!("{name}_out"), what("until the tool is out"), raised.out_ms).within(..=scene.limit_ms),
+            truth(format!("{name}_raised"), what("alarm raised"), raised.is_expected),
+            Figure::count(format!("{name}_code"), what("code of the LED"), raised.code).within(code..=code),
         ]);
     }
-    let switch = alarms::switch_to_out_ms(weeder, tester, ratio)?;
-    let hold = alarms::hold_to_out_ms(weeder, tester, ratio)?;
-    let beam = alarms::beam_to_window_ms(weeder, tester, ratio)?;
-    let time = |id: &str, what: &str, value| Figure::new(id, what, "ms", value, TIME_TOLERANCE_MS);
+    let switch = boards.switch_to_out_ms()?;
+    let hold = boards.hold_to_out_ms()?;
+    let beam = boards.beam_to_window_ms()?;
     figures.extend([
-        time("switch_out", "work switch opened, until the tool is out", switch).at_most(100.0),
-        time("beam_out", "from a beam's edge to the window: out later than due", beam).at_least(-5.0).at_most(30.0),
-        time("hold_out", "`hold` typed, until the tool is out, computer included", hold).at_most(300.0),
+        time("switch_out", "work switch opened, until the tool is out", switch).within(..=100.0),
+        time("beam_out", "from a beam's edge to the window: out later than due", beam).within(-5.0..=30.0),
+        time("hold_out", "`hold` typed, until the tool is out, computer included", hold).within(..=300.0),
     ]);
     Ok(figures)
 }
 
+/// Longest time without a pulse, in ms. A bootloader takes 2 s at most, and a virtual Uno has none: so the tolerance is
+/// as great.
+const RESET_MS: f64 = 2500.0;
+
 /// The resets' figures.
-fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) -> Result<Vec<Figure>, CheckError> {
-    resets::with_an_example(weeder, tester, |weeder, tester| {
-        let before = Kept::read(weeder, tester)?;
-        let mut figures = Vec::new();
-        for (way, id, words) in [
-            (ResetBy::Pin, "pin", "reset by its pin, at work and rolling"),
-            (ResetBy::Port, "port", "reset by opening the port, at work and rolling"),
-            (ResetBy::Watchdog, "watchdog", "restarted by the watchdog, in hold"),
-        ] {
-            let restart = resets::restart(way, weeder, tester, ratio, extent.simulated)?;
-            let what = |what: &str| format!("{words}: {what}");
-            // A bootloader takes 2 s at most, and a virtual Uno has none: so only the total is limited.
-            figures.extend([
-                Figure::new(
-                    &format!("reset_{id}_pulse"),
-                    &what("without a pulse"),
-                    "ms",
-                    restart.without_pulse_ms,
-                    2500.0,
-                )
-                .at_most(2500.0),
-                Figure::new(
-                    &format!("reset_{id}_out"),
-                    &what("the tool is out behind it"),
-                    "",
-                    f64::from(u8::from(restart.is_out)),
-                    0.0,
-                )
-                .at_least(1.0),
-            ]);
-        }
-        let moments = if extent.brief { 6 } else { 50 };
-        let saves = resets::while_saving(moments, weeder, tester)?;
-        let count = |id: &str, what: &str, value: f64| Figure::new(id, what, "", value, 0.0).at_most(0.0);
-        let lost = before.lost(&Kept::read(weeder, tester)?) as f64;
+fn resets(boards: &mut Boards, extent: Extent) -> Result<Vec<Figure>, CheckError> {
+    let before = Kept::read(boards)?;
+    let mut figures = Vec::new();
+    for (way, id, words) in [
+        (ResetBy::Pin, "pin", "reset by its pin, at work and rolling"),
+        (ResetBy::Port, "port", "reset by opening the port, at work and rolling"),
+        (ResetBy::Watchdog, "watchdog", "restarted by the watchdog, in hold"),
+    ] {
+        let Restart { without_pulse_ms, is_out } = boards.restart(way, extent.simulated)?;
+        let what = |what: &str| format!("{words}: {what}");
         figures.extend([
-            count("save_torn", &format!("settings torn by {moments} resets while saving"), saves.torn.into()),
-            Figure::new("save_new", "of these, new settings kept", "", saves.new.into(), moments.into()),
-            count("kept", "settings and taught examples lost by all resets", lost),
+            Figure::new(format!("reset_{id}_pulse"), what("without a pulse"), "ms", without_pulse_ms, RESET_MS)
+                .within(..=RESET_MS),
+            truth(format!("reset_{id}_out"), what("the tool is out behind it"), is_out),
         ]);
-        Ok(figures)
-    })
+    }
+    let moments = if extent.brief { 6 } else { 50 };
+    let saves = boards.reset_while_saving(moments)?;
+    let lost = before.lost(&Kept::read(boards)?) as f64;
+    let torn = format!("settings torn by {moments} resets while saving");
+    figures.extend([
+        Figure::count("save_torn", torn, saves.torn.into()).within(..=0.0),
+        Figure::new("save_new", "of these, new settings kept", "", saves.new.into(), moments.into()),
+        Figure::count("kept", "settings and taught examples lost by all resets", lost).within(..=0.0),
+    ]);
+    Ok(figures)
 }
 
 /// Tolerance of a swing's mean error against the simulation's, in counts. Where two zones nearly touch, a fraction of a
@@ -229,16 +210,18 @@ fn resets(weeder: &mut Weeder, tester: &mut Tester, extent: Extent, ratio: f64) 
 const SWING_MEAN_TOLERANCE: f64 = 6.0;
 
 /// A row's figures.
-fn of_row(outcome: &row::Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Figure> {
-    let (mean, worst) = outcome.swing_errors();
+fn of_row(outcome: &Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Figure> {
+    let Outcome { judgement, lost_counts } = outcome;
+    let errors = || judgement.swing_errors_ticks().into_iter().map(f64::abs);
+    let mean = errors().sum::<f64>() / errors().count().max(1) as f64;
     let id = |what: &str| format!("row_{speed}_{what}");
     let what = |what: &str| format!("row of {plants} plants and {weeds} weeds at {speed} km/h: {what}");
-    let count = |id_part: &str, words: &str, value: f64| Figure::new(&id(id_part), &what(words), "", value, 0.0);
+    let count = |id_part, words, value| Figure::count(id(id_part), what(words), value);
     vec![
-        count("damaged", "plants damaged", outcome.damaged() as f64).at_most(0.0),
-        count("cut", "tall weeds cut", outcome.cut() as f64),
-        count("lost", "counts lost", outcome.lost_counts.abs() as f64).at_most(0.0),
-        Figure::new(&id("swing_mean"), &what("mean error of a swing"), "counts", mean, SWING_MEAN_TOLERANCE),
-        Figure::new(&id("swing_worst"), &what("largest error of a swing"), "counts", worst, 6.0),
+        count("damaged", "plants damaged", judgement.count(Verdict::Damaged) as f64).within(..=0.0),
+        count("cut", "tall weeds cut", judgement.weeds.iter().filter(|weed| weed.cut).count() as f64),
+        count("lost", "counts lost", lost_counts.abs() as f64).within(..=0.0),
+        Figure::new(id("swing_mean"), what("mean error of a swing"), "counts", mean, SWING_MEAN_TOLERANCE),
+        Figure::new(id("swing_worst"), what("largest error of a swing"), "counts", errors().fold(0.0, f64::max), 6.0),
     ]
 }

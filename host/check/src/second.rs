@@ -6,6 +6,7 @@
 
 use anyhow::{Context, Result, anyhow, ensure};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -33,12 +34,6 @@ struct Turn {
     reset: bool,
 }
 
-/// The first line.
-#[derive(Serialize)]
-struct PowerUp {
-    hex: String,
-}
-
 /// The outputs of a turn.
 #[derive(Deserialize)]
 struct Done {
@@ -46,7 +41,7 @@ struct Done {
     said: Vec<u8>,
 }
 
-/// The virtual Uno. Dropping it ends its process.
+/// The virtual Uno. Its methods fail if its process has ended. Dropping it ends the process.
 pub struct SecondUno {
     process: Child,
     to: ChildStdin,
@@ -78,7 +73,7 @@ impl SecondUno {
         let from = BufReader::new(process.stdout.take().context(SECOND)?);
         let mut uno =
             Self { process, to, from, asked: 0, run: 0, edges: vec![], typed: vec![], changes: vec![], said: vec![] };
-        uno.exchange(&PowerUp { hex: hex::text(&flash) }).context(SECOND)?;
+        uno.exchange(&json!({ "hex": hex::text(&flash) })).context(SECOND)?;
         Ok(uno)
     }
 
@@ -88,9 +83,6 @@ impl SecondUno {
     }
 
     /// Lets its clock run, one whole turn at a time.
-    ///
-    /// # Errors
-    /// If the process has ended.
     pub fn run_until(&mut self, cycle: u64) -> Result<()> {
         self.asked = self.asked.max(cycle);
         if self.asked < self.run + TURN { Ok(()) } else { self.turn(false) }
@@ -123,9 +115,6 @@ impl SecondUno {
     }
 
     /// Pulls its reset.
-    ///
-    /// # Errors
-    /// If the process has ended.
     pub fn reset(&mut self) -> Result<()> {
         self.turn(false)?;
         self.turn(true)

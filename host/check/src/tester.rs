@@ -4,14 +4,13 @@
 //! numbers is an error. The clock of a simulated line runs only while it is read. So times come from the tester, not
 //! from the PC.
 
-use crate::error::CheckError;
+use crate::CheckError;
 use link::Port;
-use std::collections::VecDeque;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tester_core::frame::{self, Receiver};
-use tester_core::message::{Command, PIECES, PROTOCOL, Record, STEPS, Step};
+use tester_core::message::{Command, Done, PIECES, PROTOCOL, Record, STEPS, Step};
 use tester_core::player::Piece;
 use uno::CYCLES_PER_SECOND;
 
@@ -20,19 +19,6 @@ const READS: usize = 30;
 
 /// Tries of a command. A board that was reset by opening its port needs up to 2 s to start.
 const TRIES: usize = 8;
-
-/// The tester's answers.
-#[derive(Clone, Copy, Debug)]
-pub struct Done {
-    /// Pieces that have room.
-    pub room: u8,
-    /// The time in cycles, modulo 2^32.
-    pub time: u32,
-    /// Counts forward less counts back since the tester's start, without those of bursts.
-    pub position: i32,
-    /// The levels that the lines have, by their bits.
-    pub levels: u8,
-}
 
 /// The result of a plan.
 #[derive(Clone, Debug)]
@@ -45,7 +31,7 @@ pub struct Played {
     pub records: Vec<Record>,
 }
 
-/// The tester.
+/// The tester. Its methods fail as [`Tester::command`].
 pub struct Tester {
     port: Box<dyn Port>,
     receiver: Receiver,
@@ -53,7 +39,9 @@ pub struct Tester {
     /// The number of the next record; `None` before the first.
     expected: Option<u8>,
     missing: u32,
-    records: VecDeque<Record>,
+    /// Answers to commands, and all other records.
+    answers: Vec<Done>,
+    records: Vec<Record>,
     interrupt: Arc<AtomicBool>,
 }
 
@@ -69,7 +57,8 @@ impl Tester {
             number: 0,
             expected: None,
             missing: 0,
-            records: VecDeque::new(),
+            answers: Vec::new(),
+            records: Vec::new(),
             interrupt: Arc::default(),
         };
         tester.command(&Command::Hello)?;
@@ -100,70 +89,54 @@ impl Tester {
             self.port.flush().map_err(CheckError::TesterGone)?;
             for _ in 0..READS {
                 self.hear()?;
-                let is_answer =
-                    |record: &Record| matches!(record, Record::Done { number, .. } if *number == self.number);
-                if let Some(at) = self.records.iter().position(is_answer)
-                    && let Some(Record::Done { refusal, room, time, position, levels, protocol, .. }) =
-                        self.records.remove(at)
-                {
-                    self.records.retain(|record| !matches!(record, Record::Done { .. }));
-                    return match refusal {
-                        _ if protocol != PROTOCOL => Err(CheckError::Protocol(protocol)),
-                        Some(refusal) => Err(CheckError::Refused(refusal)),
-                        // Records from before the greeting may be missing.
-                        None if self.missing > 0 && *command != Command::Hello => {
-                            Err(CheckError::Missing(self.missing))
-                        }
-                        None => Ok(Done { room, time, position, levels }),
-                    };
-                }
+                let Some(done) = self.answers.drain(..).find(|done| done.number == self.number) else { continue };
+                return match done.refusal {
+                    _ if done.protocol != PROTOCOL => Err(CheckError::Protocol(done.protocol)),
+                    Some(refusal) => Err(CheckError::Refused(refusal)),
+                    // Records from before the greeting may be missing.
+                    None if self.missing > 0 && *command != Command::Hello => Err(CheckError::Missing(self.missing)),
+                    None => Ok(done),
+                };
             }
         }
         Err(CheckError::TesterSilent)
     }
 
-    /// Reads the input, or waits up to 20 ms for it. Returns whether there was any.
-    fn hear(&mut self) -> Result<bool, CheckError> {
+    /// Reads the input, or waits up to 20 ms for it.
+    fn hear(&mut self) -> Result<(), CheckError> {
         let mut bytes = [0; 256];
         let count = match self.port.read(&mut bytes) {
             Ok(0) => return Err(CheckError::TesterGone(io::ErrorKind::UnexpectedEof.into())),
             Ok(count) => count,
-            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
-                return Ok(false);
-            }
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => 0,
             Err(error) => return Err(CheckError::TesterGone(error)),
         };
         for &byte in &bytes[..count] {
             // A damaged record is missed by its number.
-            let Some(Ok((number, record))) = self.receiver.take::<Record>(byte) else { continue };
+            let Some((number, record)) = self.receiver.take::<Record>(byte) else { continue };
             let gap = self.expected.map_or(0, |expected| number.wrapping_sub(expected));
             self.missing += u32::from(gap);
             self.expected = Some(number.wrapping_add(1));
-            if let Record::Lost { pulses } = record {
-                self.missing += u32::from(pulses);
+            match record {
+                Record::Done(done) => self.answers.push(done),
+                Record::Lost(pulses) => self.missing += u32::from(pulses),
+                record => self.records.push(record),
             }
-            self.records.push_back(record);
         }
-        Ok(true)
+        Ok(())
     }
 
     /// All new records, oldest first.
     pub fn take_records(&mut self) -> Vec<Record> {
-        self.records.drain(..).collect()
+        std::mem::take(&mut self.records)
     }
 
     /// Sets lines, by their bits.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn set(&mut self, mask: u8, levels: u8) -> Result<Done, CheckError> {
         self.command(&Command::Lines { mask, levels })
     }
 
     /// Waits by the tester's clock, in milliseconds up to 60,000. Returns the records since the last call.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn record_for_ms(&mut self, time_ms: u32) -> Result<Vec<Record>, CheckError> {
         let begin = self.command(&Command::Clock)?.time;
         while self.command(&Command::Clock)?.time.wrapping_sub(begin) < ms(time_ms) {
@@ -173,9 +146,6 @@ impl Tester {
     }
 
     /// Starts a plan that has room in the tester as a whole, and returns at once.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn begin(&mut self, plan: &[Piece]) -> Result<(), CheckError> {
         self.command(&Command::Stop)?;
         self.take_records();
@@ -215,8 +185,8 @@ impl Tester {
             }
             for record in self.take_records() {
                 match record {
-                    Record::Started { time } => start = time,
-                    Record::Ended { position } => {
+                    Record::Started(time) => start = time,
+                    Record::Ended(position) => {
                         return Ok(Played { start, ticks: position.wrapping_sub(before), records });
                     }
                     Record::Dry => return Err(CheckError::Dry),
@@ -227,9 +197,6 @@ impl Tester {
     }
 
     /// Loads steps into the tester's pattern.
-    ///
-    /// # Errors
-    /// As [`Tester::command`].
     pub fn load(&mut self, steps: &[Step]) -> Result<(), CheckError> {
         for (number, part) in steps.chunks(STEPS).enumerate() {
             let from = (number * STEPS) as u8;

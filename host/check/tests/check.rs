@@ -2,15 +2,12 @@
 
 mod common;
 
-use check::CheckError;
 use check::desk::Desk;
 use check::pair::Wiring;
-use check::ports;
 use check::report::{Report, Verdict};
-use check::resets::{self, Kept};
+use check::resets::Kept;
 use check::run::{Extent, run};
-use check::tester::Tester;
-use check::wiring::{self, Weeder};
+use check::{Boards, CheckError};
 use common::{boards, boards_and_pair};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,14 +22,14 @@ const SRAM_USED: usize = 1750;
 const LONGEST_S: f64 = 600.0;
 const BOOTLOADER_S: f64 = 2.0;
 
-fn checked(weeder: &mut Weeder, tester: &mut Tester, brief: bool) -> Report {
-    run(weeder, tester, Extent { brief, simulated: true }, |_, _| {}).expect("the check ends")
+fn checked(boards: &mut Boards, brief: bool) -> Report {
+    run(boards, Extent { brief, simulated: true }, |_, _| {}).expect("the check ends")
 }
 
 /// The whole check, which takes two real boards ten minutes at most.
 fn whole_check() -> Report {
-    let (pair, mut weeder, mut tester) = boards_and_pair(Wiring::right());
-    let report = checked(&mut weeder, &mut tester, false);
+    let (pair, mut boards) = boards_and_pair(Wiring::right());
+    let report = checked(&mut boards, false);
     let duration_s = pair.borrow().duration_s(BOOTLOADER_S);
     println!("The whole check takes two boards {duration_s:.0} s.");
     assert!(duration_s <= LONGEST_S, "{duration_s} s");
@@ -51,8 +48,8 @@ fn is_set(variable: &str) -> bool {
 
 #[test]
 fn the_shipped_firmware_passes_and_is_as_recorded() {
-    let (pair, mut weeder, mut tester) = boards_and_pair(Wiring::right());
-    let brief = checked(&mut weeder, &mut tester, true);
+    let (pair, mut boards) = boards_and_pair(Wiring::right());
+    let brief = checked(&mut boards, true);
     assert!(brief.is_good(), "{}", brief.text());
     let pair = pair.borrow();
     let tester = pair.tester();
@@ -77,9 +74,9 @@ fn the_shipped_firmware_passes_and_is_as_recorded() {
 
 #[test]
 fn a_measured_row_agrees_with_the_simulation() {
-    let (mut weeder, mut tester) = boards(Wiring::right());
+    let mut boards = boards(Wiring::right());
     let trial = check::row::trial(8, 2, 2.5).expect("the row grows");
-    let measured = check::row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("the row is weeded").judgement;
+    let measured = boards.weed(&trial).expect("the row is weeded").judgement;
     let elf = firmware::build().expect("the weeder's firmware is built");
     let simulated = trial::run(&trial, &elf, |_| {}).expect("it is simulated").judgement;
     for (measured, simulated) in measured.plants.iter().zip(&simulated.plants) {
@@ -99,25 +96,25 @@ fn the_boards_are_found_at_two_terminals() {
     let desk = Desk::start(&tester, &weeder, None).expect("it starts");
     // The weeder's port is first, and no port is named.
     let unos = [desk.weeder(), desk.tester()].map(|path: &Path| path.to_str().expect("it is text").to_owned());
-    let (mut weeder, mut tester) = ports::open(None, None, &unos).expect("both are found");
-    assert_eq!(wiring::look(&mut weeder, &mut tester).expect("both answer"), Vec::<String>::new());
-    drop((weeder, tester));
-    let error = ports::open(Some(&unos[0]), None, &unos[..1]).map(drop).expect_err("there is no tester");
+    let mut boards = Boards::open(None, None, &unos).expect("both are found");
+    assert_eq!(boards.wire_errors().expect("both answer"), Vec::<String>::new());
+    drop(boards);
+    let error = Boards::open(Some(&unos[0]), None, &unos[..1]).map(drop).expect_err("there is no tester");
     assert!(error.to_string().starts_with("no tester answers at an Uno's port"), "{error}");
     desk.stop().expect("neither has stopped");
 }
 
 #[test]
 fn an_interrupted_check_restores_the_saved_settings() {
-    let (mut weeder, mut tester) = boards(Wiring::right());
-    let before = Kept::read(&mut weeder, &mut tester).expect("both answer");
+    let mut boards = boards(Wiring::right());
+    let before = Kept::read(&mut boards).expect("both answer");
     let interrupt = Arc::new(AtomicBool::new(false));
-    tester.interrupted_by(Arc::clone(&interrupt));
-    let tried = resets::with_an_example(&mut weeder, &mut tester, |weeder, tester| {
+    boards.tester.interrupted_by(Arc::clone(&interrupt));
+    let tried = boards.with_an_example(|boards| {
         interrupt.store(true, Ordering::Relaxed);
-        resets::while_saving(3, weeder, tester)
+        boards.reset_while_saving(3)
     });
     assert!(matches!(tried, Err(CheckError::Interrupted)), "{tried:?}");
-    let after = Kept::read(&mut weeder, &mut tester).expect("both answer");
+    let after = Kept::read(&mut boards).expect("both answer");
     assert_eq!(before, after);
 }

@@ -2,12 +2,13 @@
 
 mod common;
 
-use check::alarms::{Scene, play};
+use check::alarms::SCENES;
 use check::pair::Wiring;
-use check::rates::{self, Turning};
-use check::resets::ResetBy;
-use check::{resets, row, servo, wiring};
+use check::rates::Turning;
+use check::resets::{Kept, ResetBy};
+use check::{row, servo};
 use common::{boards, boards_with};
+use control::alarm::Alarm;
 use field::wiring as pins;
 use object::{File, Object, ObjectSection};
 use std::cell::{Cell, RefCell};
@@ -22,8 +23,8 @@ use uno::{Pin, PinChange};
 
 /// The check's sentences about these wires.
 fn said(wires: Wiring) -> Vec<String> {
-    let (mut weeder, mut tester) = boards(wires);
-    wiring::look(&mut weeder, &mut tester).expect("both boards answer")
+    let mut boards = boards(wires);
+    boards.wire_errors().expect("both boards answer")
 }
 
 /// Asserts that the check reports these changed wires in a sentence with all of these words.
@@ -106,13 +107,14 @@ fn a_missing_servo_and_a_missing_led_are_named() {
     assert_named(|wires| wires.outputs.retain(|pin| *pin != pins::LED), &["LED", "D13"]);
 }
 
-/// The pulses in hold. `change` changes the edges from the weeder.
+/// The pulses in hold. `change` changes the edges from the boards.weeder.
 fn steady(change: impl FnMut(PinChange) -> Option<PinChange> + 'static, clock_ppm: i64) -> servo::Steady {
     let wires = Wiring { from_weeder: Box::new(change), clock_ppm, ..Wiring::right() };
-    let (mut weeder, mut tester) = boards(wires);
-    weeder.to_hold().expect("it holds");
-    tester.take_records();
-    let records = tester.record_for_ms(400).expect("it records");
+    let mut boards = boards(wires);
+    boards.weeder.to_hold().expect("it holds");
+    // The first pulses are from before the weeder's reset.
+    boards.tester.record_for_ms(100).expect("it records");
+    let records = boards.tester.record_for_ms(400).expect("it records");
     servo::steady(&servo::pulses(&records, 0)).expect("there are pulses")
 }
 
@@ -159,14 +161,14 @@ fn counts_that_are_lost_above_150_000_a_second_are_counted() {
         (!is_too_fast).then_some(change)
     };
     let wires = Wiring { to_weeder: Box::new(slow), ..Wiring::right() };
-    let (mut weeder, mut tester) = boards(wires);
+    let mut boards = boards(wires);
     let mut lost = |cycles| {
         let turning = Turning { cycles, forward: true, jittered: false, busy: true };
-        rates::lost(turning, &mut weeder, &mut tester).expect("both answer").expect("it does not start afresh")
+        boards.lost_counts(turning).expect("both answer").expect("it does not start afresh")
     };
     assert_eq!(lost(106), 0);
     assert!(lost(55) > 10_000);
-    assert_eq!(rates::highest(true, true, &mut weeder, &mut tester).expect("both answer"), None);
+    assert_eq!(boards.highest_rate(true, true).expect("both answer"), None);
 }
 
 #[test]
@@ -179,8 +181,8 @@ fn a_channel_that_hides_the_end_of_a_glitch_is_counted() {
         (!is_short).then_some(change)
     };
     let wires = Wiring { to_weeder: Box::new(filter), ..Wiring::right() };
-    let (mut weeder, mut tester) = boards(wires);
-    let mut left = |channel| rates::left_by_glitches(channel, &mut weeder, &mut tester).expect("both answer");
+    let mut boards = boards(wires);
+    let mut left = |channel| boards.left_by_glitches(channel).expect("both answer");
     assert!(left(Line::EncoderA) > 0.0);
     assert!(left(Line::EncoderB) < 0.5);
 }
@@ -201,8 +203,9 @@ fn a_code_of_the_led_that_is_off_by_one_is_read_as_it_is_flashed() {
         (!hides).then_some(change)
     };
     let wires = Wiring { from_weeder: Box::new(swallow), ..Wiring::right() };
-    let (mut weeder, mut tester) = boards(wires);
-    let raised = play(Scene::DeadChannel, &mut weeder, &mut tester, 1.003).expect("both answer");
+    let mut boards = boards(wires);
+    let dead_channel = SCENES.iter().find(|scene| scene.alarm == Alarm::EncoderChannelDead).expect("it is a scene");
+    let raised = boards.play_scene(dead_channel).expect("both answer");
     assert!(raised.is_expected && raised.code != 22.0, "{raised:?}");
 }
 
@@ -214,9 +217,9 @@ fn a_swing_that_is_late_by_10_ms_is_measured() {
             Some(PinChange { cycle: change.cycle + late, ..change })
         };
         let wires = Wiring { from_weeder: Box::new(late), ..Wiring::right() };
-        let (mut weeder, mut tester) = boards(wires);
+        let mut boards = boards(wires);
         let trial = row::trial(3, 1, 2.5).expect("it grows");
-        let outcome = row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("both answer");
+        let outcome = boards.weed(&trial).expect("both answer");
         outcome.judgement.swing_errors_ticks()
     };
     let (right, wrong) = (swings(0), swings(160_000));
@@ -237,9 +240,9 @@ fn a_channel_that_fails_in_a_row_loses_counts() {
         (!is_a || *seen.borrow() % 1000 > 1).then_some(change)
     };
     let wires = Wiring { to_weeder: Box::new(drops), ..Wiring::right() };
-    let (mut weeder, mut tester) = boards(wires);
+    let mut boards = boards(wires);
     let trial = row::trial(3, 1, 2.5).expect("it grows");
-    let outcome = row::weed(&trial, &mut weeder, &mut tester, 1.003).expect("both answer");
+    let outcome = boards.weed(&trial).expect("both answer");
     assert!(outcome.lost_counts > 0, "{}", outcome.lost_counts);
 }
 
@@ -272,10 +275,10 @@ fn without_watchdog() -> NamedTempFile {
 #[test]
 fn a_weeder_without_a_watchdog_is_named() {
     let restart = |elf: &Path| {
-        let (_, mut weeder, mut tester) = boards_with(elf, Wiring::right());
-        let restart = resets::restart(ResetBy::Watchdog, &mut weeder, &mut tester, 1.003, true).expect("both answer");
+        let (_, mut boards) = boards_with(elf, Wiring::right());
+        let restart = boards.restart(ResetBy::Watchdog, true).expect("both answer");
         // The check goes on.
-        weeder.ask("get").expect("it is reset by its pin, and answers");
+        boards.weeder.ask("get").expect("it is reset by its pin, and answers");
         restart
     };
     let right = restart(&firmware::build().expect("the weeder's firmware is built"));
@@ -289,9 +292,9 @@ fn a_save_that_tears_is_counted() {
     // Each reset corrupts the half of the EEPROM that has the settings.
     let tear = |eeprom: &mut [u8]| eeprom[..512].iter_mut().for_each(|byte| *byte &= 0xF0);
     let wires = Wiring { eeprom_at_reset: Some(Box::new(tear)), ..Wiring::right() };
-    let (mut weeder, mut tester) = boards(wires);
-    weeder.to_hold().expect("it holds");
-    let saves = resets::while_saving(3, &mut weeder, &mut tester).expect("both answer");
+    let mut boards = boards(wires);
+    boards.weeder.to_hold().expect("it holds");
+    let saves = boards.reset_while_saving(3).expect("both answer");
     assert_eq!(saves.torn, 3);
 }
 
@@ -305,13 +308,13 @@ fn settings_that_a_reset_loses_are_counted() {
         }
     };
     let wires = Wiring { eeprom_at_reset: Some(Box::new(lose)), ..Wiring::right() };
-    let (mut weeder, mut tester) = boards(wires);
-    weeder.to_hold().expect("it holds");
-    weeder.ask("set margin_mm 60").expect("it obeys");
-    weeder.ask("save").expect("it saves");
-    tester.record_for_ms(1000).expect("the tester answers");
-    let saved = resets::Kept::read(&mut weeder, &mut tester).expect("both answer");
+    let mut boards = boards(wires);
+    boards.weeder.to_hold().expect("it holds");
+    boards.weeder.ask("set margin_mm 60").expect("it obeys");
+    boards.weeder.ask("save").expect("it saves");
+    boards.tester.record_for_ms(1000).expect("the tester answers");
+    let saved = Kept::read(&mut boards).expect("both answer");
     corrupts.set(true);
-    let after = resets::Kept::read(&mut weeder, &mut tester).expect("both answer");
+    let after = Kept::read(&mut boards).expect("both answer");
     assert_eq!((saved.lost(&saved), saved.lost(&after)), (0, 1));
 }

@@ -6,8 +6,8 @@ use crate::output::{print, tell};
 use crate::program::Finding;
 use crate::progress::with_bar;
 use anyhow::Result;
+use check::Boards;
 use check::desk::Desk;
-use check::ports;
 use check::run::{Extent, run as check_run};
 use clap::Args;
 use link::row_names::plugged;
@@ -70,19 +70,19 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     };
     let unos =
         if port.is_some() && tester.is_some() { vec![] } else { plugged()?.into_iter().map(|uno| uno.port).collect() };
-    let (mut weeder, mut tester) = ports::open(port.as_deref(), tester.as_deref(), &unos)?;
-    tester.interrupted_by(ctrl_c()?);
+    let mut boards = Boards::open(port.as_deref(), tester.as_deref(), &unos)?;
+    boards.tester.interrupted_by(ctrl_c()?);
     let extent = Extent { brief: arguments.brief, simulated: arguments.simulated };
     let last = Cell::new("");
     let result = with_bar("checking", |show| {
-        check_run(&mut weeder, &mut tester, extent, |what, share| {
+        check_run(&mut boards, extent, |what, share| {
             if last.replace(what) != what {
                 tell!("Next: {what}");
             }
             show(share);
         })
     });
-    drop((weeder, tester));
+    drop(boards);
     if let Some(desk) = desk {
         desk.stop()?;
     }

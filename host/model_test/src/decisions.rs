@@ -1,13 +1,11 @@
 //! The decisions as a machine under test: the controller with its console and an EEPROM, without a chip.
 
-mod console;
 mod eeprom;
 
 use crate::{
     machine::{Attended, Checked, Machine, World},
     run::{Beginning, Classification},
 };
-use console::Console;
 use control::{
     ground::{
         class::{Class, Classifier, ExamplesFull, Listed, Vote},
@@ -17,6 +15,7 @@ use control::{
     },
     measure::{quadrature::Odometer, readings::Readings, reset::Cause},
     operate::{servo, state::State, tool::Reason},
+    say::{Console, LINE, command::LineBuffer},
     settings::{Setting, Settings},
     units::{Instant, Interval, Position},
     weeder::Orders,
@@ -26,7 +25,7 @@ use eeprom::{Eeprom, Half};
 use knn::Example;
 use proptest::prelude::*;
 use rig::{Beams, ByExamples, Rig};
-use std::{cell::Cell, rc::Rc};
+use std::{cell::Cell, collections::VecDeque, rc::Rc};
 
 /// Detections below this width are weeds, where width alone decides.
 const PLANT_MM: i16 = 60;
@@ -102,18 +101,14 @@ pub struct Decisions {
     weeder: Weeder,
     orders: Orders,
     console: Console,
+    line: LineBuffer,
+    /// Typed bytes, and the lines that they make.
+    typed: VecDeque<u8>,
+    lines: VecDeque<String>,
     /// The width of the weed classified just now.
     weed: Rc<Cell<Option<i16>>>,
     eeprom: Eeprom,
     beginning: Beginning,
-}
-
-fn init(eeprom: &Eeprom, weed: &Rc<Cell<Option<i16>>>, beginning: &Beginning, world: &World, cause: Cause) -> Weeder {
-    let [for_settings, for_examples] = eeprom.halves();
-    let nearest = Nearest::uninit(&EXAMPLES[..], for_examples);
-    let classifier = Observed { nearest, by: beginning.classification, weed: Rc::clone(weed) };
-    let (readings, beams) = shown(beginning.steps, world);
-    Rig::wake_at(classifier, for_settings, readings, beams, cause)
 }
 
 /// Returns the readings in a world. It names every field of both, so that the compiler finds a missing sensor.
@@ -142,17 +137,28 @@ impl Decisions {
     /// # Errors
     /// None; a [`Drive`](crate::drive::Drive) starts every machine in this way.
     pub fn boot(beginning: &Beginning, world: &World) -> Result<Self, TestCaseError> {
-        let (eeprom, weed) = (Eeprom::new(), Rc::default());
-        let weeder = init(&eeprom, &weed, beginning, world, Cause::PowerOn);
-        Ok(Self {
+        Ok(Self::start(Eeprom::new(), beginning.clone(), world, Cause::PowerOn))
+    }
+
+    fn start(eeprom: Eeprom, beginning: Beginning, world: &World, cause: Cause) -> Self {
+        let weed = Rc::default();
+        let [for_settings, for_examples] = eeprom.halves();
+        let nearest = Nearest::uninit(&EXAMPLES[..], for_examples);
+        let classifier = Observed { nearest, by: beginning.classification, weed: Rc::clone(&weed) };
+        let (readings, beams) = shown(beginning.steps, world);
+        let weeder = Rig::wake_at(classifier, for_settings, readings, beams, cause);
+        Self {
             odometer: Odometer::new(weeder.readings.position, world.jumps),
             orders: weeder.orders(),
             weeder,
             console: Console::new(),
+            line: LineBuffer::new(),
+            typed: VecDeque::new(),
+            lines: VecDeque::new(),
             weed,
             eeprom,
-            beginning: beginning.clone(),
-        })
+            beginning,
+        }
     }
 }
 
@@ -252,17 +258,31 @@ impl Machine for Decisions {
     }
 
     fn put(&mut self, text: &str, lines: &[String]) {
-        self.console.put(text, lines);
+        self.typed.extend(text.bytes().chain(*b"\n"));
+        self.lines.extend(lines.iter().cloned());
     }
 
     fn attend(&mut self) -> Result<Attended, TestCaseError> {
-        let begun = self.console.carry_out(&mut self.weeder);
-        let written = self.console.write(&mut self.weeder)?;
+        let mut begun = None;
+        // The console runs a line at once if no byte is left to save.
+        if !self.typed.is_empty() && self.console.listens() && self.weeder.carry_on() {
+            while self.console.listens()
+                && let Some(byte) = self.typed.pop_front()
+            {
+                if let Some(line) = self.line.take(byte) {
+                    self.console.take(line);
+                    begun = self.lines.pop_front();
+                }
+            }
+        }
+        self.console.carry_on(&mut self.weeder);
+        let written: String = std::iter::from_fn(|| self.console.next_byte()).map(char::from).collect();
+        prop_assert!(written.len() <= LINE, "the line {written:?} is too long");
         Ok(Attended { begun, written: written.lines().map(|line| line.trim_end().to_owned()).collect() })
     }
 
     fn is_done(&self) -> bool {
-        self.console.is_done()
+        self.typed.is_empty() && self.console.listens()
     }
 
     fn examples(&self) -> Vec<Listed> {
@@ -275,15 +295,9 @@ impl Machine for Decisions {
     }
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
-        match torn {
-            Some(byte) => self.eeprom.lose_power(byte),
-            None => self.eeprom.reset(),
-        }
-        self.console = Console::new();
-        self.weeder = init(&self.eeprom, &self.weed, &self.beginning, world, cause);
-        self.orders = self.weeder.orders();
+        self.eeprom.reset(torn);
+        *self = Self::start(self.eeprom.clone(), self.beginning.clone(), world, cause);
         prop_assert!(self.weeder.tool_out() && self.is_sent_out());
-        self.odometer = Odometer::new(self.weeder.readings.position, world.jumps);
         Ok(())
     }
 }

@@ -54,7 +54,7 @@ struct Place {
     fastest: f64,
 }
 
-/// A machine on a row, see the module's documentation.
+/// A machine on a row, see the module's documentation. Its methods fail if a check fails.
 #[derive(Debug)]
 pub struct Drive<M> {
     machine: M,
@@ -134,16 +134,7 @@ impl<M: Machine> Drive<M> {
         boot: impl FnOnce(&Beginning, &World) -> Result<M, TestCaseError>,
     ) -> Result<Self, TestCaseError> {
         let (beginning, row) = (run.beginning.clone(), run.levels());
-        let world = World {
-            time_us: 0,
-            count: beginning.count.into(),
-            jumps: 0,
-            broken: row[0][0],
-            second_broken: false,
-            switch_on: false,
-            end_switch_on: false,
-            stack_is_low: false,
-        };
+        let world = World { count: beginning.count.into(), broken: row[0][0], ..World::default() };
         let machine = boot(&beginning, &world)?;
         let mut drive = Self {
             scale: scale(machine.settings()),
@@ -193,9 +184,6 @@ impl<M: Machine> Drive<M> {
     }
 
     /// Executes a run, and brings the machine back to work. Returns the number of checked turns.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn go(
         run: &Run,
         boot: impl FnOnce(&Beginning, &World) -> Result<M, TestCaseError>,
@@ -210,9 +198,6 @@ impl<M: Machine> Drive<M> {
     }
 
     /// Carries the machine to the headland of another row, and resets it there.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn enter_row(&mut self, run: &Run, geometry: Geometry, stem_zone: i64) -> Checked {
         self.stop();
         self.row = run.levels();
@@ -225,9 +210,6 @@ impl<M: Machine> Drive<M> {
     }
 
     /// Executes a step, and checks the machine.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn execute(&mut self, step: &Step) -> Checked {
         self.start_step(step)?;
         self.look()
@@ -261,15 +243,16 @@ impl<M: Machine> Drive<M> {
             }
             Step::Dust { times, on_second: false } => (0..2 * times).try_for_each(|_| self.edge(!self.world.broken)),
             Step::Dust { times, on_second: true } => {
-                for _ in 0..2 * times {
-                    self.second_edge(!self.world.second_broken);
-                }
+                (0..2 * times).for_each(|_| self.second_edge(!self.world.second_broken));
                 Ok(())
             }
             Step::LoseEdges { turns } if M::IS_OPEN => {
                 self.edges_get_lost = true;
                 self.turns(turns)?;
-                self.find_edges_lost()
+                self.edges_get_lost = false;
+                self.machine.lose_edges(&self.world)?;
+                prop_assert!(is_alarm(self.machine.state()) || self.is_tried, "lost edges are no alarm");
+                Ok(())
             }
             Step::LoseEdges { turns } => {
                 (0..TOO_MANY).try_for_each(|_| self.edge(!self.world.broken))?;
@@ -332,6 +315,10 @@ impl<M: Machine> Drive<M> {
         let state = self.machine.state();
         // Tests on the bench run only in HOLD.
         self.is_tried &= state == State::Hold;
+        self.check_tool_stuck(state)
+    }
+
+    fn check_tool_stuck(&self, state: State) -> Checked {
         let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
         prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
         Ok(())
@@ -339,9 +326,6 @@ impl<M: Machine> Drive<M> {
 
     /// Repairs every fault and ends the row. The operator clears the alarm, starts, and drives on until the tool is in. On the
     /// way back through the row there may be more alarms.
-    ///
-    /// # Errors
-    /// If a check fails.
     pub fn come_back_to_work(&mut self) -> Checked {
         (self.tool_is_stuck, self.world.switch_on, self.bare_from) = (false, false, self.farthest);
         self.stop();
@@ -471,19 +455,15 @@ impl<M: Machine> Drive<M> {
     fn turn(&mut self) -> Checked {
         self.turns += 1;
         let before = self.world;
-        let wheel = self.machine.settings().wheel();
-        let merge_gap = self.machine.settings().ticks(Setting::MergeGapMm).0.into();
-        self.model.follow(self.here(), merge_gap, wheel.ticks(1000).0.into());
-        self.model.keep_stems(self.ticks(Setting::StemZoneMm), self.ticks(Setting::SecondBeamMm));
         // A detection below the minimum width is dust, and causes no event.
         let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
+        self.model.follow(self.here(), self.machine.settings(), narrow_mm);
         self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
         self.had_second_beam |= self.ticks(Setting::SecondBeamMm) > 0;
         let spacing = self.ticks(Setting::GuardSpacingMm);
         if spacing > 0 && !self.guard_spacings.contains(&spacing) {
             self.guard_spacings.push(spacing);
         }
-        self.model.leave_narrow(wheel.ticks(narrow_mm).0.into());
 
         self.world.time_us += self.beginning.turn_us;
         let seconds = self.beginning.turn_us as f64 / 1e6;
@@ -558,14 +538,6 @@ impl<M: Machine> Drive<M> {
         Ok(())
     }
 
-    /// The machine finds that edges were lost.
-    fn find_edges_lost(&mut self) -> Checked {
-        self.edges_get_lost = false;
-        self.machine.lose_edges(&self.world)?;
-        prop_assert!(is_alarm(self.machine.state()) || self.is_tried, "lost edges are no alarm");
-        Ok(())
-    }
-
     /// Error of the machine's positions, in ticks, from the sensor response that it expects: this sensor answers at once.
     fn blur(&self) -> i64 {
         let (slowest, fastest) = self.speeds.extremes();
@@ -599,8 +571,7 @@ impl<M: Machine> Drive<M> {
         if M::IS_OPEN && state != state_before {
             prop_assert!(state != State::Work || self.world.switch_on, "the machine started work by itself");
             prop_assert!(!is_alarm(state_before) || !self.world.switch_on, "{state_before:?} was cleared by itself");
-            let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
-            prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
+            self.check_tool_stuck(state)?;
         }
         prop_assert!(!M::IS_OPEN || !self.world.stack_is_low || is_alarm(state), "a low stack is no alarm");
         let works = if M::IS_OPEN { state == State::Work } else { !self.is_tried };
@@ -662,12 +633,10 @@ impl<M: Machine> Drive<M> {
         let found = (!is_lost).then(|| self.machine.settings().clone());
         // A save that was not acknowledged may be complete, or have no effect.
         let expected = [&self.saving, &self.saved].map(|kept| self.with_leads_of(kept, &found));
-        if is_spoiled || self.saving.is_some() && expected[0] == found {
-            self.saved = found;
-        } else {
+        if !is_spoiled && (self.saving.is_none() || expected[0] != found) {
             prop_assert_eq!(&found, &expected[1], "other settings than were saved");
-            self.saved = found;
         }
+        self.saved = found;
         let examples = self.machine.examples();
         if is_spoiled {
         } else if is_answered {

@@ -15,7 +15,7 @@ use proptest::test_runner::TestCaseError;
 pub type Checked = Result<(), TestCaseError>;
 
 /// The levels and counts of a machine's sensors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct World {
     /// Time since the run began.
     pub time_us: u64,

@@ -14,6 +14,8 @@
 //! After an error of the encoder's count, the row is shifted by the lost or added ticks. The model still stores what
 //! the beam has seen at each count: the machine cannot know more.
 
+use control::settings::{Setting, Settings};
+
 /// Ground over which the beam was broken continuously.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stretch {
@@ -27,6 +29,18 @@ pub struct Stretch {
     margin_to: i64,
     /// Whether the tool may work here, because of a weed or of `start now`.
     is_free: bool,
+}
+
+impl Stretch {
+    /// Ground that the tool must avoid, with its whole margin.
+    fn closed(leading: i64, trailing: i64, blur: i64) -> Self {
+        Self { leading, trailing, blur, margin_to: i64::MAX, is_free: false }
+    }
+}
+
+/// The greatest blur of some stretches.
+fn blur(stretches: &[Stretch]) -> i64 {
+    stretches.iter().map(|stretch| stretch.blur).max().unwrap_or(0)
 }
 
 /// The ground as the beam has seen it.
@@ -86,10 +100,13 @@ impl Model {
         model
     }
 
-    /// Applies the present settings, with the beam at a position: the clear ground that belongs to a canopy, and a
-    /// metre. After rolling back by more than eight metres, within five centimetres, the beam sees the ground again as
-    /// new.
-    pub fn follow(&mut self, place: i64, merge_gap: i64, metre: i64) {
+    /// Applies the present settings, with the beam at a position. The machine may classify a detection up to `narrow_mm`
+    /// as a weed without an event. After rolling back by more than eight metres, within five centimetres, the beam sees
+    /// the ground again as new.
+    pub fn follow(&mut self, place: i64, settings: &Settings, narrow_mm: u16) {
+        let metre = i64::from(settings.wheel().ticks(1000).0);
+        let [merge_gap, zone, second_beam] =
+            [Setting::MergeGapMm, Setting::StemZoneMm, Setting::SecondBeamMm].map(|set| settings.ticks(set).0.into());
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
             self.may_have_forgotten = true;
@@ -105,14 +122,11 @@ impl Model {
         if self.merge_gaps.last().is_none_or(|&(_, gap)| gap != merge_gap) {
             self.merge_gaps.push((self.frontier, merge_gap));
         }
-    }
-
-    /// Applies the present stem zone, and the distance of the second beam.
-    pub fn keep_stems(&mut self, zone: i64, second_beam: i64) {
         if self.stem_zones.last().map_or(0, |&(_, last)| last) != zone {
             self.stem_zones.push((self.frontier, zone));
         }
         self.moved = self.moved.max(second_beam / 16);
+        self.narrow = self.narrow.max(settings.wheel().ticks(narrow_mm).0.into());
     }
 
     /// Whether a stem zone was set.
@@ -128,11 +142,6 @@ impl Model {
     /// Adds an error, in ticks, to every position of the machine.
     pub fn loosen(&mut self, ticks: i64) {
         self.slack += ticks;
-    }
-
-    /// The machine may classify a detection up to this width as a weed without an event.
-    pub fn leave_narrow(&mut self, ticks: i64) {
-        self.narrow = self.narrow.max(ticks);
     }
 
     /// The ground ahead of a position is seen again as new.
@@ -173,8 +182,7 @@ impl Model {
                 self.stretches
             ));
         }
-        let (leading, trailing) = (due - scatter, due + scatter);
-        self.guarded.push(Stretch { leading, trailing, blur: 0, margin_to: i64::MAX, is_free: false });
+        self.guarded.push(Stretch::closed(due - scatter, due + scatter, 0));
         Ok(())
     }
 
@@ -208,13 +216,7 @@ impl Model {
                 stretch.trailing = here;
                 stretch.blur = stretch.blur.max(blur);
             }
-            _ => self.stretches.push(Stretch {
-                leading: here,
-                trailing: here,
-                blur,
-                margin_to: i64::MAX,
-                is_free: false,
-            }),
+            _ => self.stretches.push(Stretch::closed(here, here, blur)),
         }
         self.is_growing = true;
     }
@@ -252,9 +254,7 @@ impl Model {
         let shown = nearest(last).to_vec();
         for first in (0..last).rev() {
             let (leading, trailing) = (self.stretches[first].leading, self.stretches[last - 1].trailing);
-            let tolerance = tolerance
-                + self.slack
-                + 2 * self.stretches[first..last].iter().map(|stretch| stretch.blur).max().unwrap_or(0);
+            let tolerance = tolerance + self.slack + 2 * blur(&self.stretches[first..last]);
             let shortest_since = |place| self.merge_gaps_since(place).min().unwrap_or(0);
             let before = first.checked_sub(1).map(|before| self.stretches[before].trailing);
             // The stretch before it may have ended under another setting.
@@ -324,19 +324,29 @@ impl Model {
 
     /// Whether a stretch belongs to a detection that is too wide for a weed, together with the stretches that merge with it.
     fn is_wide(&self, stretch: &Stretch) -> bool {
-        let place = self.stretches.partition_point(|other| other.leading < stretch.leading);
-        let gap = |first: usize, next: usize| {
-            let shortest = self.merge_gaps_since(self.stretches[first].leading).min().unwrap_or(0);
-            let blur = self.stretches[first].blur.max(self.stretches[next].blur);
-            let is_same =
-                self.stretches[next].leading - self.stretches[first].trailing < shortest - self.slack - 2 * blur;
-            is_same && !self.stretches[first].is_free && !self.stretches[next].is_free
+        let is_one = |before: &Stretch, behind: &Stretch| {
+            let shortest = self.merge_gaps_since(before.leading).min().unwrap_or(0);
+            let least = shortest - self.slack - 2 * before.blur.max(behind.blur);
+            behind.leading - before.trailing < least && !before.is_free && !behind.is_free
         };
-        let first = (1..=place).rev().find(|&next| !gap(next - 1, next)).unwrap_or(0);
-        let last =
-            (place..self.stretches.len() - 1).find(|&first| !gap(first, first + 1)).unwrap_or(self.stretches.len() - 1);
-        let blur = self.stretches[first..=last].iter().map(|stretch| stretch.blur).max().unwrap_or(0);
-        self.stretches[last].trailing - self.stretches[first].leading > self.narrow + self.slack + 2 * blur
+        let parts = self.detection_of(stretch, is_one);
+        let width = parts.last().zip(parts.first()).map_or(0, |(last, first)| last.trailing - first.leading);
+        width > self.narrow + self.slack + 2 * blur(parts)
+    }
+
+    /// The stretches of the detection to which a stretch belongs. `is_one` tells whether two neighbours merge.
+    fn detection_of(&self, stretch: &Stretch, is_one: impl Fn(&Stretch, &Stretch) -> bool) -> &[Stretch] {
+        // Guarded ground is not in the list, so a neighbour stands for it.
+        let Some(end) = self.stretches.len().checked_sub(1) else { return &[] };
+        let place = self.stretches.partition_point(|other| other.leading < stretch.leading).min(end);
+        let (mut first, mut last) = (place, place);
+        while first > 0 && is_one(&self.stretches[first - 1], &self.stretches[first]) {
+            first -= 1;
+        }
+        while last < end && is_one(&self.stretches[last], &self.stretches[last + 1]) {
+            last += 1;
+        }
+        &self.stretches[first..=last]
     }
 
     /// The certainly closed ground around a stretch. None if the tool may work there, or the machine may have missed it.
@@ -362,37 +372,21 @@ impl Model {
             let longest = self.merge_gaps_since(before.leading).max().unwrap_or(0);
             behind.leading - before.trailing <= longest + self.slack + 2 * before.blur.max(behind.blur)
         };
-        // Guarded ground is not in the list, so a neighbour stands for it.
-        let Some(end) = self.stretches.len().checked_sub(1) else { return 0 };
-        let place = self.stretches.partition_point(|other| other.leading < stretch.leading).min(end);
-        let (mut first, mut last) = (place, place);
-        while first > 0 && is_one(&self.stretches[first - 1], &self.stretches[first]) {
-            first -= 1;
-        }
-        while last < end && is_one(&self.stretches[last], &self.stretches[last + 1]) {
-            last += 1;
-        }
-        let (first, last) = (&self.stretches[first], &self.stretches[last]);
+        let parts = self.detection_of(stretch, is_one);
+        let (Some(first), Some(last)) = (parts.first(), parts.last()) else { return 0 };
         last.trailing - first.leading + 1 + self.slack + 2 * first.blur.max(last.blur)
     }
 
     /// The canopy of the next keep-out zone for a tool that rolls on from a position.
     pub fn next_canopy(&self, place: i64, forward: bool, margin: i64) -> Option<Stretch> {
-        if forward {
-            self.stretches
-                .iter()
-                .rev()
-                .take_while(|stretch| stretch.trailing + margin >= place)
-                .filter(|stretch| !stretch.is_free)
-                .last()
-                .copied()
+        let is_closed = |stretch: &&Stretch| !stretch.is_free;
+        let found = if forward {
+            let first = self.stretches.partition_point(|stretch| stretch.trailing + margin < place);
+            self.stretches[first..].iter().find(is_closed)
         } else {
-            self.stretches
-                .iter()
-                .take_while(|stretch| stretch.leading - margin <= place)
-                .filter(|stretch| !stretch.is_free)
-                .last()
-                .copied()
-        }
+            let end = self.stretches.partition_point(|stretch| stretch.leading - margin <= place);
+            self.stretches[..end].iter().rfind(is_closed)
+        };
+        found.copied()
     }
 }

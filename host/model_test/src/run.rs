@@ -1,6 +1,9 @@
 //! Runs: a machine, a row, and the steps on it, in the operator's terms.
 
-use control::{measure::reset::Cause, settings::SECOND_BEAM_LEAST_MM};
+use control::{
+    measure::reset::Cause,
+    settings::{SECOND_BEAM_LEAST_MM, Setting},
+};
 use field::wheel::most_slip;
 use proptest::prelude::*;
 use std::{fmt, ops::Range};
@@ -139,6 +142,7 @@ pub enum Step {
     },
 }
 
+/// The steps that [`Run::written`] parses are as it takes them.
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -146,27 +150,7 @@ impl fmt::Display for Step {
             Self::Roll { mm, mm_s } if *mm_s < 0 => write!(f, "roll back {} mm at {} mm/s", -mm, -mm_s),
             Self::Roll { mm, mm_s } => write!(f, "roll {mm} mm at {mm_s} mm/s"),
             Self::Stand { ms } => write!(f, "stand for {ms} ms"),
-            Self::Tremble { times } => write!(f, "stop, and tremble by a tick {times} times"),
-            Self::Switch { on } => write!(f, "turn the work switch {}", if *on { "on" } else { "off" }),
-            Self::Dust { times, on_second } => {
-                let beam = if *on_second { "second" } else { "first" };
-                write!(f, "change the {beam} beam's level and back, {times} times at one position")
-            }
-            Self::LoseEdges { turns } => write!(f, "lose the beams' edges for {turns} turns of the loop"),
-            Self::Silence { ms, encoder } => write!(f, "fail the encoder for {ms} ms: {encoder:?}"),
-            Self::Spike { ticks, times } => write!(f, "add {ticks} ticks to the count, {times} times a turn apart"),
-            Self::Reset(cause) => write!(f, "reset: {cause:?}"),
-            Self::Spoil { address, byte } => write!(f, "change byte {address} of the EEPROM to {byte:#04x}, and reset"),
-            Self::CutPower { line, turns, byte } => {
-                write!(
-                    f,
-                    "type `{line}`, and cut the power {turns} turns later; a byte being written becomes {byte:#04x}"
-                )
-            }
-            Self::LowerStack { turns } => write!(f, "leave 40 bytes of stack for {turns} turns"),
-            Self::Slip { permille } => write!(f, "turn the wheel {permille} thousandths farther than the ground"),
-            Self::StickTool { stuck: true } => write!(f, "let the end switch stick"),
-            Self::StickTool { stuck: false } => write!(f, "let the end switch follow the tool again"),
+            other => write!(f, "{other:?}"),
         }
     }
 }
@@ -365,40 +349,17 @@ fn setting() -> BoxedStrategy<String> {
         1 => (Just("misfit_after"), 0_u32..=6),
         1 => (Just("k"), 1_u32..=15),
     ];
-    let names = [
-        "ticks_per_rev",
-        "wheel_mm",
-        "ticks_per_m",
-        "beam_to_tool_mm",
-        "second_beam_mm",
-        "margin_mm",
-        "stem_zone_mm",
-        "lead_out_ms",
-        "lead_in_ms",
-        "servo_in_us",
-        "servo_out_us",
-        "servo_gap_ms",
-        "k",
-        "guard_spacing_mm",
-        "guard_scatter_mm",
-        "min_width_mm",
-        "misfit_after",
-        "max_width_mm",
-        "merge_gap_mm",
-        "beam_response_ms",
-        "top_speed_mm_s",
-        "no_plant_m",
-        "end_switch",
-    ];
-    let any = (prop::sample::select(names.to_vec()), prop_oneof![0_u32..=600, 0_u32..=70_000]);
+    let names: Vec<_> = Setting::all().map(|setting| setting.text().to_string()).collect();
+    let any = (prop::sample::select(names), prop_oneof![0_u32..=600, 0_u32..=70_000]);
     // With fewer ticks a metre the machine never knows its position well enough to weed.
     let any =
-        any.prop_filter("a wheel that counts", |&(name, value)| name != "ticks_per_m" || !(1..400).contains(&value));
+        any.prop_filter("a wheel that counts", |(name, value)| name != "ticks_per_m" || !(1..400).contains(value));
+    let usual = usual.prop_map(|(name, value)| (name.to_owned(), value));
     prop_oneof![9 => usual, 1 => any].prop_map(|(name, value)| format!("set {name} {value}")).boxed()
 }
 
 /// Rolls for a time at a speed.
-fn roll(mm_s: impl Strategy<Value = i32> + 'static, ms: std::ops::Range<i32>) -> BoxedStrategy<Step> {
+fn roll(mm_s: impl Strategy<Value = i32> + 'static, ms: Range<i32>) -> BoxedStrategy<Step> {
     (mm_s, ms).prop_map(|(mm_s, ms)| Step::Roll { mm: mm_s * ms / 1000 + mm_s.signum(), mm_s }).boxed()
 }
 

@@ -51,33 +51,25 @@ impl Receiver {
         Self { bytes: Vec::new(), is_too_long: false }
     }
 
-    /// Takes a byte. If it completes a frame, returns its number and message, or [`Damaged`].
-    pub fn take<Message: for<'a> Deserialize<'a>>(&mut self, byte: u8) -> Option<Result<(u8, Message), Damaged>> {
+    /// Takes a byte. Returns the number and message of the frame that it completes. A frame that noise has damaged gives
+    /// `None`.
+    pub fn take<Message: for<'a> Deserialize<'a>>(&mut self, byte: u8) -> Option<(u8, Message)> {
         if byte != 0 {
             self.is_too_long |= self.bytes.push(byte).is_err();
             return None;
         }
-        // Two zero bytes in a row hold no frame.
-        if self.bytes.is_empty() {
-            return None;
-        }
-        let decoded = if self.is_too_long { Err(Damaged) } else { decode(&mut self.bytes) };
+        let message = if self.is_too_long { None } else { decode(&mut self.bytes) };
         *self = Self::new();
-        Some(decoded)
+        message
     }
 }
 
-/// A frame changed by noise, or not a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Damaged;
-
-fn decode<Message: for<'a> Deserialize<'a>>(bytes: &mut [u8]) -> Result<(u8, Message), Damaged> {
-    let length = cobs::decode_in_place(bytes).map_err(|_| Damaged)?;
-    let (content, crc) = bytes[..length].split_last_chunk::<CRC_BYTES>().ok_or(Damaged)?;
+fn decode<Message: for<'a> Deserialize<'a>>(bytes: &mut [u8]) -> Option<(u8, Message)> {
+    let length = cobs::decode_in_place(bytes).ok()?;
+    let (content, crc) = bytes[..length].split_last_chunk::<CRC_BYTES>()?;
+    let (number, message) = content.split_first()?;
     if CRC.checksum(content) != u16::from_le_bytes(*crc) {
-        return Err(Damaged);
+        return None;
     }
-    let (number, message) = content.split_first().ok_or(Damaged)?;
-    let message = postcard::from_bytes(message).map_err(|_| Damaged)?;
-    Ok((*number, message))
+    Some((*number, postcard::from_bytes(message).ok()?))
 }

@@ -105,26 +105,30 @@ pub enum Refusal {
     Range,
 }
 
+/// The answer to a command.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Done {
+    /// The command's number.
+    pub number: u8,
+    /// The error, if the command failed.
+    pub refusal: Option<Refusal>,
+    /// Free places for pieces.
+    pub room: u8,
+    /// The time of the answer.
+    pub time: u32,
+    /// Counts forward less counts back since the tester's start, without those of bursts.
+    pub position: i32,
+    /// The levels of the lines.
+    pub levels: u8,
+    /// The protocol's version.
+    pub protocol: u8,
+}
+
 /// A record of the tester.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Record {
     /// The answer to a command.
-    Done {
-        /// The command's number.
-        number: u8,
-        /// The error, if the command failed.
-        refusal: Option<Refusal>,
-        /// Free places for pieces.
-        room: u8,
-        /// The time of the answer.
-        time: u32,
-        /// The encoder's position.
-        position: i32,
-        /// The levels of the lines.
-        levels: u8,
-        /// The protocol's version.
-        protocol: u8,
-    },
+    Done(Done),
     /// A pulse on the servo's line.
     Pulse {
         /// The time of its rising edge.
@@ -139,21 +143,12 @@ pub enum Record {
         /// Whether it is lit.
         lit: bool,
     },
-    /// The plan began.
-    Started {
-        /// The time: the first piece's wait counts from here.
-        time: u32,
-    },
-    /// The plan ended.
-    Ended {
-        /// The encoder's position.
-        position: i32,
-    },
+    /// The plan began at this time: the first piece's wait counts from here.
+    Started(u32),
+    /// The plan ended at this position of the encoder.
+    Ended(i32),
     /// The plan stopped, because the next piece came too late.
     Dry,
-    /// Pulses were lost, because the serial line was too slow.
-    Lost {
-        /// Their number since the start.
-        pulses: u16,
-    },
+    /// This many pulses were lost since the last such record, because the serial line was too slow.
+    Lost(u16),
 }

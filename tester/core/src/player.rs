@@ -1,9 +1,11 @@
-//! The player of a plan: takes pieces from a queue, and gives the lines' levels and the wait until the next event.
+//! The player of a plan: queues its pieces, and gives the lines' levels and the wait until the next event.
 //!
 //! A piece is an action on the lines, and the cycles since the previous event.
 //! It has no clock: the caller fires each event in time, and then waits as long as the player says.
 
+use crate::message::QUEUE_PIECES;
 use crate::pins::{ALL_LINES, AT_REST, Line};
+use heapless::Deque;
 use serde::{Deserialize, Serialize};
 
 /// One action, once or several times. Each is an event, a number of cycles after the previous event.
@@ -69,6 +71,7 @@ pub enum Next {
 /// Plays a plan.
 #[derive(Debug)]
 pub struct Player {
+    queue: Deque<Piece, QUEUE_PIECES>,
     /// The present piece, and its remaining events.
     piece: Option<Piece>,
     left: u8,
@@ -89,7 +92,8 @@ impl Default for Player {
 impl Player {
     /// A player without a plan, all lines at rest, at position 0.
     pub const fn new() -> Self {
-        Self { piece: None, left: 0, wanted: AT_REST, shown: AT_REST, frozen: 0, position: 0 }
+        let queue = Deque::new();
+        Self { queue, piece: None, left: 0, wanted: AT_REST, shown: AT_REST, frozen: 0, position: 0 }
     }
 
     /// The levels for the lines now.
@@ -107,14 +111,28 @@ impl Player {
         self.piece.is_some()
     }
 
-    /// Starts a plan with its first piece.
-    pub fn start(&mut self, take: impl FnOnce() -> Option<Piece>) -> Next {
-        self.load(take())
+    /// Free places for pieces.
+    pub fn room(&self) -> usize {
+        QUEUE_PIECES - self.queue.len()
     }
 
-    /// Stops the plan; the lines keep their levels.
-    pub const fn stop(&mut self) {
+    /// Queues a piece; only called if there is room.
+    pub fn push(&mut self, piece: Piece) {
+        let _ = self.queue.push_back(piece);
+    }
+
+    /// Starts the plan with its first piece.
+    pub fn start(&mut self) -> Next {
+        self.piece = self.queue.pop_front();
+        let Some(piece) = self.piece else { return Next::Dry };
+        self.left = piece.count;
+        Next::After(piece.wait)
+    }
+
+    /// Stops the plan, and drops its pieces; the lines keep their levels.
+    pub fn stop(&mut self) {
         self.piece = None;
+        self.queue.clear();
     }
 
     /// Sets lines outside a plan.
@@ -123,8 +141,8 @@ impl Player {
         self.shown = self.shown & self.frozen | self.wanted & !self.frozen;
     }
 
-    /// Fires the event that is due. `take` takes the next piece from the queue.
-    pub fn fire(&mut self, take: impl FnOnce() -> Option<Piece>) -> Next {
+    /// Fires the event that is due.
+    pub fn fire(&mut self) -> Next {
         let Some(piece) = self.piece else { return Next::Dry };
         match piece.action {
             Action::Forward => self.step(true),
@@ -145,18 +163,7 @@ impl Player {
             }
         }
         self.left = self.left.saturating_sub(1);
-        if self.left > 0 { Next::After(piece.wait) } else { self.load(take()) }
-    }
-
-    fn load(&mut self, piece: Option<Piece>) -> Next {
-        self.piece = piece;
-        match piece {
-            Some(piece) => {
-                self.left = piece.count;
-                Next::After(piece.wait)
-            }
-            None => Next::Dry,
-        }
+        if self.left > 0 { Next::After(piece.wait) } else { self.start() }
     }
 
     /// Forward is the sequence AB = 00, 10, 11, 01.

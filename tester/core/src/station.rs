@@ -4,8 +4,8 @@
 //! the line. A record without room is dropped, but uses up its number, so the computer sees the gap.
 
 use crate::frame::{self, Frame, Receiver};
-use crate::message::{Command, PATTERN_STEPS, PROTOCOL, Record, Refusal, Step};
-use crate::player::Piece;
+use crate::message::{Command, Done, PATTERN_STEPS, PROTOCOL, Record, Refusal, Step};
+use crate::player::Player;
 use heapless::Deque;
 
 /// Most records in the queue.
@@ -18,26 +18,16 @@ const CHECKED_WIDTHS: core::ops::RangeInclusive<u16> = 200..=60_000;
 pub trait Board {
     /// The time in cycles, modulo 2^32.
     fn now(&mut self) -> u32;
-    /// The encoder's position.
-    fn position(&mut self) -> i32;
-    /// Free places for pieces.
-    fn room(&mut self) -> u8;
-    /// Queues a piece; only called if there is room.
-    fn push(&mut self, piece: Piece);
-    /// Whether a plan is being played.
-    fn is_playing(&mut self) -> bool;
+    /// Accesses the plan's player, between two events.
+    fn player<R>(&mut self, access: impl FnOnce(&mut Player) -> R) -> R;
     /// Starts the plan. Returns the start time.
     fn start(&mut self) -> u32;
-    /// Stops the plan, and drops its pieces.
-    fn stop(&mut self);
     /// Sets lines.
     fn set(&mut self, mask: u8, levels: u8);
     /// Pulls the weeder's reset low, or releases it.
     fn reset(&mut self, pulled: bool);
     /// Plays these steps `run_up` times with delays longer by `slower`, and then `repeats` times as they are.
     fn burst(&mut self, steps: &[Step], run_up: u16, repeats: u16, slower: u8);
-    /// The levels of the lines.
-    fn levels(&mut self) -> u8;
     /// Makes a pulse on the capture pin.
     fn check_capture(&mut self, width: u16);
 }
@@ -73,37 +63,40 @@ impl Station {
 
     /// Takes a byte from the computer, and runs the command that it completes. A damaged frame gets no answer.
     pub fn take(&mut self, byte: u8, board: &mut impl Board) {
-        let Some(Ok((number, command))) = self.receiver.take(byte) else { return };
+        let Some((number, command)) = self.receiver.take(byte) else { return };
         let is_repeated = command != Command::Hello && self.last.is_some_and(|(last, _)| last == number);
         let refusal = match self.last {
             Some((_, refusal)) if is_repeated => refusal,
             _ => self.obey(command, board).err(),
         };
         self.last = Some((number, refusal));
-        let (room, time, position, levels) = (board.room(), board.now(), board.position(), board.levels());
-        self.record(Record::Done { number, refusal, room, time, position, levels, protocol: PROTOCOL });
+        let time = board.now();
+        let (room, position, levels) = board.player(|player| (player.room() as u8, player.position(), player.levels()));
+        self.record(Record::Done(Done { number, refusal, room, time, position, levels, protocol: PROTOCOL }));
     }
 
     fn obey(&mut self, command: Command, board: &mut impl Board) -> Result<(), Refusal> {
         match command {
-            Command::Start | Command::Burst { .. } if board.is_playing() => return Err(Refusal::Playing),
+            Command::Start | Command::Burst { .. } if board.player(|player| player.is_playing()) => {
+                return Err(Refusal::Playing);
+            }
             Command::Hello => {
-                board.stop();
+                board.player(Player::stop);
                 board.reset(false);
                 board.set(crate::pins::ALL_LINES, crate::pins::AT_REST);
                 self.records.clear();
             }
             Command::Pieces(pieces) => {
-                if usize::from(board.room()) < pieces.len() {
+                if board.player(|player| player.room()) < pieces.len() {
                     return Err(Refusal::NoRoom);
                 }
-                pieces.into_iter().for_each(|piece| board.push(piece));
+                pieces.into_iter().for_each(|piece| board.player(|player| player.push(piece)));
             }
             Command::Start => {
                 let time = board.start();
-                self.record(Record::Started { time });
+                self.record(Record::Started(time));
             }
-            Command::Stop => board.stop(),
+            Command::Stop => board.player(Player::stop),
             Command::Lines { mask, levels } => board.set(mask, levels),
             Command::Reset { pulled } => board.reset(pulled),
             Command::Pattern { from, steps } => {

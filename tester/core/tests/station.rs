@@ -1,8 +1,7 @@
 //! The station's commands on a board without a chip.
 
-use std::collections::VecDeque;
 use tester_core::frame::{Receiver, encode};
-use tester_core::message::{Command, QUEUE_PIECES, Record, Refusal, Step};
+use tester_core::message::{Command, Done, QUEUE_PIECES, Record, Refusal, Step};
 use tester_core::pins::{AT_REST, Line};
 use tester_core::player::{Action, Piece};
 use tester_core::player::{Next, Player};
@@ -12,7 +11,6 @@ use tester_core::station::{Board, Station};
 #[derive(Default)]
 struct Bare {
     player: Player,
-    queue: VecDeque<Piece>,
     bursts: Vec<(usize, u16)>,
     reset: bool,
 }
@@ -21,34 +19,18 @@ impl Board for Bare {
     fn now(&mut self) -> u32 {
         42
     }
-    fn position(&mut self) -> i32 {
-        self.player.position()
-    }
-    fn room(&mut self) -> u8 {
-        (QUEUE_PIECES - self.queue.len()) as u8
-    }
-    fn push(&mut self, piece: Piece) {
-        self.queue.push_back(piece);
-    }
-    fn is_playing(&mut self) -> bool {
-        self.player.is_playing()
+    fn player<R>(&mut self, access: impl FnOnce(&mut Player) -> R) -> R {
+        access(&mut self.player)
     }
     fn start(&mut self) -> u32 {
-        self.player.start(|| self.queue.pop_front());
+        self.player.start();
         42
-    }
-    fn stop(&mut self) {
-        self.player.stop();
-        self.queue.clear();
     }
     fn set(&mut self, mask: u8, levels: u8) {
         self.player.set(mask, levels);
     }
     fn reset(&mut self, pulled: bool) {
         self.reset = pulled;
-    }
-    fn levels(&mut self) -> u8 {
-        self.player.levels()
     }
     fn burst(&mut self, steps: &[Step], _: u16, repeats: u16, _: u8) {
         self.bursts.push((steps.len(), repeats));
@@ -64,12 +46,12 @@ fn typed(station: &mut Station, board: &mut Bare, number: u8, command: &Command)
     let mut receiver = Receiver::new();
     let frames = std::iter::from_fn(|| station.next_frame()).collect::<Vec<_>>();
     let bytes = frames.iter().flatten();
-    bytes.filter_map(|&byte| receiver.take(byte)).map(|found| found.expect("it is whole").1).collect()
+    bytes.filter_map(|&byte| receiver.take(byte)).map(|found| found.1).collect()
 }
 
 fn refusal(records: &[Record]) -> Option<Refusal> {
     records.iter().find_map(|record| match record {
-        Record::Done { refusal, .. } => *refusal,
+        Record::Done(done) => done.refusal,
         _ => None,
     })
 }
@@ -83,10 +65,10 @@ fn a_repeated_command_is_answered_but_not_run_again() {
     let (mut station, mut board) = (Station::new(), Bare::default());
     for _ in 0..3 {
         let records = typed(&mut station, &mut board, 5, &pieces(2));
-        assert!(matches!(records[..], [Record::Done { number: 5, room: 62, .. }]), "{records:?}");
+        assert!(matches!(records[..], [Record::Done(Done { number: 5, room: 62, .. })]), "{records:?}");
     }
     typed(&mut station, &mut board, 6, &pieces(2));
-    assert_eq!(board.queue.len(), 4);
+    assert_eq!(board.player.room(), QUEUE_PIECES - 4);
 }
 
 #[test]
@@ -96,7 +78,7 @@ fn pieces_without_room_are_refused_as_a_whole() {
         assert_eq!(refusal(&typed(&mut station, &mut board, number, &pieces(4))), None);
     }
     assert_eq!(refusal(&typed(&mut station, &mut board, 100, &pieces(1))), Some(Refusal::NoRoom));
-    assert_eq!(board.queue.len(), QUEUE_PIECES);
+    assert_eq!(board.player.room(), 0);
 }
 
 #[test]
@@ -124,10 +106,10 @@ fn hello_puts_everything_at_rest() {
     typed(&mut station, &mut board, 2, &Command::Reset { pulled: true });
     typed(&mut station, &mut board, 3, &Command::Lines { mask: Line::Beam.bit(), levels: 0 });
     let started = typed(&mut station, &mut board, 4, &Command::Start);
-    assert!(matches!(started[..], [Record::Started { time: 42 }, Record::Done { refusal: None, .. }]), "{started:?}");
+    assert!(matches!(started[..], [Record::Started(42), Record::Done(Done { refusal: None, .. })]), "{started:?}");
     assert_eq!(refusal(&typed(&mut station, &mut board, 5, &Command::Start)), Some(Refusal::Playing));
     typed(&mut station, &mut board, 5, &Command::Hello);
-    assert!(!board.reset && !board.is_playing() && board.queue.is_empty());
+    assert!(!board.reset && !board.player.is_playing() && board.player.room() == QUEUE_PIECES);
     assert_eq!(board.player.levels(), AT_REST);
 }
 
@@ -141,12 +123,12 @@ fn records_without_room_leave_a_gap_in_the_numbers() {
     let mut numbers = Vec::new();
     while let Some(frame) = station.next_frame() {
         for byte in frame {
-            numbers.extend(receiver.take::<Record>(byte).map(|found| found.expect("it is whole").0));
+            numbers.extend(receiver.take::<Record>(byte).map(|found| found.0));
         }
     }
     station.record(Record::Led { time: 20, lit: true });
     let next = station.next_frame().expect("it waits");
-    let (number, _) = next.iter().find_map(|&byte| receiver.take::<Record>(byte)).expect("whole").expect("whole");
+    let (number, _) = next.iter().find_map(|&byte| receiver.take::<Record>(byte)).expect("whole");
     assert_eq!((numbers, number), ((0..12).collect(), 20));
 }
 
@@ -154,15 +136,16 @@ fn records_without_room_leave_a_gap_in_the_numbers() {
 fn a_player_counts_through_the_four_steps_and_back() {
     let mut player = Player::new();
     let (a, b) = (Line::EncoderA.bit(), Line::EncoderB.bit());
-    let mut queue = VecDeque::from([
+    let plan = [
         Piece { wait: 100, count: 4, action: Action::Forward },
         Piece { wait: 50, count: 2, action: Action::Backward },
         Piece { wait: 10, count: 1, action: Action::End },
-    ]);
-    assert_eq!(player.start(|| queue.pop_front()), Next::After(100));
+    ];
+    plan.into_iter().for_each(|piece| player.push(piece));
+    assert_eq!(player.start(), Next::After(100));
     let mut seen = Vec::new();
     loop {
-        let next = player.fire(|| queue.pop_front());
+        let next = player.fire();
         seen.push((player.levels() & (a | b), player.position()));
         if next == Next::Ended {
             break;
@@ -177,12 +160,14 @@ fn a_plan_without_its_next_piece_is_dry_and_a_frozen_line_keeps_its_level() {
     let b = Line::EncoderB.bit();
     let freeze = Piece { wait: 10, count: 1, action: Action::Freeze { mask: b } };
     let roll = Piece { wait: 10, count: 4, action: Action::Forward };
-    player.start(|| Some(freeze));
-    assert_eq!(player.fire(|| Some(roll)), Next::After(10));
+    player.push(freeze);
+    player.push(roll);
+    player.start();
+    assert_eq!(player.fire(), Next::After(10));
     for _ in 0..3 {
-        assert_eq!(player.fire(|| None), Next::After(10));
+        assert_eq!(player.fire(), Next::After(10));
         assert_eq!(player.levels() & b, 0);
     }
-    assert_eq!(player.fire(|| None), Next::Dry);
+    assert_eq!(player.fire(), Next::Dry);
     assert_eq!(player.position(), 4);
 }

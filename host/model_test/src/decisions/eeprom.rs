@@ -47,23 +47,18 @@ impl Eeprom {
         [0, SIZE].map(|begin| Half { chip: Rc::clone(&self.0), begin })
     }
 
-    /// Resets the machine: a write in progress is completed.
-    pub fn reset(&mut self) {
-        self.0.borrow_mut().finish();
+    /// Resets the machine. A write in progress is completed. If the power fails, it leaves the byte `torn` instead.
+    pub fn reset(&mut self, torn: Option<u8>) {
+        let mut chip = self.0.borrow_mut();
+        if let (Some(torn), Some((_, byte))) = (torn, &mut chip.under_way) {
+            *byte = torn;
+        }
+        chip.finish();
     }
 
     /// Changes a byte, as a failing cell would.
     pub fn spoil(&mut self, address: usize, byte: u8) {
         self.0.borrow_mut().bytes[address] = byte;
-    }
-
-    /// The power fails: a write in progress leaves this byte.
-    pub fn lose_power(&mut self, becomes: u8) {
-        let mut chip = self.0.borrow_mut();
-        if let Some((_, byte)) = &mut chip.under_way {
-            *byte = becomes;
-        }
-        chip.finish();
     }
 }
 
