@@ -4,9 +4,10 @@
 //! The memory does not grow with the number of pages.
 
 use link::settings::{Setting, help, name};
+use parking_lot::Mutex;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use tokio::sync::broadcast::{self, Receiver};
 
 /// Most messages of a machine that a page may be behind: some ten seconds of work.
@@ -54,7 +55,7 @@ impl Hub {
 
     /// The machine has sent its status as a line, or has new settings or examples, as lines.
     pub fn know(&self, machine: usize, what: &str, said: Value) {
-        let mut machines = self.machines();
+        let mut machines = self.machines.lock();
         self.send(&json!({ "machine": machine, "is": what, "said": said }));
         if let Some(known) = machines.get_mut(machine).filter(|known| known["is"] == "there") {
             known[what] = said;
@@ -63,13 +64,13 @@ impl Hub {
 
     /// The machine has sent an event line.
     pub fn event(&self, machine: usize, line: &str) {
-        let _machines = self.machines();
+        let _machines = self.machines.lock();
         self.send(&json!({ "machine": machine, "is": "event", "said": line }));
     }
 
     /// Why a machine is lost; `None` if it is connected.
     pub fn why_lost(&self, machine: usize) -> Option<String> {
-        match self.machines().get(machine) {
+        match self.machines.lock().get(machine) {
             Some(known) => known["why"].as_str().map(str::to_owned),
             None => Some("there is no such machine".to_owned()),
         }
@@ -77,12 +78,12 @@ impl Hub {
 
     /// The present state of all machines, and the receiver of later messages.
     pub fn listen(&self) -> (Vec<Message>, Receiver<Message>) {
-        let machines = self.machines();
+        let machines = self.machines.lock();
         (machines.iter().map(|known| known.to_string().into()).collect(), self.pages.subscribe())
     }
 
     fn change(&self, machine: usize, message: Value) {
-        let mut machines = self.machines();
+        let mut machines = self.machines.lock();
         self.send(&message);
         if let Some(known) = machines.get_mut(machine) {
             *known = message;
@@ -93,11 +94,6 @@ impl Hub {
     fn send(&self, message: &Value) {
         // An error means that no page listens.
         let _ = self.pages.send(message.to_string().into());
-    }
-
-    fn machines(&self) -> MutexGuard<'_, Vec<Value>> {
-        // No panic can leave a state half changed.
-        self.machines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

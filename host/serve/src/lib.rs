@@ -33,15 +33,17 @@ use futures_util::future::select;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use parking_lot::Mutex;
 #[cfg(any(target_os = "linux", target_os = "android"))]
 use socket2::SockRef;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::pin::pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use thiserror::Error;
+use tokio::io::join;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::runtime::{self, Runtime};
 use tokio::time::sleep;
@@ -269,7 +271,8 @@ async fn serve(stream: TcpStream, lengths: Arc<Lengths>, routes: Router) {
     // Without this option the time limit begins only when the system's buffer is full.
     #[cfg(any(target_os = "linux", target_os = "android"))]
     let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(READER_TIME));
-    let mut stream = TimeoutStream::new(Counted::new(stream, lengths));
+    let (reader, writer) = stream.into_split();
+    let mut stream = TimeoutStream::new(join(Counted::new(reader, lengths), writer));
     stream.set_write_timeout(Some(READER_TIME));
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())

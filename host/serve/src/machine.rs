@@ -9,9 +9,11 @@ use link::session::{HOLD, Happening, Session};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+use thiserror::Error;
 use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 
 /// Shows a message to the operator at this computer.
 pub type Tell = Arc<dyn Fn(&str) + Send + Sync>;
@@ -22,23 +24,33 @@ const WAITING: usize = 64;
 /// Most stored lines of an answer. The longest answer has less than a tenth.
 const LINES: usize = 1000;
 
-/// The result of a line to type.
-#[derive(Clone, Debug)]
-pub enum Typed {
-    /// The machine's answer; its last line is `ok`, or begins with `error:`.
-    Answered(Vec<String>),
+/// Time in which a machine has answered, or is lost.
+const ANSWER_TIME: Duration = Duration::from_secs(30);
+
+/// The machine's answer to a line; its last line is `ok`, or begins with `error:`.
+pub type Answer = Result<Vec<String>, NoAnswer>;
+
+/// Why there is no answer to a line.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum NoAnswer {
     /// A client held the machine first.
+    #[error("hold came first, so this was not sent")]
     Dropped,
     /// The machine was lost before it had answered.
+    #[error("{0}")]
     Lost(String),
     /// Too many commands wait.
+    #[error("too much waits for the machine: try again")]
     Busy,
+    /// The machine was silent for too long.
+    #[error("the machine does not answer")]
+    Silent,
 }
 
 /// A line to type, the clients that wait for it, and its answer.
 struct Asked {
     line: String,
-    askers: Vec<oneshot::Sender<Typed>>,
+    askers: Vec<oneshot::Sender<Answer>>,
     answer: Vec<String>,
 }
 
@@ -64,29 +76,27 @@ impl Machine {
     }
 
     /// Types a command after the commands before it have been answered.
-    pub async fn command(&self, line: String) -> Typed {
+    pub async fn command(&self, line: String) -> Answer {
         ask(&self.commands, line).await
     }
 
     /// Types `hold` before all waiting commands.
-    pub async fn hold(&self) -> Typed {
+    pub async fn hold(&self) -> Answer {
         ask(&self.holds, HOLD.to_owned()).await
     }
 }
 
-async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Typed {
+async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Answer {
     let (asker, answer) = oneshot::channel();
-    match lines.try_send(Asked { line, askers: vec![asker], answer: Vec::new() }) {
-        Ok(()) => answer.await.unwrap_or(Typed::Busy),
-        Err(_) => Typed::Busy,
-    }
+    lines.try_send(Asked { line, askers: vec![asker], answer: Vec::new() }).map_err(|_| NoAnswer::Busy)?;
+    timeout(ANSWER_TIME, answer).await.map_err(|_| NoAnswer::Silent)?.unwrap_or(Err(NoAnswer::Busy))
 }
 
 impl Asked {
-    fn end(self, typed: &Typed) {
+    fn end(self, answer: &Answer) {
         for asker in self.askers {
             // The client may have gone.
-            let _ = asker.send(typed.clone());
+            let _ = asker.send(answer.clone());
         }
     }
 }
@@ -125,11 +135,11 @@ impl Talk {
         // A command to a lost machine must not wait for it.
         if !session.is_connected() {
             let why = self.hub.why_lost(self.number);
-            asked.end(&Typed::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned())));
+            asked.end(&Err(NoAnswer::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned()))));
         } else if asked.line == HOLD {
             for _ in 0..session.hold() {
                 if let Some(dropped) = self.asked.pop_back() {
-                    dropped.end(&Typed::Dropped);
+                    dropped.end(&Err(NoAnswer::Dropped));
                 }
             }
             match self.asked.back_mut() {
@@ -140,7 +150,7 @@ impl Talk {
         } else if session.command(&asked.line) {
             self.asked.push_back(asked);
         } else {
-            asked.end(&Typed::Busy);
+            asked.end(&Err(NoAnswer::Busy));
         }
     }
 
@@ -154,7 +164,7 @@ impl Talk {
                 self.hub.lost(self.number, &why);
                 (self.tell)(&format!("{}: {why}.", self.name));
                 for asked in self.asked.drain(..) {
-                    asked.end(&Typed::Lost(why.clone()));
+                    asked.end(&Err(NoAnswer::Lost(why.clone())));
                 }
             }
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
@@ -171,7 +181,7 @@ impl Talk {
                     if parse(asked.line.as_bytes()) == Ok(Command::Events(false)) {
                         session.turn_events_on();
                     }
-                    asked.end(&Typed::Answered(answer));
+                    asked.end(&Ok(answer));
                 }
             }
             Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
@@ -254,6 +264,10 @@ mod tests {
         timeout(Duration::from_secs(60), look).await.expect("it comes to be so");
     }
 
+    fn ok() -> Answer {
+        Ok(vec!["ok".to_owned()])
+    }
+
     fn run(test: impl Future<Output = ()>) {
         runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(test);
     }
@@ -266,10 +280,7 @@ mod tests {
                 until(|| desk.typed() == ["dump"]).await;
                 let (started, one, two) =
                     tokio::join!(machine.command("start".to_owned()), machine.hold(), machine.hold());
-                assert!(matches!(started, Typed::Dropped), "{started:?}");
-                for held in [one, two] {
-                    assert!(matches!(&held, Typed::Answered(lines) if *lines == ["ok"]), "{held:?}");
-                }
+                assert_eq!([started, one, two], [Err(NoAnswer::Dropped), ok(), ok()]);
             };
             // It does not wait for the answer in progress.
             let answered_later = async {
@@ -277,7 +288,7 @@ mod tests {
                 desk.is_silent.store(false, Ordering::Relaxed);
             };
             let (dumped, (), ()) = tokio::join!(machine.command("dump".to_owned()), others, answered_later);
-            assert!(matches!(&dumped, Typed::Answered(_)), "{dumped:?}");
+            assert!(dumped.is_ok(), "{dumped:?}");
             assert_eq!(desk.typed(), ["dump", "hold"]);
         });
     }
@@ -293,13 +304,11 @@ mod tests {
             let shows = |known: &Value, value: &str| known["settings"].to_string().contains(value);
             assert!(shows(&known, "k=3 "));
             let (_, mut early) = hub.listen();
-            let set = machine.command("set k 5".to_owned()).await;
-            assert!(matches!(&set, Typed::Answered(lines) if *lines == ["ok"]), "{set:?}");
+            assert_eq!(machine.command("set k 5".to_owned()).await, ok());
             until(|| shows(&there(), "k=5 ")).await;
             let told = std::iter::from_fn(|| early.try_recv().ok());
             assert!(told.into_iter().any(|message| message.contains(r#""is":"settings""#) && message.contains("k=5 ")));
-            let off = machine.command("events off".to_owned()).await;
-            assert!(matches!(off, Typed::Answered(_)), "{off:?}");
+            assert_eq!(machine.command("events off".to_owned()).await, ok());
             until(|| desk.typed() == ["set k 5", "events off", "events on"]).await;
         });
     }
@@ -313,15 +322,14 @@ mod tests {
                 desk.is_there.store(false, Ordering::Relaxed);
             };
             let (dumped, ()) = tokio::join!(machine.command("dump".to_owned()), pulled);
-            assert!(matches!(&dumped, Typed::Lost(why) if why.contains("the port is gone")), "{dumped:?}");
+            assert!(matches!(&dumped, Err(NoAnswer::Lost(why)) if why.contains("the port is gone")), "{dumped:?}");
             for typed in [machine.command("start".to_owned()).await, machine.hold().await] {
-                assert!(matches!(typed, Typed::Lost(_)), "{typed:?}");
+                assert!(matches!(typed, Err(NoAnswer::Lost(_))), "{typed:?}");
             }
             desk.is_silent.store(false, Ordering::Relaxed);
             desk.is_there.store(true, Ordering::Relaxed);
             until(|| hub.why_lost(0).is_none()).await;
-            let cleared = machine.command("clear".to_owned()).await;
-            assert!(matches!(cleared, Typed::Answered(_)), "{cleared:?}");
+            assert_eq!(machine.command("clear".to_owned()).await, ok());
             assert_eq!(desk.typed(), ["dump", "events on", "clear"]);
         });
     }
