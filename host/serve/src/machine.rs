@@ -194,64 +194,20 @@ impl Talk {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use control::ground::nearest::Nearest;
-    use control::memory::Volatile;
     use link::{Link, LinkError};
-    use rig::{Rig, ScriptedPort};
+    use rig::ScriptedBoard;
     use serde_json::Value;
-    use std::sync::Mutex;
-    use std::sync::atomic::{AtomicBool, Ordering};
-    use std::time::Duration;
     use tokio::runtime;
-    use tokio::time::{sleep, timeout};
-
-    /// The typed lines, except the session's own questions, and two switches.
-    #[derive(Clone, Default)]
-    struct Desk {
-        typed: Arc<Mutex<Vec<String>>>,
-        /// Keeps the machine's output back. `dump` sets it.
-        is_silent: Arc<AtomicBool>,
-        is_there: Arc<AtomicBool>,
-    }
-
-    impl Desk {
-        fn typed(&self) -> Vec<String> {
-            self.typed.lock().unwrap().clone()
-        }
-
-        /// A link to a new machine in HOLD.
-        fn open(&self) -> Result<Link, LinkError> {
-            let desk = self.clone();
-            if !desk.is_there.load(Ordering::Relaxed) {
-                return Err(LinkError::Absent("it".to_owned()));
-            }
-            let mut rig = Rig::new(Nearest::new(&[][..], Volatile::new()));
-            let mut said = Vec::new();
-            let script = move |line: Option<&str>| {
-                if let Some(line) = line.filter(|line| !line.is_empty()) {
-                    said.extend((rig.ask(line).join("\n") + "\n").bytes());
-                    if !["version", "get", "status", "examples"].contains(&line) {
-                        desk.typed.lock().unwrap().push(line.to_owned());
-                        desk.is_silent.fetch_or(line == "dump", Ordering::Relaxed);
-                    }
-                }
-                let is_silent = desk.is_silent.load(Ordering::Relaxed);
-                desk.is_there.load(Ordering::Relaxed).then(|| said.split_off(if is_silent { said.len() } else { 0 }))
-            };
-            Link::over(ScriptedPort::new(script), false)
-        }
-    }
+    use tokio::time::sleep;
 
     /// A connected machine.
-    async fn machine() -> (Machine, Arc<Hub>, Desk) {
-        let desk = Desk::default();
-        desk.is_there.store(true, Ordering::Relaxed);
-        let (hub, at_port) = (Arc::new(Hub::new(1)), desk.clone());
-        let open = move || at_port.open();
+    async fn machine() -> (Machine, Arc<Hub>, ScriptedBoard) {
+        let (hub, board) = (Arc::new(Hub::new(1)), ScriptedBoard::plugged_in());
+        let port = board.clone();
+        let open = move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false);
         let machine = Machine::start(0, "uno".to_owned(), Box::new(open), Arc::clone(&hub), Arc::new(|_| {}));
         until(|| hub.why_lost(0).is_none()).await;
-        assert_eq!(std::mem::take(&mut *desk.typed.lock().unwrap()), ["events on"]);
-        (machine, hub, desk)
+        (machine, hub, board)
     }
 
     /// Waits until the condition holds.
@@ -275,28 +231,27 @@ mod tests {
     #[test]
     fn hold_drops_waiting_commands_and_is_typed_once_for_all_clients() {
         run(async {
-            let (machine, _, desk) = machine().await;
+            let (machine, _, board) = machine().await;
             let others = async {
-                until(|| desk.typed() == ["dump"]).await;
-                let (started, one, two) =
-                    tokio::join!(machine.command("start".to_owned()), machine.hold(), machine.hold());
-                assert_eq!([started, one, two], [Err(NoAnswer::Dropped), ok(), ok()]);
+                until(|| board.typed() == ["events on", "silence"]).await;
+                let answers = tokio::join!(machine.command("start".to_owned()), machine.hold(), machine.hold());
+                assert_eq!(answers, (Err(NoAnswer::Dropped), ok(), ok()));
             };
-            // It does not wait for the answer in progress.
+            // It does not wait for the answer in progress. The first `ok` is taken for that.
             let answered_later = async {
-                until(|| desk.typed() == ["dump", "hold"]).await;
-                desk.is_silent.store(false, Ordering::Relaxed);
+                until(|| board.typed() == ["events on", "silence", "hold"]).await;
+                board.say(b"ok\n");
             };
-            let (dumped, (), ()) = tokio::join!(machine.command("dump".to_owned()), others, answered_later);
-            assert!(dumped.is_ok(), "{dumped:?}");
-            assert_eq!(desk.typed(), ["dump", "hold"]);
+            let (before, (), ()) = tokio::join!(machine.command("silence".to_owned()), others, answered_later);
+            assert_eq!(before, ok());
+            assert_eq!(board.typed(), ["events on", "silence", "hold"]);
         });
     }
 
     #[test]
     fn a_page_gets_everything_when_it_connects_and_then_the_changes_also_if_a_client_turns_the_events_off() {
         run(async {
-            let (machine, hub, desk) = machine().await;
+            let (machine, hub, board) = machine().await;
             let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();
             until(|| there()["status"].is_string()).await;
             let known = there();
@@ -309,28 +264,27 @@ mod tests {
             let told = std::iter::from_fn(|| early.try_recv().ok());
             assert!(told.into_iter().any(|message| message.contains(r#""is":"settings""#) && message.contains("k=5 ")));
             assert_eq!(machine.command("events off".to_owned()).await, ok());
-            until(|| desk.typed() == ["set k 5", "events off", "events on"]).await;
+            until(|| board.typed() == ["events on", "set k 5", "events off", "events on"]).await;
         });
     }
 
     #[test]
     fn commands_to_a_lost_machine_are_not_typed_when_it_is_back() {
         run(async {
-            let (machine, hub, desk) = machine().await;
+            let (machine, hub, board) = machine().await;
             let pulled = async {
-                until(|| desk.typed() == ["dump"]).await;
-                desk.is_there.store(false, Ordering::Relaxed);
+                until(|| board.typed() == ["events on", "silence"]).await;
+                board.plug(false);
             };
-            let (dumped, ()) = tokio::join!(machine.command("dump".to_owned()), pulled);
-            assert!(matches!(&dumped, Err(NoAnswer::Lost(why)) if why.contains("the port is gone")), "{dumped:?}");
+            let (before, ()) = tokio::join!(machine.command("silence".to_owned()), pulled);
+            assert!(matches!(&before, Err(NoAnswer::Lost(why)) if why.contains("the port is gone")), "{before:?}");
             for typed in [machine.command("start".to_owned()).await, machine.hold().await] {
                 assert!(matches!(typed, Err(NoAnswer::Lost(_))), "{typed:?}");
             }
-            desk.is_silent.store(false, Ordering::Relaxed);
-            desk.is_there.store(true, Ordering::Relaxed);
+            board.plug(true);
             until(|| hub.why_lost(0).is_none()).await;
             assert_eq!(machine.command("clear".to_owned()).await, ok());
-            assert_eq!(desk.typed(), ["dump", "events on", "clear"]);
+            assert_eq!(board.typed(), ["events on", "silence", "events on", "clear"]);
         });
     }
 }
