@@ -30,14 +30,11 @@ pub enum ExamplesError {
         "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder`, or flash this one's firmware by `weeder flash`"
     )]
     OtherTable,
-    /// An example has features that no object in whole millimetres has.
+    /// The example with this number has features that no object in whole millimetres has.
     #[error(
-        "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {number}`"
+        "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {0}`"
     )]
-    NoObject {
-        /// Its number.
-        number: u16,
-    },
+    NoObject(u16),
     /// The machine is at work: teaching needs HOLD.
     #[error("the machine is at work and takes no examples: hold it first, by its switch or `hold`; nothing was sent")]
     AtWork,
@@ -51,14 +48,9 @@ pub enum ExamplesError {
         /// Places that are free.
         free: usize,
     },
-    /// The machine cannot list its taught examples.
-    #[error(
-        "{missing} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so"
-    )]
-    NotTaken {
-        /// How many.
-        missing: usize,
-    },
+    /// The machine did not take this many.
+    #[error("{0} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so")]
+    NotTaken(usize),
 }
 
 /// The changes to a machine's examples.
@@ -97,7 +89,7 @@ pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
     for (from_field, number, example) in link.ask("examples")?.iter().filter_map(|line| self::taught(line)) {
         if from_field {
-            features_of(&example).ok_or(ExamplesError::NoObject { number })?;
+            features_of(&example).ok_or(ExamplesError::NoObject(number))?;
             taught.push((number, example));
         } else {
             built_in.push(example);
@@ -148,7 +140,7 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
     let after = set(after.iter().map(|(_, example)| example));
     let missing = named.difference(&after).count();
     if missing > 0 {
-        return Err(ExamplesError::NotTaken { missing });
+        return Err(ExamplesError::NotTaken(missing));
     }
     Ok(Pushed { taught: new.len(), forgotten: stale.len() })
 }

@@ -68,13 +68,8 @@ const HEADER: &str = "time_ms,kind,line";
 #[derive(Debug, Error)]
 pub enum LogError {
     /// The file cannot be written.
-    #[error("{path} cannot be written")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The file is no log.
     #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
@@ -96,7 +91,7 @@ impl LogWriter {
     /// # Errors
     /// If the file cannot be written, or is something else.
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let failed = |source| LogError::File { path: path.into(), source };
+        let failed = |source| FileError::unwritten(path, source);
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
         let mut bytes = Vec::new();
@@ -179,7 +174,7 @@ impl LogWriter {
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
         let written = self.file.write_record(fields).map_err(io::Error::from).and_then(|()| self.file.flush());
-        written.map_err(|source| LogError::File { path: self.path.clone(), source })
+        Ok(written.map_err(|source| FileError::unwritten(&self.path, source))?)
     }
 }
 

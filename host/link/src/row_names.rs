@@ -6,7 +6,8 @@
 //!
 //! Only [`Board::open`] opens a port. Only [`Names::write`] changes the file.
 
-use super::port::{is_uno, open};
+use super::port::is_uno;
+use super::settings_file::no_toml;
 use super::{Link, LinkError, find_uno};
 use files::{FileError, whole_file};
 use serialport::{SerialPortInfo, SerialPortType};
@@ -14,7 +15,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use toml_edit::{DocumentMut, InlineTable, Item, TomlError, Value};
+use toml_edit::{DocumentMut, InlineTable, Item, Value};
 
 /// Longest name of a row, in characters. A phone shows it before the machine.
 pub const NAME_LENGTH: usize = 24;
@@ -119,8 +120,7 @@ impl Board {
     /// # Errors
     /// If it is not plugged in, or as [`Link::open`].
     pub fn open(&self) -> Result<Link, LinkError> {
-        let (port, resets) = open(&self.port()?)?;
-        Link::over(port, resets)
+        Link::open(Some(&self.port()?))
     }
 
     /// Its present port.
@@ -300,13 +300,10 @@ impl Names {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> {
-    let at = |start: usize, problem: String| FileError::at_byte(path, text, start, problem);
-    let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
-    let read = toml_edit::Document::parse(text).map_err(broken)?;
+    let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let mut rows: Vec<Row> = Vec::new();
-    for (name, item) in read.as_table().iter() {
-        let start = read.as_table().key(name).and_then(|key| key.span()).or_else(|| item.span());
-        let wrong = |problem| at(start.map_or(0, |span| span.start), problem);
+    for (name, item) in document.iter() {
+        let wrong = |problem| FileError::at_key(path, text, name, problem);
         if let Some(problem) = wrong_with(name) {
             return Err(wrong(format!("{name:?} cannot be a row's name: {problem}")));
         }
@@ -326,7 +323,7 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> 
         }
         rows.push(Row { name: name.to_owned(), board });
     }
-    Ok((read.into_mut(), rows))
+    Ok((document, rows))
 }
 
 #[cfg(test)]

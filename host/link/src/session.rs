@@ -113,11 +113,8 @@ impl Session {
         if self.link.is_some() {
             return Ok(());
         }
-        let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
-        if opened.is_err() {
-            (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
-        }
-        opened
+        (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
+        (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link))
     }
 
     /// A session without a link: the turns call `open` until it returns one. The first failure is reported.
@@ -173,10 +170,10 @@ impl Session {
         let result = match self.link.take() {
             Some(link) => self.listen(link, now),
             None if self.retry_at.is_none_or(|at| now >= at) => {
-                self.retry_at = Some(now + RETRY);
-                let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
+                let is_loss_reported = !self.is_loss_unreported;
+                let opened = self.try_now(now);
                 // The reason was reported when it was lost.
-                if self.is_loss_unreported { opened } else { Ok(()) }
+                if is_loss_reported { Ok(()) } else { opened }
             }
             None => {
                 std::thread::sleep(Duration::from_millis(20));

@@ -13,14 +13,9 @@ pub enum SettingsError {
     /// The console failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The firmware lacks a setting that this program has, or gives an impossible value.
-    #[error(
-        "the firmware gives no valid value for {setting}: it has another version; flash this one by `weeder flash`"
-    )]
-    Unknown {
-        /// The setting's name.
-        setting: String,
-    },
+    /// The firmware lacks this setting, or gives an impossible value for it.
+    #[error("the firmware gives no valid value for {0}: it has another version; flash this one by `weeder flash`")]
+    Unknown(String),
     /// The machine is at work.
     #[error("the machine is at work, where its settings cannot all be changed: hold it first, by its switch or `hold`")]
     AtWork,
@@ -104,7 +99,7 @@ pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
     let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
     let mut settings = Settings::new();
     for setting in Setting::all() {
-        let unknown = || SettingsError::Unknown { setting: name(setting) };
+        let unknown = || SettingsError::Unknown(name(setting));
         let &(_, value) = shown.iter().find(|(known, _)| *known == setting).ok_or_else(unknown)?;
         settings.set(setting, value).map_err(|_| unknown())?;
     }
@@ -179,7 +174,7 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     let before = read(link)?;
     let mut after = before.clone();
     for &(setting, value) in wanted {
-        after.set(setting, value).map_err(|_| SettingsError::Unknown { setting: name(setting) })?;
+        after.set(setting, value).map_err(|_| SettingsError::Unknown(name(setting)))?;
     }
     let names = |wheel: Setting| wanted.iter().any(|&(setting, _)| setting == wheel);
     let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
