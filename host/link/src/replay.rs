@@ -199,7 +199,8 @@ fn replay_stretch(
 fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>) -> Result<Played, ReplayError> {
     let mut player = Player::new(stretch, pace);
     let mut logged: Vec<Heard> = Vec::new();
-    let mut last = (stretch.first.clone(), stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms));
+    // The PC's time when the machine was at its present position.
+    let mut last_ms = stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms);
     let mut notes = Vec::new();
     // Whether the next start treats unseen ground as bare.
     let mut starts_now = false;
@@ -207,18 +208,16 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
         progress.advance();
         match happened {
             Happened::Status(status) => {
-                player.roll(&last.0, status, entry.time_ms.saturating_sub(last.1)).map_err(|()| {
+                if !player.roll(status, entry.time_ms.saturating_sub(last_ms)) {
                     let problem = "the machine cannot have rolled so far since the status before".to_owned();
-                    ReplayError::Line { line: entry.number, problem }
-                })?;
-                last = (status.clone(), entry.time_ms);
+                    return Err(ReplayError::Line { line: entry.number, problem });
+                }
+                last_ms = entry.time_ms;
             }
             Happened::Event(event) => {
                 let mut is_given = false;
                 if let Some(at) = stretch.position_of_change(place) {
-                    player.roll_to(at, &last.0, stretch.next_status(place));
-                    last.0.position = player.position();
-                    last.0.speed_mm_s = player.speed_mm_s;
+                    player.roll_to(at, stretch.next_status(place));
                 }
                 match event {
                     EventLine::State { mode } => player.enter(*mode, std::mem::take(&mut starts_now)),
@@ -235,11 +234,9 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
                     starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
                     continue;
                 }
-                if let Some(at) = stretch.position_of_command(entry.time_ms, &last, place) {
-                    player.roll_to(at, &last.0, stretch.next_status(place));
-                    last.0.position = player.position();
-                    last.0.speed_mm_s = player.speed_mm_s;
-                    last.1 = entry.time_ms;
+                if let Some(at) = stretch.position_of_command(entry.time_ms, (player.position(), last_ms), place) {
+                    player.roll_to(at, stretch.next_status(place));
+                    last_ms = entry.time_ms;
                 }
                 if !player.command(line) {
                     notes.push(format!("line {}: not replayed from `{}` on", entry.number, in_a_line(line)));
@@ -248,7 +245,8 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
             }
         }
     }
-    Ok(Played { logged, replayed: player.heard, notes, end: last.0.position })
+    let end = player.position();
+    Ok(Played { logged, replayed: player.heard, notes, end })
 }
 
 #[cfg(test)]

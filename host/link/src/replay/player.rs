@@ -144,7 +144,8 @@ impl<'a> Player<'a> {
         let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { SLOWLY_MM_S };
         let distance_mm = i64::from(self.rig.settings().wheel().millimetres(Ticks(distance)));
         let time_ms = (distance_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
-        self.roll_by(distance, speed_mm_s, speed_mm_s, time_ms);
+        self.speed_mm_s = speed_mm_s;
+        self.roll_by(distance, speed_mm_s, time_ms);
         self.speed_mm_s = first.speed_mm_s;
     }
 
@@ -160,43 +161,41 @@ impl<'a> Player<'a> {
         TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
     }
 
-    /// Rolls from one status to the next, `host_ms` later by the PC's clock.
-    pub(super) fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
+    /// Rolls to the next status, `host_ms` later by the PC's clock. False if that is too far.
+    pub(super) fn roll(&mut self, to: &Status, host_ms: u64) -> bool {
         let distance = to.position.wrapping_sub(self.position());
-        if distance.saturating_abs() > LONGEST_DISTANCE {
-            return Err(());
-        }
         if distance == 0 {
             self.speed_mm_s = to.speed_mm_s;
             // A line between the two may have moved it here already.
             if f64::from(to.speed_mm_s.saturating_abs()) < SURE_MM_S {
                 self.rest(host_ms.min(LONGEST_REST_MS));
             }
-            return Ok(());
+        } else if distance.saturating_abs() <= LONGEST_DISTANCE {
+            self.roll_by(distance, to.speed_mm_s, host_ms);
+        } else {
+            return false;
         }
-        self.roll_by(distance, from.speed_mm_s, to.speed_mm_s, host_ms);
-        Ok(())
+        true
     }
 
     /// Rolls to a position, if it lies before the next status.
-    pub(super) fn roll_to(&mut self, place: i32, from: &Status, next: Option<&Status>) {
+    pub(super) fn roll_to(&mut self, place: i32, next: Option<&Status>) {
         let distance = place.wrapping_sub(self.position());
         let Some(next) = next else { return };
         let whole = next.position.wrapping_sub(self.position());
-        if distance == 0 || distance.signum() != whole.signum() || distance.unsigned_abs() > whole.unsigned_abs() {
-            return;
-        }
-        if distance.unsigned_abs() > LONGEST_DISTANCE as u32 {
+        let farthest = whole.unsigned_abs().min(LONGEST_DISTANCE as u32);
+        if distance == 0 || distance.signum() != whole.signum() || distance.unsigned_abs() > farthest {
             return;
         }
         let share = f64::from(distance) / f64::from(whole);
-        let speed = self.pace.speed(from.speed_mm_s.into(), next.speed_mm_s.into(), share);
-        self.roll_by(distance, from.speed_mm_s, distance.signum() * speed.round() as i32, 0);
+        let speed = self.pace.speed(self.speed_mm_s.into(), next.speed_mm_s.into(), share);
+        self.roll_by(distance, distance.signum() * speed.round() as i32, 0);
     }
 
     /// Rolls a distance, tick by tick. The time follows from the speeds, because a busy PC reads lines late and together.
     /// Near standstill it follows from the PC's clock.
-    fn roll_by(&mut self, distance: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
+    fn roll_by(&mut self, distance: i32, to_mm_s: i32, host_ms: u64) {
+        let from_mm_s = self.speed_mm_s;
         let tick_mm = 100.0 / f64::from(self.rig.settings().wheel().ticks(100).0.max(1));
         let distance_mm = f64::from(distance) * tick_mm;
         let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
@@ -269,9 +268,7 @@ impl<'a> Player<'a> {
     /// Enters a state, unless it is there already. With `now` it works over unseen ground too, as `start now`.
     pub(super) fn enter(&mut self, mode: Mode, now: bool) {
         match (mode, self.rig.state()) {
-            (Mode::Work, State::Hold) => {
-                let _ = self.rig.start(now);
-            }
+            (Mode::Work, State::Hold) => _ = self.rig.start(now),
             (Mode::Hold, State::Work | State::Alarm(_)) => {
                 self.rig.hold();
                 self.rig.clear();
@@ -299,24 +296,16 @@ impl<'a> Player<'a> {
     /// Executes a typed line. False if it cannot be replayed.
     pub(super) fn command(&mut self, line: &str) -> bool {
         match command::parse(line.as_bytes()) {
-            Ok(Command::Start { now }) => {
-                let _ = self.rig.start(now);
-            }
+            // If the log lacks the answer: the firmware refused what the replay refuses.
+            Ok(Command::Start { now }) => _ = self.rig.start(now),
             Ok(Command::Hold) => self.rig.hold(),
             Ok(Command::Clear) => self.rig.clear(),
             // The log lacks the second beam's edges.
             Ok(Command::Set(Setting::SecondBeamMm, 1..)) => return false,
-            Ok(Command::Set(setting, value)) => {
-                // If the log lacks the answer: the firmware refused what the replay refuses.
-                let _ = self.rig.set(setting, value);
-            }
-            Ok(Command::Label { label, force }) => {
-                let _ = self.rig.label(label, force);
-            }
+            Ok(Command::Set(setting, value)) => _ = self.rig.set(setting, value),
+            Ok(Command::Label { label, force }) => _ = self.rig.label(label, force),
             Ok(Command::Feature(feature)) => self.rig.enter_feature(feature),
-            Ok(Command::Teach(label)) => {
-                let _ = self.rig.teach(label);
-            }
+            Ok(Command::Teach(label)) => _ = self.rig.teach(label),
             Ok(Command::Forget(_) | Command::ForgetAll) => return false,
             _ => {
                 let word = line.split_whitespace().next().unwrap_or_default();

@@ -123,9 +123,9 @@ impl<'a> Stretch<'a> {
         first.saturating_add(self.settings.ticks(Setting::BeamToToolMm).0).saturating_add(behind)
     }
 
-    /// The machine's position at a typed command that changes no state: between two statuses, by the PC's clock. `start
-    /// now` at work lets the tool into the row at its next swing in.
-    pub(super) fn position_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
+    /// The machine's position at a typed command that changes no state: between its last position, with that time, and
+    /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in.
+    pub(super) fn position_of_command(&self, time_ms: u64, last: (i32, u64), place: usize) -> Option<i32> {
         if let Happened::Command { line, .. } = self.happened[place].1
             && matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }))
             && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
@@ -135,8 +135,8 @@ impl<'a> Stretch<'a> {
         let (entry, next) = self.happened[place..].iter().find_map(|told| Some((told.0, status(told)?)))?;
         let whole_ms = entry.time_ms.checked_sub(last.1).filter(|&time_ms| time_ms > 0)?;
         let share = time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
-        let distance = f64::from(next.position.wrapping_sub(last.0.position)) * share;
-        Some(last.0.position.wrapping_add(distance as i32))
+        let distance = f64::from(next.position.wrapping_sub(last.0)) * share;
+        Some(last.0.wrapping_add(distance as i32))
     }
 
     /// The position of a state change that an event reports. An alarm has its own position. Else the next swing has it.
