@@ -253,9 +253,8 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
             continue;
         };
         let (place, end) = places.take(peer.ip());
-        let lengths = Arc::<Lengths>::default();
-        let visitor =
-            Visitor { address: peer.ip(), door: Arc::clone(&door), place: place.into(), lengths: Arc::clone(&lengths) };
+        let (address, door, place, lengths) = (peer.ip(), Arc::clone(&door), Arc::new(place), Arc::default());
+        let visitor = Visitor { address, door, place, lengths: Arc::clone(&lengths), known: None };
         let routes = routes.clone().layer(Extension(visitor));
         tokio::spawn(async move {
             // Closes the connection at its end, or when it loses its place.

@@ -88,16 +88,14 @@ pub struct Visitor {
     pub place: Arc<Place>,
     /// Its `Content-Length` lines.
     pub lengths: Arc<Lengths>,
+    /// Who sent the present request, if it may see the page.
+    pub known: Option<Client>,
 }
 
-/// The client of a request, if it may see the page.
-#[derive(Clone, Copy)]
-struct Known(Option<Client>);
-
-impl Known {
-    fn enter(self, place: &Place, stage: Stage) {
-        if let Some(client) = self.0 {
-            place.enter(stage, client);
+impl Visitor {
+    fn enter(&self, stage: Stage) {
+        if let Some(client) = self.known {
+            self.place.enter(stage, client);
         }
     }
 }
@@ -129,7 +127,7 @@ pub fn routes(served: Arc<Served>) -> Router {
 /// Passes a request to the door. Returns an error page if the door refuses it.
 async fn admit(
     State(served): State<Arc<Served>>,
-    Extension(visitor): Extension<Visitor>,
+    Extension(mut visitor): Extension<Visitor>,
     request: Request,
     next: Next,
 ) -> Response {
@@ -139,12 +137,12 @@ async fn admit(
     let mut response = match visitor.door.admit(&request, phone.is_some()) {
         Ok(()) => match whole(request, &visitor.lengths).await {
             Ok(mut request) => {
-                let known = Known(match visitor.door.reach {
+                visitor.known = match visitor.door.reach {
                     Reach::Here => Some(Client::Here),
                     Reach::Lan { .. } => phone.map(Client::Phone),
-                });
-                known.enter(&visitor.place, Stage::Asking);
-                request.extensions_mut().insert(known);
+                };
+                visitor.enter(Stage::Asking);
+                request.extensions_mut().insert(visitor);
                 next.run(request).await
             }
             Err(problem) => problem,
@@ -172,8 +170,8 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
 }
 
 /// The page, or the form for the code.
-async fn front(State(served): State<Arc<Served>>, Extension(Known(known)): Extension<Known>, uri: Uri) -> Response {
-    if known.is_none() {
+async fn front(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>, uri: Uri) -> Response {
+    if visitor.known.is_none() {
         return Html(form::HTML).into_response();
     }
     // This tells the page that it is connected to a machine.
@@ -241,8 +239,7 @@ async fn machines(
 /// Types a line to a machine, if this is allowed, and returns its answer.
 async fn command(
     State(served): State<Arc<Served>>,
-    Extension(Visitor { door, place, .. }): Extension<Visitor>,
-    Extension(known): Extension<Known>,
+    Extension(visitor): Extension<Visitor>,
     Path(number): Path<usize>,
     body: Bytes,
 ) -> Response {
@@ -250,7 +247,7 @@ async fn command(
         return refused(StatusCode::NOT_FOUND, "there is no such machine");
     };
     let Ok(line) = String::from_utf8(body.into()) else { return no_line() };
-    let order = match rules::allow(&line, door.reach) {
+    let order = match rules::allow(&line, visitor.door.reach) {
         Ok(order) => order,
         Err(Forbidden::NoLine) => return no_line(),
         Err(why) => return refused(StatusCode::FORBIDDEN, why),
@@ -260,7 +257,7 @@ async fn command(
     }
     let answer = match order {
         Order::Hold => {
-            known.enter(&place, Stage::Holding);
+            visitor.enter(Stage::Holding);
             machine.hold().await
         }
         Order::Type => machine.command(line).await,
@@ -275,12 +272,8 @@ async fn command(
 
 /// Holds all machines at once. Every client that is let in may do this. Returns for each machine why it has not obeyed,
 /// or nothing, and the time of the last one that has.
-async fn hold_all(
-    State(served): State<Arc<Served>>,
-    Extension(Visitor { place, .. }): Extension<Visitor>,
-    Extension(known): Extension<Known>,
-) -> impl IntoResponse {
-    known.enter(&place, Stage::Holding);
+async fn hold_all(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>) -> impl IntoResponse {
+    visitor.enter(Stage::Holding);
     let since = Instant::now();
     let holds = served.machines.iter().map(|machine| async move { (machine.hold().await, since.elapsed()) });
     let (mut machines, mut last_ms) = (Vec::new(), None);
@@ -335,10 +328,9 @@ fn no_line() -> Response {
 /// Streams the state and output of all machines while the page reads it.
 async fn events(
     State(served): State<Arc<Served>>,
-    Extension(Visitor { place, .. }): Extension<Visitor>,
-    Extension(known): Extension<Known>,
+    Extension(visitor): Extension<Visitor>,
 ) -> Sse<impl Stream<Item = Result<Event, Infallible>> + use<>> {
-    known.enter(&place, Stage::Listening);
+    visitor.enter(Stage::Listening);
     Sse::new(heard(&served.hub).map(|message| Ok(Event::default().data(&*message))))
 }
 
