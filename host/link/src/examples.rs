@@ -21,34 +21,24 @@ pub type Taught = Example<COUNT>;
 
 /// Why examples could not be read or taught.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum ExamplesError {
-    /// The console failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The firmware has other built-in examples than this program.
     #[error(
         "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder`, or flash this one's firmware by `weeder flash`"
     )]
     OtherTable,
-    /// The example with this number has features that no object in whole millimetres has.
     #[error(
         "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {0}`"
     )]
     NoObject(u16),
-    /// The machine is at work: teaching needs HOLD.
     #[error("the machine is at work and takes no examples: hold it first, by its switch or `hold`; nothing was sent")]
     AtWork,
-    /// They do not find room.
     #[error(
         "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or use --replace to forget all that are not in the file; nothing was sent"
     )]
-    NoRoom {
-        /// Examples that would be taught.
-        new: usize,
-        /// Places that are free.
-        free: usize,
-    },
-    /// The machine did not take this many.
+    NoRoom { new: usize, free: usize },
     #[error("{0} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so")]
     NotTaken(usize),
 }

@@ -51,20 +51,14 @@ pub const SWING_MS: i32 = 25;
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum ReplayError {
-    /// The log has nothing to replay.
     #[error(
         "the log has no machine in it: `weeder record` and `weeder monitor --log` write one with its settings and status"
     )]
     Nothing,
-    /// A line has impossible content.
     #[error("line {line} of the log: {problem}")]
-    Line {
-        /// The line, counted from 1.
-        line: u64,
-        /// The problem.
-        problem: String,
-    },
+    Line { line: u64, problem: String },
 }
 
 /// A difference between log and replay.

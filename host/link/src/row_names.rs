@@ -67,29 +67,14 @@ pub struct Plugged {
 
 /// Why the rows' names cannot be read or changed.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum NamesError {
-    /// An error of the file, or of a line in it.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A name that no row can have.
     #[error("{name:?} cannot be a row's name: {problem}")]
-    Name {
-        /// The name.
-        name: String,
-        /// The problem, and what would be right.
-        problem: String,
-    },
-    /// There is no such row.
+    Name { name: String, problem: String },
     #[error("{path} has no row {name}: it has {known}")]
-    NoRow {
-        /// The file.
-        path: PathBuf,
-        /// The name.
-        name: String,
-        /// The names that are there.
-        known: String,
-    },
-    /// The port.
+    NoRow { path: PathBuf, name: String, known: String },
     #[error(transparent)]
     Port(#[from] LinkError),
 }

@@ -9,29 +9,18 @@ use thiserror::Error;
 
 /// Why settings could not be read or changed.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum SettingsError {
-    /// The console failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The firmware lacks this setting, or gives an impossible value for it.
     #[error("the firmware gives no valid value for {0}: it has another version; flash this one by `weeder flash`")]
     Unknown(String),
-    /// The machine is at work.
     #[error("the machine is at work, where its settings cannot all be changed: hold it first, by its switch or `hold`")]
     AtWork,
-    /// The settings would contradict each other.
     #[error("{0}; nothing was sent")]
     Contradiction(String),
-    /// A setting has another value than the one sent.
     #[error("{setting} was set to {wanted} and is {found}: try again, and see to the supply if it stays so")]
-    NotTaken {
-        /// The setting's name.
-        setting: String,
-        /// The value sent.
-        wanted: u16,
-        /// The firmware's value.
-        found: u16,
-    },
+    NotTaken { setting: String, wanted: u16, found: u16 },
 }
 
 /// A setting's name.

@@ -16,7 +16,6 @@ const FORM: [&str; 4] = ["/", "/pair", "/pair.css", "/pair.js"];
 /// An address at which requests come in.
 #[derive(Clone, Debug)]
 pub struct Door {
-    /// From where they come.
     pub reach: Reach,
     /// The valid values of a request's `Host`.
     names: Vec<String>,
@@ -25,19 +24,15 @@ pub struct Door {
 /// Why a request does not come in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Denial {
-    /// Its `Host` is not an address of this server.
     #[error("this is not the address that `weeder serve` printed: type that one, with its number")]
     ForeignHost,
-    /// It comes from a page of another origin, or names no origin.
     #[error("this request comes from another page: open the address that `weeder serve` printed")]
     ForeignOrigin,
-    /// It has no valid token.
     #[error("this phone is not paired: open the address that `weeder serve` printed, and type its code")]
     NotPaired,
 }
 
 impl Denial {
-    /// HTTP's number for it.
     pub fn status(self) -> StatusCode {
         match self {
             Denial::ForeignHost => StatusCode::MISDIRECTED_REQUEST,

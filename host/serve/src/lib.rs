@@ -1,23 +1,23 @@
 //! Serves the page over http: from the computer with the serial ports of one or more machines to a phone in the cab.
 //!
 //! [`Server::open`] binds the addresses and starts the machines. [`Server::run`] serves until it is stopped. The
-//! decisions are in modules without sockets and clocks. [`door`] decides which requests come in. [`pairing`] decides
-//! which phones may use the network. [`rules`] decides which commands may be typed from where. [`machine`] talks to one
-//! machine in its own thread. [`hub`] sends the machines' output to all pages. `routes` and this file connect these
+//! decisions are in modules without sockets and clocks. `door` decides which requests come in. `pairing` decides
+//! which phones may use the network. `rules` decides which commands may be typed from where. `machine` talks to one
+//! machine in its own thread. `hub` sends the machines' output to all pages. `routes` and this file connect these
 //! modules to the network.
 //!
 //! http is not encrypted: use it only in a network in which others may read. The server flashes nothing, and serves no
 //! files except the page's own.
 
-pub mod door;
-pub mod hub;
+mod door;
+mod hub;
 mod lengths;
-pub mod machine;
+mod machine;
 pub mod page;
-pub mod pairing;
+mod pairing;
 mod places;
 mod routes;
-pub mod rules;
+mod rules;
 
 use self::door::Door;
 use self::hub::Hub;
@@ -89,32 +89,22 @@ pub struct Setup {
 
 /// The errors of starting the server.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum ServeError {
-    /// The computer is in no network.
     #[error("this computer is in no network: join one, or name its address in one, as in `--lan 192.168.4.1`")]
     NoNetwork,
-    /// It is in several.
     #[error("this computer has several addresses: choose the one of the phone's network, as in `--lan {}`, of {}",
         .0[0], .0.iter().map(Ipv4Addr::to_string).collect::<Vec<_>>().join(", "))]
     SeveralNetworks(Vec<Ipv4Addr>),
-    /// An address that means all networks, or only this computer.
+    /// It means all networks, or only this computer.
     #[error("{0} cannot be opened by a phone: name this computer's address in the phone's network, or use --lan alone")]
     NoAddress(Ipv4Addr),
-    /// Another program uses the port.
     #[error("port {} of {} is in use: end the other program, or choose another port by --http-port", .0.port(), .0.ip())]
     InUse(SocketAddr),
-    /// The address is another computer's.
     #[error("{0} is no address of this computer: use --lan alone, or name one of its addresses")]
     NotMine(Ipv4Addr),
-    /// The address cannot be had.
     #[error("no connection can be taken at {address}")]
-    NotBound {
-        /// The address.
-        address: SocketAddr,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// The system lacks something.
+    NotBound { address: SocketAddr, source: io::Error },
     #[error("the system gives no {0}")]
     System(&'static str, #[source] io::Error),
 }

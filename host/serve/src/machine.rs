@@ -33,16 +33,12 @@ pub type Answer = Result<Vec<String>, NoAnswer>;
 /// Why there is no answer to a line.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum NoAnswer {
-    /// A client held the machine first.
     #[error("hold came first, so this was not sent")]
     Dropped,
-    /// The machine was lost before it had answered.
     #[error("{0}")]
     Lost(String),
-    /// Too many commands wait.
     #[error("too much waits for the machine: try again")]
     Busy,
-    /// The machine was silent for too long.
     #[error("the machine does not answer")]
     Silent,
 }

@@ -65,28 +65,20 @@ const COOKIE_NAME: &str = "weeder";
 
 /// The state that all requests share.
 pub struct Served {
-    /// The page.
     pub page: Page,
     /// The machines, in the order of their numbers.
     pub machines: Vec<Machine>,
-    /// Their output.
     pub hub: Arc<Hub>,
-    /// Who is paired.
     pub pairing: Mutex<Pairing>,
-    /// Prints a message for the operator.
     pub tell: Tell,
 }
 
 /// The client of a connection, and its door.
 #[derive(Clone)]
 pub struct Visitor {
-    /// His address.
     pub address: IpAddr,
-    /// The door.
     pub door: Arc<Door>,
-    /// The place of the connection.
     pub place: Arc<Place>,
-    /// Its `Content-Length` lines.
     pub lengths: Arc<Lengths>,
     /// Who sent the present request, if it may see the page.
     pub known: Option<Client>,
