@@ -278,7 +278,7 @@ fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
 }
 
 /// How each kind of value of the tables is read.
-mod kind {
+pub(super) mod kind {
     use super::{Alarm, Class, Warning, names};
     use control::say::Text;
     use std::str::FromStr;
@@ -294,7 +294,7 @@ mod kind {
         Some(word.to_owned())
     }
 
-    pub(super) fn class(word: &str) -> Option<Class> {
+    pub(crate) fn class(word: &str) -> Option<Class> {
         named(word, [Class::Plant, Class::Weed, Class::Unknown], names::class)
     }
 

@@ -108,30 +108,20 @@ fn explain(name: &str, error: serialport::Error) -> LinkError {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn port(name: &str, ids: Option<(u16, u16)>) -> SerialPortInfo {
-        SerialPortInfo {
-            port_name: name.to_owned(),
-            port_type: match ids {
-                None => SerialPortType::Unknown,
-                Some((vid, pid)) => SerialPortType::UsbPort(UsbPortInfo {
-                    vid,
-                    pid,
-                    serial_number: None,
-                    manufacturer: None,
-                    product: None,
-                }),
-            },
-        }
+    /// A board's port, by its USB vendor and product, and its serial number if it has one.
+    pub(crate) fn usb(name: &str, (vid, pid): (u16, u16), serial_number: Option<&str>) -> SerialPortInfo {
+        let serial_number = serial_number.map(str::to_owned);
+        let usb = UsbPortInfo { vid, pid, serial_number, manufacturer: None, product: None };
+        SerialPortInfo { port_name: name.to_owned(), port_type: SerialPortType::UsbPort(usb) }
     }
 
     #[test]
     fn the_only_uno_is_found_among_other_ports_and_none_or_two_are_an_error() {
-        let other = port("ttyS0", None);
-        let [one, two] =
-            [("ttyACM0", (0x2341, 0x0043)), ("ttyUSB0", (0x1A86, 0x7523))].map(|(name, ids)| port(name, Some(ids)));
+        let other = SerialPortInfo { port_name: "ttyS0".to_owned(), port_type: SerialPortType::Unknown };
+        let (one, two) = (usb("ttyACM0", UNOS[1], None), usb("ttyUSB0", UNOS[5], None));
         assert_eq!(only_uno(&[other.clone(), one.clone()]).unwrap(), "ttyACM0");
         for (ports, words) in [
             (vec![one, two], "choose one by --port, of ttyACM0, ttyUSB0"),

@@ -111,8 +111,16 @@ pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
 ///
 /// # Errors
 /// As [`replay`].
-pub fn replay_with(log: &[Entry], tell: impl FnMut(f64)) -> Result<Replayed, ReplayError> {
-    let mut progress = Progress { done: 0, all: Pace::ALL.len() * log.len(), tell };
+pub fn replay_with(log: &[Entry], mut tell: impl FnMut(f64)) -> Result<Replayed, ReplayError> {
+    // Replayed lines, of the total at all paces.
+    let (mut done, all) = (0, Pace::ALL.len() * log.len());
+    let mut advance = || {
+        let before = 100 * done / all;
+        done += 1;
+        if before < 100 * done / all {
+            tell(done as f64 / all as f64);
+        }
+    };
     let mut replayed = Replayed::default();
     let mut stretches = 0;
     let mut rest = log;
@@ -120,33 +128,13 @@ pub fn replay_with(log: &[Entry], tell: impl FnMut(f64)) -> Result<Replayed, Rep
         rest = &rest[start + 1..];
         let end =
             rest.iter().position(|entry| matches!(entry.kind, Kind::Connected | Kind::Lost)).unwrap_or(rest.len());
-        let stretch = Stretch::read(&rest[..end])?;
-        if let Some(stretch) = stretch {
+        if let Some(stretch) = Stretch::read(&rest[..end])? {
             stretches += 1;
-            replay_stretch(&stretch, &mut replayed, &mut progress)?;
+            replay_stretch(&stretch, &mut replayed, &mut advance)?;
         }
         rest = &rest[end..];
     }
     if stretches == 0 { Err(ReplayError::Nothing) } else { Ok(replayed) }
-}
-
-/// How far a replay is.
-struct Progress<Tell> {
-    /// Replayed lines, of the total at all paces.
-    done: usize,
-    all: usize,
-    tell: Tell,
-}
-
-impl<Tell: FnMut(f64)> Progress<Tell> {
-    /// Another line is replayed.
-    fn advance(&mut self) {
-        let percent = |done: usize| 100 * done / self.all.max(1);
-        if percent(self.done) < percent(self.done + 1) {
-            (self.tell)((self.done + 1) as f64 / self.all as f64);
-        }
-        self.done += 1;
-    }
 }
 
 /// The result of a stretch at one pace.
@@ -160,11 +148,7 @@ struct Played {
 }
 
 /// Replays a stretch and adds its result.
-fn replay_stretch(
-    stretch: &Stretch,
-    replayed: &mut Replayed,
-    progress: &mut Progress<impl FnMut(f64)>,
-) -> Result<(), ReplayError> {
+fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl FnMut()) -> Result<(), ReplayError> {
     if stretch.settings.get(Setting::SecondBeamMm) > 0 {
         replayed.notes.push("a machine with a second beam is not replayed: the log lacks its edges".to_owned());
         return Ok(());
@@ -178,7 +162,7 @@ fn replay_stretch(
 
     let mut played = Vec::new();
     for pace in Pace::ALL {
-        played.push(play(stretch, pace, progress)?);
+        played.push(play(stretch, pace, advance)?);
     }
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // The logged values are the same at every pace.
@@ -189,8 +173,8 @@ fn replay_stretch(
     Ok(())
 }
 
-/// Replays a stretch at one pace.
-fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>) -> Result<Played, ReplayError> {
+/// Replays a stretch at one pace. Calls `advance` for each line.
+fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Played, ReplayError> {
     let mut player = Player::new(stretch, pace);
     let mut logged: Vec<Heard> = Vec::new();
     // The PC's time when the machine was at its present position.
@@ -199,7 +183,7 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
     // Whether the next start treats unseen ground as bare.
     let mut starts_now = false;
     for (place, (entry, happened)) in stretch.happened.iter().enumerate() {
-        progress.advance();
+        advance();
         match happened {
             Happened::Status(status) => {
                 if !player.roll(status, entry.time_ms.saturating_sub(last_ms)) {

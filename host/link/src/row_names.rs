@@ -314,14 +314,9 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serialport::UsbPortInfo;
+    use crate::port::tests::usb;
 
-    fn usb(port: &str, serial_number: Option<&str>) -> SerialPortInfo {
-        let serial_number = serial_number.map(str::to_owned);
-        let (manufacturer, product) = (None, None);
-        let usb = UsbPortInfo { vid: 0x2341, pid: 0x0043, serial_number, manufacturer, product };
-        SerialPortInfo { port_name: port.to_owned(), port_type: SerialPortType::UsbPort(usb) }
-    }
+    const UNO: (u16, u16) = (0x2341, 0x0043);
 
     fn number(text: &str) -> Board {
         Board::SerialNumber(text.to_owned())
@@ -329,8 +324,8 @@ mod tests {
 
     #[test]
     fn a_board_with_a_number_is_found_at_whichever_port_it_comes_back() {
-        let before = [usb("/dev/ttyACM0", Some("A1")), usb("/dev/ttyACM1", Some("B2"))];
-        let after = [usb("/dev/ttyACM1", Some("A1")), usb("/dev/ttyACM4", Some("B2"))];
+        let before = [usb("/dev/ttyACM0", UNO, Some("A1")), usb("/dev/ttyACM1", UNO, Some("B2"))];
+        let after = [usb("/dev/ttyACM1", UNO, Some("A1")), usb("/dev/ttyACM4", UNO, Some("B2"))];
         assert_eq!(of(&before[0], &before, Path::new("/no-such")), number("A1"));
         assert_eq!([&before, &after].map(|ports| numbered("A1", ports).unwrap()), ["/dev/ttyACM0", "/dev/ttyACM1"]);
         let error = numbered("C3", &after).unwrap_err().to_string();
@@ -352,11 +347,11 @@ mod tests {
         std::os::unix::fs::symlink(&first, places.join("usbv2-0:2:1.0")).unwrap();
         let by_place = Board::Port(places.join("usb-0:2:1.0").display().to_string());
         for number in [None, Some("0001"), Some(" ")] {
-            let ports = [usb(&first, number), usb(&second, number)];
+            let ports = [usb(&first, UNO, number), usb(&second, UNO, number)];
             assert_eq!(of(&ports[0], &ports, &places), by_place);
             assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "it has no link for a socket");
         }
-        let twins = [usb(&first, Some("0001")), usb(&second, Some("0001"))];
+        let twins = [usb(&first, UNO, Some("0001")), usb(&second, UNO, Some("0001"))];
         let error = numbered("0001", &twins).unwrap_err().to_string();
         assert!(error.contains("are both of the serial number 0001") && error.contains("weeder rows name"), "{error}");
     }
