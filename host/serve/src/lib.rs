@@ -11,7 +11,6 @@
 
 mod door;
 mod hub;
-mod lengths;
 mod machine;
 pub mod page;
 mod pairing;
@@ -21,7 +20,6 @@ mod rules;
 
 use self::door::Door;
 use self::hub::Hub;
-use self::lengths::{Counted, Lengths};
 use self::machine::Machine;
 use self::page::Page;
 use self::pairing::{CODE_LENGTH, Code, Pairing};
@@ -43,7 +41,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use thiserror::Error;
-use tokio::io::join;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::runtime::{self, Runtime};
 use tokio::time::sleep;
@@ -243,25 +240,23 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
             continue;
         };
         let (place, end) = places.take(peer.ip());
-        let (address, door, place, lengths) = (peer.ip(), Arc::clone(&door), Arc::new(place), Arc::default());
-        let visitor = Visitor { address, door, place, lengths: Arc::clone(&lengths), known: None };
+        let visitor = Visitor { address: peer.ip(), door: Arc::clone(&door), place: place.into(), known: None };
         let routes = routes.clone().layer(Extension(visitor));
         tokio::spawn(async move {
             // Closes the connection at its end, or when it loses its place.
-            select(pin!(serve(stream, lengths, routes)), end).await;
+            select(pin!(serve(stream, routes)), end).await;
         });
     }
 }
 
 /// Serves a connection to its end. Closes it if the client sends too slowly or does not read.
-async fn serve(stream: TcpStream, lengths: Arc<Lengths>, routes: Router) {
+async fn serve(stream: TcpStream, routes: Router) {
     // Without this option the connection is only slower.
     let _ = stream.set_nodelay(true);
     // Without this option the time limit begins only when the system's buffer is full.
     #[cfg(any(target_os = "linux", target_os = "android"))]
     let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(READER_TIME));
-    let (reader, writer) = stream.into_split();
-    let mut stream = TimeoutStream::new(join(Counted::new(reader, lengths), writer));
+    let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(READER_TIME));
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())

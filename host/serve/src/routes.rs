@@ -14,7 +14,6 @@
 
 use super::door::Door;
 use super::hub::{Hub, Message};
-use super::lengths::Lengths;
 use super::machine::{Machine, NoAnswer, Tell};
 use super::page::{Page, form};
 use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
@@ -25,8 +24,8 @@ use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_LENGTH, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HeaderName, LOCATION,
-    REFERRER_POLICY, RETRY_AFTER, SET_COOKIE, TRANSFER_ENCODING, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HeaderName, LOCATION, REFERRER_POLICY, RETRY_AFTER,
+    SET_COOKIE, TRANSFER_ENCODING, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
@@ -79,7 +78,6 @@ pub struct Visitor {
     pub address: IpAddr,
     pub door: Arc<Door>,
     pub place: Arc<Place>,
-    pub lengths: Arc<Lengths>,
     /// Who sent the present request, if it may see the page.
     pub known: Option<Client>,
 }
@@ -127,7 +125,7 @@ async fn admit(
     yield_now().await;
     let phone = cookies(request.headers()).find_map(|token| served.pairing.lock().phone(token));
     let mut response = match visitor.door.admit(&request, phone.is_some()) {
-        Ok(()) => match whole(request, &visitor.lengths).await {
+        Ok(()) => match whole(request).await {
             Ok(mut request) => {
                 visitor.known = match visitor.door.reach {
                     Reach::Here => Some(Client::Here),
@@ -290,18 +288,17 @@ fn refused(status: StatusCode, why: impl Display) -> Response {
 }
 
 /// Reads a request with its short body. Otherwise returns the error.
-async fn whole(request: Request, lengths: &Lengths) -> Result<Request, Response> {
-    let headers = request.headers();
-    if lengths.are_two(headers.get_all(CONTENT_LENGTH).iter().count(), headers.contains_key(TRANSFER_ENCODING)) {
-        return Err(refused(StatusCode::BAD_REQUEST, "send Content-Length or Transfer-Encoding, not both"));
+async fn whole(request: Request) -> Result<Request, Response> {
+    // With `Content-Length` as well, it may be an attempt at request smuggling (RFC 9112, section 6.1). hyper drops one of
+    // the two before any other code sees the request. Browsers send `Content-Length` alone.
+    if request.headers().contains_key(TRANSFER_ENCODING) {
+        return Err(refused(StatusCode::BAD_REQUEST, "send Content-Length, not Transfer-Encoding"));
     }
     let (head, body) = request.into_parts();
     match timeout(BODY_TIME, to_bytes(body, BODY_BYTES)).await {
         Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
         // Any other error means that the body is too long.
-        Ok(Err(error)) if is_malformed(&error) => {
-            Err(refused(StatusCode::BAD_REQUEST, "the body is no chunks of HTTP, or ends too soon"))
-        }
+        Ok(Err(error)) if is_malformed(&error) => Err(refused(StatusCode::BAD_REQUEST, "the body ends too soon")),
         Ok(Err(_)) => Err(refused(StatusCode::PAYLOAD_TOO_LARGE, Forbidden::NoLine)),
         Err(_) => Err(refused(StatusCode::REQUEST_TIMEOUT, "the line has not come")),
     }
