@@ -102,15 +102,10 @@ pub(super) fn taught(line: &str) -> Option<(bool, u16, Taught)> {
 /// errors of the link.
 pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed, ExamplesError> {
     let before = read(link)?;
-    let (known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
+    let (mut known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
     let stale: Vec<u16> =
         before.iter().filter(|(_, example)| replace && !named.contains(example)).map(|&(number, _)| number).collect();
-    let mut new: Vec<Taught> = Vec::new();
-    for example in wanted {
-        if !known.contains(example) && !new.contains(example) {
-            new.push(*example);
-        }
-    }
+    let new: Vec<&Taught> = wanted.iter().filter(|&&example| known.insert(example)).collect();
     let free = usize::from(CAPACITY) - (before.len() - stale.len());
     if new.len() > free {
         return Err(ExamplesError::NoRoom { new: new.len(), free });

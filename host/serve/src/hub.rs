@@ -48,7 +48,6 @@ impl Hub {
         );
     }
 
-    /// The machine is lost.
     pub fn lost(&self, machine: usize, why: &str) {
         self.change(machine, lost(machine, why));
     }

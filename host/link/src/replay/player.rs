@@ -84,7 +84,6 @@ pub(super) struct Player<'a> {
     steps: u64,
     /// The machine's speed over the ground.
     pub(super) speed_mm_s: i32,
-    /// The events of the decisions.
     pub(super) heard: Vec<Heard>,
     /// Whether the next alarm was raised by the replay itself.
     swallows_alarm: bool,
@@ -149,7 +148,6 @@ impl<'a> Player<'a> {
         self.speed_mm_s = first.speed_mm_s;
     }
 
-    /// The machine's position.
     pub(super) fn position(&self) -> i32 {
         self.rig.readings.position.count()
     }
