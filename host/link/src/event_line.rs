@@ -71,8 +71,11 @@ macro_rules! event_lines {
         }),*];
 
         impl EventLine {
-            /// Parses a line by the table of events. `None` if it matches no event.
-            fn of_table(line: &str) -> Option<Self> {
+            /// Parses an event's line. `None` if it is no event.
+            pub fn parse(line: &str) -> Option<Self> {
+                if is_plot(line) {
+                    return Some(Self::Plot);
+                }
                 $(
                     let read = |values: Values<'_>| {
                         let _ = &values;
@@ -260,13 +263,6 @@ impl<'a> Values<'a> {
     /// As [`text`](Self::text), parsed as a number. `None` if it is no number.
     pub fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
         self.text(key)?.parse().ok()
-    }
-}
-
-impl EventLine {
-    /// Parses an event's line. `None` if it is no event.
-    pub fn parse(line: &str) -> Option<Self> {
-        if is_plot(line) { Some(Self::Plot) } else { Self::of_table(line) }
     }
 }
 

@@ -96,10 +96,8 @@ impl Link {
     /// If the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
-        let (port, resets) = match port {
-            Some(port) => port::open(port)?,
-            None => port::open(&find_uno()?)?,
-        };
+        let name = port.map_or_else(find_uno, |port| Ok(port.to_owned()))?;
+        let (port, resets) = port::open(&name)?;
         Self::over(port, resets)
     }
 

@@ -11,11 +11,8 @@ use std::time::Duration;
 /// Bits in a second on the firmware's serial line.
 const BAUD: u32 = 115_200;
 
-/// Longest time that a read waits for a byte.
-const READ_MS: u64 = 20;
-
-/// Longest wait of a write for room, and of a read.
-const PATIENCE: Duration = Duration::from_millis(READ_MS);
+/// Longest wait of a read for a byte, and of a write for room.
+const PATIENCE: Duration = Duration::from_millis(20);
 
 /// USB vendors and products of the Uno, and of the converters on compatible boards.
 const UNOS: [(u16, u16); 10] = [
@@ -39,10 +36,6 @@ pub fn find_uno() -> Result<String, LinkError> {
     only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
 }
 
-/// The only Uno's port among these.
-///
-/// # Errors
-/// If there is none, or several.
 fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
     let unos: Vec<String> = ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect();
     match unos.as_slice() {

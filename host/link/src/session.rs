@@ -95,28 +95,6 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens a link by `open`. The session calls `open` again after each loss.
-    ///
-    /// # Errors
-    /// If the first link fails.
-    pub fn open(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, SettingsError> {
-        let mut session = Self::waiting_for(open);
-        session.try_now(Instant::now())?;
-        Ok(session)
-    }
-
-    /// Opens a missing link now. The turns then try again, without reporting this error a second time.
-    ///
-    /// # Errors
-    /// If the link fails.
-    pub fn try_now(&mut self, now: Instant) -> Result<(), SettingsError> {
-        if self.link.is_some() {
-            return Ok(());
-        }
-        (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
-        (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link))
-    }
-
     /// A session without a link: the turns call `open` until it returns one. The first failure is reported.
     pub fn waiting_for(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Self {
         Self {
@@ -131,6 +109,15 @@ impl Session {
             is_loss_unreported: true,
             happened: VecDeque::new(),
         }
+    }
+
+    /// Opens the missing link now. The turns then try again, without reporting this error a second time.
+    ///
+    /// # Errors
+    /// If the link fails.
+    pub fn try_now(&mut self, now: Instant) -> Result<(), SettingsError> {
+        (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
+        (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link))
     }
 
     /// Types a command after the commands before it have been answered. False if it is no command or too many wait.

@@ -349,14 +349,7 @@ fn range<T: Ord + Copy + std::ops::Sub<Output = T> + Default>(values: impl Itera
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn settings(changes: &[(Setting, u16)]) -> Settings {
-        let mut settings = Settings::new();
-        for &(setting, value) in changes {
-            settings.set(setting, value).expect("within its range");
-        }
-        settings
-    }
+    use crate::settings::tests::settings;
 
     fn heard(lines: &[&[&str]]) -> SetUp {
         SetUp::of_lines(lines.concat())

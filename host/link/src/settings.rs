@@ -200,12 +200,13 @@ pub(super) fn status(link: &mut Link) -> Result<Status, LinkError> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn settings(values: &[(Setting, u16)]) -> Settings {
+    /// The factory settings with some other values.
+    pub(crate) fn settings(values: &[(Setting, u16)]) -> Settings {
         let mut settings = Settings::new();
         for &(setting, value) in values {
             settings.set(setting, value).unwrap();

@@ -370,8 +370,8 @@ struct Canopies {
     first: i32,
     /// Their numbers, by where they begin.
     by_from: Vec<usize>,
-    /// For each of these, the farthest end of it and all before it, in ticks from `first`.
-    farthest: Vec<i32>,
+    /// The widest of them in ticks.
+    widest: i32,
 }
 
 impl Canopies {
@@ -379,21 +379,18 @@ impl Canopies {
         let (canopies, first) = (canopies(stretch), stretch.first.position);
         let mut by_from: Vec<usize> = (0..canopies.len()).collect();
         by_from.sort_by_key(|&number| canopies[number].from.wrapping_sub(first));
-        let mut farthest = Vec::with_capacity(by_from.len());
-        for &number in &by_from {
-            let end = canopies[number].to.wrapping_sub(first);
-            farthest.push(farthest.last().map_or(end, |&before: &i32| before.max(end)));
-        }
-        Self { canopies, first, by_from, farthest }
+        let widest = canopies.iter().map(|canopy| canopy.to.wrapping_sub(canopy.from)).max().unwrap_or(0);
+        Self { canopies, first, by_from, widest }
     }
 
     /// The first of them in the log over this ground.
     fn over(&self, ground: i32) -> Option<&Canopy> {
         let ticks = ground.wrapping_sub(self.first);
-        let begun =
-            self.by_from.partition_point(|&number| self.canopies[number].from.wrapping_sub(self.first) <= ticks);
-        let near = (0..begun).rev().take_while(|&place| self.farthest[place] > ticks);
-        let over = near.map(|place| self.by_from[place]).filter(|&number| self.canopies[number].is_over(ground));
-        over.min().map(|number| &self.canopies[number])
+        let from = |&number: &usize| self.canopies[number].from.wrapping_sub(self.first);
+        let begun = self.by_from.partition_point(|number| from(number) <= ticks);
+        let near =
+            self.by_from[..begun].iter().rev().take_while(|number| ticks.wrapping_sub(from(number)) < self.widest);
+        let over = near.filter(|&&number| self.canopies[number].is_over(ground));
+        over.min().map(|&number| &self.canopies[number])
     }
 }
