@@ -73,9 +73,10 @@ impl Rows {
             .map(|(row, open)| {
                 let (orders, ordered) = mpsc::channel();
                 let (tried, first) = mpsc::channel();
-                let talk = Talk { row, heard: sender.clone(), typed: VecDeque::new(), hold: Owed::Nothing };
+                let talk = Talk { row, heard: sender.clone(), typed: VecDeque::new() };
                 thread::spawn(move || {
                     let mut session = Session::waiting_for(open);
+                    session.keeps_hold = true;
                     let missing = session.try_now(Instant::now()).err();
                     if let Some(why) = &missing {
                         talk.tell(What::Happened(Happening::Lost(why.to_string())));
@@ -127,24 +128,12 @@ impl Rows {
     }
 }
 
-/// The state of an ordered `hold`.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Owed {
-    /// It was answered, or none was ordered.
-    Nothing,
-    /// The session has it.
-    Answer,
-    /// It will be typed when the row is back.
-    Typing,
-}
-
 /// A row's thread.
 struct Talk {
     row: usize,
     heard: Sender<Heard>,
     /// Typed lines without an answer.
     typed: VecDeque<String>,
-    hold: Owed,
 }
 
 impl Talk {
@@ -153,33 +142,24 @@ impl Talk {
         loop {
             loop {
                 match orders.try_recv() {
-                    Ok(Order::Hold) => self.hold = Owed::Typing,
-                    Ok(Order::Type(command)) => {
-                        // In the order of arrival: a `hold` does not drop commands that came after it.
-                        self.hold_where_owed(&mut session);
-                        self.type_or_report(&mut session, command);
+                    Ok(Order::Hold) => {
+                        let dropped = session.hold();
+                        if dropped > 0 {
+                            let command =
+                                if dropped == 1 { "a command".to_owned() } else { format!("{dropped} commands") };
+                            self.tell(What::NotTyped { command, why: "hold came first".to_owned() });
+                        }
                     }
+                    Ok(Order::Type(command)) => self.type_or_report(&mut session, command),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            self.hold_where_owed(&mut session);
             for happening in session.turn(Instant::now()) {
                 if !self.take(happening) {
                     return;
                 }
             }
-        }
-    }
-
-    fn hold_where_owed(&mut self, session: &mut Session) {
-        if self.hold == Owed::Typing && session.is_connected() {
-            let dropped = session.hold();
-            if dropped > 0 {
-                let command = if dropped == 1 { "a command".to_owned() } else { format!("{dropped} commands") };
-                self.tell(What::NotTyped { command, why: "hold came first".to_owned() });
-            }
-            self.hold = Owed::Answer;
         }
     }
 
@@ -196,20 +176,11 @@ impl Talk {
         let mut answered = None;
         match &happening {
             Happening::Command(line) => self.typed.push_back(line.clone()),
-            Happening::Lost(_) => {
-                self.typed.clear();
-                if self.hold == Owed::Answer {
-                    self.hold = Owed::Typing;
-                }
-            }
+            Happening::Lost(_) => self.typed.clear(),
             Happening::Answer(line) => {
                 if let ConsoleLine::End { error } = ConsoleLine::parse(line)
                     && let Some(command) = self.typed.pop_front()
                 {
-                    let is_hold = command == super::session::HOLD;
-                    if is_hold && self.hold == Owed::Answer {
-                        self.hold = Owed::Nothing;
-                    }
                     let refusal = error.map(|_| line.clone());
                     answered = Some(What::Answered { command, refusal });
                 }

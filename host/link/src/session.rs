@@ -78,6 +78,8 @@ type Opener = Box<dyn FnMut() -> Result<Link, LinkError>>;
 
 /// A link that is opened again after a loss.
 pub struct Session {
+    /// Whether a `hold` without an answer outlasts a loss. It is then the first line that is typed after the loss.
+    pub keeps_hold: bool,
     open: Opener,
     link: Option<Link>,
     /// Lines without an answer, in the order of the answers: one command, and each `hold` typed after it.
@@ -98,6 +100,7 @@ impl Session {
     /// A session without a link: the turns call `open` until it returns one. The first failure is reported.
     pub fn waiting_for(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Self {
         Self {
+            keeps_hold: false,
             open: Box::new(open),
             link: None,
             asked: VecDeque::new(),
@@ -176,10 +179,11 @@ impl Session {
 
     /// The Uno is gone, or has restarted: pending commands will not be answered.
     fn lose(&mut self, why: String) {
-        self.asked.clear();
+        self.is_to_hold |= self.asked.drain(..).any(|asked| asked.line == HOLD);
+        self.is_to_hold &= self.keeps_hold;
         self.waiting.clear();
         self.own.clear();
-        (self.is_to_hold, self.is_loss_unreported) = (false, false);
+        self.is_loss_unreported = false;
         self.happened.push_back(Happening::Lost(why));
     }
 
