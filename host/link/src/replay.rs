@@ -205,14 +205,14 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
                 }
                 logged.push(Heard { line: entry.number, steps: 0, event: *event, speed: player.speed().0, is_given });
             }
-            Happened::Command { is_refused: true, .. } => {}
-            Happened::Command { line, .. } => {
+            Happened::Refused => {}
+            Happened::Command(line) => {
                 // The status that shows the new state must come nearer to the command.
                 if stretch.is_reported_by_event(place) {
                     starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
                     continue;
                 }
-                if let Some(at) = stretch.position_of_command(entry.time_ms, (player.position(), last_ms), place) {
+                if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {
                     player.roll_to(at, stretch.next_status(place));
                     last_ms = entry.time_ms;
                 }

@@ -351,7 +351,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
                 let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
                 canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
             }
-            Happened::Command { line, is_refused: false } => {
+            Happened::Command(line) => {
                 // Later holds have the new margin.
                 if let Ok(Command::Set(setting, value)) = command::parse(line.as_bytes()) {
                     let _ = settings.set(setting, value);
