@@ -4,7 +4,7 @@
 //! part is [`ConsoleLine::Other`]. This module does not know which command a line answers. A setting's name, range and
 //! unit are read from the line, not from this version's table.
 
-use super::event_line::{Counts, EventLine, Fields, LineDescription, Status, ValueDescription};
+use super::event_line::{Counts, EventLine, Fields, LineDescription, Status, ValueDescription, kind};
 use control::ground::class::Class;
 use control::ground::features::COUNT;
 
@@ -170,11 +170,7 @@ fn example(line: &str) -> Option<ConsoleLine> {
         _ => return None,
     };
     let number = words.next()?.parse().ok()?;
-    let label = match words.next()? {
-        "plant" => Class::Plant,
-        "weed" => Class::Weed,
-        _ => return None,
-    };
+    let label = kind::class(words.next()?).filter(|&class| class != Class::Unknown)?;
     let mut features = [0; COUNT];
     for feature in &mut features {
         *feature = words.next()?.parse().ok()?;
@@ -244,7 +240,6 @@ fn is_word(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Mode;
     use crate::settings::{self, Setting};
     use control::ground::{class::label, nearest::Nearest};
     use control::measure::reset::Cause;
@@ -270,58 +265,49 @@ mod tests {
 
     #[test]
     fn the_firmware_says_its_name_by_itself_and_when_asked() {
-        let greeting = ConsoleLine::Greeting { version: "0.2.0".to_owned(), cause: "brown_out".to_owned() };
-        assert_eq!(
-            ConsoleLine::parse("weeder 0.2.0, reset by brown_out, state alarm 5-1 settings_lost, tool out"),
-            greeting
-        );
-        assert_eq!(ConsoleLine::parse("weeder 0.2.0"), ConsoleLine::Version { version: "0.2.0".to_owned() });
-        assert_eq!(
-            ConsoleLine::parse("weeder 0.2.0 (abc1234)"),
-            ConsoleLine::Version { version: "0.2.0 (abc1234)".to_owned() }
-        );
+        let greeting = |version: &str, cause: &str| {
+            let (version, cause) = (version.to_owned(), cause.to_owned());
+            ConsoleLine::Greeting { version, cause }
+        };
+        for cut in ["", "o", "status pos=123 to", "error: no such com", "state is=ho", "weeder 0.1"] {
+            let line = format!("{cut}weeder 0.2.0, reset by brown_out, state alarm 5-1 settings_lost, tool out");
+            assert_eq!(ConsoleLine::parse(&line), greeting("0.2.0", "brown_out"), "{line}");
+        }
+        let of_a_commit = "obj\u{fffd}weeder 0.2.0 (abc1234+), reset by button, state hold";
+        assert_eq!(ConsoleLine::parse(of_a_commit), greeting("0.2.0 (abc1234+)", "button"));
+        for version in ["0.2.0", "0.2.0 (abc1234)"].map(str::to_owned) {
+            assert_eq!(ConsoleLine::parse(&format!("weeder {version}")), ConsoleLine::Version { version });
+        }
         for foreign in ["weeder 0.2.0 abc1234", "weeder 0.2.0 ()", "weeder  (abc1234)", "weeder 0.2.0 (abc 1234)"] {
             assert_eq!(ConsoleLine::parse(foreign), ConsoleLine::Other, "{foreign}");
-        }
-        let of_a_commit = ConsoleLine::Greeting { version: "0.2.0 (abc1234+)".to_owned(), cause: "button".to_owned() };
-        assert_eq!(ConsoleLine::parse("obj\u{fffd}weeder 0.2.0 (abc1234+), reset by button, state hold"), of_a_commit);
-        for cut in ["o", "status pos=123 to", "error: no such com", "state is=ho", "weeder 0.1"] {
-            let line = format!("{cut}weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands");
-            assert_eq!(ConsoleLine::parse(&line), greeting, "{line}");
         }
     }
 
     #[test]
     fn lines_of_answers_are_told_apart() {
-        assert_eq!(ConsoleLine::parse("ok"), DONE);
-        assert_eq!(
-            ConsoleLine::parse("error: no such command"),
-            ConsoleLine::End { error: Some("no such command".to_owned()) }
-        );
-        let taught =
-            ConsoleLine::Example { from_field: true, number: 7, label: Class::Weed, features: [1, 2, 3, 4, 5] };
-        assert_eq!(ConsoleLine::parse("field 7 weed 1 2 3 4 5"), taught);
+        let refused = ConsoleLine::End { error: Some("no such command".to_owned()) };
+        let features = [1, 2, 3, 4, 5];
+        let taught = ConsoleLine::Example { from_field: true, number: 7, label: Class::Weed, features };
         let help = ConsoleLine::Help { name: "get".to_owned(), help: "shows settings".to_owned() };
-        assert_eq!(ConsoleLine::parse("get [name] - shows settings"), help);
-        let status = "state=work tool=in pos=1 speed_mm_s=2 windows=1 unseen_mm=0";
-        assert!(matches!(ConsoleLine::parse(status), ConsoleLine::Status(Status { mode: Mode::Work, .. })));
-        assert!(matches!(
-            ConsoleLine::parse("swing tool=in pos=3"),
-            ConsoleLine::Event(EventLine::Swing { out: false, position: 3 })
-        ));
-        for line in [
-            "",
-            "okay",
-            "weeder",
-            "weeder ",
-            "weeder 1, reset by ",
-            "field 7 grass 1 2 3 4 5",
-            "field 7 weed 1 2 3 4",
-            "field 7 weed 1 2 3 4 256",
-            "field x weed 1",
-            "k=3",
+        let swing = ConsoleLine::Event(EventLine::Swing { out: false, position: 3 });
+        for (line, meant) in [
+            ("ok", DONE),
+            ("error: no such command", refused),
+            ("field 7 weed 1 2 3 4 5", taught),
+            ("get [name] - shows settings", help),
+            ("swing tool=in pos=3", swing),
+            ("", ConsoleLine::Other),
+            ("okay", ConsoleLine::Other),
+            ("weeder", ConsoleLine::Other),
+            ("weeder ", ConsoleLine::Other),
+            ("weeder 1, reset by ", ConsoleLine::Other),
+            ("field 7 grass 1 2 3 4 5", ConsoleLine::Other),
+            ("field 7 weed 1 2 3 4", ConsoleLine::Other),
+            ("field 7 weed 1 2 3 4 256", ConsoleLine::Other),
+            ("field x weed 1", ConsoleLine::Other),
+            ("k=3", ConsoleLine::Other),
         ] {
-            assert_eq!(ConsoleLine::parse(line), ConsoleLine::Other, "{line:?}");
+            assert_eq!(ConsoleLine::parse(line), meant, "{line:?}");
         }
     }
 
@@ -353,15 +339,10 @@ mod tests {
         assert!(matches!(answer("status").as_slice(), [ConsoleLine::Status(_), ConsoleLine::Counts(_), DONE]));
         assert!(matches!(answer("nothing").as_slice(), [ConsoleLine::End { error: Some(_) }]));
         let examples = answer("examples");
-        let [
-            ConsoleLine::Example { from_field: false, .. },
-            ConsoleLine::Example { label: Class::Weed, .. },
-            rest @ ..,
-        ] = examples.as_slice()
-        else {
-            panic!("{examples:?}")
-        };
-        assert_eq!(rest.last(), Some(&DONE));
+        let [first, second, .., end] = examples.as_slice() else { panic!("{examples:?}") };
+        assert!(matches!(first, ConsoleLine::Example { from_field: false, label: Class::Plant, .. }), "{first:?}");
+        assert!(matches!(second, ConsoleLine::Example { from_field: false, label: Class::Weed, .. }), "{second:?}");
+        assert_eq!(end, &DONE);
         let help = answer("help");
         assert!(
             help.len() > 15 && help[..help.len() - 1].iter().all(|said| matches!(said, ConsoleLine::Help { .. })),

@@ -71,8 +71,11 @@ macro_rules! event_lines {
         }),*];
 
         impl EventLine {
-            /// Parses a line by the table of events. `None` if it matches no event.
-            fn of_table(line: &str) -> Option<Self> {
+            /// Parses an event's line. `None` if it is no event.
+            pub fn parse(line: &str) -> Option<Self> {
+                if is_plot(line) {
+                    return Some(Self::Plot);
+                }
                 $(
                     let read = |values: Values<'_>| {
                         let _ = &values;
@@ -263,13 +266,6 @@ impl<'a> Values<'a> {
     }
 }
 
-impl EventLine {
-    /// Parses an event's line. `None` if it is no event.
-    pub fn parse(line: &str) -> Option<Self> {
-        if is_plot(line) { Some(Self::Plot) } else { Self::of_table(line) }
-    }
-}
-
 /// The rest of an event's line after its beginning. `None` if the line begins otherwise.
 fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
     let rest = line.strip_prefix(beginning)?;
@@ -278,7 +274,7 @@ fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
 }
 
 /// How each kind of value of the tables is read.
-mod kind {
+pub(super) mod kind {
     use super::{Alarm, Class, Warning, names};
     use control::say::Text;
     use std::str::FromStr;
@@ -294,7 +290,7 @@ mod kind {
         Some(word.to_owned())
     }
 
-    pub(super) fn class(word: &str) -> Option<Class> {
+    pub(crate) fn class(word: &str) -> Option<Class> {
         named(word, [Class::Plant, Class::Weed, Class::Unknown], names::class)
     }
 
@@ -491,63 +487,37 @@ mod tests {
     }
 
     #[test]
-    fn a_line_means_what_it_says() {
+    fn lines_of_other_versions_and_curves_are_events_and_nothing_else_is() {
+        let too_fast = Some(EventLine::Alarm { alarm: Alarm::TooFast, position: 1 });
         for (line, meant) in [
-            (
-                "weed pos=-70000 votes=2 spacing=1146 delay=668 hold=477 actuation=1145",
-                EventLine::Detection {
-                    class: Class::Weed,
-                    position: -70_000,
-                    votes: 2,
-                    spacing: 1146,
-                    delay: 668,
-                    hold: 477,
-                    actuation: 1145,
-                },
-            ),
-            ("swing tool=out pos=12", EventLine::Swing { out: true, position: 12 }),
-            ("state is=alarm", EventLine::State { mode: Mode::Alarm }),
-            ("alarm code=3-1 name=too_fast pos=1", EventLine::Alarm { alarm: Alarm::TooFast, position: 1 }),
+            ("alarm code=3-1 name=too_fast pos=1", too_fast),
             // In the format of version 0.1.
-            ("alarm name=too_fast code=31 pos=1", EventLine::Alarm { alarm: Alarm::TooFast, position: 1 }),
-            ("calibrated by=eye, as seen", EventLine::CalibratedByEye {}),
-            ("calibrated by=none, the end switch did not follow", EventLine::NotCalibrated {}),
+            ("alarm name=too_fast code=31 pos=1", too_fast),
             // A newer firmware may say more.
-            ("guarded pos=3 for=plant", EventLine::Guarded { position: 3 }),
+            ("guarded pos=-70000 for=plant", Some(EventLine::Guarded { position: -70_000 })),
+            ("calibrated by=eye, as seen", Some(EventLine::CalibratedByEye {})),
+            ("speed_mm_s:-3,tool_deg:45,beam_broken:0,windows:2", Some(EventLine::Plot)),
+            (">tool_deg:0", Some(EventLine::Plot)),
+            ("error: 7", None),
+            ("error: no such command", None),
+            (":", None),
+            ("a:b,c:1", None),
+            ("", None),
+            ("ok", None),
+            ("plant", None),
+            ("plant pos=1 votes=3", None),
+            ("swing tool=up pos=1", None),
+            ("swing tool=out pos=99999999999", None),
+            ("state=work tool=in pos=1", None),
+            ("alarm code=1-1 name=boredom pos=1", None),
+            ("warning name=", None),
+            ("calibrated by=hand", None),
+            ("calibrated lead_out_ms=150 set=yes", None),
+            ("guardedpos=1", None),
+            ("pos=1 swing tool=out", None),
+            ("plant pos=1 votes=300 spacing=1 delay=1 hold=1 actuation=1", None),
         ] {
-            assert_eq!(EventLine::parse(line), Some(meant), "{line}");
-        }
-    }
-
-    #[test]
-    fn points_of_curves_are_no_answer() {
-        for line in ["speed_mm_s:-3,tool_deg:45,beam_broken:0,windows:2", ">tool_deg:0"] {
-            assert_eq!(EventLine::parse(line), Some(EventLine::Plot), "{line}");
-        }
-        for line in ["error: 7", "error: no such command", ":", "a:b,c:1"] {
-            assert_eq!(EventLine::parse(line), None, "{line}");
-        }
-    }
-
-    #[test]
-    fn a_line_that_is_no_event_is_none() {
-        for line in [
-            "",
-            "ok",
-            "plant",
-            "plant pos=1 votes=3",
-            "swing tool=up pos=1",
-            "swing tool=out pos=99999999999",
-            "state=work tool=in pos=1",
-            "alarm code=1-1 name=boredom pos=1",
-            "warning name=",
-            "calibrated by=hand",
-            "calibrated lead_out_ms=150 set=yes",
-            "guardedpos=1",
-            "pos=1 swing tool=out",
-            "plant pos=1 votes=300 spacing=1 delay=1 hold=1 actuation=1",
-        ] {
-            assert_eq!(EventLine::parse(line), None, "{line}");
+            assert_eq!(EventLine::parse(line), meant, "{line}");
         }
     }
 

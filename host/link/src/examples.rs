@@ -21,44 +21,26 @@ pub type Taught = Example<COUNT>;
 
 /// Why examples could not be read or taught.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum ExamplesError {
-    /// The console failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The firmware has other built-in examples than this program.
     #[error(
         "the firmware has other built-in examples than this program, so its taught examples cannot be converted to millimetres: use its own `weeder`, or flash this one's firmware by `weeder flash`"
     )]
     OtherTable,
-    /// An example has features that no object in whole millimetres has.
     #[error(
-        "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {number}`"
+        "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {0}`"
     )]
-    NoObject {
-        /// Its number.
-        number: u16,
-    },
-    /// The machine is at work: teaching needs HOLD.
+    NoObject(u16),
     #[error("the machine is at work and takes no examples: hold it first, by its switch or `hold`; nothing was sent")]
     AtWork,
-    /// They do not find room.
     #[error(
         "{new} examples are new to the machine, which has room for {free} of its {CAPACITY}: leave some out, or use --replace to forget all that are not in the file; nothing was sent"
     )]
-    NoRoom {
-        /// Examples that would be taught.
-        new: usize,
-        /// Places that are free.
-        free: usize,
-    },
-    /// The machine cannot list its taught examples.
-    #[error(
-        "{missing} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so"
-    )]
-    NotTaken {
-        /// How many.
-        missing: usize,
-    },
+    NoRoom { new: usize, free: usize },
+    #[error("{0} of the examples are not on the machine afterwards: try again, and see to the supply if it stays so")]
+    NotTaken(usize),
 }
 
 /// The changes to a machine's examples.
@@ -97,7 +79,7 @@ pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
     let (mut built_in, mut taught) = (Vec::new(), Vec::new());
     for (from_field, number, example) in link.ask("examples")?.iter().filter_map(|line| self::taught(line)) {
         if from_field {
-            features_of(&example).ok_or(ExamplesError::NoObject { number })?;
+            features_of(&example).ok_or(ExamplesError::NoObject(number))?;
             taught.push((number, example));
         } else {
             built_in.push(example);
@@ -120,15 +102,10 @@ pub(super) fn taught(line: &str) -> Option<(bool, u16, Taught)> {
 /// errors of the link.
 pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed, ExamplesError> {
     let before = read(link)?;
-    let (known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
+    let (mut known, named) = (set(before.iter().map(|(_, example)| example)), set(wanted));
     let stale: Vec<u16> =
         before.iter().filter(|(_, example)| replace && !named.contains(example)).map(|&(number, _)| number).collect();
-    let mut new: Vec<Taught> = Vec::new();
-    for example in wanted {
-        if !known.contains(example) && !new.contains(example) {
-            new.push(*example);
-        }
-    }
+    let new: Vec<&Taught> = wanted.iter().filter(|&&example| known.insert(example)).collect();
     let free = usize::from(CAPACITY) - (before.len() - stale.len());
     if new.len() > free {
         return Err(ExamplesError::NoRoom { new: new.len(), free });
@@ -148,7 +125,7 @@ pub fn push(link: &mut Link, wanted: &[Taught], replace: bool) -> Result<Pushed,
     let after = set(after.iter().map(|(_, example)| example));
     let missing = named.difference(&after).count();
     if missing > 0 {
-        return Err(ExamplesError::NotTaken { missing });
+        return Err(ExamplesError::NotTaken(missing));
     }
     Ok(Pushed { taught: new.len(), forgotten: stale.len() })
 }

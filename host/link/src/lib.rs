@@ -44,7 +44,7 @@ pub use self::port::{find_uno, listen, open_other, try_port};
 pub use control::{ground::class::Class, say::names};
 
 use std::collections::VecDeque;
-use std::io::{self, Read, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
 /// Characters that the firmware takes in a line.
@@ -96,10 +96,8 @@ impl Link {
     /// If the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
-        let (port, resets) = match port {
-            Some(port) => port::open(port)?,
-            None => port::open(&find_uno()?)?,
-        };
+        let name = port.map_or_else(find_uno, |port| Ok(port.to_owned()))?;
+        let (port, resets) = port::open(&name)?;
         Self::over(port, resets)
     }
 
@@ -227,9 +225,8 @@ impl Link {
     }
 
     fn type_line(&mut self, line: &str) -> Result<(), LinkError> {
-        let gone = |error| LinkError::Gone(error);
-        self.port.write_all(format!("{line}\n").as_bytes()).map_err(gone)?;
-        self.port.flush().map_err(gone)
+        let written = self.port.write_all(format!("{line}\n").as_bytes()).and_then(|()| self.port.flush());
+        written.map_err(LinkError::Gone)
     }
 
     /// Returns a buffered line, or reads one.
@@ -239,13 +236,15 @@ impl Link {
         }
         let mut bytes = [0; 256];
         match self.port.read(&mut bytes) {
-            Ok(0) => Err(LinkError::Gone(io::ErrorKind::UnexpectedEof.into())),
+            Ok(0) => Err(LinkError::Gone(ErrorKind::UnexpectedEof.into())),
             Ok(count) => {
                 self.lines.take(&bytes[..count]);
                 Ok(Received::Bytes(count))
             }
-            Err(error) if is_nothing(&error) => Ok(Received::Nothing),
-            Err(error) => Err(LinkError::Gone(error)),
+            Err(error) => match error.kind() {
+                ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted => Ok(Received::Nothing),
+                _ => Err(LinkError::Gone(error)),
+            },
         }
     }
 
@@ -268,11 +267,6 @@ pub fn is_command(line: &str) -> bool {
 /// Whether a line is the firmware's greeting after a start.
 pub fn is_greeting(line: &str) -> bool {
     matches!(ConsoleLine::parse(line), ConsoleLine::Greeting { .. })
-}
-
-/// Whether a read ended without a byte and can be repeated.
-fn is_nothing(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }
 
 #[cfg(test)]

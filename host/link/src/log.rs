@@ -68,13 +68,8 @@ const HEADER: &str = "time_ms,kind,line";
 #[derive(Debug, Error)]
 pub enum LogError {
     /// The file cannot be written.
-    #[error("{path} cannot be written")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The file is no log.
     #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
@@ -96,7 +91,7 @@ impl LogWriter {
     /// # Errors
     /// If the file cannot be written, or is something else.
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let failed = |source| LogError::File { path: path.into(), source };
+        let failed = |source| FileError::unwritten(path, source);
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
         let mut bytes = Vec::new();
@@ -179,7 +174,7 @@ impl LogWriter {
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
         let written = self.file.write_record(fields).map_err(io::Error::from).and_then(|()| self.file.flush());
-        written.map_err(|source| LogError::File { path: self.path.clone(), source })
+        Ok(written.map_err(|source| FileError::unwritten(&self.path, source))?)
     }
 }
 
@@ -226,9 +221,10 @@ pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
 /// Reads a log in pieces, so that the whole text is not in memory.
 pub struct Pieces {
     path: PathBuf,
-    /// The text up to the header's end. Each piece is parsed below it.
-    head: String,
-    has_header: bool,
+    /// The header, and below it the wanted lines of a piece.
+    table: String,
+    /// The number of each of these lines in the log.
+    numbers: Vec<u64>,
     /// The beginning of an incomplete line.
     cut: Vec<u8>,
     /// Lines that were read.
@@ -239,7 +235,8 @@ pub struct Pieces {
 impl Pieces {
     /// A log before its first line. The path is for error messages.
     pub fn new(path: &Path) -> Self {
-        Self { path: path.into(), head: String::new(), has_header: false, cut: Vec::new(), lines: 0, is_empty: true }
+        let (table, numbers, cut) = (String::new(), Vec::new(), Vec::new());
+        Self { path: path.into(), table, numbers, cut, lines: 0, is_empty: true }
     }
 
     /// Parses the lines that end in the next bytes of the log, without the unwanted ones.
@@ -268,38 +265,36 @@ impl Pieces {
         let last = std::mem::take(&mut self.cut);
         let entries = self.lines(last, is_wanted)?;
         // For an empty log this returns the error for a missing header.
-        if self.is_empty { parse(&self.path, self.head.into_bytes()) } else { Ok(entries) }
+        if self.is_empty { self.parse() } else { Ok(entries) }
     }
 
     fn lines(&mut self, text: Vec<u8>, mut is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
-        let no_text = "this is not text: a log is a CSV file in UTF-8";
-        let failed = |line, problem| FileError::Line { path: self.path.clone(), line, problem };
-        let text = String::from_utf8(text).map_err(|_| failed(self.lines + 1, no_text.to_owned()))?;
+        let no_text = "this is not text: a log is a CSV file in UTF-8".to_owned();
+        let failed = |_| FileError::Line { path: self.path.clone(), line: self.lines + 1, problem: no_text };
+        let text = String::from_utf8(text).map_err(failed)?;
         let text = if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n") } else { text };
-        let mut below = String::with_capacity(text.len());
-        let (mut above, mut any) = (self.lines, false);
         for line in text.split_inclusive('\n') {
             self.lines += 1;
             let is_text = line != "\n" && !line.starts_with('#');
-            // A comment replaces each skipped line, so that line numbers stay right.
-            if !self.has_header {
-                self.head.push_str(if is_text { line } else { "#\n" });
-                self.has_header = is_text;
-                above = self.lines;
-            } else if is_text && is_wanted(line) {
-                below.push_str(line);
-                any = true;
-            } else {
-                below.push_str("#\n");
+            if is_text && (self.numbers.is_empty() || is_wanted(line)) {
+                self.table.push_str(line);
+                self.numbers.push(self.lines);
             }
         }
-        if !any {
+        if self.numbers.len() < 2 {
             return Ok(Vec::new());
         }
         self.is_empty = false;
-        let head = self.head.bytes().filter(|&byte| byte == b'\n').count() as u64;
-        let numbered = |line: u64| if line > head { line - head + above } else { line };
-        let entries = parse(&self.path, (self.head.clone() + &below).into_bytes()).map_err(|error| match error {
+        let entries = self.parse();
+        self.table.truncate(self.table.find('\n').map_or(0, |end| end + 1));
+        self.numbers.truncate(1);
+        entries
+    }
+
+    /// Parses the table. Entries and errors have the numbers of the log's lines.
+    fn parse(&self) -> Result<Vec<Entry>, FileError> {
+        let numbered = |line: u64| self.numbers.get((line as usize).wrapping_sub(1)).copied().unwrap_or(line);
+        let entries = parse(&self.path, self.table.clone().into_bytes()).map_err(|error| match error {
             FileError::Line { path, line, problem } => FileError::Line { path, line: numbered(line), problem },
             file @ FileError::File { .. } => file,
         })?;

@@ -11,11 +11,8 @@ use std::time::Duration;
 /// Bits in a second on the firmware's serial line.
 const BAUD: u32 = 115_200;
 
-/// Longest time that a read waits for a byte.
-const READ_MS: u64 = 20;
-
-/// Longest wait of a write for room, and of a read.
-const PATIENCE: Duration = Duration::from_millis(READ_MS);
+/// Longest wait of a read for a byte, and of a write for room.
+const PATIENCE: Duration = Duration::from_millis(20);
 
 /// USB vendors and products of the Uno, and of the converters on compatible boards.
 const UNOS: [(u16, u16); 10] = [
@@ -39,10 +36,6 @@ pub fn find_uno() -> Result<String, LinkError> {
     only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
 }
 
-/// The only Uno's port among these.
-///
-/// # Errors
-/// If there is none, or several.
 fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
     let unos: Vec<String> = ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect();
     match unos.as_slice() {
@@ -108,30 +101,20 @@ fn explain(name: &str, error: serialport::Error) -> LinkError {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn port(name: &str, ids: Option<(u16, u16)>) -> SerialPortInfo {
-        SerialPortInfo {
-            port_name: name.to_owned(),
-            port_type: match ids {
-                None => SerialPortType::Unknown,
-                Some((vid, pid)) => SerialPortType::UsbPort(UsbPortInfo {
-                    vid,
-                    pid,
-                    serial_number: None,
-                    manufacturer: None,
-                    product: None,
-                }),
-            },
-        }
+    /// A board's port, by its USB vendor and product, and its serial number if it has one.
+    pub(crate) fn usb(name: &str, (vid, pid): (u16, u16), serial_number: Option<&str>) -> SerialPortInfo {
+        let serial_number = serial_number.map(str::to_owned);
+        let usb = UsbPortInfo { vid, pid, serial_number, manufacturer: None, product: None };
+        SerialPortInfo { port_name: name.to_owned(), port_type: SerialPortType::UsbPort(usb) }
     }
 
     #[test]
     fn the_only_uno_is_found_among_other_ports_and_none_or_two_are_an_error() {
-        let other = port("ttyS0", None);
-        let [one, two] =
-            [("ttyACM0", (0x2341, 0x0043)), ("ttyUSB0", (0x1A86, 0x7523))].map(|(name, ids)| port(name, Some(ids)));
+        let other = SerialPortInfo { port_name: "ttyS0".to_owned(), port_type: SerialPortType::Unknown };
+        let (one, two) = (usb("ttyACM0", UNOS[1], None), usb("ttyUSB0", UNOS[5], None));
         assert_eq!(only_uno(&[other.clone(), one.clone()]).unwrap(), "ttyACM0");
         for (ports, words) in [
             (vec![one, two], "choose one by --port, of ttyACM0, ttyUSB0"),

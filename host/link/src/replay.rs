@@ -51,20 +51,14 @@ pub const SWING_MS: i32 = 25;
 
 /// Why a log cannot be replayed.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum ReplayError {
-    /// The log has nothing to replay.
     #[error(
         "the log has no machine in it: `weeder record` and `weeder monitor --log` write one with its settings and status"
     )]
     Nothing,
-    /// A line has impossible content.
     #[error("line {line} of the log: {problem}")]
-    Line {
-        /// The line, counted from 1.
-        line: u64,
-        /// The problem.
-        problem: String,
-    },
+    Line { line: u64, problem: String },
 }
 
 /// A difference between log and replay.
@@ -117,8 +111,16 @@ pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
 ///
 /// # Errors
 /// As [`replay`].
-pub fn replay_with(log: &[Entry], tell: impl FnMut(f64)) -> Result<Replayed, ReplayError> {
-    let mut progress = Progress { done: 0, all: Pace::ALL.len() * log.len(), tell };
+pub fn replay_with(log: &[Entry], mut tell: impl FnMut(f64)) -> Result<Replayed, ReplayError> {
+    // Replayed lines, of the total at all paces.
+    let (mut done, all) = (0, Pace::ALL.len() * log.len());
+    let mut advance = || {
+        let before = 100 * done / all;
+        done += 1;
+        if before < 100 * done / all {
+            tell(done as f64 / all as f64);
+        }
+    };
     let mut replayed = Replayed::default();
     let mut stretches = 0;
     let mut rest = log;
@@ -126,33 +128,13 @@ pub fn replay_with(log: &[Entry], tell: impl FnMut(f64)) -> Result<Replayed, Rep
         rest = &rest[start + 1..];
         let end =
             rest.iter().position(|entry| matches!(entry.kind, Kind::Connected | Kind::Lost)).unwrap_or(rest.len());
-        let stretch = Stretch::read(&rest[..end])?;
-        if let Some(stretch) = stretch {
+        if let Some(stretch) = Stretch::read(&rest[..end])? {
             stretches += 1;
-            replay_stretch(&stretch, &mut replayed, &mut progress)?;
+            replay_stretch(&stretch, &mut replayed, &mut advance)?;
         }
         rest = &rest[end..];
     }
     if stretches == 0 { Err(ReplayError::Nothing) } else { Ok(replayed) }
-}
-
-/// How far a replay is.
-struct Progress<Tell> {
-    /// Replayed lines, of the total at all paces.
-    done: usize,
-    all: usize,
-    tell: Tell,
-}
-
-impl<Tell: FnMut(f64)> Progress<Tell> {
-    /// Another line is replayed.
-    fn advance(&mut self) {
-        let percent = |done: usize| 100 * done / self.all.max(1);
-        if percent(self.done) < percent(self.done + 1) {
-            (self.tell)((self.done + 1) as f64 / self.all as f64);
-        }
-        self.done += 1;
-    }
 }
 
 /// The result of a stretch at one pace.
@@ -166,11 +148,7 @@ struct Played {
 }
 
 /// Replays a stretch and adds its result.
-fn replay_stretch(
-    stretch: &Stretch,
-    replayed: &mut Replayed,
-    progress: &mut Progress<impl FnMut(f64)>,
-) -> Result<(), ReplayError> {
+fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl FnMut()) -> Result<(), ReplayError> {
     if stretch.settings.get(Setting::SecondBeamMm) > 0 {
         replayed.notes.push("a machine with a second beam is not replayed: the log lacks its edges".to_owned());
         return Ok(());
@@ -184,7 +162,7 @@ fn replay_stretch(
 
     let mut played = Vec::new();
     for pace in Pace::ALL {
-        played.push(play(stretch, pace, progress)?);
+        played.push(play(stretch, pace, advance)?);
     }
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // The logged values are the same at every pace.
@@ -195,30 +173,29 @@ fn replay_stretch(
     Ok(())
 }
 
-/// Replays a stretch at one pace.
-fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>) -> Result<Played, ReplayError> {
+/// Replays a stretch at one pace. Calls `advance` for each line.
+fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Played, ReplayError> {
     let mut player = Player::new(stretch, pace);
     let mut logged: Vec<Heard> = Vec::new();
-    let mut last = (stretch.first.clone(), stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms));
+    // The PC's time when the machine was at its present position.
+    let mut last_ms = stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms);
     let mut notes = Vec::new();
     // Whether the next start treats unseen ground as bare.
     let mut starts_now = false;
     for (place, (entry, happened)) in stretch.happened.iter().enumerate() {
-        progress.advance();
+        advance();
         match happened {
             Happened::Status(status) => {
-                player.roll(&last.0, status, entry.time_ms.saturating_sub(last.1)).map_err(|()| {
+                if !player.roll(status, entry.time_ms.saturating_sub(last_ms)) {
                     let problem = "the machine cannot have rolled so far since the status before".to_owned();
-                    ReplayError::Line { line: entry.number, problem }
-                })?;
-                last = (status.clone(), entry.time_ms);
+                    return Err(ReplayError::Line { line: entry.number, problem });
+                }
+                last_ms = entry.time_ms;
             }
             Happened::Event(event) => {
                 let mut is_given = false;
                 if let Some(at) = stretch.position_of_change(place) {
-                    player.roll_to(at, &last.0, stretch.next_status(place));
-                    last.0.position = player.position();
-                    last.0.speed_mm_s = player.speed_mm_s;
+                    player.roll_to(at, stretch.next_status(place));
                 }
                 match event {
                     EventLine::State { mode } => player.enter(*mode, std::mem::take(&mut starts_now)),
@@ -228,18 +205,16 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
                 }
                 logged.push(Heard { line: entry.number, steps: 0, event: *event, speed: player.speed().0, is_given });
             }
-            Happened::Command { is_refused: true, .. } => {}
-            Happened::Command { line, .. } => {
+            Happened::Refused => {}
+            Happened::Command(line) => {
                 // The status that shows the new state must come nearer to the command.
                 if stretch.is_reported_by_event(place) {
                     starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
                     continue;
                 }
-                if let Some(at) = stretch.position_of_command(entry.time_ms, &last, place) {
-                    player.roll_to(at, &last.0, stretch.next_status(place));
-                    last.0.position = player.position();
-                    last.0.speed_mm_s = player.speed_mm_s;
-                    last.1 = entry.time_ms;
+                if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {
+                    player.roll_to(at, stretch.next_status(place));
+                    last_ms = entry.time_ms;
                 }
                 if !player.command(line) {
                     notes.push(format!("line {}: not replayed from `{}` on", entry.number, in_a_line(line)));
@@ -248,7 +223,8 @@ fn play(stretch: &Stretch, pace: Pace, progress: &mut Progress<impl FnMut(f64)>)
             }
         }
     }
-    Ok(Played { logged, replayed: player.heard, notes, end: last.0.position })
+    let end = player.position();
+    Ok(Played { logged, replayed: player.heard, notes, end })
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@
 //!
 //! Only [`Board::open`] opens a port. Only [`Names::write`] changes the file.
 
-use super::port::{is_uno, open};
+use super::port::is_uno;
+use super::settings_file::no_toml;
 use super::{Link, LinkError, find_uno};
 use files::{FileError, whole_file};
 use serialport::{SerialPortInfo, SerialPortType};
@@ -14,7 +15,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use toml_edit::{DocumentMut, InlineTable, Item, TomlError, Value};
+use toml_edit::{DocumentMut, InlineTable, Item, Value};
 
 /// Longest name of a row, in characters. A phone shows it before the machine.
 pub const NAME_LENGTH: usize = 24;
@@ -66,29 +67,14 @@ pub struct Plugged {
 
 /// Why the rows' names cannot be read or changed.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum NamesError {
-    /// An error of the file, or of a line in it.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A name that no row can have.
     #[error("{name:?} cannot be a row's name: {problem}")]
-    Name {
-        /// The name.
-        name: String,
-        /// The problem, and what would be right.
-        problem: String,
-    },
-    /// There is no such row.
+    Name { name: String, problem: String },
     #[error("{path} has no row {name}: it has {known}")]
-    NoRow {
-        /// The file.
-        path: PathBuf,
-        /// The name.
-        name: String,
-        /// The names that are there.
-        known: String,
-    },
-    /// The port.
+    NoRow { path: PathBuf, name: String, known: String },
     #[error(transparent)]
     Port(#[from] LinkError),
 }
@@ -119,8 +105,7 @@ impl Board {
     /// # Errors
     /// If it is not plugged in, or as [`Link::open`].
     pub fn open(&self) -> Result<Link, LinkError> {
-        let (port, resets) = open(&self.port()?)?;
-        Link::over(port, resets)
+        Link::open(Some(&self.port()?))
     }
 
     /// Its present port.
@@ -300,13 +285,10 @@ impl Names {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> {
-    let at = |start: usize, problem: String| FileError::at_byte(path, text, start, problem);
-    let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
-    let read = toml_edit::Document::parse(text).map_err(broken)?;
+    let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let mut rows: Vec<Row> = Vec::new();
-    for (name, item) in read.as_table().iter() {
-        let start = read.as_table().key(name).and_then(|key| key.span()).or_else(|| item.span());
-        let wrong = |problem| at(start.map_or(0, |span| span.start), problem);
+    for (name, item) in document.iter() {
+        let wrong = |problem| FileError::at_key(path, text, name, problem);
         if let Some(problem) = wrong_with(name) {
             return Err(wrong(format!("{name:?} cannot be a row's name: {problem}")));
         }
@@ -326,20 +308,15 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> 
         }
         rows.push(Row { name: name.to_owned(), board });
     }
-    Ok((read.into_mut(), rows))
+    Ok((document, rows))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serialport::UsbPortInfo;
+    use crate::port::tests::usb;
 
-    fn usb(port: &str, serial_number: Option<&str>) -> SerialPortInfo {
-        let serial_number = serial_number.map(str::to_owned);
-        let (manufacturer, product) = (None, None);
-        let usb = UsbPortInfo { vid: 0x2341, pid: 0x0043, serial_number, manufacturer, product };
-        SerialPortInfo { port_name: port.to_owned(), port_type: SerialPortType::UsbPort(usb) }
-    }
+    const UNO: (u16, u16) = (0x2341, 0x0043);
 
     fn number(text: &str) -> Board {
         Board::SerialNumber(text.to_owned())
@@ -347,8 +324,8 @@ mod tests {
 
     #[test]
     fn a_board_with_a_number_is_found_at_whichever_port_it_comes_back() {
-        let before = [usb("/dev/ttyACM0", Some("A1")), usb("/dev/ttyACM1", Some("B2"))];
-        let after = [usb("/dev/ttyACM1", Some("A1")), usb("/dev/ttyACM4", Some("B2"))];
+        let before = [usb("/dev/ttyACM0", UNO, Some("A1")), usb("/dev/ttyACM1", UNO, Some("B2"))];
+        let after = [usb("/dev/ttyACM1", UNO, Some("A1")), usb("/dev/ttyACM4", UNO, Some("B2"))];
         assert_eq!(of(&before[0], &before, Path::new("/no-such")), number("A1"));
         assert_eq!([&before, &after].map(|ports| numbered("A1", ports).unwrap()), ["/dev/ttyACM0", "/dev/ttyACM1"]);
         let error = numbered("C3", &after).unwrap_err().to_string();
@@ -370,11 +347,11 @@ mod tests {
         std::os::unix::fs::symlink(&first, places.join("usbv2-0:2:1.0")).unwrap();
         let by_place = Board::Port(places.join("usb-0:2:1.0").display().to_string());
         for number in [None, Some("0001"), Some(" ")] {
-            let ports = [usb(&first, number), usb(&second, number)];
+            let ports = [usb(&first, UNO, number), usb(&second, UNO, number)];
             assert_eq!(of(&ports[0], &ports, &places), by_place);
             assert_eq!(of(&ports[1], &ports, &places), Board::Port(second.clone()), "it has no link for a socket");
         }
-        let twins = [usb(&first, Some("0001")), usb(&second, Some("0001"))];
+        let twins = [usb(&first, UNO, Some("0001")), usb(&second, UNO, Some("0001"))];
         let error = numbered("0001", &twins).unwrap_err().to_string();
         assert!(error.contains("are both of the serial number 0001") && error.contains("weeder rows name"), "{error}");
     }

@@ -10,6 +10,7 @@
 use super::session::{Happening, Session};
 use super::settings::SettingsError;
 use super::{ConsoleLine, Link, LinkError};
+use std::cmp::Reverse;
 use std::collections::VecDeque;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread;
@@ -73,9 +74,10 @@ impl Rows {
             .map(|(row, open)| {
                 let (orders, ordered) = mpsc::channel();
                 let (tried, first) = mpsc::channel();
-                let talk = Talk { row, heard: sender.clone(), typed: VecDeque::new(), hold: Owed::Nothing };
+                let talk = Talk { row, heard: sender.clone(), typed: VecDeque::new() };
                 thread::spawn(move || {
                     let mut session = Session::waiting_for(open);
+                    session.keeps_hold = true;
                     let missing = session.try_now(Instant::now()).err();
                     if let Some(why) = &missing {
                         talk.tell(What::Happened(Happening::Lost(why.to_string())));
@@ -127,24 +129,12 @@ impl Rows {
     }
 }
 
-/// The state of an ordered `hold`.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Owed {
-    /// It was answered, or none was ordered.
-    Nothing,
-    /// The session has it.
-    Answer,
-    /// It will be typed when the row is back.
-    Typing,
-}
-
 /// A row's thread.
 struct Talk {
     row: usize,
     heard: Sender<Heard>,
     /// Typed lines without an answer.
     typed: VecDeque<String>,
-    hold: Owed,
 }
 
 impl Talk {
@@ -153,33 +143,24 @@ impl Talk {
         loop {
             loop {
                 match orders.try_recv() {
-                    Ok(Order::Hold) => self.hold = Owed::Typing,
-                    Ok(Order::Type(command)) => {
-                        // In the order of arrival: a `hold` does not drop commands that came after it.
-                        self.hold_where_owed(&mut session);
-                        self.type_or_report(&mut session, command);
+                    Ok(Order::Hold) => {
+                        let dropped = session.hold();
+                        if dropped > 0 {
+                            let command =
+                                if dropped == 1 { "a command".to_owned() } else { format!("{dropped} commands") };
+                            self.tell(What::NotTyped { command, why: "hold came first".to_owned() });
+                        }
                     }
+                    Ok(Order::Type(command)) => self.type_or_report(&mut session, command),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            self.hold_where_owed(&mut session);
             for happening in session.turn(Instant::now()) {
                 if !self.take(happening) {
                     return;
                 }
             }
-        }
-    }
-
-    fn hold_where_owed(&mut self, session: &mut Session) {
-        if self.hold == Owed::Typing && session.is_connected() {
-            let dropped = session.hold();
-            if dropped > 0 {
-                let command = if dropped == 1 { "a command".to_owned() } else { format!("{dropped} commands") };
-                self.tell(What::NotTyped { command, why: "hold came first".to_owned() });
-            }
-            self.hold = Owed::Answer;
         }
     }
 
@@ -196,20 +177,11 @@ impl Talk {
         let mut answered = None;
         match &happening {
             Happening::Command(line) => self.typed.push_back(line.clone()),
-            Happening::Lost(_) => {
-                self.typed.clear();
-                if self.hold == Owed::Answer {
-                    self.hold = Owed::Typing;
-                }
-            }
+            Happening::Lost(_) => self.typed.clear(),
             Happening::Answer(line) => {
                 if let ConsoleLine::End { error } = ConsoleLine::parse(line)
                     && let Some(command) = self.typed.pop_front()
                 {
-                    let is_hold = command == super::session::HOLD;
-                    if is_hold && self.hold == Owed::Answer {
-                        self.hold = Owed::Nothing;
-                    }
                     let refusal = error.map(|_| line.clone());
                     answered = Some(What::Answered { command, refusal });
                 }
@@ -225,11 +197,11 @@ impl Talk {
 }
 
 /// The state of one row in a HOLD to all.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Held {
     Waiting,
     Obeyed(Duration),
-    Refused(String),
+    Refused,
     NotThere,
 }
 
@@ -252,10 +224,10 @@ impl Hold {
         let Some(held) = self.rows.get_mut(heard.row) else { return };
         match &heard.what {
             What::Answered { command, refusal } if command == super::session::HOLD => {
-                *held = match (refusal, &*held) {
-                    (_, Held::Obeyed(_)) => return,
-                    (None, _) => Held::Obeyed(heard.at.saturating_duration_since(self.since)),
-                    (Some(refusal), _) => Held::Refused(refusal.clone()),
+                *held = match (&*held, refusal) {
+                    (Held::Obeyed(_), _) => return,
+                    (_, None) => Held::Obeyed(heard.at.saturating_duration_since(self.since)),
+                    (_, Some(_)) => Held::Refused,
                 };
             }
             What::Happened(Happening::Lost(_)) if *held == Held::Waiting => *held = Held::NotThere,
@@ -273,34 +245,29 @@ impl Hold {
         self.rows.iter().all(|held| matches!(held, Held::Obeyed(_)))
     }
 
-    /// The time until the last row obeyed, of those that have.
-    pub fn time(&self) -> Option<Duration> {
-        self.rows.iter().filter_map(|held| if let Held::Obeyed(time) = held { Some(*time) } else { None }).max()
-    }
-
     /// A summary in one line: how many rows have obeyed and after what time, then which rows have not.
     pub fn summary(&self, names: &[String]) -> String {
-        let of = |is_so: fn(&Held) -> bool| -> Vec<&str> {
-            let rows = self.rows.iter().zip(names).filter(|(held, _)| is_so(held));
-            rows.map(|(_, name)| name.as_str()).collect()
-        };
-        let obeyed = of(|held| matches!(held, Held::Obeyed(_))).len();
-        let mut parts = vec![match self.time() {
-            Some(time) => format!("HOLD {obeyed} of {} in {} ms", self.rows.len(), time.as_millis()),
-            None => format!("HOLD {obeyed} of {}", self.rows.len()),
+        let rows = self.rows.iter().zip(names);
+        let obeyed = rows.clone().filter_map(|(held, name)| match held {
+            Held::Obeyed(time) => Some((time, name)),
+            _ => None,
+        });
+        let (count, all) = (obeyed.clone().count(), self.rows.len());
+        let last = obeyed.min_by_key(|&(time, _)| Reverse(time));
+        let mut parts = vec![match last {
+            Some((time, _)) => format!("HOLD {count} of {all} in {} ms", time.as_millis()),
+            None => format!("HOLD {count} of {all}"),
         }];
-        for (what, rows) in [
-            ("NOT THERE", of(|held| *held == Held::NotThere)),
-            ("REFUSED", of(|held| matches!(held, Held::Refused(_)))),
-            ("no answer yet", of(|held| *held == Held::Waiting)),
-        ] {
-            if !rows.is_empty() {
-                parts.push(format!("{what}: {}", rows.join(", ")));
+        for (what, state) in
+            [("NOT THERE", Held::NotThere), ("REFUSED", Held::Refused), ("no answer yet", Held::Waiting)]
+        {
+            let those = rows.clone().filter(|&(held, _)| *held == state);
+            let those: Vec<&str> = those.map(|(_, name)| name.as_str()).collect();
+            if !those.is_empty() {
+                parts.push(format!("{what}: {}", those.join(", ")));
             }
         }
-        let last = self.time().map(Held::Obeyed);
-        let last = self.rows.iter().zip(names).find(|(held, _)| Some(*held) == last.as_ref());
-        if let (Some((_, name)), 2..) = (last, obeyed) {
+        if let (Some((_, name)), 2..) = (last, count) {
             parts.push(format!("{name} last"));
         }
         parts.join("; ")

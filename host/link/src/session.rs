@@ -78,6 +78,8 @@ type Opener = Box<dyn FnMut() -> Result<Link, LinkError>>;
 
 /// A link that is opened again after a loss.
 pub struct Session {
+    /// Whether a `hold` without an answer outlasts a loss. It is then the first line that is typed after the loss.
+    pub keeps_hold: bool,
     open: Opener,
     link: Option<Link>,
     /// Lines without an answer, in the order of the answers: one command, and each `hold` typed after it.
@@ -95,34 +97,10 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens a link by `open`. The session calls `open` again after each loss.
-    ///
-    /// # Errors
-    /// If the first link fails.
-    pub fn open(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Result<Self, SettingsError> {
-        let mut session = Self::waiting_for(open);
-        session.try_now(Instant::now())?;
-        Ok(session)
-    }
-
-    /// Opens a missing link now. The turns then try again, without reporting this error a second time.
-    ///
-    /// # Errors
-    /// If the link fails.
-    pub fn try_now(&mut self, now: Instant) -> Result<(), SettingsError> {
-        if self.link.is_some() {
-            return Ok(());
-        }
-        let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
-        if opened.is_err() {
-            (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
-        }
-        opened
-    }
-
     /// A session without a link: the turns call `open` until it returns one. The first failure is reported.
     pub fn waiting_for(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Self {
         Self {
+            keeps_hold: false,
             open: Box::new(open),
             link: None,
             asked: VecDeque::new(),
@@ -134,6 +112,15 @@ impl Session {
             is_loss_unreported: true,
             happened: VecDeque::new(),
         }
+    }
+
+    /// Opens the missing link now. The turns then try again, without reporting this error a second time.
+    ///
+    /// # Errors
+    /// If the link fails.
+    pub fn try_now(&mut self, now: Instant) -> Result<(), SettingsError> {
+        (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
+        (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link))
     }
 
     /// Types a command after the commands before it have been answered. False if it is no command or too many wait.
@@ -173,10 +160,10 @@ impl Session {
         let result = match self.link.take() {
             Some(link) => self.listen(link, now),
             None if self.retry_at.is_none_or(|at| now >= at) => {
-                self.retry_at = Some(now + RETRY);
-                let opened = (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link));
+                let is_loss_reported = !self.is_loss_unreported;
+                let opened = self.try_now(now);
                 // The reason was reported when it was lost.
-                if self.is_loss_unreported { opened } else { Ok(()) }
+                if is_loss_reported { Ok(()) } else { opened }
             }
             None => {
                 std::thread::sleep(Duration::from_millis(20));
@@ -192,10 +179,11 @@ impl Session {
 
     /// The Uno is gone, or has restarted: pending commands will not be answered.
     fn lose(&mut self, why: String) {
-        self.asked.clear();
+        self.is_to_hold |= self.asked.drain(..).any(|asked| asked.line == HOLD);
+        self.is_to_hold &= self.keeps_hold;
         self.waiting.clear();
         self.own.clear();
-        (self.is_to_hold, self.is_loss_unreported) = (false, false);
+        self.is_loss_unreported = false;
         self.happened.push_back(Happening::Lost(why));
     }
 

@@ -20,9 +20,8 @@ use super::settings::shown;
 use control::settings::{Setting, Settings};
 use std::{collections::VecDeque, fmt};
 
-/// Required timings of the servo, each with six swings out and six in, and measurements of the wheel.
+/// Required timings of the servo, each with six swings out and six in.
 const TIMINGS: usize = 2;
-const STRETCHES: usize = SetUp::STRETCHES;
 
 /// The newest plants that count for the scatter of slip, as measured by a second beam.
 const PLANTS: usize = 12;
@@ -108,7 +107,8 @@ impl fmt::Display for Step {
             Self::TimeServo(done) => write!(f, "time the servo: `calibrate servo` ({done} of {TIMINGS} done)"),
             Self::SetLead(lead, worst_ms) => write!(f, "take the worst time: `set {} {worst_ms}`", lead.text()),
             Self::MeasureWheel(done) => {
-                write!(f, "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {STRETCHES} done)")
+                let all = SetUp::STRETCHES;
+                write!(f, "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)")
             }
             Self::PassPlants(done) => {
                 write!(f, "measure the slip with both beams: roll past {PLANTS} plants ({done} done)")
@@ -140,32 +140,20 @@ struct Timing {
 }
 
 /// The measurements of a machine in a session.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SetUp {
     /// Whether the line that is being answered measures the wheel.
     measures_the_wheel: bool,
     /// Whether the margin was set in this session.
     sets_margin: bool,
-    /// The servo's pulses in use.
-    pulses: (u16, u16),
+    /// The settings in use, as far as the session shows them.
+    settings: Settings,
     timings: Vec<Timing>,
     ticks_per_m: Vec<u16>,
     slip_permille: VecDeque<i32>,
 }
 
-impl Default for SetUp {
-    fn default() -> Self {
-        Self {
-            measures_the_wheel: false,
-            sets_margin: false,
-            pulses: pulses(&Settings::new()),
-            timings: Vec::new(),
-            ticks_per_m: Vec::new(),
-            slip_permille: VecDeque::new(),
-        }
-    }
-}
-
+/// The pulse widths of the servo's stroke, in and out.
 fn pulses(settings: &Settings) -> (u16, u16) {
     (settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs))
 }
@@ -214,7 +202,9 @@ impl SetUp {
     /// Listens to what happened.
     pub fn take(&mut self, happening: &Happening) {
         match happening {
-            Happening::Connected { settings, .. } | Happening::Settings(settings, _) => self.pulses = pulses(settings),
+            Happening::Connected { settings, .. } | Happening::Settings(settings, _) => {
+                self.settings = settings.clone();
+            }
             Happening::Command(line) => self.take_command(line),
             Happening::Answer(line) => self.take_answer(line),
             Happening::Event(event, _) => self.take_event(event),
@@ -229,16 +219,16 @@ impl SetUp {
     }
 
     fn take_answer(&mut self, line: &str) {
-        match shown(line) {
-            Some((Setting::TicksPerM, ticks)) if self.measures_the_wheel => self.ticks_per_m.push(ticks),
-            Some((Setting::ServoInUs, in_us)) => self.pulses.0 = in_us,
-            Some((Setting::ServoOutUs, out_us)) => self.pulses.1 = out_us,
-            _ => {}
+        let Some((setting, value)) = shown(line) else { return };
+        // A value out of range is noise.
+        let _ = self.settings.set(setting, value);
+        if setting == Setting::TicksPerM && self.measures_the_wheel {
+            self.ticks_per_m.push(value);
         }
     }
 
     fn take_event(&mut self, event: &EventLine) {
-        let pulses = self.pulses;
+        let pulses = pulses(&self.settings);
         match *event {
             EventLine::CalibratedBySwitch { out_ms, in_ms, .. } => {
                 self.timings.push(Timing { leads: Some((out_ms, in_ms)), pulses });
@@ -276,7 +266,7 @@ impl SetUp {
         // no measured value, the measurements were of another wheel.
         let is_in_use = settings.get(Setting::TicksPerM) > 0;
         let stretches = if is_in_use { self.ticks_per_m.len() } else { 0 };
-        if stretches < STRETCHES {
+        if stretches < Self::STRETCHES {
             missing.push(Step::MeasureWheel(stretches));
         }
         if settings.get(Setting::SecondBeamMm) > 0 && self.slip_permille.len() < PLANTS {
@@ -359,19 +349,19 @@ fn range<T: Ord + Copy + std::ops::Sub<Output = T> + Default>(values: impl Itera
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::tests::settings;
 
-    fn settings(changes: &[(Setting, u16)]) -> Settings {
-        let mut settings = Settings::new();
-        for &(setting, value) in changes {
-            settings.set(setting, value).expect("within its range");
-        }
-        settings
+    fn heard(lines: &[&[&str]]) -> SetUp {
+        SetUp::of_lines(lines.concat())
     }
 
-    const TIMED: [&str; 2] =
-        ["calibrated lead_out_ms=150 lead_in_ms=52 set=yes", "calibrated lead_out_ms=158 lead_in_ms=56 set=yes"];
+    const TIMED: &[&str] =
+        &["calibrated lead_out_ms=150 lead_in_ms=52 set=yes", "calibrated lead_out_ms=158 lead_in_ms=56 set=yes"];
 
-    const MEASURED: [&str; 7] = [
+    const BY_EYE: &str = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
+
+    /// Two measurements of the wheel.
+    const MEASURED: &[&str] = &[
         "> calibrate 10000",
         "ticks_per_m=1910 from 0 to 20000, default 0, not saved",
         "> get ticks_per_m",
@@ -381,141 +371,118 @@ mod tests {
         "ok",
     ];
 
+    /// A third one.
+    const THIRD: &[&str] = &["> calibrate 10000", "ticks_per_m=1920 from 0 to 20000, default 0, not saved"];
+
+    /// The worst leads of those that were timed, with a value for another setting.
+    fn worst_leads(other: Setting, value: u16) -> Vec<(Setting, u16)> {
+        vec![(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (other, value)]
+    }
+
     #[test]
     fn a_machine_without_measurements_is_left_alone() {
-        let set_up = SetUp::of_lines(["> get", MEASURED[1], "slip permille=12"]);
-        assert_eq!(set_up.next(&Settings::new()), None);
+        assert_eq!(heard(&[&["> get", MEASURED[1], "slip permille=12"]]).next(&Settings::new()), None);
     }
 
     #[test]
     fn servo_wheel_and_margin_come_one_after_the_other() {
-        let next = |lines: &[&'static str], changes: &[_]| {
-            SetUp::of_lines(lines.iter().copied()).next(&settings(changes)).expect("something is to be done")
-        };
-        let mut lines = vec![TIMED[0]];
+        let next = |lines: &[&[&str]], changes: &[_]| heard(lines).next(&settings(changes)).expect("there is a step");
         let leads = [(Setting::LeadOutMs, 150), (Setting::LeadInMs, 56)];
-        assert_eq!(next(&lines, &leads), Step::TimeServo(1));
-        lines.push(TIMED[1]);
-        assert_eq!(next(&lines, &leads), Step::SetLead(Setting::LeadOutMs, 158));
+        assert_eq!(next(&[&TIMED[..1]], &leads), Step::TimeServo(1));
+        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadOutMs, 158));
         let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 56)];
-        assert_eq!(next(&lines, &leads), Step::SetLead(Setting::LeadInMs, 52));
-        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52)];
-        assert_eq!(next(&lines, &leads), Step::MeasureWheel(0));
-        lines.extend(MEASURED);
-        let leads = [leads[0], leads[1], (Setting::TicksPerM, 1920)];
-        assert_eq!(next(&lines, &leads), Step::MeasureWheel(2));
-        lines.extend(["> calibrate 10000", "ticks_per_m=1920 from 0 to 20000, default 0, not saved"]);
+        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadInMs, 52));
+        let mut changes = worst_leads(Setting::TicksPerM, 0);
+        assert_eq!(next(&[TIMED], &changes), Step::MeasureWheel(0));
+        changes[2].1 = 1920;
+        assert_eq!(next(&[TIMED, MEASURED], &changes), Step::MeasureWheel(2));
         // 10 of 1920 ticks and 3 % over 400 mm, 15 ms at 0.694 m/s, and the firmware's 5 mm.
-        let step = next(&lines, &leads);
+        let step = next(&[TIMED, MEASURED, THIRD], &changes);
         let Step::SetMargin(margin) = step else { panic!("{step:?}") };
         assert!((margin.slip_mm - 400.0 * (10.0 / 1920.0 + 0.03)).abs() < 1e-9);
         assert!((margin.servo_mm - 15.0 * SPEED_M_S).abs() < 1e-9);
-        assert_eq!(margin.least_mm(), 30);
-        assert_eq!(
-            Step::SetMargin(margin).to_string(),
-            "lower the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"
-        );
-        let ready = [leads[0], leads[1], leads[2], (Setting::MarginMm, 30)];
-        assert!(matches!(next(&lines, &ready), Step::Ready(_)));
-        let low = [leads[0], leads[1], leads[2], (Setting::MarginMm, 29)];
-        let step = next(&lines, &low).to_string();
-        assert!(step.starts_with("raise the margin: `set margin_mm 30`"), "{step}");
+        for (in_use_mm, told) in [
+            (50, "lower the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"),
+            (30, "the margin pays for slip 14 + servo 10 + 5 mm at 2.5 km/h: `save`"),
+            (29, "raise the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"),
+        ] {
+            let changes = [&changes[..], &[(Setting::MarginMm, in_use_mm)]].concat();
+            assert_eq!(next(&[TIMED, MEASURED, THIRD], &changes).to_string(), told);
+        }
     }
 
     #[test]
     fn with_a_second_beam_plants_show_the_remaining_slip() {
-        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::SecondBeamMm, 200)];
-        let mut lines = [&TIMED[..], &MEASURED, &MEASURED].concat();
+        let mut changes = worst_leads(Setting::SecondBeamMm, 200);
         assert_eq!(
-            SetUp::of_lines(lines.iter().copied()).missing(&settings(&leads)),
+            heard(&[TIMED, MEASURED, MEASURED]).missing(&settings(&changes)),
             [Step::MeasureWheel(0), Step::PassPlants(0)],
             "the wheel as it is set was not measured"
         );
-        let leads = [&leads[..], &[(Setting::TicksPerM, 1930)]].concat();
-        lines.extend(["slip permille=40"; 5]);
-        assert_eq!(SetUp::of_lines(lines.iter().copied()).next(&settings(&leads)), Some(Step::PassPlants(5)));
+        changes.push((Setting::TicksPerM, 1930));
+        let few = heard(&[TIMED, MEASURED, MEASURED, &["slip permille=40"; 5]]);
+        assert_eq!(few.next(&settings(&changes)), Some(Step::PassPlants(5)));
         // Old values do not count.
-        lines.extend(["slip permille=50", "slip permille=90"].repeat(PLANTS / 2));
-        let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&leads));
-        let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
+        let plants = ["slip permille=50", "slip permille=90"].repeat(PLANTS / 2);
+        let enough = heard(&[TIMED, MEASURED, MEASURED, &["slip permille=40"; 5], &plants]);
+        let margin = enough.margin(&settings(&changes)).expect("all was measured");
         assert!((margin.slip_mm - 8.0).abs() < 1e-9, "a twenty-fifth of 200 mm: {margin:?}");
     }
 
     #[test]
     fn beside_a_stem_s_zone_the_margin_covers_half_of_the_worst() {
-        let third = ["> calibrate 10000", "ticks_per_m=1930"];
-        let mut lines = [&TIMED[..], &MEASURED, &third].concat();
-        lines.extend(["slip permille=12"; PLANTS]);
-        let beam = [
-            (Setting::LeadOutMs, 158),
-            (Setting::LeadInMs, 52),
-            (Setting::TicksPerM, 1930),
-            (Setting::SecondBeamMm, 200),
-        ];
-        let with_zone = |zone_mm| settings(&[&beam[..], &[(Setting::StemZoneMm, zone_mm)]].concat());
-        let margin_mm = |zone_mm| {
-            let margin = SetUp::of_lines(lines.iter().copied()).margin(&with_zone(zone_mm)).expect("all was measured");
-            margin.least_mm()
-        };
+        let set_up = heard(&[TIMED, MEASURED, THIRD, &["slip permille=12"; PLANTS]]);
         // 3 % of 200 mm, 15 ms at 2.5 km/h and the firmware's 5 mm: 21.4.
-        assert_eq!((margin_mm(0), margin_mm(100)), (22, 11));
+        for (zone_mm, least_mm) in [(0, 22), (100, 11)] {
+            let mut changes = worst_leads(Setting::TicksPerM, 1930);
+            changes.extend([(Setting::SecondBeamMm, 200), (Setting::StemZoneMm, zone_mm)]);
+            let margin = set_up.margin(&settings(&changes)).expect("all was measured");
+            assert_eq!(margin.least_mm(), least_mm, "{margin:?}");
+        }
     }
 
     #[test]
     fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
-        let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
         let failed = "calibrated by=none, the end switch did not follow";
-        let mut lines = vec![by_eye, failed, by_eye];
-        lines.extend(MEASURED);
-        lines.extend(MEASURED);
-        let step = SetUp::of_lines(lines.iter().copied()).next(&settings(&[(Setting::TicksPerM, 1930)]));
-        let Some(Step::SetMargin(margin)) = step else { panic!("{step:?}") };
+        let set_up = heard(&[&[BY_EYE, failed, BY_EYE], MEASURED, MEASURED]);
+        let margin = set_up.margin(&settings(&[(Setting::TicksPerM, 1930)])).expect("all was measured");
         assert!((margin.servo_mm - f64::from(SERVO_MS) * SPEED_M_S).abs() < 1e-9);
     }
 
     #[test]
     fn a_servo_that_was_timed_over_another_stroke_is_to_be_timed_again() {
-        let lines = [&["servo_out_us=1795"][..], &TIMED, &MEASURED, &MEASURED].concat();
-        let set_up = SetUp::of_lines(lines);
-        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::TicksPerM, 1930)];
+        let set_up = heard(&[&["servo_out_us=1795"], TIMED, MEASURED, MEASURED]);
         for (out_us, missing) in [(1795, vec![]), (1800, vec![Step::TimeServo(0)]), (1700, vec![Step::TimeServo(0)])] {
-            let settings = settings(&[&leads[..], &[(Setting::ServoOutUs, out_us)]].concat());
-            assert_eq!(set_up.missing(&settings), missing, "{out_us}");
+            let changes = [worst_leads(Setting::TicksPerM, 1930), vec![(Setting::ServoOutUs, out_us)]].concat();
+            assert_eq!(set_up.missing(&settings(&changes)), missing, "{out_us}");
         }
     }
 
     #[test]
-    fn another_wheel_was_not_measured() {
-        let set_up = SetUp::of_lines([&TIMED[..], &MEASURED, &MEASURED].concat());
-        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52)];
-        assert_eq!(set_up.missing(&settings(&leads)), [Step::MeasureWheel(0)]);
-    }
-
-    #[test]
     fn a_margin_below_the_measured_one_gives_a_warning() {
-        let ready = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (Setting::TicksPerM, 1920)];
-        let with_margin = |margin_mm| settings(&[&ready[..], &[(Setting::MarginMm, margin_mm)]].concat());
-        let third = ["> calibrate 10000", "ticks_per_m=1920"];
-        let typed = ["> set margin_mm 13"];
-        let measured = SetUp::of_lines([&TIMED[..], &MEASURED, &third, &typed].concat());
-        assert_eq!(measured.warning(&with_margin(30)), None);
-        let warning = measured.warning(&with_margin(29)).expect("it is too small");
-        assert_eq!(warning, "margin_mm 29 is too small: the measurements need 30");
-        let in_part = SetUp::of_lines([&TIMED[..], &typed].concat());
-        let warning = in_part.warning(&with_margin(49)).expect("the wheel was not measured");
-        assert_eq!(warning, "margin_mm 49 is not measured: measure the wheel first; 50 is safe");
-        assert_eq!(in_part.warning(&with_margin(50)), None);
-        let nothing = SetUp::of_lines(typed).warning(&with_margin(13)).expect("nothing was measured");
-        assert_eq!(nothing, "margin_mm 13 is not measured: time the servo and measure the wheel first; 50 is safe");
+        let typed = &["> set margin_mm 13"][..];
+        let all = heard(&[TIMED, MEASURED, THIRD, typed]);
+        let (in_part, nothing) = (heard(&[TIMED, typed]), heard(&[typed]));
         // A machine that was set up earlier gets no warning.
-        assert_eq!(SetUp::of_lines(["> get"]).warning(&with_margin(13)), None);
+        let earlier = heard(&[&["> get"]]);
+        let (servo, wheel) = ("time the servo and ", "measure the wheel first; 50 is safe");
+        for (set_up, margin_mm, warning) in [
+            (&all, 30, None),
+            (&all, 29, Some("margin_mm 29 is too small: the measurements need 30".to_owned())),
+            (&in_part, 50, None),
+            (&in_part, 49, Some(format!("margin_mm 49 is not measured: {wheel}"))),
+            (&nothing, 13, Some(format!("margin_mm 13 is not measured: {servo}{wheel}"))),
+            (&earlier, 13, None),
+        ] {
+            let changes = [worst_leads(Setting::TicksPerM, 1920), vec![(Setting::MarginMm, margin_mm)]].concat();
+            assert_eq!(set_up.warning(&settings(&changes)), warning);
+        }
     }
 
     #[test]
     fn measurements_are_the_same_after_writing_and_reading() {
-        let by_eye = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
-        let heard = [&["servo_out_us=1795"][..], &TIMED, &MEASURED, &[by_eye, "slip permille=-4"]].concat();
-        let (set_up, settings) = (SetUp::of_lines(heard), settings(&[(Setting::ServoOutUs, 1795)]));
+        let set_up = heard(&[&["servo_out_us=1795"], TIMED, MEASURED, &[BY_EYE, "slip permille=-4"]]);
+        let settings = settings(&[(Setting::ServoOutUs, 1795)]);
         let lines = set_up.lines();
         let again = SetUp::of_lines(lines.iter().map(String::as_str));
         assert_eq!((again.lines(), again.missing(&settings)), (lines, set_up.missing(&settings)));

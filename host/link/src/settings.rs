@@ -9,34 +9,18 @@ use thiserror::Error;
 
 /// Why settings could not be read or changed.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum SettingsError {
-    /// The console failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The firmware lacks a setting that this program has, or gives an impossible value.
-    #[error(
-        "the firmware gives no valid value for {setting}: it has another version; flash this one by `weeder flash`"
-    )]
-    Unknown {
-        /// The setting's name.
-        setting: String,
-    },
-    /// The machine is at work.
+    #[error("the firmware gives no valid value for {0}: it has another version; flash this one by `weeder flash`")]
+    Unknown(String),
     #[error("the machine is at work, where its settings cannot all be changed: hold it first, by its switch or `hold`")]
     AtWork,
-    /// The settings would contradict each other.
     #[error("{0}; nothing was sent")]
     Contradiction(String),
-    /// A setting has another value than the one sent.
     #[error("{setting} was set to {wanted} and is {found}: try again, and see to the supply if it stays so")]
-    NotTaken {
-        /// The setting's name.
-        setting: String,
-        /// The value sent.
-        wanted: u16,
-        /// The firmware's value.
-        found: u16,
-    },
+    NotTaken { setting: String, wanted: u16, found: u16 },
 }
 
 /// A setting's name.
@@ -104,7 +88,7 @@ pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
     let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
     let mut settings = Settings::new();
     for setting in Setting::all() {
-        let unknown = || SettingsError::Unknown { setting: name(setting) };
+        let unknown = || SettingsError::Unknown(name(setting));
         let &(_, value) = shown.iter().find(|(known, _)| *known == setting).ok_or_else(unknown)?;
         settings.set(setting, value).map_err(|_| unknown())?;
     }
@@ -179,7 +163,7 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     let before = read(link)?;
     let mut after = before.clone();
     for &(setting, value) in wanted {
-        after.set(setting, value).map_err(|_| SettingsError::Unknown { setting: name(setting) })?;
+        after.set(setting, value).map_err(|_| SettingsError::Unknown(name(setting)))?;
     }
     let names = |wheel: Setting| wanted.iter().any(|&(setting, _)| setting == wheel);
     let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
@@ -216,12 +200,13 @@ pub(super) fn status(link: &mut Link) -> Result<Status, LinkError> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn settings(values: &[(Setting, u16)]) -> Settings {
+    /// The factory settings with some other values.
+    pub(crate) fn settings(values: &[(Setting, u16)]) -> Settings {
         let mut settings = Settings::new();
         for &(setting, value) in values {
             settings.set(setting, value).unwrap();

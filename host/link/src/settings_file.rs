@@ -8,7 +8,7 @@ use super::settings::{Setting, Settings, help, name, range};
 use files::{FileError, whole_file};
 use std::fs;
 use std::path::Path;
-use toml_edit::{Decor, Document, DocumentMut, Item, Key, TomlError, Value};
+use toml_edit::{Decor, DocumentMut, Item, Key, TomlError, Value};
 
 /// The head of a new file.
 const HEAD: &str = "\
@@ -24,7 +24,7 @@ const OLD_MERGE_GAP: &str = "merge_gap_ticks";
 /// # Errors
 /// Names the file, the line, and what would be right.
 pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, FileError> {
-    parse(path, &text(path)?)
+    parse(path, &text(path)?).map(|(_, settings)| settings)
 }
 
 /// Writes all settings into a file. An existing file keeps its comments, and must be a settings file.
@@ -49,15 +49,18 @@ fn text(path: &Path) -> Result<String, FileError> {
         .map_err(|_| FileError::at_byte(path, "", 0, "this is no text: a settings file is TOML in UTF-8"))
 }
 
-fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, FileError> {
-    let at = |start: usize, problem: String| FileError::at_byte(path, text, start, problem);
-    let broken = |error: TomlError| at(error.span().map_or(0, |span| span.start), error.message().replace('\n', ", "));
-    let document = Document::parse(text).map_err(broken)?;
+/// An error in the line where a text is no TOML.
+pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
+    let start = error.span().map_or(0, |span| span.start);
+    FileError::at_byte(path, text, start, error.message().replace('\n', ", "))
+}
+
+fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<(Setting, u16)>), FileError> {
+    let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let mut settings = Vec::new();
     let mut old_merge_gap = None;
-    for (key, item) in document.as_table().iter() {
-        let start = document.as_table().key(key).and_then(|key| key.span()).or_else(|| item.span());
-        let wrong = |problem| at(start.map_or(0, |span| span.start), problem);
+    for (key, item) in document.iter() {
+        let wrong = |problem| FileError::at_key(path, text, key, problem);
         if key == OLD_MERGE_GAP {
             let ticks = item.as_integer().and_then(|ticks| u16::try_from(ticks).ok()).filter(|&ticks| ticks <= 2000);
             let right = || wrong(format!("{key} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm"));
@@ -75,7 +78,7 @@ fn parse(path: &Path, text: &str) -> Result<Vec<(Setting, u16)>, FileError> {
     if let Some(ticks) = old_merge_gap.filter(|_| settings.iter().all(|&(setting, _)| setting != Setting::MergeGapMm)) {
         settings.push((Setting::MergeGapMm, merge_gap_mm(ticks, &settings)));
     }
-    Ok(settings)
+    Ok((document, settings))
 }
 
 /// Converts ticks to millimetres of the wheel in these settings. Missing settings have their defaults.
@@ -105,9 +108,7 @@ fn right(setting: Setting) -> String {
 }
 
 fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileError> {
-    parse(path, old)?;
-    let mut document: DocumentMut =
-        old.parse().map_err(|error: TomlError| FileError::at_byte(path, old, 0, error.message()))?;
+    let (mut document, _) = parse(path, old)?;
     // In a file without values the comments belong to its end, and new values would go before them.
     let head = if document.is_empty() {
         document = DocumentMut::new();
@@ -146,7 +147,7 @@ mod tests {
 
     /// Parses a file's text. Returns the error's message otherwise.
     fn parsed(text: &str) -> Result<Vec<(Setting, u16)>, String> {
-        parse(Path::new("machine.toml"), text).map_err(|error| error.to_string())
+        parse(Path::new("machine.toml"), text).map(|(_, settings)| settings).map_err(|error| error.to_string())
     }
 
     #[test]

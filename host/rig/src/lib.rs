@@ -8,7 +8,7 @@
 
 mod scripted_port;
 
-pub use self::scripted_port::ScriptedPort;
+pub use self::scripted_port::{ScriptedBoard, ScriptedPort};
 
 use control::ground::{class::Classifier, features, nearest::Nearest};
 use control::measure::readings::{Edge, Readings, Startup};

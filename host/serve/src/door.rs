@@ -5,6 +5,8 @@
 //! change something and name no origin. Over the network, unpaired clients get only the form for the code.
 
 use super::rules::Reach;
+use axum::http::header::{HOST, HeaderName, ORIGIN};
+use axum::http::{HeaderValue, Method, Request, StatusCode};
 use std::net::Ipv4Addr;
 use thiserror::Error;
 
@@ -14,52 +16,28 @@ const FORM: [&str; 4] = ["/", "/pair", "/pair.css", "/pair.js"];
 /// An address at which requests come in.
 #[derive(Clone, Debug)]
 pub struct Door {
-    /// From where they come.
     pub reach: Reach,
     /// The valid values of a request's `Host`.
     names: Vec<String>,
 }
 
-/// The parts of a request that the door checks. A header that occurs twice has both of its values here.
-#[derive(Clone, Copy, Debug)]
-pub struct Knock<'a> {
-    /// Whether it changes nothing: GET and HEAD.
-    pub only_looks: bool,
-    /// Its path.
-    pub path: &'a str,
-    /// Whether its target also names a host, as in a request to a proxy.
-    pub is_for_proxy: bool,
-    /// `Host`.
-    pub hosts: &'a [&'a [u8]],
-    /// `Origin`.
-    pub origins: &'a [&'a [u8]],
-    /// `Sec-Fetch-Site`: the origin of the request, if the browser sends it.
-    pub sites: &'a [&'a [u8]],
-    /// Whether its cookie belongs to a paired browser.
-    pub is_paired: bool,
-}
-
 /// Why a request does not come in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Denial {
-    /// Its `Host` is not an address of this server.
     #[error("this is not the address that `weeder serve` printed: type that one, with its number")]
     ForeignHost,
-    /// It comes from a page of another origin, or names no origin.
     #[error("this request comes from another page: open the address that `weeder serve` printed")]
     ForeignOrigin,
-    /// It has no valid token.
     #[error("this phone is not paired: open the address that `weeder serve` printed, and type its code")]
     NotPaired,
 }
 
 impl Denial {
-    /// HTTP's number for it.
-    pub fn status(self) -> u16 {
+    pub fn status(self) -> StatusCode {
         match self {
-            Denial::ForeignHost => 421,
-            Denial::ForeignOrigin => 403,
-            Denial::NotPaired => 401,
+            Denial::ForeignHost => StatusCode::MISDIRECTED_REQUEST,
+            Denial::ForeignOrigin => StatusCode::FORBIDDEN,
+            Denial::NotPaired => StatusCode::UNAUTHORIZED,
         }
     }
 }
@@ -76,31 +54,38 @@ impl Door {
         Self { reach: Reach::Lan { may_start }, names: named(&address.to_string(), port) }
     }
 
-    /// Lets a request in.
+    /// Lets a request in. `is_paired` says whether its cookie belongs to a paired browser.
     ///
     /// # Errors
     /// The reason for refusing it.
-    pub fn admit(&self, knock: &Knock) -> Result<(), Denial> {
+    pub fn admit<B>(&self, request: &Request<B>, is_paired: bool) -> Result<(), Denial> {
+        // A header that occurs twice has both of its values here.
+        let all = |name: HeaderName| -> Vec<&[u8]> {
+            request.headers().get_all(name).iter().map(HeaderValue::as_bytes).collect()
+        };
+        // In a request to a proxy, the target names a host as well.
+        let is_for_proxy = request.uri().authority().is_some();
         let is_name = |host: &[u8]| self.names.iter().any(|name| name.as_bytes() == host);
-        let host = match knock.hosts {
-            [host] if !knock.is_for_proxy && is_name(host) => host,
+        let host = match all(HOST)[..] {
+            [host] if !is_for_proxy && is_name(host) => host,
             _ => return Err(Denial::ForeignHost),
         };
-        match knock.origins {
+        match all(ORIGIN)[..] {
             // A browser omits the origin when a page reads from its own server.
-            [] if knock.only_looks => {}
+            [] if matches!(*request.method(), Method::GET | Method::HEAD) => {}
             [origin] if origin.strip_prefix(b"http://") == Some(host) => {}
             _ => return Err(Denial::ForeignOrigin),
         }
         // A foreign page can embed a path of this server as a picture, and such a request has no origin. A link to the
         // front page is followed all the same.
+        let path = request.uri().path();
         let is_own = |site: &&[u8]| matches!(*site, b"same-origin" | b"none");
-        if knock.path != "/" && !knock.sites.iter().all(is_own) {
+        if path != "/" && !all(HeaderName::from_static("sec-fetch-site")).iter().all(is_own) {
             return Err(Denial::ForeignOrigin);
         }
         match self.reach {
             Reach::Here => Ok(()),
-            Reach::Lan { .. } if knock.is_paired || FORM.contains(&knock.path) => Ok(()),
+            Reach::Lan { .. } if is_paired || FORM.contains(&path) => Ok(()),
             Reach::Lan { .. } => Err(Denial::NotPaired),
         }
     }
@@ -116,114 +101,100 @@ fn named(host: &str, port: u16) -> Vec<String> {
 mod tests {
     use super::*;
 
-    const LOOK: Knock = Knock {
-        only_looks: true,
-        path: "/events",
-        is_for_proxy: false,
-        hosts: &[b"192.168.1.5:8866"],
-        origins: &[],
-        sites: &[],
-        is_paired: true,
-    };
-    const POST: Knock =
-        Knock { only_looks: false, path: "/machines/0/command", origins: &[b"http://192.168.1.5:8866"], ..LOOK };
+    const ADDRESS: &str = "192.168.1.5:8866";
+    const OWN: &str = "http://192.168.1.5:8866";
+    const METHODS: [Method; 2] = [Method::GET, Method::POST];
 
     fn lan() -> Door {
         Door::lan(Ipv4Addr::new(192, 168, 1, 5), 8866, false)
     }
 
-    #[test]
-    fn a_paired_client_that_names_the_address_comes_in() {
-        assert_eq!(lan().admit(&LOOK), Ok(()));
-        assert_eq!(lan().admit(&POST), Ok(()));
+    fn request(method: Method, uri: &str, hosts: &[&str], origins: &[&str]) -> Request<()> {
+        let mut request = Request::builder().method(method).uri(uri);
+        for (name, values) in [(HOST, hosts), (ORIGIN, origins)] {
+            request = values.iter().fold(request, |request, &value| request.header(&name, value));
+        }
+        request.body(()).unwrap()
     }
 
-    #[test]
-    fn another_host_is_refused_everywhere_even_if_all_else_is_right() {
-        let hosts: [&[&[u8]]; 9] = [
-            &[],
-            &[b""],
-            &[b"weeder.example:8866"],
-            &[b"192.168.1.5"],
-            &[b"192.168.1.5:8867"],
-            &[b"192.168.1.50:8866"],
-            &[b"localhost:8866"],
-            &[b"192.168.1.5:8866", b"192.168.1.5:8866"],
-            &[b"192.168.1.5:8866", b"weeder.example"],
-        ];
-        for hosts in hosts {
-            for path in ["/", "/pair", "/pair.js", "/page.js", "/machines", "/events"] {
-                for knock in [Knock { hosts, path, ..LOOK }, Knock { hosts, path, ..POST }] {
-                    assert_eq!(lan().admit(&knock), Err(Denial::ForeignHost), "{knock:?}");
-                }
-            }
-        }
-        assert_eq!(lan().admit(&Knock { is_for_proxy: true, ..LOOK }), Err(Denial::ForeignHost));
-    }
+    /// The hosts and origins of a request, and whether it comes in by GET and by POST.
+    type Case = (&'static [&'static str], &'static [&'static str], [Result<(), Denial>; 2]);
 
     #[test]
-    fn another_origin_stays_out_everywhere_and_so_does_a_post_without_an_origin() {
-        let origins: [&[&[u8]]; 7] = [
-            &[b"null"],
-            &[b"http://weeder.example:8866"],
-            &[b"https://192.168.1.5:8866"],
-            &[b"http://192.168.1.5"],
-            &[b"http://192.168.1.5:8866.example"],
-            &[b"http://192.168.1.5:8866", b"http://192.168.1.5:8866"],
-            &[b""],
+    fn a_paired_client_comes_in_if_it_names_the_address_and_no_other_origin() {
+        let (foreign_host, foreign_origin) = (Err(Denial::ForeignHost), Err(Denial::ForeignOrigin));
+        let cases: &[Case] = &[
+            (&[ADDRESS], &[OWN], [Ok(()); 2]),
+            (&[ADDRESS], &[], [Ok(()), foreign_origin]),
+            (&[], &[], [foreign_host; 2]),
+            (&[""], &[OWN], [foreign_host; 2]),
+            (&["weeder.example:8866"], &[], [foreign_host; 2]),
+            (&["weeder.example:8866"], &[OWN], [foreign_host; 2]),
+            (&["192.168.1.5"], &[OWN], [foreign_host; 2]),
+            (&["192.168.1.5:8867"], &[OWN], [foreign_host; 2]),
+            (&["192.168.1.50:8866"], &[OWN], [foreign_host; 2]),
+            (&["localhost:8866"], &[OWN], [foreign_host; 2]),
+            (&[ADDRESS, ADDRESS], &[OWN], [foreign_host; 2]),
+            (&[ADDRESS, "weeder.example"], &[OWN], [foreign_host; 2]),
+            (&[ADDRESS], &["null"], [foreign_origin; 2]),
+            (&[ADDRESS], &["http://weeder.example:8866"], [foreign_origin; 2]),
+            (&[ADDRESS], &["https://192.168.1.5:8866"], [foreign_origin; 2]),
+            (&[ADDRESS], &["http://192.168.1.5"], [foreign_origin; 2]),
+            (&[ADDRESS], &["http://192.168.1.5:8866.example"], [foreign_origin; 2]),
+            (&[ADDRESS], &[OWN, OWN], [foreign_origin; 2]),
+            (&[ADDRESS], &[""], [foreign_origin; 2]),
         ];
-        for origins in origins {
+        for (hosts, origins, admitted) in cases {
             for path in ["/", "/pair", "/pair.js", "/page.js", "/machines", "/events"] {
-                for knock in [Knock { origins, path, ..LOOK }, Knock { origins, path, ..POST }] {
-                    assert_eq!(lan().admit(&knock), Err(Denial::ForeignOrigin), "{knock:?}");
-                }
+                let requests = METHODS.map(|method| request(method, path, hosts, origins));
+                assert_eq!(requests.each_ref().map(|request| lan().admit(request, true)), *admitted, "{requests:?}");
             }
         }
-        assert_eq!(lan().admit(&Knock { origins: &[], ..POST }), Err(Denial::ForeignOrigin));
+        let for_proxy = request(Method::GET, "http://192.168.1.5:8866/events", &[ADDRESS], &[]);
+        assert_eq!(lan().admit(&for_proxy, true), foreign_host);
     }
 
     #[test]
     fn embedding_in_another_page_stays_out_and_a_link_to_the_front_is_followed() {
         for (site, comes_in) in [("same-origin", true), ("none", true), ("same-site", false), ("cross-site", false)] {
-            let knock = Knock { sites: &[site.as_bytes()], ..LOOK };
-            assert_eq!(lan().admit(&knock).is_ok(), comes_in, "{site}");
-            assert_eq!(lan().admit(&Knock { path: "/", ..knock }), Ok(()), "{site}");
+            for (path, comes_in) in [("/events", comes_in), ("/", true)] {
+                let mut request = request(Method::GET, path, &[ADDRESS], &[]);
+                request.headers_mut().insert("sec-fetch-site", HeaderValue::from_static(site));
+                assert_eq!(lan().admit(&request, true).is_ok(), comes_in, "{site} {path}");
+            }
         }
     }
 
     #[test]
     fn an_unpaired_client_finds_the_form_and_nothing_else() {
-        for path in ["/", "/pair", "/pair.css", "/pair.js"] {
-            assert_eq!(lan().admit(&Knock { path, is_paired: false, ..LOOK }), Ok(()), "{path}");
-            assert_eq!(lan().admit(&Knock { path, is_paired: false, ..POST }), Ok(()), "{path}");
-        }
-        for path in ["", "//", "/?", "/pair/", "/page.js", "/page.css", "/machines", "/events", "/machines/0/command"] {
-            for knock in [Knock { path, is_paired: false, ..LOOK }, Knock { path, is_paired: false, ..POST }] {
-                assert_eq!(lan().admit(&knock), Err(Denial::NotPaired), "{knock:?}");
+        let form = ["/", "/pair", "/pair.css", "/pair.js"].map(|path| (path, Ok(())));
+        let others = ["//", "/pair/", "/page.js", "/page.css", "/machines", "/events", "/machines/0/command"];
+        for (path, admitted) in form.into_iter().chain(others.map(|path| (path, Err(Denial::NotPaired)))) {
+            for method in METHODS {
+                assert_eq!(lan().admit(&request(method, path, &[ADDRESS], &[OWN]), false), admitted, "{path}");
             }
         }
     }
 
     #[test]
     fn at_the_computer_itself_the_name_and_the_origin_suffice_without_a_code() {
-        let door = Door::here(8866);
+        let admit = |host, origins: &[&str]| {
+            let method = if origins.is_empty() { Method::GET } else { Method::POST };
+            Door::here(8866).admit(&request(method, "/events", &[host], origins), false)
+        };
         for host in ["127.0.0.1:8866", "localhost:8866"] {
-            let origin = format!("http://{host}");
-            let knock = Knock { hosts: &[host.as_bytes()], is_paired: false, ..LOOK };
-            assert_eq!(door.admit(&knock), Ok(()));
-            let knock = Knock { hosts: &[host.as_bytes()], origins: &[origin.as_bytes()], ..POST };
-            assert_eq!(door.admit(&knock), Ok(()));
+            assert_eq!(admit(host, &[]), Ok(()));
+            assert_eq!(admit(host, &[&format!("http://{host}")]), Ok(()));
         }
         // Both names are its own, and yet two origins.
-        let mixed = Knock { hosts: &[b"127.0.0.1:8866"], origins: &[b"http://localhost:8866"], ..POST };
-        assert_eq!(door.admit(&mixed), Err(Denial::ForeignOrigin));
-        assert_eq!(door.admit(&Knock { hosts: &[b"192.168.1.5:8866"], ..LOOK }), Err(Denial::ForeignHost));
+        assert_eq!(admit("127.0.0.1:8866", &["http://localhost:8866"]), Err(Denial::ForeignOrigin));
+        assert_eq!(admit(ADDRESS, &[]), Err(Denial::ForeignHost));
     }
 
     #[test]
     fn at_the_port_of_http_a_browser_leaves_its_number_out() {
         let door = Door::lan(Ipv4Addr::new(192, 168, 1, 5), 80, false);
-        let knock = Knock { hosts: &[b"192.168.1.5"], origins: &[b"http://192.168.1.5"], ..POST };
-        assert_eq!(door.admit(&knock), Ok(()));
+        let request = request(Method::POST, "/machines/0/command", &["192.168.1.5"], &["http://192.168.1.5"]);
+        assert_eq!(door.admit(&request, true), Ok(()));
     }
 }

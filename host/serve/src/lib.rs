@@ -1,27 +1,25 @@
 //! Serves the page over http: from the computer with the serial ports of one or more machines to a phone in the cab.
 //!
 //! [`Server::open`] binds the addresses and starts the machines. [`Server::run`] serves until it is stopped. The
-//! decisions are in modules without sockets and clocks. [`door`] decides which requests come in. [`pairing`] decides
-//! which phones may use the network. [`rules`] decides which commands may be typed from where. [`machine`] talks to one
-//! machine in its own thread. [`hub`] sends the machines' output to all pages. `routes` and this file connect these
+//! decisions are in modules without sockets and clocks. `door` decides which requests come in. `pairing` decides
+//! which phones may use the network. `rules` decides which commands may be typed from where. `machine` talks to one
+//! machine in its own thread. `hub` sends the machines' output to all pages. `routes` and this file connect these
 //! modules to the network.
 //!
 //! http is not encrypted: use it only in a network in which others may read. The server flashes nothing, and serves no
 //! files except the page's own.
 
-pub mod door;
-pub mod hub;
-mod lengths;
-pub mod machine;
+mod door;
+mod hub;
+mod machine;
 pub mod page;
-pub mod pairing;
+mod pairing;
 mod places;
 mod routes;
-pub mod rules;
+mod rules;
 
 use self::door::Door;
 use self::hub::Hub;
-use self::lengths::{Counted, Lengths};
 use self::machine::Machine;
 use self::page::Page;
 use self::pairing::{CODE_LENGTH, Code, Pairing};
@@ -33,13 +31,14 @@ use futures_util::future::select;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use parking_lot::Mutex;
 #[cfg(any(target_os = "linux", target_os = "android"))]
 use socket2::SockRef;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::pin::pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use thiserror::Error;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
@@ -87,32 +86,22 @@ pub struct Setup {
 
 /// The errors of starting the server.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum ServeError {
-    /// The computer is in no network.
     #[error("this computer is in no network: join one, or name its address in one, as in `--lan 192.168.4.1`")]
     NoNetwork,
-    /// It is in several.
     #[error("this computer has several addresses: choose the one of the phone's network, as in `--lan {}`, of {}",
         .0[0], .0.iter().map(Ipv4Addr::to_string).collect::<Vec<_>>().join(", "))]
     SeveralNetworks(Vec<Ipv4Addr>),
-    /// An address that means all networks, or only this computer.
+    /// It means all networks, or only this computer.
     #[error("{0} cannot be opened by a phone: name this computer's address in the phone's network, or use --lan alone")]
     NoAddress(Ipv4Addr),
-    /// Another program uses the port.
     #[error("port {} of {} is in use: end the other program, or choose another port by --http-port", .0.port(), .0.ip())]
     InUse(SocketAddr),
-    /// The address is another computer's.
     #[error("{0} is no address of this computer: use --lan alone, or name one of its addresses")]
     NotMine(Ipv4Addr),
-    /// The address cannot be had.
     #[error("no connection can be taken at {address}")]
-    NotBound {
-        /// The address.
-        address: SocketAddr,
-        /// The system's error.
-        source: io::Error,
-    },
-    /// The system lacks something.
+    NotBound { address: SocketAddr, source: io::Error },
     #[error("the system gives no {0}")]
     System(&'static str, #[source] io::Error),
 }
@@ -251,25 +240,23 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
             continue;
         };
         let (place, end) = places.take(peer.ip());
-        let lengths = Arc::<Lengths>::default();
-        let visitor =
-            Visitor { address: peer.ip(), door: Arc::clone(&door), place: place.into(), lengths: Arc::clone(&lengths) };
+        let visitor = Visitor { address: peer.ip(), door: Arc::clone(&door), place: place.into(), known: None };
         let routes = routes.clone().layer(Extension(visitor));
         tokio::spawn(async move {
             // Closes the connection at its end, or when it loses its place.
-            select(pin!(serve(stream, lengths, routes)), end).await;
+            select(pin!(serve(stream, routes)), end).await;
         });
     }
 }
 
 /// Serves a connection to its end. Closes it if the client sends too slowly or does not read.
-async fn serve(stream: TcpStream, lengths: Arc<Lengths>, routes: Router) {
+async fn serve(stream: TcpStream, routes: Router) {
     // Without this option the connection is only slower.
     let _ = stream.set_nodelay(true);
     // Without this option the time limit begins only when the system's buffer is full.
     #[cfg(any(target_os = "linux", target_os = "android"))]
     let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(READER_TIME));
-    let mut stream = TimeoutStream::new(Counted::new(stream, lengths));
+    let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(READER_TIME));
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())

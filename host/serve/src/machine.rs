@@ -9,9 +9,11 @@ use link::session::{HOLD, Happening, Session};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+use thiserror::Error;
 use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 
 /// Shows a message to the operator at this computer.
 pub type Tell = Arc<dyn Fn(&str) + Send + Sync>;
@@ -22,23 +24,29 @@ const WAITING: usize = 64;
 /// Most stored lines of an answer. The longest answer has less than a tenth.
 const LINES: usize = 1000;
 
-/// The result of a line to type.
-#[derive(Clone, Debug)]
-pub enum Typed {
-    /// The machine's answer; its last line is `ok`, or begins with `error:`.
-    Answered(Vec<String>),
-    /// A client held the machine first.
+/// Time in which a machine has answered, or is lost.
+const ANSWER_TIME: Duration = Duration::from_secs(30);
+
+/// The machine's answer to a line; its last line is `ok`, or begins with `error:`.
+pub type Answer = Result<Vec<String>, NoAnswer>;
+
+/// Why there is no answer to a line.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum NoAnswer {
+    #[error("hold came first, so this was not sent")]
     Dropped,
-    /// The machine was lost before it had answered.
+    #[error("{0}")]
     Lost(String),
-    /// Too many commands wait.
+    #[error("too much waits for the machine: try again")]
     Busy,
+    #[error("the machine does not answer")]
+    Silent,
 }
 
 /// A line to type, the clients that wait for it, and its answer.
 struct Asked {
     line: String,
-    askers: Vec<oneshot::Sender<Typed>>,
+    askers: Vec<oneshot::Sender<Answer>>,
     answer: Vec<String>,
 }
 
@@ -64,29 +72,27 @@ impl Machine {
     }
 
     /// Types a command after the commands before it have been answered.
-    pub async fn command(&self, line: String) -> Typed {
+    pub async fn command(&self, line: String) -> Answer {
         ask(&self.commands, line).await
     }
 
     /// Types `hold` before all waiting commands.
-    pub async fn hold(&self) -> Typed {
+    pub async fn hold(&self) -> Answer {
         ask(&self.holds, HOLD.to_owned()).await
     }
 }
 
-async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Typed {
+async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Answer {
     let (asker, answer) = oneshot::channel();
-    match lines.try_send(Asked { line, askers: vec![asker], answer: Vec::new() }) {
-        Ok(()) => answer.await.unwrap_or(Typed::Busy),
-        Err(_) => Typed::Busy,
-    }
+    lines.try_send(Asked { line, askers: vec![asker], answer: Vec::new() }).map_err(|_| NoAnswer::Busy)?;
+    timeout(ANSWER_TIME, answer).await.map_err(|_| NoAnswer::Silent)?.unwrap_or(Err(NoAnswer::Busy))
 }
 
 impl Asked {
-    fn end(self, typed: &Typed) {
+    fn end(self, answer: &Answer) {
         for asker in self.askers {
             // The client may have gone.
-            let _ = asker.send(typed.clone());
+            let _ = asker.send(answer.clone());
         }
     }
 }
@@ -125,11 +131,11 @@ impl Talk {
         // A command to a lost machine must not wait for it.
         if !session.is_connected() {
             let why = self.hub.why_lost(self.number);
-            asked.end(&Typed::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned())));
+            asked.end(&Err(NoAnswer::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned()))));
         } else if asked.line == HOLD {
             for _ in 0..session.hold() {
                 if let Some(dropped) = self.asked.pop_back() {
-                    dropped.end(&Typed::Dropped);
+                    dropped.end(&Err(NoAnswer::Dropped));
                 }
             }
             match self.asked.back_mut() {
@@ -140,7 +146,7 @@ impl Talk {
         } else if session.command(&asked.line) {
             self.asked.push_back(asked);
         } else {
-            asked.end(&Typed::Busy);
+            asked.end(&Err(NoAnswer::Busy));
         }
     }
 
@@ -154,7 +160,7 @@ impl Talk {
                 self.hub.lost(self.number, &why);
                 (self.tell)(&format!("{}: {why}.", self.name));
                 for asked in self.asked.drain(..) {
-                    asked.end(&Typed::Lost(why.clone()));
+                    asked.end(&Err(NoAnswer::Lost(why.clone())));
                 }
             }
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
@@ -171,7 +177,7 @@ impl Talk {
                     if parse(asked.line.as_bytes()) == Ok(Command::Events(false)) {
                         session.turn_events_on();
                     }
-                    asked.end(&Typed::Answered(answer));
+                    asked.end(&Ok(answer));
                 }
             }
             Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
@@ -184,64 +190,20 @@ impl Talk {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use control::ground::nearest::Nearest;
-    use control::memory::Volatile;
     use link::{Link, LinkError};
-    use rig::{Rig, ScriptedPort};
+    use rig::ScriptedBoard;
     use serde_json::Value;
-    use std::sync::Mutex;
-    use std::sync::atomic::{AtomicBool, Ordering};
-    use std::time::Duration;
     use tokio::runtime;
-    use tokio::time::{sleep, timeout};
-
-    /// The typed lines, except the session's own questions, and two switches.
-    #[derive(Clone, Default)]
-    struct Desk {
-        typed: Arc<Mutex<Vec<String>>>,
-        /// Keeps the machine's output back. `dump` sets it.
-        is_silent: Arc<AtomicBool>,
-        is_there: Arc<AtomicBool>,
-    }
-
-    impl Desk {
-        fn typed(&self) -> Vec<String> {
-            self.typed.lock().unwrap().clone()
-        }
-
-        /// A link to a new machine in HOLD.
-        fn open(&self) -> Result<Link, LinkError> {
-            let desk = self.clone();
-            if !desk.is_there.load(Ordering::Relaxed) {
-                return Err(LinkError::Absent("it".to_owned()));
-            }
-            let mut rig = Rig::new(Nearest::new(&[][..], Volatile::new()));
-            let mut said = Vec::new();
-            let script = move |line: Option<&str>| {
-                if let Some(line) = line.filter(|line| !line.is_empty()) {
-                    said.extend((rig.ask(line).join("\n") + "\n").bytes());
-                    if !["version", "get", "status", "examples"].contains(&line) {
-                        desk.typed.lock().unwrap().push(line.to_owned());
-                        desk.is_silent.fetch_or(line == "dump", Ordering::Relaxed);
-                    }
-                }
-                let is_silent = desk.is_silent.load(Ordering::Relaxed);
-                desk.is_there.load(Ordering::Relaxed).then(|| said.split_off(if is_silent { said.len() } else { 0 }))
-            };
-            Link::over(ScriptedPort::new(script), false)
-        }
-    }
+    use tokio::time::sleep;
 
     /// A connected machine.
-    async fn machine() -> (Machine, Arc<Hub>, Desk) {
-        let desk = Desk::default();
-        desk.is_there.store(true, Ordering::Relaxed);
-        let (hub, at_port) = (Arc::new(Hub::new(1)), desk.clone());
-        let open = move || at_port.open();
+    async fn machine() -> (Machine, Arc<Hub>, ScriptedBoard) {
+        let (hub, board) = (Arc::new(Hub::new(1)), ScriptedBoard::plugged_in());
+        let port = board.clone();
+        let open = move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false);
         let machine = Machine::start(0, "uno".to_owned(), Box::new(open), Arc::clone(&hub), Arc::new(|_| {}));
         until(|| hub.why_lost(0).is_none()).await;
-        assert_eq!(std::mem::take(&mut *desk.typed.lock().unwrap()), ["events on"]);
-        (machine, hub, desk)
+        (machine, hub, board)
     }
 
     /// Waits until the condition holds.
@@ -254,6 +216,10 @@ mod tests {
         timeout(Duration::from_secs(60), look).await.expect("it comes to be so");
     }
 
+    fn ok() -> Answer {
+        Ok(vec!["ok".to_owned()])
+    }
+
     fn run(test: impl Future<Output = ()>) {
         runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(test);
     }
@@ -261,31 +227,27 @@ mod tests {
     #[test]
     fn hold_drops_waiting_commands_and_is_typed_once_for_all_clients() {
         run(async {
-            let (machine, _, desk) = machine().await;
+            let (machine, _, board) = machine().await;
             let others = async {
-                until(|| desk.typed() == ["dump"]).await;
-                let (started, one, two) =
-                    tokio::join!(machine.command("start".to_owned()), machine.hold(), machine.hold());
-                assert!(matches!(started, Typed::Dropped), "{started:?}");
-                for held in [one, two] {
-                    assert!(matches!(&held, Typed::Answered(lines) if *lines == ["ok"]), "{held:?}");
-                }
+                until(|| board.typed() == ["events on", "silence"]).await;
+                let answers = tokio::join!(machine.command("start".to_owned()), machine.hold(), machine.hold());
+                assert_eq!(answers, (Err(NoAnswer::Dropped), ok(), ok()));
             };
-            // It does not wait for the answer in progress.
+            // It does not wait for the answer in progress. The first `ok` is taken for that.
             let answered_later = async {
-                until(|| desk.typed() == ["dump", "hold"]).await;
-                desk.is_silent.store(false, Ordering::Relaxed);
+                until(|| board.typed() == ["events on", "silence", "hold"]).await;
+                board.say(b"ok\n");
             };
-            let (dumped, (), ()) = tokio::join!(machine.command("dump".to_owned()), others, answered_later);
-            assert!(matches!(&dumped, Typed::Answered(_)), "{dumped:?}");
-            assert_eq!(desk.typed(), ["dump", "hold"]);
+            let (before, (), ()) = tokio::join!(machine.command("silence".to_owned()), others, answered_later);
+            assert_eq!(before, ok());
+            assert_eq!(board.typed(), ["events on", "silence", "hold"]);
         });
     }
 
     #[test]
     fn a_page_gets_everything_when_it_connects_and_then_the_changes_also_if_a_client_turns_the_events_off() {
         run(async {
-            let (machine, hub, desk) = machine().await;
+            let (machine, hub, board) = machine().await;
             let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();
             until(|| there()["status"].is_string()).await;
             let known = there();
@@ -293,36 +255,32 @@ mod tests {
             let shows = |known: &Value, value: &str| known["settings"].to_string().contains(value);
             assert!(shows(&known, "k=3 "));
             let (_, mut early) = hub.listen();
-            let set = machine.command("set k 5".to_owned()).await;
-            assert!(matches!(&set, Typed::Answered(lines) if *lines == ["ok"]), "{set:?}");
+            assert_eq!(machine.command("set k 5".to_owned()).await, ok());
             until(|| shows(&there(), "k=5 ")).await;
             let told = std::iter::from_fn(|| early.try_recv().ok());
             assert!(told.into_iter().any(|message| message.contains(r#""is":"settings""#) && message.contains("k=5 ")));
-            let off = machine.command("events off".to_owned()).await;
-            assert!(matches!(off, Typed::Answered(_)), "{off:?}");
-            until(|| desk.typed() == ["set k 5", "events off", "events on"]).await;
+            assert_eq!(machine.command("events off".to_owned()).await, ok());
+            until(|| board.typed() == ["events on", "set k 5", "events off", "events on"]).await;
         });
     }
 
     #[test]
     fn commands_to_a_lost_machine_are_not_typed_when_it_is_back() {
         run(async {
-            let (machine, hub, desk) = machine().await;
+            let (machine, hub, board) = machine().await;
             let pulled = async {
-                until(|| desk.typed() == ["dump"]).await;
-                desk.is_there.store(false, Ordering::Relaxed);
+                until(|| board.typed() == ["events on", "silence"]).await;
+                board.plug(false);
             };
-            let (dumped, ()) = tokio::join!(machine.command("dump".to_owned()), pulled);
-            assert!(matches!(&dumped, Typed::Lost(why) if why.contains("the port is gone")), "{dumped:?}");
+            let (before, ()) = tokio::join!(machine.command("silence".to_owned()), pulled);
+            assert!(matches!(&before, Err(NoAnswer::Lost(why)) if why.contains("the port is gone")), "{before:?}");
             for typed in [machine.command("start".to_owned()).await, machine.hold().await] {
-                assert!(matches!(typed, Typed::Lost(_)), "{typed:?}");
+                assert!(matches!(typed, Err(NoAnswer::Lost(_))), "{typed:?}");
             }
-            desk.is_silent.store(false, Ordering::Relaxed);
-            desk.is_there.store(true, Ordering::Relaxed);
+            board.plug(true);
             until(|| hub.why_lost(0).is_none()).await;
-            let cleared = machine.command("clear".to_owned()).await;
-            assert!(matches!(cleared, Typed::Answered(_)), "{cleared:?}");
-            assert_eq!(desk.typed(), ["dump", "events on", "clear"]);
+            assert_eq!(machine.command("clear".to_owned()).await, ok());
+            assert_eq!(board.typed(), ["events on", "silence", "events on", "clear"]);
         });
     }
 }

@@ -45,12 +45,9 @@ impl Page {
 }
 
 /// The form for the code.
-pub mod form {
-    /// The content.
+pub(crate) mod form {
     pub const HTML: &str = include_str!("pair/pair.html");
-    /// The style.
     pub const CSS: &str = include_str!("pair/pair.css");
-    /// The script.
     pub const JS: &str = include_str!("pair/pair.js");
 }
 

@@ -6,9 +6,10 @@
 //!
 //! The limits of `tower` do not fit: they count requests, and treat all clients alike.
 
+use parking_lot::Mutex;
 use std::convert::Infallible;
 use std::net::IpAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use tokio::sync::oneshot::{self, Receiver, Sender};
 
 /// Connections in a stage. A browser opens six.
@@ -70,16 +71,11 @@ impl Places {
     /// A place for a new connection, and the signal for its end.
     pub fn take(&self, address: IpAddr) -> (Place, End) {
         let (end, ended) = oneshot::channel();
-        let mut table = self.table();
+        let mut table = self.0.lock();
         let number = table.next;
         table.next += 1;
         table.enter(Taken { number, client: Client::Address(address), stage: Stage::Opening, _end: end });
         (Place { number, places: self.clone() }, ended)
-    }
-
-    fn table(&self) -> MutexGuard<'_, Table> {
-        // No panic can leave it half changed.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -117,7 +113,7 @@ impl Place {
     /// Assigns the connection to this client, as the newest of a stage. A connection that has lost its place does not
     /// enter.
     pub fn enter(&self, stage: Stage, client: Client) {
-        let mut table = self.places.table();
+        let mut table = self.places.0.lock();
         if let Some(taken) = table.leave(self.number) {
             table.enter(Taken { stage, client, ..taken });
         }
@@ -126,7 +122,7 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        self.places.table().leave(self.number);
+        self.places.0.lock().leave(self.number);
     }
 }
 
@@ -226,6 +222,6 @@ mod tests {
         connections[0].0.enter(Stage::Holding, Client::Phone(1));
         assert!(!connections[0].is_open());
         drop(connections);
-        assert!(places.table().taken.is_empty());
+        assert!(places.0.lock().taken.is_empty());
     }
 }

@@ -12,10 +12,9 @@
 //!
 //! No path leads to any other file, and no path flashes a board.
 
-use super::door::{Door, Knock};
+use super::door::Door;
 use super::hub::{Hub, Message};
-use super::lengths::Lengths;
-use super::machine::{Machine, Tell, Typed};
+use super::machine::{Machine, NoAnswer, Tell};
 use super::page::{Page, form};
 use super::pairing::{Pairing, TOKEN_LENGTH, Token, Try, hexadecimal};
 use super::places::{Client, Place, Stage};
@@ -25,20 +24,22 @@ use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_LENGTH, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HOST, HeaderName, LOCATION, ORIGIN,
-    REFERRER_POLICY, RETRY_AFTER, SET_COOKIE, TRANSFER_ENCODING, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HeaderName, LOCATION, REFERRER_POLICY, RETRY_AFTER,
+    SET_COOKIE, TRANSFER_ENCODING, X_CONTENT_TYPE_OPTIONS,
 };
-use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, Sse};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_util::future::join_all;
 use futures_util::stream::{self, Stream, StreamExt};
+use parking_lot::Mutex;
 use std::convert::Infallible;
 use std::error::Error;
+use std::fmt::Display;
 use std::net::IpAddr;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::task::yield_now;
@@ -49,9 +50,6 @@ const BODY_BYTES: usize = 256;
 
 /// Time limit for the body.
 const BODY_TIME: Duration = Duration::from_secs(5);
-
-/// Time in which a machine has answered, or is lost.
-const ANSWER_TIME: Duration = Duration::from_secs(30);
 
 /// Time between heartbeats to a page. The page reports a lost computer after six times as long.
 const BEAT: Duration = Duration::from_millis(500);
@@ -66,46 +64,28 @@ const COOKIE_NAME: &str = "weeder";
 
 /// The state that all requests share.
 pub struct Served {
-    /// The page.
     pub page: Page,
     /// The machines, in the order of their numbers.
     pub machines: Vec<Machine>,
-    /// Their output.
     pub hub: Arc<Hub>,
-    /// Who is paired.
     pub pairing: Mutex<Pairing>,
-    /// Prints a message for the operator.
     pub tell: Tell,
-}
-
-impl Served {
-    fn pairing(&self) -> MutexGuard<'_, Pairing> {
-        // No panic can leave it half changed.
-        self.pairing.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 /// The client of a connection, and its door.
 #[derive(Clone)]
 pub struct Visitor {
-    /// His address.
     pub address: IpAddr,
-    /// The door.
     pub door: Arc<Door>,
-    /// The place of the connection.
     pub place: Arc<Place>,
-    /// Its `Content-Length` lines.
-    pub lengths: Arc<Lengths>,
+    /// Who sent the present request, if it may see the page.
+    pub known: Option<Client>,
 }
 
-/// The client of a request, if it may see the page.
-#[derive(Clone, Copy)]
-struct Known(Option<Client>);
-
-impl Known {
-    fn enter(self, place: &Place, stage: Stage) {
-        if let Some(client) = self.0 {
-            place.enter(stage, client);
+impl Visitor {
+    fn enter(&self, stage: Stage) {
+        if let Some(client) = self.known {
+            self.place.enter(stage, client);
         }
     }
 }
@@ -137,41 +117,27 @@ pub fn routes(served: Arc<Served>) -> Router {
 /// Passes a request to the door. Returns an error page if the door refuses it.
 async fn admit(
     State(served): State<Arc<Served>>,
-    Extension(visitor): Extension<Visitor>,
+    Extension(mut visitor): Extension<Visitor>,
     request: Request,
     next: Next,
 ) -> Response {
     // A client that sends many requests ahead must not block other clients.
     yield_now().await;
-    let phone = cookies(request.headers()).find_map(|token| served.pairing().phone(token));
-    let (hosts, origins) = (all(request.headers(), HOST), all(request.headers(), ORIGIN));
-    let sites = all(request.headers(), HeaderName::from_static("sec-fetch-site"));
-    let knock = Knock {
-        only_looks: matches!(*request.method(), Method::GET | Method::HEAD),
-        path: request.uri().path(),
-        is_for_proxy: request.uri().authority().is_some(),
-        hosts: &hosts,
-        origins: &origins,
-        sites: &sites,
-        is_paired: phone.is_some(),
-    };
-    let mut response = match visitor.door.admit(&knock) {
-        Ok(()) => match whole(request, &visitor.lengths).await {
+    let phone = cookies(request.headers()).find_map(|token| served.pairing.lock().phone(token));
+    let mut response = match visitor.door.admit(&request, phone.is_some()) {
+        Ok(()) => match whole(request).await {
             Ok(mut request) => {
-                let known = Known(match visitor.door.reach {
+                visitor.known = match visitor.door.reach {
                     Reach::Here => Some(Client::Here),
                     Reach::Lan { .. } => phone.map(Client::Phone),
-                });
-                known.enter(&visitor.place, Stage::Asking);
-                request.extensions_mut().insert(known);
+                };
+                visitor.enter(Stage::Asking);
+                request.extensions_mut().insert(visitor);
                 next.run(request).await
             }
             Err(problem) => problem,
         },
-        Err(denial) => {
-            let status = StatusCode::from_u16(denial.status()).unwrap_or(StatusCode::FORBIDDEN);
-            (status, format!("{denial}\n")).into_response()
-        }
+        Err(denial) => (denial.status(), format!("{denial}\n")).into_response(),
     };
     let headers = response.headers_mut();
     for (name, value) in [
@@ -186,11 +152,6 @@ async fn admit(
     response
 }
 
-/// All values of a header.
-fn all(headers: &HeaderMap, name: HeaderName) -> Vec<&[u8]> {
-    headers.get_all(name).iter().map(HeaderValue::as_bytes).collect()
-}
-
 /// The values of this program's cookie.
 fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
     let lines = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
@@ -199,8 +160,8 @@ fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
 }
 
 /// The page, or the form for the code.
-async fn front(State(served): State<Arc<Served>>, Extension(Known(known)): Extension<Known>, uri: Uri) -> Response {
-    if known.is_none() {
+async fn front(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>, uri: Uri) -> Response {
+    if visitor.known.is_none() {
         return Html(form::HTML).into_response();
     }
     // This tells the page that it is connected to a machine.
@@ -220,14 +181,14 @@ async fn pair(
         return (StatusCode::NOT_FOUND, "this computer needs no code\n").into_response();
     }
     let Ok(typed) = String::from_utf8(body.into()) else { return no_line() };
-    let tried = served.pairing().try_code(&typed, Instant::now());
+    let tried = served.pairing.lock().try_code(&typed, Instant::now());
     match tried {
         Try::Right => {
             let mut token: Token = [0; TOKEN_LENGTH];
             if getrandom::fill(&mut token).is_err() {
                 return (StatusCode::INTERNAL_SERVER_ERROR, "the system has no randomness to give\n").into_response();
             }
-            let paired = served.pairing().pair(token);
+            let paired = served.pairing.lock().pair(token);
             (served.tell)(&format!("{address} is paired now. Paired in all: {paired}."));
             let cookie = format!("{COOKIE_NAME}={}; HttpOnly; SameSite=Strict; Path=/", hexadecimal(&token));
             (StatusCode::NO_CONTENT, [(SET_COOKIE, cookie)]).into_response()
@@ -268,8 +229,7 @@ async fn machines(
 /// Types a line to a machine, if this is allowed, and returns its answer.
 async fn command(
     State(served): State<Arc<Served>>,
-    Extension(Visitor { door, place, .. }): Extension<Visitor>,
-    Extension(known): Extension<Known>,
+    Extension(visitor): Extension<Visitor>,
     Path(number): Path<usize>,
     body: Bytes,
 ) -> Response {
@@ -277,87 +237,69 @@ async fn command(
         return refused(StatusCode::NOT_FOUND, "there is no such machine");
     };
     let Ok(line) = String::from_utf8(body.into()) else { return no_line() };
-    let order = match rules::allow(&line, door.reach) {
+    let order = match rules::allow(&line, visitor.door.reach) {
         Ok(order) => order,
         Err(Forbidden::NoLine) => return no_line(),
-        Err(why) => return refused(StatusCode::FORBIDDEN, &why.to_string()),
+        Err(why) => return refused(StatusCode::FORBIDDEN, why),
     };
     if let Some(why) = served.hub.why_lost(number) {
-        return refused(StatusCode::SERVICE_UNAVAILABLE, &why);
+        return refused(StatusCode::SERVICE_UNAVAILABLE, why);
     }
-    let typed = match order {
+    let answer = match order {
         Order::Hold => {
-            known.enter(&place, Stage::Holding);
-            timeout(ANSWER_TIME, machine.hold()).await
+            visitor.enter(Stage::Holding);
+            machine.hold().await
         }
-        Order::Type => timeout(ANSWER_TIME, machine.command(line)).await,
+        Order::Type => machine.command(line).await,
     };
-    match typed {
-        Ok(Typed::Answered(lines)) => (lines.join("\n") + "\n").into_response(),
-        Ok(Typed::Dropped) => refused(StatusCode::CONFLICT, "hold came first, so this was not sent"),
-        Ok(Typed::Lost(why)) => refused(StatusCode::SERVICE_UNAVAILABLE, &why),
-        Ok(Typed::Busy) => refused(StatusCode::SERVICE_UNAVAILABLE, "too much waits for the machine: try again"),
-        Err(_) => refused(StatusCode::GATEWAY_TIMEOUT, "the machine does not answer"),
+    match answer {
+        Ok(lines) => (lines.join("\n") + "\n").into_response(),
+        Err(why @ NoAnswer::Dropped) => refused(StatusCode::CONFLICT, why),
+        Err(why @ (NoAnswer::Lost(_) | NoAnswer::Busy)) => refused(StatusCode::SERVICE_UNAVAILABLE, why),
+        Err(why @ NoAnswer::Silent) => refused(StatusCode::GATEWAY_TIMEOUT, why),
     }
 }
 
 /// Holds all machines at once. Every client that is let in may do this. Returns for each machine why it has not obeyed,
 /// or nothing, and the time of the last one that has.
-async fn hold_all(
-    State(served): State<Arc<Served>>,
-    Extension(Visitor { place, .. }): Extension<Visitor>,
-    Extension(known): Extension<Known>,
-) -> impl IntoResponse {
-    known.enter(&place, Stage::Holding);
+async fn hold_all(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>) -> impl IntoResponse {
+    visitor.enter(Stage::Holding);
     let since = Instant::now();
-    let holds = served.machines.iter().map(|machine| async move {
-        let typed = timeout(ANSWER_TIME, machine.hold()).await;
-        (why_not_held(typed.ok()), since.elapsed())
-    });
-    let held = join_all(holds).await;
-    let obeyed = held.iter().filter(|(why, _)| why.is_none());
-    let last_ms = obeyed.map(|(_, time)| time.as_millis() as u64).max();
-    let machines: Vec<_> = served.machines.iter().zip(&held).map(|(machine, (why, _))| (&machine.name, why)).collect();
-    for (name, why) in &machines {
-        if let Some(why) = why {
-            (served.tell)(&format!("{name} has not obeyed HOLD: {why}."));
+    let holds = served.machines.iter().map(|machine| async move { (machine.hold().await, since.elapsed()) });
+    let (mut machines, mut last_ms) = (Vec::new(), None);
+    for (Machine { name, .. }, (answer, time)) in served.machines.iter().zip(join_all(holds).await) {
+        let error = match answer {
+            Ok(lines) => lines.into_iter().next_back().filter(|line| line.starts_with("error:")),
+            Err(why) => Some(why.to_string()),
+        };
+        match &error {
+            Some(why) => (served.tell)(&format!("{name} has not obeyed HOLD: {why}.")),
+            None => last_ms = last_ms.max(Some(time.as_millis() as u64)),
         }
+        machines.push(serde_json::json!({ "name": name, "error": error }));
     }
-    let machines: Vec<_> =
-        machines.into_iter().map(|(name, why)| serde_json::json!({ "name": name, "error": why })).collect();
     let said = serde_json::json!({ "machines": machines, "lastMs": last_ms });
     ([(CONTENT_TYPE, "application/json")], said.to_string())
 }
 
-/// Returns why a machine has not obeyed a `hold`, from its result.
-fn why_not_held(typed: Option<Typed>) -> Option<String> {
-    match typed {
-        Some(Typed::Answered(lines)) => lines.last().filter(|line| line.starts_with("error:")).cloned(),
-        Some(Typed::Lost(why)) => Some(why),
-        Some(Typed::Dropped | Typed::Busy) => Some("too much waits for the machine: try again".to_owned()),
-        None => Some("the machine does not answer".to_owned()),
-    }
-}
-
 /// The answer to a line that was not typed, in the machine's own form of an error.
-fn refused(status: StatusCode, why: &str) -> Response {
+fn refused(status: StatusCode, why: impl Display) -> Response {
     (status, format!("error: {why}\n")).into_response()
 }
 
 /// Reads a request with its short body. Otherwise returns the error.
-async fn whole(request: Request, lengths: &Lengths) -> Result<Request, Response> {
-    let headers = request.headers();
-    if lengths.are_two(headers.get_all(CONTENT_LENGTH).iter().count(), headers.contains_key(TRANSFER_ENCODING)) {
-        return Err(refused(StatusCode::BAD_REQUEST, "send Content-Length or Transfer-Encoding, not both"));
+async fn whole(request: Request) -> Result<Request, Response> {
+    // With `Content-Length` as well, it may be an attempt at request smuggling (RFC 9112, section 6.1). hyper drops one of
+    // the two before any other code sees the request. Browsers send `Content-Length` alone.
+    if request.headers().contains_key(TRANSFER_ENCODING) {
+        return Err(refused(StatusCode::BAD_REQUEST, "send Content-Length, not Transfer-Encoding"));
     }
     let (head, body) = request.into_parts();
     match timeout(BODY_TIME, to_bytes(body, BODY_BYTES)).await {
         Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
         // Any other error means that the body is too long.
-        Ok(Err(error)) if is_malformed(&error) => {
-            Err(refused(StatusCode::BAD_REQUEST, "the body is no chunks of HTTP, or ends too soon"))
-        }
-        Ok(Err(_)) => Err(refused(StatusCode::PAYLOAD_TOO_LARGE, &Forbidden::NoLine.to_string())),
+        Ok(Err(error)) if is_malformed(&error) => Err(refused(StatusCode::BAD_REQUEST, "the body ends too soon")),
+        Ok(Err(_)) => Err(refused(StatusCode::PAYLOAD_TOO_LARGE, Forbidden::NoLine)),
         Err(_) => Err(refused(StatusCode::REQUEST_TIMEOUT, "the line has not come")),
     }
 }
@@ -369,16 +311,15 @@ fn is_malformed(error: &(dyn Error + 'static)) -> bool {
 
 /// The error for a body that is no line.
 fn no_line() -> Response {
-    refused(StatusCode::BAD_REQUEST, &Forbidden::NoLine.to_string())
+    refused(StatusCode::BAD_REQUEST, Forbidden::NoLine)
 }
 
 /// Streams the state and output of all machines while the page reads it.
 async fn events(
     State(served): State<Arc<Served>>,
-    Extension(Visitor { place, .. }): Extension<Visitor>,
-    Extension(known): Extension<Known>,
+    Extension(visitor): Extension<Visitor>,
 ) -> Sse<impl Stream<Item = Result<Event, Infallible>> + use<>> {
-    known.enter(&place, Stage::Listening);
+    visitor.enter(Stage::Listening);
     Sse::new(heard(&served.hub).map(|message| Ok(Event::default().data(&*message))))
 }
 

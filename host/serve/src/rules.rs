@@ -33,29 +33,22 @@ pub enum Order {
 /// Why a line is not passed on to the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Forbidden {
-    /// It is none.
     #[error("that is no command: it has to be one line of 1 to {} printable ASCII characters", link::COMMAND_LENGTH)]
     NoLine,
-    /// The command is unknown.
     #[error("`weeder serve` does not know that command, and passes on only known commands: `help` lists them")]
     Unknown,
-    /// The operator has not allowed it.
     #[error("this is not allowed from here: go to the machine, or have `weeder serve` started with --allow-start")]
     NoStart,
-    /// It moves the tool over ground that the beam has not seen.
     #[error(
         "this takes the tool over ground that the beam has not seen, and is never allowed over the network: go to the machine"
     )]
     Unseen,
-    /// It drives the tool directly.
     #[error(
         "this moves the tool, and is never allowed over the network: go to the computer that has the machine's port"
     )]
     MovesTool,
-    /// It changes the machine's settings or examples.
     #[error("this changes the machine, and is never allowed over the network: go to the computer that has its port")]
     ChangesMachine,
-    /// It changes the output for all other clients.
     #[error(
         "this changes the events for all clients, and is never allowed over the network: type it at the computer with the port"
     )]

@@ -8,7 +8,7 @@
 use crate::examples::Taught;
 use control::ground::features::{self, Features};
 use control::ground::{
-    class::{Class, Classifier, ExamplesFull, Listed, Vote},
+    class::{Class, Classifier, ExamplesFull, Vote},
     nearest::Nearest,
 };
 use control::memory::Volatile;
@@ -25,11 +25,9 @@ const OBJECTS: usize = 16;
 /// The log's values for the detection in the beam.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// The machine's vote.
     pub(super) vote: Vote,
     /// Distance from the leading edge of the plant before, in mm.
     pub(super) spacing_mm: i16,
-    /// Its width in mm.
     pub(super) width_mm: i16,
     /// Whether to accept the log's vote: it depends on ground from before the log.
     pub(super) is_given: bool,
@@ -55,7 +53,7 @@ impl Witness {
     }
 }
 
-/// The firmware's classifier, with values from the log.
+/// The firmware's classifier, with values from the log. A replay lists no examples, and ends where one is forgotten.
 pub(super) struct ReplayClassifier<'a> {
     /// The built-in examples alone. A label must not contradict them.
     built_in: Nearest<&'a [Taught], Volatile>,
@@ -81,8 +79,6 @@ impl<'a> ReplayClassifier<'a> {
 }
 
 impl Classifier for ReplayClassifier<'_> {
-    fn init(&mut self) {}
-
     fn classify(&self, features: &Features, k: u8) -> Vote {
         let Some(seen) = self.witness.seen.get() else { return self.nearest.classify(features, k) };
         let describe = |class| Features::describe(class, seen.spacing_mm, seen.width_mm);
@@ -105,18 +101,6 @@ impl Classifier for ReplayClassifier<'_> {
 
     fn keep(&mut self, example: Taught) -> Result<(), ExamplesFull> {
         self.nearest.keep(example)
-    }
-
-    fn forget(&mut self, number: u8) -> bool {
-        self.nearest.forget(number)
-    }
-
-    fn listed(&self, place: u8) -> Option<(Listed, u8)> {
-        self.nearest.listed(place)
-    }
-
-    fn spoiled(&self) -> u8 {
-        self.nearest.spoiled()
     }
 
     fn carry_on(&mut self) -> bool {

@@ -14,7 +14,6 @@ pub(super) struct Heard {
     pub(super) line: u64,
     /// Steps of the replay until this event; 0 for the log.
     pub(super) steps: u64,
-    /// The event.
     pub(super) event: EventLine,
     /// The machine's speed then, in ticks a second.
     pub(super) speed: i32,

@@ -84,7 +84,6 @@ pub(super) struct Player<'a> {
     steps: u64,
     /// The machine's speed over the ground.
     pub(super) speed_mm_s: i32,
-    /// The events of the decisions.
     pub(super) heard: Vec<Heard>,
     /// Whether the next alarm was raised by the replay itself.
     swallows_alarm: bool,
@@ -144,11 +143,11 @@ impl<'a> Player<'a> {
         let speed_mm_s = if first.speed_mm_s > 0 { first.speed_mm_s } else { SLOWLY_MM_S };
         let distance_mm = i64::from(self.rig.settings().wheel().millimetres(Ticks(distance)));
         let time_ms = (distance_mm * 1000 / i64::from(speed_mm_s)).unsigned_abs();
-        self.roll_by(distance, speed_mm_s, speed_mm_s, time_ms);
+        self.speed_mm_s = speed_mm_s;
+        self.roll_by(distance, speed_mm_s, time_ms);
         self.speed_mm_s = first.speed_mm_s;
     }
 
-    /// The machine's position.
     pub(super) fn position(&self) -> i32 {
         self.rig.readings.position.count()
     }
@@ -160,43 +159,41 @@ impl<'a> Player<'a> {
         TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
     }
 
-    /// Rolls from one status to the next, `host_ms` later by the PC's clock.
-    pub(super) fn roll(&mut self, from: &Status, to: &Status, host_ms: u64) -> Result<(), ()> {
+    /// Rolls to the next status, `host_ms` later by the PC's clock. False if that is too far.
+    pub(super) fn roll(&mut self, to: &Status, host_ms: u64) -> bool {
         let distance = to.position.wrapping_sub(self.position());
-        if distance.saturating_abs() > LONGEST_DISTANCE {
-            return Err(());
-        }
         if distance == 0 {
             self.speed_mm_s = to.speed_mm_s;
             // A line between the two may have moved it here already.
             if f64::from(to.speed_mm_s.saturating_abs()) < SURE_MM_S {
                 self.rest(host_ms.min(LONGEST_REST_MS));
             }
-            return Ok(());
+        } else if distance.saturating_abs() <= LONGEST_DISTANCE {
+            self.roll_by(distance, to.speed_mm_s, host_ms);
+        } else {
+            return false;
         }
-        self.roll_by(distance, from.speed_mm_s, to.speed_mm_s, host_ms);
-        Ok(())
+        true
     }
 
     /// Rolls to a position, if it lies before the next status.
-    pub(super) fn roll_to(&mut self, place: i32, from: &Status, next: Option<&Status>) {
+    pub(super) fn roll_to(&mut self, place: i32, next: Option<&Status>) {
         let distance = place.wrapping_sub(self.position());
         let Some(next) = next else { return };
         let whole = next.position.wrapping_sub(self.position());
-        if distance == 0 || distance.signum() != whole.signum() || distance.unsigned_abs() > whole.unsigned_abs() {
-            return;
-        }
-        if distance.unsigned_abs() > LONGEST_DISTANCE as u32 {
+        let farthest = whole.unsigned_abs().min(LONGEST_DISTANCE as u32);
+        if distance == 0 || distance.signum() != whole.signum() || distance.unsigned_abs() > farthest {
             return;
         }
         let share = f64::from(distance) / f64::from(whole);
-        let speed = self.pace.speed(from.speed_mm_s.into(), next.speed_mm_s.into(), share);
-        self.roll_by(distance, from.speed_mm_s, distance.signum() * speed.round() as i32, 0);
+        let speed = self.pace.speed(self.speed_mm_s.into(), next.speed_mm_s.into(), share);
+        self.roll_by(distance, distance.signum() * speed.round() as i32, 0);
     }
 
     /// Rolls a distance, tick by tick. The time follows from the speeds, because a busy PC reads lines late and together.
     /// Near standstill it follows from the PC's clock.
-    fn roll_by(&mut self, distance: i32, from_mm_s: i32, to_mm_s: i32, host_ms: u64) {
+    fn roll_by(&mut self, distance: i32, to_mm_s: i32, host_ms: u64) {
+        let from_mm_s = self.speed_mm_s;
         let tick_mm = 100.0 / f64::from(self.rig.settings().wheel().ticks(100).0.max(1));
         let distance_mm = f64::from(distance) * tick_mm;
         let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
@@ -269,9 +266,7 @@ impl<'a> Player<'a> {
     /// Enters a state, unless it is there already. With `now` it works over unseen ground too, as `start now`.
     pub(super) fn enter(&mut self, mode: Mode, now: bool) {
         match (mode, self.rig.state()) {
-            (Mode::Work, State::Hold) => {
-                let _ = self.rig.start(now);
-            }
+            (Mode::Work, State::Hold) => _ = self.rig.start(now),
             (Mode::Hold, State::Work | State::Alarm(_)) => {
                 self.rig.hold();
                 self.rig.clear();
@@ -299,24 +294,16 @@ impl<'a> Player<'a> {
     /// Executes a typed line. False if it cannot be replayed.
     pub(super) fn command(&mut self, line: &str) -> bool {
         match command::parse(line.as_bytes()) {
-            Ok(Command::Start { now }) => {
-                let _ = self.rig.start(now);
-            }
+            // If the log lacks the answer: the firmware refused what the replay refuses.
+            Ok(Command::Start { now }) => _ = self.rig.start(now),
             Ok(Command::Hold) => self.rig.hold(),
             Ok(Command::Clear) => self.rig.clear(),
             // The log lacks the second beam's edges.
             Ok(Command::Set(Setting::SecondBeamMm, 1..)) => return false,
-            Ok(Command::Set(setting, value)) => {
-                // If the log lacks the answer: the firmware refused what the replay refuses.
-                let _ = self.rig.set(setting, value);
-            }
-            Ok(Command::Label { label, force }) => {
-                let _ = self.rig.label(label, force);
-            }
+            Ok(Command::Set(setting, value)) => _ = self.rig.set(setting, value),
+            Ok(Command::Label { label, force }) => _ = self.rig.label(label, force),
             Ok(Command::Feature(feature)) => self.rig.enter_feature(feature),
-            Ok(Command::Teach(label)) => {
-                let _ = self.rig.teach(label);
-            }
+            Ok(Command::Teach(label)) => _ = self.rig.teach(label),
             Ok(Command::Forget(_) | Command::ForgetAll) => return false,
             _ => {
                 let word = line.split_whitespace().next().unwrap_or_default();
@@ -364,7 +351,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
                 let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
                 canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
             }
-            Happened::Command { line, is_refused: false } => {
+            Happened::Command(line) => {
                 // Later holds have the new margin.
                 if let Ok(Command::Set(setting, value)) = command::parse(line.as_bytes()) {
                     let _ = settings.set(setting, value);
@@ -383,8 +370,8 @@ struct Canopies {
     first: i32,
     /// Their numbers, by where they begin.
     by_from: Vec<usize>,
-    /// For each of these, the farthest end of it and all before it, in ticks from `first`.
-    farthest: Vec<i32>,
+    /// The widest of them in ticks.
+    widest: i32,
 }
 
 impl Canopies {
@@ -392,21 +379,18 @@ impl Canopies {
         let (canopies, first) = (canopies(stretch), stretch.first.position);
         let mut by_from: Vec<usize> = (0..canopies.len()).collect();
         by_from.sort_by_key(|&number| canopies[number].from.wrapping_sub(first));
-        let mut farthest = Vec::with_capacity(by_from.len());
-        for &number in &by_from {
-            let end = canopies[number].to.wrapping_sub(first);
-            farthest.push(farthest.last().map_or(end, |&before: &i32| before.max(end)));
-        }
-        Self { canopies, first, by_from, farthest }
+        let widest = canopies.iter().map(|canopy| canopy.to.wrapping_sub(canopy.from)).max().unwrap_or(0);
+        Self { canopies, first, by_from, widest }
     }
 
     /// The first of them in the log over this ground.
     fn over(&self, ground: i32) -> Option<&Canopy> {
         let ticks = ground.wrapping_sub(self.first);
-        let begun =
-            self.by_from.partition_point(|&number| self.canopies[number].from.wrapping_sub(self.first) <= ticks);
-        let near = (0..begun).rev().take_while(|&place| self.farthest[place] > ticks);
-        let over = near.map(|place| self.by_from[place]).filter(|&number| self.canopies[number].is_over(ground));
-        over.min().map(|number| &self.canopies[number])
+        let from = |&number: &usize| self.canopies[number].from.wrapping_sub(self.first);
+        let begun = self.by_from.partition_point(|number| from(number) <= ticks);
+        let near =
+            self.by_from[..begun].iter().rev().take_while(|number| ticks.wrapping_sub(from(number)) < self.widest);
+        let over = near.filter(|&&number| self.canopies[number].is_over(ground));
+        over.min().map(|&number| &self.canopies[number])
     }
 }

@@ -13,11 +13,9 @@ use std::collections::VecDeque;
 pub(super) enum Happened<'a> {
     Status(Status),
     Event(EventLine),
-    Command {
-        line: &'a str,
-        /// Whether the firmware answered with an error. Then the command had no effect.
-        is_refused: bool,
-    },
+    Command(&'a str),
+    /// A command that the firmware answered with an error. It had no effect.
+    Refused,
 }
 
 /// A log from one start of the link to its end.
@@ -68,13 +66,12 @@ impl<'a> Stretch<'a> {
                 }
                 Kind::Command => {
                     unanswered.push_back(happened.len());
-                    happened.push((entry, Happened::Command { line: &entry.text, is_refused: false }));
+                    happened.push((entry, Happened::Command(&entry.text)));
                 }
                 Kind::Answer => {
                     let ConsoleLine::End { error } = ConsoleLine::parse(&entry.text) else { continue };
-                    let place = unanswered.pop_front();
-                    if let Some((_, Happened::Command { is_refused, .. })) = place.map(|place| &mut happened[place]) {
-                        *is_refused = error.is_some();
+                    if let (Some(place), Some(_)) = (unanswered.pop_front(), error) {
+                        happened[place] = (happened[place].0, Happened::Refused);
                     }
                 }
                 Kind::Connected | Kind::Lost => {}
@@ -123,10 +120,10 @@ impl<'a> Stretch<'a> {
         first.saturating_add(self.settings.ticks(Setting::BeamToToolMm).0).saturating_add(behind)
     }
 
-    /// The machine's position at a typed command that changes no state: between two statuses, by the PC's clock. `start
-    /// now` at work lets the tool into the row at its next swing in.
-    pub(super) fn position_of_command(&self, time_ms: u64, last: &(Status, u64), place: usize) -> Option<i32> {
-        if let Happened::Command { line, .. } = self.happened[place].1
+    /// The machine's position at a typed command that changes no state: between its last position, with that time, and
+    /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in.
+    pub(super) fn position_of_command(&self, last: (i32, u64), place: usize) -> Option<i32> {
+        if let (_, Happened::Command(line)) = self.happened[place]
             && matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }))
             && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
         {
@@ -134,9 +131,9 @@ impl<'a> Stretch<'a> {
         }
         let (entry, next) = self.happened[place..].iter().find_map(|told| Some((told.0, status(told)?)))?;
         let whole_ms = entry.time_ms.checked_sub(last.1).filter(|&time_ms| time_ms > 0)?;
-        let share = time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
-        let distance = f64::from(next.position.wrapping_sub(last.0.position)) * share;
-        Some(last.0.position.wrapping_add(distance as i32))
+        let share = self.happened[place].0.time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
+        let distance = f64::from(next.position.wrapping_sub(last.0)) * share;
+        Some(last.0.wrapping_add(distance as i32))
     }
 
     /// The position of a state change that an event reports. An alarm has its own position. Else the next swing has it.
@@ -159,7 +156,7 @@ impl<'a> Stretch<'a> {
     /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
     /// requested status between them.
     pub(super) fn is_reported_by_event(&self, place: usize) -> bool {
-        let Happened::Command { line, .. } = self.happened[place].1 else { return false };
+        let Happened::Command(line) = self.happened[place].1 else { return false };
         let brings = match command::parse(line.as_bytes()) {
             Ok(Command::Start { .. }) => Mode::Work,
             Ok(Command::Hold | Command::Clear) => Mode::Hold,

@@ -1,55 +1,7 @@
 //! Rows whose firmware stops answering, or is unplugged.
 
 use super::*;
-use control::ground::nearest::Nearest;
-use control::measure::reset::Cause;
-use control::memory::Volatile;
-use rig::{Rig, ScriptedPort};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
-
-/// A row's board: whether its cable is plugged in, whether it is silent, and the typed lines.
-#[derive(Clone, Default)]
-struct Desk {
-    is_there: Arc<AtomicBool>,
-    is_silent: Arc<AtomicBool>,
-    typed: Arc<Mutex<Vec<String>>>,
-}
-
-impl Desk {
-    fn plugged_in() -> Self {
-        let desk = Self::default();
-        desk.is_there.store(true, Ordering::Relaxed);
-        desk
-    }
-
-    fn typed(&self) -> Vec<String> {
-        self.typed.lock().unwrap().clone()
-    }
-
-    /// Opens the board's port: a new board, whose alarm about its settings is not cleared.
-    fn opener(&self) -> Opener {
-        let desk = self.clone();
-        Box::new(move || {
-            let (desk, is_there) = (desk.clone(), Arc::clone(&desk.is_there));
-            if !desk.is_there.load(Ordering::Relaxed) {
-                return Err(LinkError::Absent("it".to_owned()));
-            }
-            let mut rig = Rig::wake(Nearest::new(&[][..], Volatile::new()), Volatile::new(), Cause::PowerOn);
-            let mut answer = move |line: &str| {
-                if !["", "version", "get", "status", "examples", "events on"].contains(&line) {
-                    desk.typed.lock().unwrap().push(line.to_owned());
-                }
-                let is_silent = line.is_empty() || desk.is_silent.load(Ordering::Relaxed);
-                if is_silent { String::new() } else { rig.ask(line).join("\n") + "\n" }
-            };
-            let script = move |line: Option<&str>| {
-                is_there.load(Ordering::Relaxed).then(|| line.map(&mut answer).unwrap_or_default().into_bytes())
-            };
-            Link::over(ScriptedPort::new(script), false)
-        })
-    }
-}
+use rig::ScriptedBoard;
 
 /// Reads events of the rows until `is_so` returns true.
 fn until(rows: &Rows, mut is_so: impl FnMut(&Heard) -> bool) {
@@ -66,35 +18,46 @@ fn answers(heard: &Heard, row: usize, line: &str) -> bool {
     matches!(&heard.what, What::Answered { command, .. } if heard.row == row && command == line)
 }
 
-fn open(desks: &[Desk]) -> (Rows, Vec<Option<SettingsError>>) {
-    Rows::open(desks.iter().map(Desk::opener).collect())
+/// Whether this line was typed.
+fn types(heard: &Heard, line: &str) -> bool {
+    matches!(&heard.what, What::Happened(Happening::Command(typed)) if typed == line)
+}
+
+fn open(boards: &[ScriptedBoard]) -> (Rows, Vec<Option<SettingsError>>) {
+    let opener = |board: &ScriptedBoard| -> Opener {
+        let board = board.clone();
+        Box::new(move || Link::over(board.open().ok_or(LinkError::Absent("it".to_owned()))?, false))
+    };
+    Rows::open(boards.iter().map(opener).collect())
 }
 
 #[test]
 fn missing_rows_are_reported_and_the_others_work() {
-    let desks = [Desk::plugged_in(), Desk::default(), Desk::plugged_in()];
-    let (rows, missing) = open(&desks);
+    let boards = [ScriptedBoard::plugged_in(), ScriptedBoard::default(), ScriptedBoard::plugged_in()];
+    let (rows, missing) = open(&boards);
     let missing: Vec<Option<String>> = missing.into_iter().map(|why| why.map(|why| why.to_string())).collect();
     assert!(missing[0].is_none() && missing[2].is_none(), "{missing:?}");
     assert!(missing[1].as_ref().is_some_and(|why| why.contains("there is no port it")), "{missing:?}");
     rows.command(1, "clear");
     until(&rows, |heard| matches!(&heard.what, What::NotTyped { .. } if heard.row == 1));
-    rows.command(2, "start");
+    rows.command(2, "hepl");
     until(
         &rows,
-        |heard| matches!(&heard.what, What::Answered { refusal: Some(refusal), .. } if heard.row == 2 && refusal.contains("alarm")),
+        |heard| matches!(&heard.what, What::Answered { refusal: Some(why), .. } if heard.row == 2 && why.contains("no such")),
     );
-    desks[1].is_there.store(true, Ordering::Relaxed);
+    boards[1].plug(true);
     until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Connected { .. }) if heard.row == 1));
-    assert_eq!(desks.each_ref().map(Desk::typed), [vec![], vec![], vec!["start".to_owned()]]);
+    let typed = boards.each_ref().map(ScriptedBoard::typed);
+    assert_eq!(typed, [&["events on"][..], &["events on"], &["events on", "hepl"]]);
 }
 
 #[test]
 fn a_silent_or_lost_row_delays_no_other_row_s_hold() {
-    let desks = [Desk::plugged_in(), Desk::plugged_in(), Desk::plugged_in()];
-    let (rows, _) = open(&desks);
-    desks[0].is_silent.store(true, Ordering::Relaxed);
-    desks[1].is_there.store(false, Ordering::Relaxed);
+    let boards = [(); 3].map(|()| ScriptedBoard::plugged_in());
+    let (rows, _) = open(&boards);
+    rows.command(0, "silence");
+    until(&rows, |heard| types(heard, "silence"));
+    boards[1].plug(false);
     until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Lost(_)) if heard.row == 1));
     for row in 0..3 {
         rows.command(row, "label plant");
@@ -112,28 +75,27 @@ fn a_silent_or_lost_row_delays_no_other_row_s_hold() {
         summary.starts_with("HOLD 1 of 3 in ") && summary.ends_with(" ms; NOT THERE: middle; no answer yet: left"),
         "{summary}"
     );
-    assert!(desks[2].typed().contains(&"hold".to_owned()));
+    assert!(boards[2].typed().contains(&"hold".to_owned()));
 }
 
 #[test]
 fn a_row_that_was_lost_with_a_hold_unanswered_holds_first_when_it_is_back_and_types_nothing_else() {
-    let desk = Desk::plugged_in();
-    let (rows, _) = open(std::slice::from_ref(&desk));
-    desk.is_silent.store(true, Ordering::Relaxed);
-    // It goes before the pending status request, which is never answered.
+    let board = ScriptedBoard::plugged_in();
+    let (rows, _) = open(std::slice::from_ref(&board));
+    rows.command(0, "silence");
+    until(&rows, |heard| types(heard, "silence"));
+    // The answer to it is taken for the one to the command before.
     rows.hold(0);
-    until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Command(line)) if line == "hold"));
+    until(&rows, |heard| types(heard, "hold"));
     rows.command(0, "label plant");
-    desk.is_there.store(false, Ordering::Relaxed);
+    board.plug(false);
     until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Lost(_))));
     rows.hold(0);
     rows.command(0, "clear");
     until(&rows, |heard| matches!(&heard.what, What::NotTyped { command, .. } if command == "clear"));
-    desk.typed.lock().unwrap().clear();
-    desk.is_silent.store(false, Ordering::Relaxed);
-    desk.is_there.store(true, Ordering::Relaxed);
+    board.plug(true);
     until(&rows, |heard| answers(heard, 0, "hold"));
-    assert_eq!(desk.typed(), ["hold"]);
+    assert_eq!(board.typed(), ["events on", "silence", "hold", "events on", "hold"]);
 }
 
 #[test]
@@ -157,7 +119,7 @@ fn a_hold_to_all_has_the_time_of_the_last_row_and_the_rows_that_have_not_obeyed(
     assert_eq!(lost.summary(&names), "HOLD 2 of 3 in 31 ms; NOT THERE: 3; 1 last");
     // It is back, and holds.
     lost.take(&obeyed(2, 4000));
-    assert_eq!((lost.is_obeyed(), lost.time()), (true, Some(Duration::from_secs(4))));
+    assert_eq!((lost.is_obeyed(), lost.summary(&names)), (true, "HOLD 3 of 3 in 4000 ms; 3 last".to_owned()));
     hold.take(&obeyed(2, 30));
     assert_eq!(hold.summary(&names), "HOLD 3 of 3 in 31 ms; 1 last");
     let refusal = What::Answered { command: "hold".to_owned(), refusal: Some("error: no".to_owned()) };

@@ -55,13 +55,10 @@ pub fn steps() -> Vec<ManualStep> {
     sections(PAGE).filter_map(step).collect()
 }
 
-/// The text before each step's number.
-const HEADING: &str = "\n### ";
-
 /// The page's sections that are steps, each from its number on.
 fn sections(page: &'static str) -> impl Iterator<Item = &'static str> {
     let steps = page.split_once("<!-- steps -->").and_then(|(_, rest)| rest.split_once("<!-- steps end -->"));
-    steps.map_or("", |(steps, _)| steps).split(HEADING).skip(1)
+    steps.map_or("", |(steps, _)| steps).split("\n### ").skip(1)
 }
 
 /// Parses a section: its number and title, a line of instruction, and the lines to type, if there are any.

@@ -63,7 +63,7 @@ fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], e
         Some(port) => Link::over(port, false),
         None => Err(LinkError::Absent("it is gone".to_owned())),
     };
-    let mut session = Session::open(open).expect("the firmware answers");
+    let mut session = Session::waiting_for(open);
     for command in commands {
         assert!(session.command(command), "{command}");
     }

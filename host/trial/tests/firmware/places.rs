@@ -88,7 +88,7 @@ fn recorded(
         Some(port) => Link::over(port, false),
         None => Err(LinkError::Absent("it is gone".to_owned())),
     };
-    let mut session = Session::open(open).expect("the firmware answers");
+    let mut session = Session::waiting_for(open);
     // The simulated servo has no load, and the tool swings in between any two plants.
     assert!(session.command("set lead_out_ms 180") && session.command("start"));
     let folder = tempfile::tempdir().expect("there is room for a log");
