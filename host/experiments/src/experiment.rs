@@ -155,21 +155,6 @@ struct Plot {
     spacing_cm: f64,
 }
 
-/// The result of one controller in one row.
-#[derive(Clone, Copy, Debug)]
-struct RowOutcome {
-    effect: Effect,
-    zones: Zones,
-    weeded_share: f64,
-    weedable_share: f64,
-    undamaged_share: f64,
-    budget: Budget,
-    /// The time of the row and its turn, and the simulated part of it.
-    seconds: f64,
-    moved_s: f64,
-    alarm: bool,
-}
-
 /// Rows of a plot that are in memory at once.
 const BATCH: u32 = 256;
 
@@ -265,11 +250,10 @@ impl Experiment {
 
     fn weed_plot(&self, plot: &Plot, engine: &Engine, row_done: &(impl Fn() + Sync)) -> Result<Vec<PlotOutcome>> {
         let rows = self.conditions.plot.rows;
-        let mut outcomes: Vec<PlotOutcome> =
-            self.controllers.iter().map(|&controller| self.untouched(plot, controller)).collect();
+        let mut outcomes: Vec<PlotOutcome> = Vec::new();
         for first in (0..rows).step_by(BATCH as usize) {
             let batch = first..rows.min(first + BATCH);
-            let weeded: Vec<Vec<RowOutcome>> = batch
+            let weeded: Vec<Vec<PlotOutcome>> = batch
                 .into_par_iter()
                 .map(|row| {
                     let outcomes = self.weed_row(plot, row, engine)?;
@@ -277,19 +261,25 @@ impl Experiment {
                     Ok(outcomes)
                 })
                 .collect::<Result<_>>()?;
-            for by_controller in weeded {
-                for (outcome, row) in outcomes.iter_mut().zip(by_controller) {
-                    outcome.add(&row, rows);
+            for row in weeded {
+                if outcomes.is_empty() {
+                    outcomes = row;
+                } else {
+                    outcomes.iter_mut().zip(&row).for_each(|(outcome, row)| outcome.add(row));
                 }
             }
         }
+        outcomes.iter_mut().for_each(PlotOutcome::record_counts);
         Ok(outcomes)
     }
 
-    /// A plot before weeding.
-    fn untouched(&self, plot: &Plot, controller: Treatment) -> PlotOutcome {
-        let Conditions { plot: area, machine, .. } = &self.conditions;
-        let width_m = area.row_spacing_mm / 1000.0;
+    /// A row's part of its plot, by each controller, with the same inputs. Its record has no counts yet.
+    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<PlotOutcome>> {
+        let (stand, drive, trial) = self.grow(plot, row)?;
+        let sensors = sensors(&trial);
+        let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
+        let Conditions { plot: area, machine: mechanism, .. } = &self.conditions;
+        let (rows, width_m) = (f64::from(area.rows), area.row_spacing_mm / 1000.0);
         let record = PlotRecord {
             replication: plot.replication,
             speed_km_h: plot.speed_km_h,
@@ -298,57 +288,32 @@ impl Experiment {
             weeds_after: 0,
             plants: 0,
             damaged: 0,
-            area_m2: f64::from(area.rows) * area.row_m * width_m,
-            time_s: 0.0,
+            area_m2: rows * area.row_m * width_m,
+            time_s: drive.row_s + drive.turn_s,
             width_m,
-            power_hp: machine.power_hp,
+            power_hp: mechanism.power_hp,
         };
-        PlotOutcome {
-            controller,
-            record,
-            effect: Effect::default(),
-            zones: Zones::default(),
-            weeded_share: 0.0,
-            weedable_share: 0.0,
-            undamaged_share: 0.0,
-            budget: Budget::default(),
-            alarms: 0,
-            moved_s: 0.0,
-        }
-    }
-
-    /// The inputs that all controllers share in a row.
-    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>> {
-        let (stand, drive, trial) = self.grow(plot, row)?;
-        let sensors = sensors(&trial);
-        let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
         let outcome = |&controller: &Treatment| {
             let weeded = weed(&trial, &sensors, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
             let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
             let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
-            let span_mm = row.span_mm();
-            Ok(RowOutcome {
-                budget: Budget::of(&span_mm, &judgement.weeded_mm, &weeded.reasons, machine, motion),
-                effect: effect(
-                    &stand,
-                    machine,
-                    &self.conditions.machine,
-                    (motion, &drive.steering),
-                    pulses,
-                    start_cycle,
-                ),
+            let budget = Budget::of(&row.span_mm(), &judgement.weeded_mm, &weeded.reasons, machine, motion);
+            Ok(PlotOutcome {
+                controller,
+                record,
+                effect: effect(&stand, machine, mechanism, (motion, &drive.steering), pulses, start_cycle),
                 zones: Zones {
                     all: judgement.plants.len() as u32,
                     reached: judgement.count(Verdict::Damaged) as u32,
                     margins_cut: judgement.count(Verdict::MarginCut) as u32,
                 },
-                weeded_share: judgement.weeded_share,
-                weedable_share: judgement.weedable_share,
-                undamaged_share,
-                seconds: drive.row_s + drive.turn_s,
+                weeded_share: judgement.weeded_share / rows,
+                weedable_share: judgement.weedable_share / rows,
+                undamaged_share: undamaged_share / rows,
+                budget: budget / rows,
+                alarms: u32::from(weeded.alarm),
                 moved_s: motion.duration_s(),
-                alarm: weeded.alarm,
             })
         };
         self.controllers.iter().map(outcome).collect()
@@ -435,16 +400,21 @@ fn weed(
 }
 
 impl PlotOutcome {
-    /// Adds a row of the plot.
-    fn add(&mut self, row: &RowOutcome, rows: u32) {
-        self.effect += row.effect;
-        self.zones += row.zones;
-        self.weeded_share += row.weeded_share / f64::from(rows);
-        self.weedable_share += row.weedable_share / f64::from(rows);
-        self.undamaged_share += row.undamaged_share / f64::from(rows);
-        self.budget += row.budget / f64::from(rows);
-        self.alarms += u32::from(row.alarm);
-        self.moved_s += row.moved_s;
+    /// Adds another row of the plot, or another plot. The caller weights the shares.
+    fn add(&mut self, other: &Self) {
+        self.effect += other.effect;
+        self.zones += other.zones;
+        self.weeded_share += other.weeded_share;
+        self.weedable_share += other.weedable_share;
+        self.undamaged_share += other.undamaged_share;
+        self.budget += other.budget;
+        self.alarms += other.alarms;
+        self.moved_s += other.moved_s;
+        self.record.time_s += other.record.time_s;
+    }
+
+    /// Puts the counts of all rows into the record.
+    fn record_counts(&mut self) {
         let Effect { plants, in_plot, counted, .. } = self.effect;
         // A plot's record has `u32` counts.
         let in_a_plot = |weeds: u64| u32::try_from(weeds).unwrap_or(u32::MAX);
@@ -455,7 +425,6 @@ impl PlotOutcome {
             weeds_after: in_a_plot(weeds.after),
             plants,
             damaged: self.effect.injured(),
-            time_s: self.record.time_s + row.seconds,
             ..self.record
         };
     }

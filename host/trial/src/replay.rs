@@ -5,12 +5,12 @@
 //! continues.
 
 use crate::console::Status;
-use crate::run::{TrialError, boot};
+use crate::run::{PROGRESS_CYCLES, TrialError, boot};
 use control::measure::quadrature::{Channels, Quadrature, Step};
 use field::wiring;
 use std::path::Path;
+use uno::PinChange;
 use uno::capture::Capture;
-use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// The firmware's count, relative to its position at the start of the recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +38,6 @@ pub struct Replay {
 
 /// Pause after each stretch of the recording, so that the firmware has served the last edge.
 const PAUSE_MS: u64 = 1;
-
-/// Simulated time between two reports of progress.
-const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
 /// Plays the recording to the firmware at `elf`. `progress` gets the share done, from 0 to 1.
 ///
@@ -147,20 +144,18 @@ fn apply(levels: &mut Channels, change: &PinChange) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use field::machine::encoder_edge;
 
     /// The edges of these steps from AB = 00. A negative number of steps goes backwards.
-    fn edges(steps: &[i32]) -> Vec<PinChange> {
-        const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
-        let mut count = 0_i32;
+    fn edges(steps: &[i64]) -> Vec<PinChange> {
+        let mut count = 0;
         let directions = steps.iter().flat_map(|&steps| (0..steps.abs()).map(move |_| steps.signum()));
         directions
-            .enumerate()
-            .map(|(index, direction)| {
-                let before = FORWARD[count.rem_euclid(4) as usize];
+            .zip(0..)
+            .map(|(direction, index)| {
+                let before = count;
                 count += direction;
-                let (a, b) = FORWARD[count.rem_euclid(4) as usize];
-                let (pin, high) = if a == before.0 { (wiring::ENCODER_B, b) } else { (wiring::ENCODER_A, a) };
-                PinChange { cycle: index as u64 * 1000, pin, high }
+                encoder_edge(index * 1000, before, count)
             })
             .collect()
     }

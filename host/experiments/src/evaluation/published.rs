@@ -12,13 +12,11 @@
 //! engine. Eq. 30, where it falls, does not.
 
 use super::plot::Response;
+use crate::table::NOTHING;
 use serde::Serialize;
 
 /// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
 pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
-
-/// The text of a missing figure.
-const NOT_SAID: &str = "\u{2013}";
 
 /// Machines that weed in the row, those with a beam first, as measured by their authors in a field or on a test track.
 /// Each source counts weeds in its own way.
@@ -48,8 +46,8 @@ pub const MACHINES: [[&str; 7]; 6] = [
         "Cordill and Grift, two tines",
         "maize",
         "the stalk's width",
-        NOT_SAID,
-        NOT_SAID,
+        NOTHING,
+        NOTHING,
         "8.8 without weeds, 23.7 among weeds",
         "Biosystems Engineering, 2011, doi 10.1016/j.biosystemseng.2011.07.007",
     ],

@@ -3,7 +3,7 @@
 
 use super::published::Published;
 use super::{Analysis, Performance, PlotRecord, ResponseAnalysis};
-use crate::statistics::{AnalysisOfVariance, BinomialModel};
+use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
 use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use std::fmt::{self, Display, Formatter};
 
@@ -184,25 +184,19 @@ impl ResponseAnalysis {
         let range = |&(low, high): &(f64, f64)| format!("{} to {}", fixed(low, 2), fixed(high, 2));
         let published: Vec<String> = self.published.ranges.iter().map(range).collect();
         let share = |value| fixed(value, 4);
+        let ours = |value: fn(&LinearModel) -> f64, said: fn(f64) -> String| optional(model.map(value), said);
         let row = |what: &str, ours: String, paper: String| vec![what.to_owned(), ours, paper];
+        let nothing = || NOTHING.to_owned();
         let mut table = Table::new("Fit and range", ["", "this trial", "paper"]);
         table.rows = vec![
-            row("R²", optional(model.map(|model| model.r_squared), share), share(self.published.r_squared)),
+            row("R²", ours(|model| model.r_squared, share), share(self.published.r_squared)),
             row(
                 "adjusted R²",
-                optional(model.map(|model| model.adjusted_r_squared), share),
+                ours(|model| model.adjusted_r_squared, share),
                 optional(self.published.adjusted_r_squared, share),
             ),
-            row(
-                "residual standard error",
-                optional(model.map(|model| model.residual_standard_error), significant),
-                NOTHING.to_owned(),
-            ),
-            row(
-                "degrees of freedom",
-                optional(model.map(|model| model.degrees_of_freedom as f64), short),
-                NOTHING.to_owned(),
-            ),
+            row("residual standard error", ours(|model| model.residual_standard_error, significant), nothing()),
+            row("degrees of freedom", ours(|model| model.degrees_of_freedom as f64, short), nothing()),
             row(&format!("range, {}", self.response.unit()), range(&self.range), published.join(",\n")),
         ];
         table
@@ -231,17 +225,16 @@ impl BinomialModel {
         let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
         let mut table = Table::new("Binomial model of the counts", columns);
         for term in &self.terms {
-            let (times, least, greatest) = term.odds_ratio();
-            let (name, times) = match term.name {
-                "speed" => {
-                    ("for each km/h", format!("{} ({} to {})", fixed(times, 2), fixed(least, 2), fixed(greatest, 2)))
-                }
-                "spacing" => (
-                    "for each cm of spacing",
-                    format!("{} ({} to {})", fixed(times, 3), fixed(least, 3), fixed(greatest, 3)),
-                ),
-                name => (name, NOTHING.to_owned()),
+            let (name, decimals) = match term.name {
+                "speed" => ("for each km/h", Some(2)),
+                "spacing" => ("for each cm of spacing", Some(3)),
+                name => (name, None),
             };
+            let times = decimals.map_or(NOTHING.to_owned(), |decimals| {
+                let (times, least, greatest) = term.odds_ratio();
+                let fixed = |odds| fixed(odds, decimals);
+                format!("{} ({} to {})", fixed(times), fixed(least), fixed(greatest))
+            });
             let cells =
                 [significant(term.estimate), significant(term.standard_error), fixed(term.z, 2), probability(term.p)];
             table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());

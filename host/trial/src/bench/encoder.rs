@@ -20,13 +20,13 @@ use super::load::{EDGE_CYCLES, Telemetry, flicker};
 use crate::console::{ConsoleError, Status, ask};
 use crate::run;
 use anyhow::Result;
+use field::machine::encoder_edge;
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::path::Path;
-use uno::{CYCLES_PER_SECOND, PinChange};
-use uno::{Place, SENT_BYTE_CYCLES, Uno};
+use uno::{CYCLES_PER_SECOND, PinChange, Place, SENT_BYTE_CYCLES, Uno};
 
 /// Fewest counts of a trial: the count's second byte changes more than a hundred times.
 const FEWEST_COUNTS: f64 = 40_000.0;
@@ -183,7 +183,8 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
     let end = begin + WORST_CYCLES;
     let mut world = World::new(turning.load, begin);
     // A slow first edge. Its direction lets the firmware resolve a jump.
-    uno.set(nth_edge(turning.direction, 0).pin, nth_edge(turning.direction, 0).high);
+    let PinChange { pin, high, .. } = nth_edge(turning.direction, 0);
+    uno.set(pin, high);
     uno.run_for_ms(1)?;
     // A real wheel accelerates gradually. Without a run-up the firmware would take the jumps for noise.
     let run_up = uno.cycle();
@@ -281,15 +282,13 @@ pub(super) fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iter
     })
 }
 
-/// Pin and level of an edge, counted from 0.
+/// An edge, counted from 0. Its cycle is 0.
 fn nth_edge(direction: Direction, number: u32) -> PinChange {
-    // Forward, A leads B; backward, B leads A.
-    let (first, second) = match direction {
-        Direction::Forward => (wiring::ENCODER_A, wiring::ENCODER_B),
-        Direction::Backward => (wiring::ENCODER_B, wiring::ENCODER_A),
-    };
-    let pin = if number.is_multiple_of(2) { first } else { second };
-    PinChange { cycle: 0, pin, high: number % 4 < 2 }
+    let number = i64::from(number);
+    match direction {
+        Direction::Forward => encoder_edge(0, number, number + 1),
+        Direction::Backward => encoder_edge(0, -number, -number - 1),
+    }
 }
 
 /// The highest rate without a lost count.
