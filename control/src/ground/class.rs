@@ -56,10 +56,10 @@ pub struct Listed {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExamplesFull;
 
-/// Classifies detections, and learns from examples.
+/// Classifies detections, and learns from examples. By default it has no examples, and can be taught none.
 pub trait Classifier {
     /// Checks the saved examples. The caller calls it once, before any other method.
-    fn init(&mut self);
+    fn init(&mut self) {}
 
     /// Classifies a detection by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
@@ -77,29 +77,43 @@ pub trait Classifier {
     }
 
     /// The class by the built-in examples alone; [`Class::Unknown`] if there are none. Ends a classification that has begun.
-    fn built_in_class(&mut self, features: &Features) -> Class;
+    fn built_in_class(&mut self, _features: &Features) -> Class {
+        Class::Unknown
+    }
 
     /// Adds a detection as an example of the class `label`, and starts to save it.
     ///
     /// # Errors
     /// [`ExamplesFull`]; the operator has to forget an example first.
-    fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull>;
+    fn teach(&mut self, _features: &Features, _label: u8) -> Result<(), ExamplesFull> {
+        Err(ExamplesFull)
+    }
 
     /// Adds a complete example, and starts to save it.
     ///
     /// # Errors
     /// [`ExamplesFull`]; the operator has to forget an example first.
-    fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull>;
+    fn keep(&mut self, _example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
+        Err(ExamplesFull)
+    }
 
     /// Forgets a field example. Returns whether it existed.
-    fn forget(&mut self, number: u8) -> bool;
+    fn forget(&mut self, _number: u8) -> bool {
+        false
+    }
 
     /// The first example from `place` on in the list of all, and the place behind it.
-    fn listed(&self, place: u8) -> Option<(Listed, u8)>;
+    fn listed(&self, _place: u8) -> Option<(Listed, u8)> {
+        None
+    }
 
     /// Saved examples that were invalid at start-up, and dropped.
-    fn spoiled(&self) -> u8;
+    fn spoiled(&self) -> u8 {
+        0
+    }
 
     /// Runs one step of saving, without waiting. Returns whether all is written.
-    fn carry_on(&mut self) -> bool;
+    fn carry_on(&mut self) -> bool {
+        true
+    }
 }

@@ -1,7 +1,7 @@
 //! The evaluation of a field trial: from the counts of each plot to the paper's measures (Eq. 22 to 27), and from these
 //! to models and analyses of variance, beside the paper's own figures.
 //!
-//! A trial has plots at some speeds and plant spacings, with replications. [`PlotRecord`] is one plot. [`table`] reads
+//! A trial has plots at some speeds and plant spacings, with replications. [`PlotRecord`] is one plot. [`read_csv`] reads
 //! plots from CSV. [`PlotRecord::performance`] calculates the measures of one plot, and [`Analysis`] analyses
 //! all plots. [`published`] holds the paper's printed figures. The code does not distinguish real plots from simulated
 //! plots.
@@ -10,9 +10,9 @@ mod findings;
 mod plot;
 pub mod published;
 pub(crate) mod report;
-pub mod table;
+mod table;
 
-pub use self::plot::{Performance, PlotRecord, Response};
+pub use self::plot::{COLUMNS, Performance, PlotRecord, Response};
 pub use self::table::read_csv;
 
 use self::published::Published;
@@ -99,13 +99,6 @@ impl Analysis {
         };
         let responses = Response::ALL.map(analyse).to_vec();
         Ok(Self { records, performances, responses })
-    }
-
-    /// The plots, numbered from 1, that cover more ground than their speed and width allow. Their field efficiency is
-    /// above 100 %, so area, time, width or speed is wrong.
-    pub fn faster_than_possible(&self) -> Vec<usize> {
-        let plots = (1..).zip(&self.performances);
-        plots.filter(|(_, plot)| plot.field_efficiency_percent > 100.0).map(|(number, _)| number).collect()
     }
 
     /// The plots by treatment, slow and narrow first.

@@ -354,7 +354,6 @@ impl Experiment {
     }
 }
 
-/// The result of a row.
 struct Weeded {
     pulses: Vec<Pulse>,
     start_cycle: u64,
@@ -367,7 +366,6 @@ fn sensors(trial: &Trial) -> LazyCell<Sensors, impl FnOnce() -> Sensors> {
     LazyCell::new(|| Sensors::new(trial, native::TURN_S))
 }
 
-/// Has a controller weed a row.
 fn weed(
     trial: &Trial,
     sensors: &LazyCell<Sensors, impl FnOnce() -> Sensors>,

@@ -3,7 +3,7 @@
 //! A block has each treatment once, in random order. Neighbouring plots are alike, so the differences between blocks
 //! can be separated from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
 
-use crate::evaluation::table::COLUMNS;
+use crate::evaluation::COLUMNS;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;

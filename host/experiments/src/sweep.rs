@@ -19,7 +19,6 @@ pub const SPEEDS_KM_H: (f64, f64) = (0.1, 8.0);
 /// Valid plant spacings, least and greatest, in cm.
 pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
 
-/// Most values of an axis.
 const MOST_VALUES: usize = 1000;
 
 /// A parameter and its values.
@@ -183,22 +182,18 @@ impl Sweep {
         places.map(|(x, y)| Ok(Place { x, y, experiment: self.at(x, y)? })).collect()
     }
 
-    /// A point's values, in words.
     fn describe(&self, place: &Place) -> String {
         let second = self.y.as_ref().zip(place.y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
         format!("{} = {}{}", self.x.parameter, place.x, second.unwrap_or_default())
     }
 
-    /// The experiment at a point.
     fn at(&self, x: f64, y: Option<f64>) -> Result<Experiment> {
         let mut experiment = Experiment {
             speeds_km_h: vec![self.speed_km_h],
             spacings_cm: vec![self.spacing_cm],
             replications: 1,
             controllers: vec![self.controller],
-            conditions: self.conditions.clone(),
-            examples: Vec::new(),
-            seed: self.seed,
+            ..Experiment::as_in_the_paper(self.conditions.clone(), self.seed)
         };
         for (axis, value) in [(Some(&self.x), Some(x)), (self.y.as_ref(), y)] {
             let (Some(axis), Some(value)) = (axis, value) else { continue };

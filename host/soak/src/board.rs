@@ -10,7 +10,7 @@ use control::ground::examples::EXAMPLES;
 use control::ground::{class::Listed, nearest::Nearest};
 use control::measure::reset::Cause;
 use control::memory::{SIZE, Volatile};
-use control::operate::{state::State, tool::Reason};
+use control::operate::state::State;
 use control::say::command::{Command, parse};
 use control::settings::{Setting, Settings};
 use field::machine::{channels, encoder_edge};
@@ -181,10 +181,7 @@ impl Board {
 
     /// The line that was begun was answered.
     fn end(&mut self, line: &str, is_ok: bool) {
-        let Ok(command) = parse(line.as_bytes()) else { return };
-        if !is_ok {
-            return;
-        }
+        let (true, Ok(command)) = (is_ok, parse(line.as_bytes())) else { return };
         match command {
             Command::Set(setting, value) => {
                 let _ = self.settings.set(setting, value);
@@ -266,14 +263,6 @@ impl Machine for Board {
         self.to_come.push((levels, false));
     }
 
-    fn lose_edges(&mut self, _: &World) -> Checked {
-        Ok(())
-    }
-
-    fn place(&self, count: i64) -> i64 {
-        count
-    }
-
     fn own_count(&self, count: i64) -> i32 {
         (count - self.zero) as i32
     }
@@ -312,10 +301,6 @@ impl Machine for Board {
         Err(Failure::fail(format!("in {:?} the servo has a pulse of {} us", self.state, self.servo.width_us)))
     }
 
-    fn take_weed(&mut self) -> Option<i16> {
-        None
-    }
-
     fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -326,14 +311,6 @@ impl Machine for Board {
 
     fn state(&self) -> State {
         self.state
-    }
-
-    fn has_heartbeat(&self) -> bool {
-        true
-    }
-
-    fn reason(&self) -> Option<Reason> {
-        None
     }
 
     fn unseen_mm(&self) -> i16 {

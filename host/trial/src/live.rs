@@ -306,7 +306,6 @@ impl LiveUno {
         })
     }
 
-    /// Runs for a slice.
     fn slice(&mut self) -> Result<()> {
         self.serve()?;
         self.roll();
@@ -330,7 +329,6 @@ impl LiveUno {
         self.keep_eeprom()
     }
 
-    /// Plugs the cable in again.
     fn plug_in(&mut self) -> Result<()> {
         let pty = terminal(self.link.as_deref())?;
         self.path = pty.path().to_owned();

@@ -110,22 +110,16 @@ fn pauses(first_levels: &[PinChange], edges: &[PinChange]) -> Vec<usize> {
         apply(&mut levels, change);
     }
     let mut decoder = Quadrature::new(levels);
-    let mut count = 0;
-    let (mut lowest, mut highest) = ((count, 0), (count, 0));
-    for (index, change) in edges.iter().enumerate() {
+    let mut counts = vec![0];
+    for change in edges {
         apply(&mut levels, change);
-        if let Step::Ticks(ticks) = decoder.step(levels) {
-            count += i64::from(ticks);
-        }
-        let here = (count, index + 1);
-        if count < lowest.0 {
-            lowest = here;
-        }
-        if count > highest.0 {
-            highest = here;
-        }
+        let ticks = if let Step::Ticks(ticks) = decoder.step(levels) { i64::from(ticks) } else { 0 };
+        counts.push(counts[counts.len() - 1] + ticks);
     }
-    let mut pauses = vec![lowest.1, highest.1, edges.len()];
+    // Of equal counts, each takes the first.
+    let lowest = (0..counts.len()).min_by_key(|&edge| counts[edge]).unwrap_or(0);
+    let highest = (0..counts.len()).rev().max_by_key(|&edge| counts[edge]).unwrap_or(0);
+    let mut pauses = vec![lowest, highest, edges.len()];
     pauses.sort_unstable();
     pauses.dedup();
     pauses

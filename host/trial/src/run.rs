@@ -16,8 +16,7 @@ use link::settings::name;
 use std::path::Path;
 use thiserror::Error;
 use uno::elf::Size;
-use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
-use uno::{Uno, UnoError};
+use uno::{CYCLES_PER_SECOND, PinChange, Pulse, Uno, UnoError};
 
 /// Why a trial had no outcome.
 #[derive(Debug, Error)]

@@ -15,13 +15,16 @@ impl Analysis {
             findings.extend(response.odds());
         }
         findings.extend(self.responses.iter().flat_map(ResponseAnalysis::checked));
-        let hasty = self.faster_than_possible();
+        // Area, time, width or speed is wrong.
+        let plots = (1..).zip(&self.performances);
+        let hasty =
+            plots.filter(|(_, plot)| plot.field_efficiency_percent > 100.0).map(|(number, _)| f64::from(number));
+        let hasty: Vec<f64> = hasty.collect();
         if !hasty.is_empty() {
-            let plots: Vec<f64> = hasty.into_iter().map(|plot| plot as f64).collect();
-            let of = if plots.len() == 1 { "Plot" } else { "Plots" };
+            let of = if hasty.len() == 1 { "Plot" } else { "Plots" };
             findings.push(format!(
                 "{of} {}: more ground was covered than speed and width allow (field efficiency above 100 %), so check area, time, width and speed.",
-                list(&plots)
+                list(&hasty)
             ));
         }
         findings

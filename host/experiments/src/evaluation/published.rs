@@ -189,7 +189,8 @@ const FIELD_EFFICIENCY: Published = Published {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::{Performance, PlotRecord};
+    use crate::evaluation::PlotRecord;
+    use crate::evaluation::tests::PLOT;
 
     /// The engine that was chosen, hp.
     const POWER_HP: f64 = 2.5;
@@ -199,21 +200,9 @@ mod tests {
 
     /// The index of a plot with these counts out of 10,000: the paper prints two decimals.
     fn index(capacity_ha_h: f64, damaged: u32, weeds_after: u32, power_hp: f64) -> f64 {
-        let record = PlotRecord {
-            replication: 1,
-            speed_km_h: 1.0,
-            spacing_cm: 60.0,
-            weeds_before: 10_000,
-            weeds_after,
-            plants: 10_000,
-            damaged,
-            area_m2: capacity_ha_h * 10_000.0,
-            time_s: 3600.0,
-            width_m: WIDTH_M,
-            power_hp,
-        };
-        let Performance { performance_index, .. } = record.performance();
-        performance_index
+        let (area_m2, time_s) = (capacity_ha_h * 10_000.0, 3600.0);
+        let record = PlotRecord { weeds_before: 10_000, weeds_after, plants: 10_000, damaged, ..PLOT };
+        PlotRecord { area_m2, time_s, power_hp, ..record }.performance().performance_index
     }
 
     #[test]

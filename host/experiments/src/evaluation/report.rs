@@ -102,44 +102,13 @@ impl Analysis {
 
     /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
-        let written_down = [
-            "plot",
-            "replication",
-            "speed, km/h",
-            "spacing, cm",
-            "weeds before",
-            "weeds after",
-            "plants",
-            "damaged",
-            "area, m²",
-            "time, s",
-            "width, m",
-            "power, hp",
-        ];
-        let mut table =
-            Table::new("Each plot: counts, measurements and results", written_down.into_iter().chain(MEASURES));
-        for (index, (record, performance)) in self.records.iter().zip(&self.performances).enumerate() {
-            let cells = [(index + 1).to_string()].into_iter().chain(counted(record)).chain(measures(performance));
-            table.rows.push(cells.collect());
+        let columns = ["plot"].iter().chain(PlotRecord::HEADINGS).chain(&MEASURES).copied();
+        let mut table = Table::new("Each plot: counts, measurements and results", columns);
+        for ((record, performance), number) in self.records.iter().zip(&self.performances).zip(1_u32..) {
+            table.rows.push([vec![number.to_string()], record.cells(), measures(performance).into()].concat());
         }
         table
     }
-}
-
-fn counted(record: &PlotRecord) -> [String; 11] {
-    [
-        record.replication.to_string(),
-        short(record.speed_km_h),
-        short(record.spacing_cm),
-        record.weeds_before.to_string(),
-        record.weeds_after.to_string(),
-        record.plants.to_string(),
-        record.damaged.to_string(),
-        fixed(record.area_m2, 2),
-        fixed(record.time_s, 1),
-        fixed(record.width_m, 2),
-        fixed(record.power_hp, 2),
-    ]
 }
 
 impl ResponseAnalysis {

@@ -3,7 +3,7 @@
 use super::*;
 
 /// A plot whose measures are round numbers.
-const PLOT: PlotRecord = PlotRecord {
+pub const PLOT: PlotRecord = PlotRecord {
     replication: 1,
     speed_km_h: 1.5,
     spacing_cm: 50.0,

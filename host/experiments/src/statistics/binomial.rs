@@ -169,7 +169,6 @@ fn deviance(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
     counts.iter().zip(shares).map(of_plot).sum()
 }
 
-/// Pearson's chi-square.
 fn pearson(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
     let of_plot = |((count, of), share): (&(u32, u32), &f64)| {
         let of = f64::from(*of);

@@ -181,7 +181,9 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
     let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
     let begin = uno.cycle();
     let end = begin + WORST_CYCLES;
-    let mut world = World::new(turning.load, begin);
+    let telemetry = Telemetry::default();
+    let byte_after = begin + SENT_BYTE_CYCLES;
+    let mut world = World { load: turning.load, telemetry, beam: true, beam_after: begin, byte_after };
     // A slow first edge. Its direction lets the firmware resolve a jump.
     let PinChange { pin, high, .. } = nth_edge(turning.direction, 0);
     uno.set(pin, high);
@@ -230,11 +232,6 @@ struct World {
 }
 
 impl World {
-    fn new(load: Load, begin: u64) -> Self {
-        let line = begin + SENT_BYTE_CYCLES;
-        Self { load, telemetry: Telemetry::default(), beam: true, beam_after: begin, byte_after: line }
-    }
-
     /// Runs until a handler begins or the loop is about to turn interrupts off. Returns the cycle of the handler's entry.
     /// After `sections` critical sections it causes another interrupt.
     fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64> {
