@@ -144,10 +144,10 @@ impl Sweep {
     /// As [`Sweep::run`].
     pub fn run_shard(&self, shard: Shard, progress: impl Fn(f64) + Sync) -> Result<Vec<Numbered<PlotOutcome>>> {
         let places = self.places()?;
-        let mine: Vec<(u64, &Place)> =
-            shard.numbers(self.size()).map(|number| (number, &places[number as usize])).collect();
+        let mine: Vec<u64> = shard.numbers(self.size()).collect();
         let done = AtomicUsize::new(0);
-        let weed = |&(number, place): &(u64, &Place)| {
+        let weed = |&number: &u64| {
+            let place = &places[number as usize];
             let outcomes = place.experiment.run(&Engine::Native, |_| ());
             let outcomes = outcomes.with_context(|| format!("at {}", self.describe(place)))?;
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / mine.len() as f64);

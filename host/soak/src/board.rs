@@ -22,7 +22,6 @@ use model_test::drive::is_end;
 use model_test::machine::{Attended, Checked, Machine, World};
 use model_test::run::Beginning;
 use std::collections::VecDeque;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use trial::console::ask;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno};
@@ -96,12 +95,6 @@ pub struct Board {
     stack_was_low: bool,
 }
 
-impl fmt::Debug for Board {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "an Uno at cycle {}", self.uno.cycle())
-    }
-}
-
 impl Board {
     /// Powers up an Uno with the firmware at `elf`, and starts clock and count as `beginning` has them.
     ///
@@ -109,7 +102,7 @@ impl Board {
     /// If the firmware cannot be read, or does not start.
     pub fn boot(elf: &Path, beginning: &Beginning, world: &World) -> Result<Self, Failure> {
         let mut uno = Uno::boot(elf)?;
-        show_beams(&mut uno, world);
+        beams(world).into_iter().for_each(|(pin, high)| uno.set(pin, high));
         uno.run_until_symbol("main", GREETING_CYCLES)?;
         let (count, overflows) = (beginning.count.to_le_bytes(), (beginning.steps >> 8).to_le_bytes());
         uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2])?;
@@ -232,9 +225,9 @@ impl Board {
     }
 }
 
-fn show_beams(uno: &mut Uno, world: &World) {
-    uno.set(wiring::BEAM, !world.broken);
-    uno.set(wiring::SECOND_BEAM, !world.second_broken);
+/// The levels of the beams' lines.
+fn beams(world: &World) -> [(Pin, bool); 2] {
+    [(wiring::BEAM, !world.broken), (wiring::SECOND_BEAM, !world.second_broken)]
 }
 
 impl Machine for Board {
@@ -259,8 +252,7 @@ impl Machine for Board {
     }
 
     fn beam_edge(&mut self, world: &World) {
-        let levels = vec![(wiring::BEAM, !world.broken), (wiring::SECOND_BEAM, !world.second_broken)];
-        self.to_come.push((levels, false));
+        self.to_come.push((beams(world).to_vec(), false));
     }
 
     fn own_count(&self, count: i64) -> i32 {
@@ -382,7 +374,7 @@ impl Machine for Board {
     }
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
-        show_beams(&mut self.uno, world);
+        beams(world).into_iter().for_each(|(pin, high)| self.uno.set(pin, high));
         // A line on its way would otherwise reach the restarted machine.
         while self.uno.bytes_pending() > 0 {
             self.uno.run_for_ms(1)?;

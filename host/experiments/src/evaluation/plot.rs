@@ -14,9 +14,12 @@ const S_PER_H: f64 = 3600.0;
 /// Declares a plot's record. Each column of a table of plots has its type, how it is read, its heading in a report, and
 /// its text there.
 macro_rules! plot_record {
-    ($($(#[doc = $about:literal])+ $column:ident: $type:ty = $read:ident($($least:literal)?), $heading:literal => $shown:expr;)+) => {
+    ($(
+        $(#[doc = $about:literal])+
+        $column:ident: $type:ty = $read:ident($($least:literal)?), $heading:literal => $shown:expr;
+    )+) => {
         /// The counts and measurements of one plot.
-        #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
         pub struct PlotRecord {
             $($(#[doc = $about])+ pub $column: $type,)+
         }

@@ -91,13 +91,6 @@ pub struct Coefficients {
     pub per_cm: Option<f64>,
 }
 
-impl Coefficients {
-    /// The response at a speed in km/h and a spacing in cm, if all coefficients are known.
-    pub fn at(&self, speed_km_h: f64, spacing_cm: f64) -> Option<f64> {
-        Some(self.constant? + self.per_km_h? * speed_km_h + self.per_cm? * spacing_cm)
-    }
-}
-
 /// The paper's figures for one response.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Published {
@@ -223,7 +216,9 @@ mod tests {
     #[test]
     fn the_printed_equations_give_the_stated_contradictions() {
         let all = |response| {
-            let of_speed = |speed| [50.0, 60.0].map(|spacing| Published::of(response).equation.at(speed, spacing));
+            let Coefficients { constant, per_km_h, per_cm } = Published::of(response).equation;
+            let at = |speed: f64, spacing: f64| Some(constant? + per_km_h? * speed + per_cm? * spacing);
+            let of_speed = |speed| [50.0, 60.0].map(|spacing| at(speed, spacing));
             [1.0, 1.5, 2.0, 2.5].into_iter().flat_map(of_speed).collect::<Option<Vec<f64>>>()
         };
         assert_eq!(all(Response::PlantDamage), None);

@@ -137,11 +137,6 @@ impl AnalysisOfVariance {
         });
         Ok(Self { sources, remarks })
     }
-
-    /// The source with this name, if the analysis has it.
-    pub fn source(&self, name: &str) -> Option<&Source> {
-        self.sources.iter().find(|source| source.name == name)
-    }
 }
 
 /// The plots of each level of a factor.

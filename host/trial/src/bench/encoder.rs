@@ -126,13 +126,11 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> 
     let end = begin + (f64::from(counts) * step_cycles).ceil() as u64;
     uno.drive(edges(turning, step_cycles, begin).take(counts as usize));
     let mut telemetry = Telemetry::default();
-    match turning.load {
-        Load::Idle => uno.run_until(end)?,
-        Load::Telemetry => {
-            uno.drive(flicker(begin, end));
-            telemetry.run_until(&mut uno, end)?;
-        }
+    if turning.load == Load::Telemetry {
+        uno.drive(flicker(begin, end));
+        telemetry.run_until(&mut uno, end)?;
     }
+    uno.run_until(end)?;
     let line_share = telemetry.line_share(end - begin);
     counted(&mut uno, turning, counts.into(), line_share)
 }
