@@ -2,7 +2,7 @@
 //!
 //! A [`Run`] is a trial that a test can inspect and operate meanwhile. This file makes no verdicts: the tests do.
 
-use field::machine::{Machine, cycle_at};
+use field::machine::{Machine, cycle_at, encoder_edge};
 use field::motion::Motion;
 use field::row::{Row, Thing};
 use field::servo::Command;
@@ -294,16 +294,13 @@ impl Run {
 
 /// Steps of an encoder, +1 or -1, as levels on its pins from AB = 00, each at its cycle.
 pub fn encoder_steps(steps: impl IntoIterator<Item = (u64, i32)>) -> Vec<PinChange> {
-    const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
-    let mut phase = 0_i32;
+    let mut ticks = 0;
     steps
         .into_iter()
         .map(|(cycle, step)| {
-            let (a, _) = FORWARD[phase.rem_euclid(4) as usize];
-            phase += step;
-            let (new_a, new_b) = FORWARD[phase.rem_euclid(4) as usize];
-            let (pin, high) = if a == new_a { (wiring::ENCODER_B, new_b) } else { (wiring::ENCODER_A, new_a) };
-            PinChange { cycle, pin, high }
+            let before = ticks;
+            ticks += i64::from(step);
+            encoder_edge(cycle, before, ticks)
         })
         .collect()
 }

@@ -40,8 +40,8 @@ fn at_10_km_h_no_plant_is_damaged_and_commands_are_as_exact_in_time() {
     let machine = Machine { beam_to_tool_mm: 800.0, ..Machine::default() };
     let rows = Rows { seeds: 0..cases(20), machine, speed_km_h: 10.0, spacing_mm: 1400.0..1800.0, weeds: 0 };
     let lateness = lateness_without_damage(&rows);
-    let worst = lateness.milliseconds(lateness.worst_ticks());
-    let mean = lateness.milliseconds(lateness.mean_ticks());
+    let [worst, mean] =
+        [lateness.worst_ticks(), lateness.mean_ticks()].map(|ticks| ticks / lateness.ticks_per_s * 1000.0);
     println!("{} swings, {worst:.2} ms at worst, {mean:.2} ms in the mean", lateness.errors_ticks.len());
     assert!(worst <= WORST_MS, "{worst} ms");
     assert!(mean <= MEAN_MS, "{mean} ms");

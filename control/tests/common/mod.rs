@@ -1,10 +1,9 @@
 //! Shared code of the decisions' tests: a machine with a classifier that knows the true classes.
 
 use control::ground::{
-    class::{Class, Classifier, ExamplesFull, Listed, Vote},
+    class::{Class, Classifier, Vote},
     features::Features,
 };
-use knn::Example;
 use rig::Rig;
 
 /// The least hold of a plant that is 60 mm wide, in mm.
@@ -29,8 +28,6 @@ impl ByWidth {
 }
 
 impl Classifier for ByWidth {
-    fn init(&mut self) {}
-
     fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
         self.vote = (self.classify(features, k), self.turns);
         (self.turns == 0).then_some(self.vote.0)
@@ -45,34 +42,6 @@ impl Classifier for ByWidth {
     fn classify(&self, features: &Features, _: u8) -> Vote {
         let class = if features.hold_mm < self.least_hold_mm { Class::Weed } else { Class::Plant };
         Vote { class, votes: 1 }
-    }
-
-    fn built_in_class(&mut self, _: &Features) -> Class {
-        Class::Unknown
-    }
-
-    fn teach(&mut self, _: &Features, _: u8) -> Result<(), ExamplesFull> {
-        Err(ExamplesFull)
-    }
-
-    fn keep(&mut self, _: Example<5>) -> Result<(), ExamplesFull> {
-        Err(ExamplesFull)
-    }
-
-    fn forget(&mut self, _: u8) -> bool {
-        false
-    }
-
-    fn listed(&self, _: u8) -> Option<(Listed, u8)> {
-        None
-    }
-
-    fn spoiled(&self) -> u8 {
-        0
-    }
-
-    fn carry_on(&mut self) -> bool {
-        true
     }
 }
 

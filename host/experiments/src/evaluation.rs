@@ -1,7 +1,7 @@
 //! The evaluation of a field trial: from the counts of each plot to the paper's measures (Eq. 22 to 27), and from these
 //! to models and analyses of variance, beside the paper's own figures.
 //!
-//! A trial has plots at some speeds and plant spacings, with replications. [`PlotRecord`] is one plot. [`table`] reads
+//! A trial has plots at some speeds and plant spacings, with replications. [`PlotRecord`] is one plot. [`read_csv`] reads
 //! plots from CSV. [`PlotRecord::performance`] calculates the measures of one plot, and [`Analysis`] analyses
 //! all plots. [`published`] holds the paper's printed figures. The code does not distinguish real plots from simulated
 //! plots.
@@ -10,13 +10,15 @@ mod findings;
 mod plot;
 pub mod published;
 pub(crate) mod report;
-pub mod table;
+mod table;
 
-pub use self::plot::{Performance, PlotRecord, Response};
+pub use self::plot::{COLUMNS, Performance, PlotRecord, Response};
 pub use self::table::read_csv;
 
 use self::published::Published;
-use crate::statistics::{AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share};
+use crate::statistics::{
+    AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share, grouped, mean,
+};
 use anyhow::{Result, anyhow, ensure};
 use serde::Serialize;
 
@@ -99,46 +101,35 @@ impl Analysis {
         Ok(Self { records, performances, responses })
     }
 
-    /// The plots, numbered from 1, that cover more ground than their speed and width allow. Their field efficiency is
-    /// above 100 %, so area, time, width or speed is wrong.
-    pub fn faster_than_possible(&self) -> Vec<usize> {
-        let plots = (1..).zip(&self.performances);
-        plots.filter(|(_, plot)| plot.field_efficiency_percent > 100.0).map(|(number, _)| number).collect()
-    }
-
     /// The plots by treatment, slow and narrow first.
     pub fn treatments(&self) -> Vec<Treatment> {
-        let mut of_treatments: Vec<(f64, f64)> =
-            self.records.iter().map(|record| (record.speed_km_h, record.spacing_cm)).collect();
-        of_treatments.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        of_treatments.dedup();
-        of_treatments.into_iter().map(|(speed_km_h, spacing_cm)| self.treatment(speed_km_h, spacing_cm)).collect()
+        let plots = self.records.iter().zip(&self.performances);
+        let mut of_treatments = grouped(plots.map(|plot| ((plot.0.speed_km_h, plot.0.spacing_cm), plot)));
+        of_treatments.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        of_treatments.into_iter().map(|(_, plots)| Treatment::of(plots)).collect()
     }
+}
 
-    /// The plots of one speed and spacing.
-    fn treatment(&self, speed_km_h: f64, spacing_cm: f64) -> Treatment {
-        let is_in = |record: &PlotRecord| record.speed_km_h == speed_km_h && record.spacing_cm == spacing_cm;
-        let both = self.records.iter().zip(&self.performances);
-        let (records, plots): (Vec<&PlotRecord>, Vec<&Performance>) = both.filter(|(record, _)| is_in(record)).unzip();
-        let mean = |quantity: fn(&Performance) -> f64| {
-            plots.iter().map(|plot| quantity(plot)).sum::<f64>() / plots.len() as f64
-        };
-        let mean = Performance {
-            plant_damage_percent: mean(|plot| plot.plant_damage_percent),
-            weeding_efficiency_percent: mean(|plot| plot.weeding_efficiency_percent),
-            theoretical_capacity_ha_h: mean(|plot| plot.theoretical_capacity_ha_h),
-            effective_capacity_ha_h: mean(|plot| plot.effective_capacity_ha_h),
-            field_efficiency_percent: mean(|plot| plot.field_efficiency_percent),
-            performance_index: mean(|plot| plot.performance_index),
-        };
-        let weeding: Vec<f64> = plots.iter().map(|plot| plot.weeding_efficiency_percent).collect();
-        Treatment {
-            speed_km_h,
-            spacing_cm,
-            plots: plots.len(),
-            mean,
+impl Treatment {
+    /// The treatment of these plots, at least one.
+    fn of(plots: Vec<(&PlotRecord, &Performance)>) -> Self {
+        let (records, performances): (Vec<&PlotRecord>, Vec<&Performance>) = plots.into_iter().unzip();
+        let values = |quantity: fn(&Performance) -> f64| performances.iter().copied().map(quantity).collect::<Vec<_>>();
+        let mean_of = |quantity| mean(&values(quantity));
+        Self {
+            speed_km_h: records[0].speed_km_h,
+            spacing_cm: records[0].spacing_cm,
+            plots: records.len(),
+            mean: Performance {
+                plant_damage_percent: mean_of(|plot| plot.plant_damage_percent),
+                weeding_efficiency_percent: mean_of(|plot| plot.weeding_efficiency_percent),
+                theoretical_capacity_ha_h: mean_of(|plot| plot.theoretical_capacity_ha_h),
+                effective_capacity_ha_h: mean_of(|plot| plot.effective_capacity_ha_h),
+                field_efficiency_percent: mean_of(|plot| plot.field_efficiency_percent),
+                performance_index: mean_of(|plot| plot.performance_index),
+            },
             damaged: damaged(records),
-            weeding_efficiency: Mean::of(&weeding),
+            weeding_efficiency: Mean::of(&values(|plot| plot.weeding_efficiency_percent)),
         }
     }
 }

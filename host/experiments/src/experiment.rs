@@ -146,29 +146,8 @@ impl AddAssign for Zones {
     }
 }
 
-/// A plot's place in the experiment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Plot {
-    index: u64,
-    replication: u32,
-    speed_km_h: f64,
-    spacing_cm: f64,
-}
-
-/// The result of one controller in one row.
-#[derive(Clone, Copy, Debug)]
-struct RowOutcome {
-    effect: Effect,
-    zones: Zones,
-    weeded_share: f64,
-    weedable_share: f64,
-    undamaged_share: f64,
-    budget: Budget,
-    /// The time of the row and its turn, and the simulated part of it.
-    seconds: f64,
-    moved_s: f64,
-    alarm: bool,
-}
+/// A plot's number, and its record before weeding.
+type Plot<'a> = (u64, &'a PlotRecord);
 
 /// Rows of a plot that are in memory at once.
 const BATCH: u32 = 256;
@@ -190,14 +169,20 @@ impl Experiment {
         }
     }
 
-    /// All plots, by speed, spacing and replication.
-    fn plots(&self) -> Vec<Plot> {
-        let treatments = self.speeds_km_h.iter().flat_map(|&speed| self.spacings_cm.iter().map(move |&s| (speed, s)));
-        treatments
-            .flat_map(|treatment| (1..=self.replications).map(move |replication| (treatment, replication)))
-            .zip(0..)
-            .map(|(((speed_km_h, spacing_cm), replication), index)| Plot { index, replication, speed_km_h, spacing_cm })
-            .collect()
+    /// All plots before weeding, by speed, spacing and replication.
+    fn plots(&self) -> Vec<PlotRecord> {
+        let Conditions { plot: area, machine, .. } = &self.conditions;
+        let width_m = area.row_spacing_mm / 1000.0;
+        let area_m2 = f64::from(area.rows) * area.row_m * width_m;
+        let before = PlotRecord { area_m2, width_m, power_hp: machine.power_hp, ..PlotRecord::default() };
+        let mut plots = Vec::new();
+        for &speed_km_h in &self.speeds_km_h {
+            for &spacing_cm in &self.spacings_cm {
+                let plot = |replication| PlotRecord { replication, speed_km_h, spacing_cm, ..before };
+                plots.extend((1..=self.replications).map(plot));
+            }
+        }
+        plots
     }
 
     /// Number of plots. All controllers weed each of them.
@@ -213,8 +198,8 @@ impl Experiment {
     /// Approximate number of plants: the number of planting positions.
     pub fn plants(&self) -> f64 {
         let row_cm = 100.0 * self.conditions.plot.row_m;
-        let of_rows: f64 = self.spacings_cm.iter().map(|spacing_cm| row_cm / spacing_cm).sum();
-        of_rows * self.speeds_km_h.len() as f64 * f64::from(self.replications) * f64::from(self.conditions.plot.rows)
+        let of_rows: f64 = self.plots().iter().map(|plot| row_cm / plot.spacing_cm).sum();
+        of_rows * f64::from(self.conditions.plot.rows)
     }
 
     /// Weeds the field. Returns an outcome for each plot and each controller, by speed, spacing and replication.
@@ -239,12 +224,12 @@ impl Experiment {
         progress: impl Fn(f64) + Sync,
     ) -> Result<Vec<Numbered<Vec<PlotOutcome>>>> {
         let plots = self.plots();
-        let mine: Vec<&Plot> = shard.numbers(self.size()).map(|number| &plots[number as usize]).collect();
+        let mine: Vec<u64> = shard.numbers(self.size()).collect();
         let (done, all) = (AtomicUsize::new(0), (mine.len() * self.conditions.plot.rows as usize) as f64);
         let row_done = || progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / all);
-        let weed = |plot: &&Plot| {
-            let outcome = self.weed_plot(plot, engine, &row_done)?;
-            Ok(Numbered { number: plot.index, outcome })
+        let weed = |&number: &u64| {
+            let outcome = self.weed_plot((number, &plots[number as usize]), engine, &row_done)?;
+            Ok(Numbered { number, outcome })
         };
         mine.par_iter().map(weed).collect()
     }
@@ -254,22 +239,22 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::run`].
     pub fn example(&self, engine: &Engine) -> Result<Option<(Row, Judgement)>> {
-        let fastest = self.plots().into_iter().reduce(|a, b| if b.speed_km_h > a.speed_km_h { b } else { a });
-        let Some(plot) = fastest else { return Ok(None) };
-        let (stand, _, trial) = self.grow(&plot, 0)?;
+        let plots = (0..).zip(self.plots());
+        let fastest = plots.reduce(|a, b| if b.1.speed_km_h > a.1.speed_km_h { b } else { a });
+        let Some((number, plot)) = fastest else { return Ok(None) };
+        let (stand, _, trial) = self.grow((number, &plot), 0)?;
         let weeded = weed(&trial, &sensors(&trial), &stand, Treatment::Firmware, engine)?;
         let Trial { row, machine, motion, timing, .. } = &trial;
         let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
         Ok(row.beginning(DRAWN_MM).map(|beginning| (beginning, judgement)))
     }
 
-    fn weed_plot(&self, plot: &Plot, engine: &Engine, row_done: &(impl Fn() + Sync)) -> Result<Vec<PlotOutcome>> {
+    fn weed_plot(&self, plot: Plot, engine: &Engine, row_done: &(impl Fn() + Sync)) -> Result<Vec<PlotOutcome>> {
         let rows = self.conditions.plot.rows;
-        let mut outcomes: Vec<PlotOutcome> =
-            self.controllers.iter().map(|&controller| self.untouched(plot, controller)).collect();
+        let mut outcomes: Vec<PlotOutcome> = Vec::new();
         for first in (0..rows).step_by(BATCH as usize) {
             let batch = first..rows.min(first + BATCH);
-            let weeded: Vec<Vec<RowOutcome>> = batch
+            let weeded: Vec<Vec<PlotOutcome>> = batch
                 .into_par_iter()
                 .map(|row| {
                     let outcomes = self.weed_row(plot, row, engine)?;
@@ -277,89 +262,58 @@ impl Experiment {
                     Ok(outcomes)
                 })
                 .collect::<Result<_>>()?;
-            for by_controller in weeded {
-                for (outcome, row) in outcomes.iter_mut().zip(by_controller) {
-                    outcome.add(&row, rows);
+            for row in weeded {
+                if outcomes.is_empty() {
+                    outcomes = row;
+                } else {
+                    outcomes.iter_mut().zip(&row).for_each(|(outcome, row)| outcome.add(row));
                 }
             }
         }
+        outcomes.iter_mut().for_each(PlotOutcome::record_counts);
         Ok(outcomes)
     }
 
-    /// A plot before weeding.
-    fn untouched(&self, plot: &Plot, controller: Treatment) -> PlotOutcome {
-        let Conditions { plot: area, machine, .. } = &self.conditions;
-        let width_m = area.row_spacing_mm / 1000.0;
-        let record = PlotRecord {
-            replication: plot.replication,
-            speed_km_h: plot.speed_km_h,
-            spacing_cm: plot.spacing_cm,
-            weeds_before: 0,
-            weeds_after: 0,
-            plants: 0,
-            damaged: 0,
-            area_m2: f64::from(area.rows) * area.row_m * width_m,
-            time_s: 0.0,
-            width_m,
-            power_hp: machine.power_hp,
-        };
-        PlotOutcome {
-            controller,
-            record,
-            effect: Effect::default(),
-            zones: Zones::default(),
-            weeded_share: 0.0,
-            weedable_share: 0.0,
-            undamaged_share: 0.0,
-            budget: Budget::default(),
-            alarms: 0,
-            moved_s: 0.0,
-        }
-    }
-
-    /// The inputs that all controllers share in a row.
-    fn weed_row(&self, plot: &Plot, row: u32, engine: &Engine) -> Result<Vec<RowOutcome>> {
+    /// A row's part of its plot, by each controller, with the same inputs. Its record has no counts yet.
+    fn weed_row(&self, plot: Plot, row: u32, engine: &Engine) -> Result<Vec<PlotOutcome>> {
         let (stand, drive, trial) = self.grow(plot, row)?;
         let sensors = sensors(&trial);
         let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
+        let Conditions { plot: area, machine: mechanism, .. } = &self.conditions;
+        let rows = f64::from(area.rows);
+        let record = PlotRecord { time_s: drive.row_s + drive.turn_s, ..*plot.1 };
         let outcome = |&controller: &Treatment| {
             let weeded = weed(&trial, &sensors, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
             let (pulses, start_cycle) = (&weeded.pulses, weeded.start_cycle);
             let judgement = judge(row, machine, motion, *timing, pulses, start_cycle);
-            let span_mm = row.span_mm();
-            Ok(RowOutcome {
-                budget: Budget::of(&span_mm, &judgement.weeded_mm, &weeded.reasons, machine, motion),
-                effect: effect(
-                    &stand,
-                    machine,
-                    &self.conditions.machine,
-                    (motion, &drive.steering),
-                    pulses,
-                    start_cycle,
-                ),
+            let budget = Budget::of(&row.span_mm(), &judgement.weeded_mm, &weeded.reasons, machine, motion);
+            Ok(PlotOutcome {
+                controller,
+                record,
+                effect: effect(&stand, machine, mechanism, (motion, &drive.steering), pulses, start_cycle),
                 zones: Zones {
                     all: judgement.plants.len() as u32,
                     reached: judgement.count(Verdict::Damaged) as u32,
                     margins_cut: judgement.count(Verdict::MarginCut) as u32,
                 },
-                weeded_share: judgement.weeded_share,
-                weedable_share: judgement.weedable_share,
-                undamaged_share,
-                seconds: drive.row_s + drive.turn_s,
+                weeded_share: judgement.weeded_share / rows,
+                weedable_share: judgement.weedable_share / rows,
+                undamaged_share: undamaged_share / rows,
+                budget: budget / rows,
+                alarms: u32::from(weeded.alarm),
                 moved_s: motion.duration_s(),
-                alarm: weeded.alarm,
             })
         };
         self.controllers.iter().map(outcome).collect()
     }
 
     /// A row that has grown, how it is driven, and both as a trial for the firmware.
-    fn grow(&self, plot: &Plot, row: u32) -> Result<(Stand, Drive, Trial)> {
+    fn grow(&self, (number, plot): Plot, row: u32) -> Result<(Stand, Drive, Trial)> {
         // Stand, driving and machine each have their own random numbers.
         let chance = |of: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-            rng.set_stream(plot.index << 34 | u64::from(row) << 2 | of);
+            rng.set_stream(number << 34 | u64::from(row) << 2 | of);
             rng
         };
         let spacing_cm = plot.spacing_cm;
@@ -389,7 +343,6 @@ impl Experiment {
     }
 }
 
-/// The result of a row.
 struct Weeded {
     pulses: Vec<Pulse>,
     start_cycle: u64,
@@ -402,7 +355,6 @@ fn sensors(trial: &Trial) -> LazyCell<Sensors, impl FnOnce() -> Sensors> {
     LazyCell::new(|| Sensors::new(trial, native::TURN_S))
 }
 
-/// Has a controller weed a row.
 fn weed(
     trial: &Trial,
     sensors: &LazyCell<Sensors, impl FnOnce() -> Sensors>,
@@ -435,16 +387,21 @@ fn weed(
 }
 
 impl PlotOutcome {
-    /// Adds a row of the plot.
-    fn add(&mut self, row: &RowOutcome, rows: u32) {
-        self.effect += row.effect;
-        self.zones += row.zones;
-        self.weeded_share += row.weeded_share / f64::from(rows);
-        self.weedable_share += row.weedable_share / f64::from(rows);
-        self.undamaged_share += row.undamaged_share / f64::from(rows);
-        self.budget += row.budget / f64::from(rows);
-        self.alarms += u32::from(row.alarm);
-        self.moved_s += row.moved_s;
+    /// Adds another row of the plot, or another plot. The caller weights the shares.
+    fn add(&mut self, other: &Self) {
+        self.effect += other.effect;
+        self.zones += other.zones;
+        self.weeded_share += other.weeded_share;
+        self.weedable_share += other.weedable_share;
+        self.undamaged_share += other.undamaged_share;
+        self.budget += other.budget;
+        self.alarms += other.alarms;
+        self.moved_s += other.moved_s;
+        self.record.time_s += other.record.time_s;
+    }
+
+    /// Puts the counts of all rows into the record.
+    fn record_counts(&mut self) {
         let Effect { plants, in_plot, counted, .. } = self.effect;
         // A plot's record has `u32` counts.
         let in_a_plot = |weeds: u64| u32::try_from(weeds).unwrap_or(u32::MAX);
@@ -455,7 +412,6 @@ impl PlotOutcome {
             weeds_after: in_a_plot(weeds.after),
             plants,
             damaged: self.effect.injured(),
-            time_s: self.record.time_s + row.seconds,
             ..self.record
         };
     }

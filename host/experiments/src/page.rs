@@ -90,35 +90,35 @@ struct Measure {
     value: fn(&Total) -> f64,
 }
 
-const DAMAGE: Measure = Measure {
-    chart: [
-        "Plant damage",
-        "% of the plants",
-        "Share of the plants whose stem zone the tool entered. Lower is better.",
-    ],
-    table: "Plants damaged by each controller, %",
-    value: Total::plant_damage_percent,
-};
-
-const WEEDING: Measure = Measure {
-    chart: [
-        "In-row weeding",
-        "% of the row's ground",
-        "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.",
-    ],
-    table: "Ground of the row weeded by each controller, %",
-    value: |total| 100.0 * total.weeded_share,
-};
-
-const ZONES: Measure = Measure {
-    chart: [
-        "Zones reached",
-        "% of the plants' zones",
-        "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.",
-    ],
-    table: "Zones reached by each controller, %",
-    value: Total::zones_reached_percent,
-};
+const MEASURES: [Measure; 3] = [
+    Measure {
+        chart: [
+            "Plant damage",
+            "% of the plants",
+            "Share of the plants whose stem zone the tool entered. Lower is better.",
+        ],
+        table: "Plants damaged by each controller, %",
+        value: Total::plant_damage_percent,
+    },
+    Measure {
+        chart: [
+            "In-row weeding",
+            "% of the row's ground",
+            "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.",
+        ],
+        table: "Ground of the row weeded by each controller, %",
+        value: |total| 100.0 * total.weeded_share,
+    },
+    Measure {
+        chart: [
+            "Zones reached",
+            "% of the plants' zones",
+            "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.",
+        ],
+        table: "Zones reached by each controller, %",
+        value: Total::zones_reached_percent,
+    },
+];
 
 /// The name of the line below which a controller cuts no margin.
 const BOUND: &str = "most with every zone and margin kept";
@@ -135,7 +135,7 @@ impl Controllers {
         let bound = curve(BOUND, first, |total| 100.0 * total.weedable_share);
         let present = || Treatment::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
         let (mut figures, mut tables) = (Vec::new(), Vec::new());
-        for (Measure { chart, table, value }, bound) in [(DAMAGE, None), (WEEDING, Some(bound)), (ZONES, None)] {
+        for (Measure { chart, table, value }, bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
             let mut curves: Vec<Curve> = present().map(|one| curve(one.title(), one, value)).collect();
             figures.push(figure::curves(chart, &curves, bound.as_ref())?);
             curves.extend(bound);

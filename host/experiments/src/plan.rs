@@ -3,6 +3,7 @@
 //! A block has each treatment once, in random order. Neighbouring plots are alike, so the differences between blocks
 //! can be separated from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
 
+use crate::evaluation::COLUMNS;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -64,10 +65,7 @@ impl Plan {
         for note in notes {
             writeln!(to, "# {note}")?;
         }
-        writeln!(
-            to,
-            "plot,replication,speed_km_h,spacing_cm,weeds_before,weeds_after,plants,damaged,area_m2,time_s,width_m,power_hp"
-        )?;
+        writeln!(to, "plot,{}", COLUMNS.join(","))?;
         let known = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
         for PlannedPlot { plot, block, speed_km_h, spacing_cm } in self.plots() {
             let (width, power) = (known(self.width_m), known(self.power_hp));

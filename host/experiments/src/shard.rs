@@ -213,6 +213,15 @@ pub fn read_outcomes<T: DeserializeOwned>(
 pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
     let missing =
         |which: String| anyhow!("{which} missing: name all parts of the study, or compute the missing ones by --shard");
+    let study = |header: &Header| {
+        let Header { command, settings, shard, all, .. } = header.clone();
+        [
+            ("command", command.into()),
+            ("settings", settings),
+            ("number of parts", shard.of.into()),
+            ("size", all.into()),
+        ]
+    };
     let (other, first) = parts.first().ok_or_else(|| missing("all parts are".to_owned()))?;
     for (name, header) in parts {
         let theirs = &header.program;
@@ -220,12 +229,10 @@ pub fn together(parts: &[(String, Header)], ours: &Program) -> Result<()> {
             theirs == ours,
             "{name} is of weeder {theirs}, and this is weeder {ours}: put parts together with the very program that computed them"
         );
-        let theirs = [("command", header.command.clone().into()), ("settings", header.settings.clone())];
-        let ours = [("command", first.command.clone().into()), ("settings", first.settings.clone())];
-        let counts = |header: &Header| [("number of parts", header.shard.of.into()), ("size", header.all.into())];
-        let theirs = theirs.into_iter().chain(counts(header));
-        let ours = ours.into_iter().chain(counts(first));
-        let differs = theirs.zip(ours).find_map(|((what, theirs), (_, ours))| difference(what, &theirs, &ours));
+        let differs = study(header)
+            .into_iter()
+            .zip(study(first))
+            .find_map(|((what, theirs), (_, ours))| difference(what, &theirs, &ours));
         if let Some((what, theirs, ours)) = differs {
             bail!("{name} belongs to another study than {other}: its {what} is {theirs}, not {ours}");
         }

@@ -19,6 +19,7 @@ pub use binomial::{BinomialModel, OddsTerm};
 pub use checks::Checks;
 pub(crate) use checks::{SIGNIFICANCE, probability};
 pub use design::{Design, NoModel, Remark};
+pub(crate) use design::{grouped, mean};
 pub use interval::{CONFIDENCE, Mean, Share};
 pub use linear::{LinearModel, Term};
 pub use variance::{AnalysisOfVariance, Source};

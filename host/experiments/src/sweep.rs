@@ -19,7 +19,6 @@ pub const SPEEDS_KM_H: (f64, f64) = (0.1, 8.0);
 /// Valid plant spacings, least and greatest, in cm.
 pub const SPACINGS_CM: (f64, f64) = (5.0, 500.0);
 
-/// Most values of an axis.
 const MOST_VALUES: usize = 1000;
 
 /// A parameter and its values.
@@ -145,10 +144,10 @@ impl Sweep {
     /// As [`Sweep::run`].
     pub fn run_shard(&self, shard: Shard, progress: impl Fn(f64) + Sync) -> Result<Vec<Numbered<PlotOutcome>>> {
         let places = self.places()?;
-        let mine: Vec<(u64, &Place)> =
-            shard.numbers(self.size()).map(|number| (number, &places[number as usize])).collect();
+        let mine: Vec<u64> = shard.numbers(self.size()).collect();
         let done = AtomicUsize::new(0);
-        let weed = |&(number, place): &(u64, &Place)| {
+        let weed = |&number: &u64| {
+            let place = &places[number as usize];
             let outcomes = place.experiment.run(&Engine::Native, |_| ());
             let outcomes = outcomes.with_context(|| format!("at {}", self.describe(place)))?;
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / mine.len() as f64);
@@ -183,22 +182,18 @@ impl Sweep {
         places.map(|(x, y)| Ok(Place { x, y, experiment: self.at(x, y)? })).collect()
     }
 
-    /// A point's values, in words.
     fn describe(&self, place: &Place) -> String {
         let second = self.y.as_ref().zip(place.y).map(|(axis, y)| format!(", {} = {y}", axis.parameter));
         format!("{} = {}{}", self.x.parameter, place.x, second.unwrap_or_default())
     }
 
-    /// The experiment at a point.
     fn at(&self, x: f64, y: Option<f64>) -> Result<Experiment> {
         let mut experiment = Experiment {
             speeds_km_h: vec![self.speed_km_h],
             spacings_cm: vec![self.spacing_cm],
             replications: 1,
             controllers: vec![self.controller],
-            conditions: self.conditions.clone(),
-            examples: Vec::new(),
-            seed: self.seed,
+            ..Experiment::as_in_the_paper(self.conditions.clone(), self.seed)
         };
         for (axis, value) in [(Some(&self.x), Some(x)), (self.y.as_ref(), y)] {
             let (Some(axis), Some(value)) = (axis, value) else { continue };

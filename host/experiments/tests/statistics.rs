@@ -248,9 +248,10 @@ fn a_constant_factor_is_left_out_with_a_remark() {
         // By hand: the means are 1.5 and 4, so the factor has 6.25 and the residual 2.5.
         let analysis = AnalysisOfVariance::of(&design, &values).unwrap();
         assert_eq!(analysis.remarks, [remark]);
-        assert_close(analysis.source(left).unwrap().sum_of_squares, 6.25);
-        assert_close(analysis.source(left).unwrap().f.unwrap(), 5.0);
-        assert_close(analysis.source("residual").unwrap().sum_of_squares, 2.5);
+        assert_eq!(analysis.sources.iter().map(|source| source.name).collect::<Vec<_>>(), [left, "residual"]);
+        assert_close(analysis.sources[0].sum_of_squares, 6.25);
+        assert_close(analysis.sources[0].f.unwrap(), 5.0);
+        assert_close(analysis.sources[1].sum_of_squares, 2.5);
     }
 }
 

@@ -222,13 +222,9 @@ impl Machine {
             .filter_map(|passing| {
                 let before = *ticks;
                 *ticks += if passing.forward { 1 } else { -1 };
-                let (a, b) = channels(*ticks);
-                let cycle = cycle_at(start_cycle, passing.time_s);
-                if channels(before).0 == a {
-                    return Some(PinChange { cycle, pin: wiring::ENCODER_B, high: b });
-                }
+                let edge = encoder_edge(cycle_at(start_cycle, passing.time_s), before, *ticks);
                 let hidden = self.dirt.hides(before.min(*ticks).div_euclid(PULSE_TICKS));
-                (!hidden).then_some(PinChange { cycle, pin: wiring::ENCODER_A, high: a })
+                (edge.pin == wiring::ENCODER_B || !hidden).then_some(edge)
             })
             .collect()
     }
@@ -296,9 +292,16 @@ impl Sensor {
 }
 
 /// Levels of the channels A and B at a count, in the four phases of forward motion.
-pub(crate) fn channels(ticks: i64) -> (bool, bool) {
+pub fn channels(ticks: i64) -> (bool, bool) {
     let phase = ticks.rem_euclid(PULSE_TICKS);
     (matches!(phase, 1 | 2), matches!(phase, 2 | 3))
+}
+
+/// The edge of a clean encoder from one count to the next, or to the one before.
+pub fn encoder_edge(cycle: u64, from_ticks: i64, to_ticks: i64) -> PinChange {
+    let ((before, _), (a, b)) = (channels(from_ticks), channels(to_ticks));
+    let (pin, high) = if a == before { (wiring::ENCODER_B, b) } else { (wiring::ENCODER_A, a) };
+    PinChange { cycle, pin, high }
 }
 
 /// The cycle of the Uno's clock at a motion's time.

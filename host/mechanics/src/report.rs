@@ -6,7 +6,7 @@ use comfy_table::{Attribute, Cell, CellAlignment, Color, ContentArrangement, Tab
 
 /// Every figure with its equation and its interpretation, and a `!` if the machine should be changed.
 pub fn design_table(figures: &[Figure]) -> Table {
-    let mut table = table(&["quantity", "equation", "it gives", "unit", "", "which means"]);
+    let mut table = table(&["quantity", "equation", "it gives", "unit", "", "which means"], 2..3);
     for figure in figures {
         let sense = Cell::new(&figure.sense);
         table.add_row([
@@ -18,7 +18,6 @@ pub fn design_table(figures: &[Figure]) -> Table {
             if figure.concern { sense.fg(Color::Red).add_attribute(Attribute::Bold) } else { sense },
         ]);
     }
-    align_right(&mut table, 2..3);
     table
 }
 
@@ -30,7 +29,7 @@ pub fn comparison_table(comparisons: &[Comparison]) -> Table {
         header.push("your\nmachine");
     }
     header.extend(["unit", "verdict", "remark"]);
-    let mut table = table(&header);
+    let mut table = table(&header, 2..5 + usize::from(own));
     for comparison in comparisons {
         let number = |value| Cell::new(digits_beside(value, comparison.decimals));
         let mut row = vec![
@@ -46,25 +45,20 @@ pub fn comparison_table(comparisons: &[Comparison]) -> Table {
         row.extend([Cell::new(comparison.unit), verdict_cell(comparison.verdict), Cell::new(&comparison.remark)]);
         table.add_row(row);
     }
-    align_right(&mut table, 2..5 + usize::from(own));
     table
 }
 
-fn table(header: &[&str]) -> Table {
+/// A table whose columns `numbers` stand to the right.
+fn table(header: &[&str], numbers: std::ops::Range<usize>) -> Table {
     let mut table = Table::new();
     table
         .load_style(presets::UTF8_BORDERS_ONLY)
         .set_content_arrangement(ContentArrangement::Dynamic)
         .set_header(header);
-    table
-}
-
-fn align_right(table: &mut Table, columns: std::ops::Range<usize>) {
-    for column in columns {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
+    for column in table.column_iter_mut().take(numbers.end).skip(numbers.start) {
+        column.set_cell_alignment(CellAlignment::Right);
     }
+    table
 }
 
 fn verdict_cell(verdict: Verdict) -> Cell {

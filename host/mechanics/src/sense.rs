@@ -60,13 +60,8 @@ impl Design {
     /// Every result with its equation and its interpretation, in the order of the paper. `machine` is the calculated
     /// machine.
     pub fn figures(&self, machine: &Machine) -> Vec<Figure> {
-        let mut figures = self.traction(machine);
-        figures.extend(self.tools(machine));
-        figures.extend(self.shanks(machine));
-        figures.extend(self.drive(machine));
-        figures.extend(self.wheel_and_handle(machine));
-        figures.extend(self.capacity(machine));
-        figures
+        let parts = [Self::traction, Self::tools, Self::shanks, Self::drive, Self::wheel_and_handle, Self::capacity];
+        parts.into_iter().flat_map(|part| part(self, machine)).collect()
     }
 
     fn traction(&self, machine: &Machine) -> Vec<Figure> {

@@ -64,10 +64,7 @@ impl Swing {
     }
 
     /// The same with a tool of another width, mm.
-    ///
-    /// # Errors
-    /// As [`Swing::of`].
-    pub fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64) -> Result<Self, String> {
+    fn with_tool(machine: &Machine, torque: Torque, tool_mm: f64) -> Result<Self, String> {
         let inputs = machine.swing;
         let arm_mm = MM.value(machine.intra_row.shank_length);
         let aside_mm = kept_mm(machine) / 2.0 + MM.value(inputs.room) + tool_mm / 2.0;
@@ -114,17 +111,12 @@ impl Swing {
 
     /// The settings that follow, as lines for the firmware's console.
     pub fn set_lines(&self) -> Vec<String> {
-        let Self { servo_in_us, servo_out_us, lead_out_ms, lead_in_ms, stem_zone_mm, margin_mm, .. } = self;
-        let mut lines = vec![
-            format!("set servo_in_us {servo_in_us}"),
-            format!("set servo_out_us {servo_out_us}"),
-            format!("set lead_out_ms {lead_out_ms}"),
-            format!("set lead_in_ms {lead_in_ms}"),
-        ];
-        if *stem_zone_mm > 0 {
-            lines.extend([format!("set stem_zone_mm {stem_zone_mm}"), format!("set margin_mm {margin_mm}")]);
-        }
-        lines
+        let pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
+        let leads = [("lead_out_ms", self.lead_out_ms), ("lead_in_ms", self.lead_in_ms)];
+        let zone = [("stem_zone_mm", self.stem_zone_mm), ("margin_mm", self.margin_mm)];
+        let zone = if self.stem_zone_mm > 0 { &zone[..] } else { &[] };
+        let settings = pulses.iter().chain(&leads).chain(zone);
+        settings.map(|(name, value)| format!("set {name} {value}")).collect()
     }
 
     /// Its description, in sentences. `torque` is the one used in the calculation.

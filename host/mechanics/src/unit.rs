@@ -49,11 +49,16 @@ pub trait Written: Copy + 'static {
     const UNITS: &'static [Unit<Self>];
 }
 
-/// Declares units by the names of `uom`'s, and the quantities that use them.
+/// Declares units by the names of `uom`'s, and the quantities that use them. A number behind a unit divides it.
 macro_rules! units {
-    ($($quantity:ident, $kind:literal {$($(#[$doc:meta])* $constant:ident = $name:literal, $unit:path;)+})+) => {$(
-        $($(#[$doc])* pub const $constant: Unit<$quantity> =
-            Unit { name: $name, of: $quantity::new::<$unit>, value: |quantity| quantity.get::<$unit>() };)+
+    ($($quantity:ident, $kind:literal {
+        $($(#[$doc:meta])* $constant:ident = $name:literal, $unit:path $(, $parts:literal)?;)+
+    })+) => {$(
+        $($(#[$doc])* pub const $constant: Unit<$quantity> = Unit {
+            name: $name,
+            of: |value| $quantity::new::<$unit>(value $(/ $parts)?),
+            value: |quantity| quantity.get::<$unit>() $(* $parts)?,
+        };)+
 
         impl Written for $quantity {
             const KIND: &'static str = $kind;
@@ -121,26 +126,16 @@ units! {
         /// Newton.
         NEWTON = "N", force::newton;
     }
+    Torque, "a torque" {
+        /// The weight of a kilogram on an arm of a centimetre: the usual unit in data sheets of servos.
+        KG_CM = "kg cm", torque::kilogram_force_meter, 100.0;
+        /// Newton metre.
+        NEWTON_METRE = "N m", torque::newton_meter;
+    }
     Ratio, "a share" {
         /// Hundredth.
         PERCENT = "%", ratio::percent;
     }
-}
-
-/// Newton metre.
-pub const NEWTON_METRE: Unit<Torque> =
-    Unit { name: "N m", of: Torque::new::<torque::newton_meter>, value: |torque| torque.get::<torque::newton_meter>() };
-
-/// The weight of a kilogram on an arm of a centimetre: the usual unit in data sheets of servos.
-pub const KG_CM: Unit<Torque> = Unit {
-    name: "kg cm",
-    of: |value| Torque::new::<torque::kilogram_force_meter>(value / 100.0),
-    value: |torque| torque.get::<torque::kilogram_force_meter>() * 100.0,
-};
-
-impl Written for Torque {
-    const KIND: &'static str = "a torque";
-    const UNITS: &'static [Unit<Self>] = &[KG_CM, NEWTON_METRE];
 }
 
 /// Hectare per hour.

@@ -44,7 +44,8 @@ pub struct Attended {
     pub written: Vec<String>,
 }
 
-/// A machine, see the module's documentation.
+/// A machine, see the module's documentation. The methods with a body are right for a machine that shows only its pins and its
+/// answers.
 pub trait Machine: Sized {
     /// Whether the state is visible at any moment, and the turn of each effect is known.
     const IS_OPEN: bool;
@@ -69,10 +70,14 @@ pub trait Machine: Sized {
     ///
     /// # Errors
     /// If the machine does not notice.
-    fn lose_edges(&mut self, world: &World) -> Checked;
+    fn lose_edges(&mut self, _world: &World) -> Checked {
+        Ok(())
+    }
 
     /// The machine's position at a count, without noise that it filters.
-    fn place(&self, count: i64) -> i64;
+    fn place(&self, count: i64) -> i64 {
+        count
+    }
 
     /// The machine's own counter at a count. The counter may restart at 0 when the machine starts.
     fn own_count(&self, count: i64) -> i32;
@@ -90,7 +95,9 @@ pub trait Machine: Sized {
     fn check_pulse(&self, is_tried: bool) -> Checked;
 
     /// Takes the width of the detection that was just classified as a weed, in millimetres.
-    fn take_weed(&mut self) -> Option<i16>;
+    fn take_weed(&mut self) -> Option<i16> {
+        None
+    }
 
     /// The settings in use.
     fn settings(&self) -> &Settings;
@@ -102,10 +109,14 @@ pub trait Machine: Sized {
     fn state(&self) -> State;
 
     /// Whether the loop resets the watchdog.
-    fn has_heartbeat(&self) -> bool;
+    fn has_heartbeat(&self) -> bool {
+        true
+    }
 
     /// Why the tool is out, if that is visible.
-    fn reason(&self) -> Option<Reason>;
+    fn reason(&self) -> Option<Reason> {
+        None
+    }
 
     /// The last known distance to roll until seen ground reaches the tool, in millimetres.
     fn unseen_mm(&self) -> i16;

@@ -10,21 +10,21 @@ use control::ground::examples::EXAMPLES;
 use control::ground::{class::Listed, nearest::Nearest};
 use control::measure::reset::Cause;
 use control::memory::{SIZE, Volatile};
-use control::operate::{state::State, tool::Reason};
+use control::operate::state::State;
 use control::say::command::{Command, parse};
 use control::settings::{Setting, Settings};
+use field::machine::{channels, encoder_edge};
 use field::wiring;
+use link::{Values, settings};
 use model_test::Failure;
 use model_test::decisions::from_the_field;
 use model_test::drive::is_end;
 use model_test::machine::{Attended, Checked, Machine, World};
 use model_test::run::Beginning;
 use std::collections::VecDeque;
-use std::fmt;
 use std::path::{Path, PathBuf};
-use trial::console::{ConsoleError, ask};
-use uno::{CYCLES_PER_SECOND, Pin, PinChange};
-use uno::{Uno, UnoError};
+use trial::console::ask;
+use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno};
 
 const CYCLES_A_US: u64 = CYCLES_PER_SECOND / 1_000_000;
 
@@ -73,8 +73,8 @@ pub struct Board {
     uno: Uno,
     /// Levels of this turn, and whether each is the encoder's; those keep their order in time.
     to_come: Vec<(Vec<(Pin, bool)>, bool)>,
-    /// The encoder's phase.
-    phase: usize,
+    /// The encoder's count.
+    ticks: i64,
     /// The world's count at which the firmware's was 0.
     zero: i64,
     servo: ServoLine,
@@ -95,42 +95,25 @@ pub struct Board {
     stack_was_low: bool,
 }
 
-impl fmt::Debug for Board {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "an Uno at cycle {}", self.uno.cycle())
-    }
-}
-
-fn stopped(error: UnoError) -> Failure {
-    Failure::fail(error.to_string())
-}
-
-fn unanswered(error: ConsoleError) -> Failure {
-    Failure::fail(error.to_string())
-}
-
-/// The encoder's channels A and B, forward.
-const CHANNELS: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
-
 impl Board {
     /// Powers up an Uno with the firmware at `elf`, and starts clock and count as `beginning` has them.
     ///
     /// # Errors
     /// If the firmware cannot be read, or does not start.
     pub fn boot(elf: &Path, beginning: &Beginning, world: &World) -> Result<Self, Failure> {
-        let mut uno = Uno::boot(elf).map_err(stopped)?;
-        show_beams(&mut uno, world);
-        uno.run_until_symbol("main", GREETING_CYCLES).map_err(stopped)?;
+        let mut uno = Uno::boot(elf)?;
+        beams(world).into_iter().for_each(|(pin, high)| uno.set(pin, high));
+        uno.run_until_symbol("main", GREETING_CYCLES)?;
         let (count, overflows) = (beginning.count.to_le_bytes(), (beginning.steps >> 8).to_le_bytes());
-        uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2]).map_err(stopped)?;
-        uno.write("weeder_firmware::encoder::COUNT_HIGH", &count[2..]).map_err(stopped)?;
-        uno.write("weeder_firmware::clock::OVERFLOWS_LOW", &overflows[..1]).map_err(stopped)?;
-        uno.write("weeder_firmware::clock::OVERFLOWS_HIGH", &overflows[1..3]).map_err(stopped)?;
+        uno.write("weeder_firmware::encoder::COUNT_LOW", &count[..2])?;
+        uno.write("weeder_firmware::encoder::COUNT_HIGH", &count[2..])?;
+        uno.write("weeder_firmware::clock::OVERFLOWS_LOW", &overflows[..1])?;
+        uno.write("weeder_firmware::clock::OVERFLOWS_HIGH", &overflows[1..3])?;
         let mut board = Self {
             elf: elf.to_owned(),
             uno,
             to_come: Vec::new(),
-            phase: 0,
+            ticks: 0,
             zero: 0,
             servo: ServoLine::default(),
             typed: VecDeque::new(),
@@ -150,7 +133,7 @@ impl Board {
     }
 
     fn init(&mut self) -> Result<String, Failure> {
-        let greeting = self.uno.run_until_serial("commands\r\n", GREETING_CYCLES).map_err(stopped)?;
+        let greeting = self.uno.run_until_serial("commands\r\n", GREETING_CYCLES)?;
         let state = greeting.rsplit_once(", state ").and_then(|(_, rest)| rest.split(',').next());
         self.state = match state.and_then(|state| state.split(' ').next_back()) {
             Some("hold") => State::Hold,
@@ -170,18 +153,19 @@ impl Board {
     /// Takes the reported state and settings.
     fn hear(&mut self, line: &str) -> Checked {
         if line.starts_with("state=") {
-            self.state = match value(line, "state") {
-                "hold" => State::Hold,
-                "work" => State::Work,
-                _ => self.alarm(value(line, "name"))?,
+            let values = Values(line);
+            self.state = match values.text("state") {
+                Some("hold") => State::Hold,
+                Some("work") => State::Work,
+                _ => self.alarm(values.text("name").unwrap_or_default())?,
             };
-            self.unseen_mm = value(line, "unseen_mm").parse().unwrap_or_default();
+            self.unseen_mm = values.number("unseen_mm").unwrap_or_default();
             let rests = self.state != State::Work;
             self.rests_since = rests.then(|| self.rests_since.unwrap_or(self.uno.cycle()));
             self.times_the_servo &= self.state == State::Hold;
         } else if line.contains("calibrated") {
             (self.times_the_servo, self.in_doubt) = (false, true);
-        } else if let Some((setting, value)) = setting(line) {
+        } else if let Some((setting, value)) = settings::shown(line) {
             // A value out of range would differ later, and be found.
             let _ = self.settings.set(setting, value);
         }
@@ -190,10 +174,7 @@ impl Board {
 
     /// The line that was begun was answered.
     fn end(&mut self, line: &str, is_ok: bool) {
-        let Ok(command) = parse(line.as_bytes()) else { return };
-        if !is_ok {
-            return;
-        }
+        let (true, Ok(command)) = (is_ok, parse(line.as_bytes())) else { return };
         match command {
             Command::Set(setting, value) => {
                 let _ = self.settings.set(setting, value);
@@ -239,30 +220,14 @@ impl Board {
 
     /// The number of taught examples that the firmware reports.
     fn listed_examples(&mut self) -> Result<usize, Failure> {
-        let lines = ask(&mut self.uno, "examples").map_err(unanswered)?;
+        let lines = ask(&mut self.uno, "examples")?;
         Ok(lines.iter().filter(|line| line.starts_with("field ")).count())
     }
 }
 
-fn show_beams(uno: &mut Uno, world: &World) {
-    uno.set(wiring::BEAM, !world.broken);
-    uno.set(wiring::SECOND_BEAM, !world.second_broken);
-}
-
-/// The value of a key in a line; empty if it is not there.
-fn value<'a>(line: &'a str, key: &str) -> &'a str {
-    line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('=')).unwrap_or_default()
-}
-
-/// The setting that a line of `get` shows, and its value.
-fn setting(line: &str) -> Option<(Setting, u16)> {
-    let (name, rest) = line.split_once('=')?;
-    let value = match rest.split(' ').next()? {
-        "on" => 1,
-        "off" => 0,
-        number => number.parse().ok()?,
-    };
-    Some((Setting::find(name.as_bytes())?, value))
+/// The levels of the beams' lines.
+fn beams(world: &World) -> [(Pin, bool); 2] {
+    [(wiring::BEAM, !world.broken), (wiring::SECOND_BEAM, !world.second_broken)]
 }
 
 impl Machine for Board {
@@ -273,32 +238,21 @@ impl Machine for Board {
     const LATENESS_US: u64 = 26_000;
 
     fn count(&mut self, up: bool) {
-        let (a, b) = CHANNELS[self.phase];
-        self.phase = (self.phase + if up { 1 } else { 3 }) % 4;
-        let (new_a, new_b) = CHANNELS[self.phase];
-        let level = if a == new_a { (wiring::ENCODER_B, new_b) } else { (wiring::ENCODER_A, new_a) };
-        debug_assert!(a != new_a || b != new_b, "a step changes one channel");
-        self.to_come.push((vec![level], true));
+        let before = self.ticks;
+        self.ticks += if up { 1 } else { -1 };
+        let PinChange { pin, high, .. } = encoder_edge(0, before, self.ticks);
+        self.to_come.push((vec![(pin, high)], true));
     }
 
     fn spike(&mut self, _: &mut World, _: i32) -> i64 {
-        let (a, b) = CHANNELS[self.phase];
+        let (a, b) = channels(self.ticks);
         self.to_come.push((vec![(wiring::ENCODER_A, !a), (wiring::ENCODER_B, !b)], false));
         self.to_come.push((vec![(wiring::ENCODER_A, a), (wiring::ENCODER_B, b)], false));
         SPIKE_TICKS
     }
 
     fn beam_edge(&mut self, world: &World) {
-        let levels = vec![(wiring::BEAM, !world.broken), (wiring::SECOND_BEAM, !world.second_broken)];
-        self.to_come.push((levels, false));
-    }
-
-    fn lose_edges(&mut self, _: &World) -> Checked {
-        Ok(())
-    }
-
-    fn place(&self, count: i64) -> i64 {
-        count
+        self.to_come.push((beams(world).to_vec(), false));
     }
 
     fn own_count(&self, count: i64) -> i32 {
@@ -318,11 +272,11 @@ impl Machine for Board {
         }
         if stack_is_low && !self.stack_was_low {
             let corrupted = self.uno.first_stack_address() + LOW_STACK;
-            self.uno.write_sram(corrupted, &[0]).map_err(stopped)?;
+            self.uno.write_sram(corrupted, &[0])?;
             self.stack_was_low = true;
         }
         self.drive(cycles);
-        self.uno.run_until(until).map_err(stopped)?;
+        self.uno.run_until(until)?;
         self.servo.take(&self.uno.take_changes());
         self.heard += &self.uno.received();
         if self.uno.resets().len() > self.resets {
@@ -339,10 +293,6 @@ impl Machine for Board {
         Err(Failure::fail(format!("in {:?} the servo has a pulse of {} us", self.state, self.servo.width_us)))
     }
 
-    fn take_weed(&mut self) -> Option<i16> {
-        None
-    }
-
     fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -353,14 +303,6 @@ impl Machine for Board {
 
     fn state(&self) -> State {
         self.state
-    }
-
-    fn has_heartbeat(&self) -> bool {
-        true
-    }
-
-    fn reason(&self) -> Option<Reason> {
-        None
     }
 
     fn unseen_mm(&self) -> i16 {
@@ -424,21 +366,21 @@ impl Machine for Board {
     fn spoil(&mut self, address: usize, byte: u8) -> Checked {
         let mut eeprom = self.uno.eeprom();
         eeprom[address] = byte;
-        self.uno = Uno::boot_with_eeprom(&self.elf, &eeprom).map_err(stopped)?;
-        let (a, b) = CHANNELS[self.phase];
+        self.uno = Uno::boot_with_eeprom(&self.elf, &eeprom)?;
+        let (a, b) = channels(self.ticks);
         self.uno.set(wiring::ENCODER_A, a);
         self.uno.set(wiring::ENCODER_B, b);
         Ok(())
     }
 
     fn reset(&mut self, cause: Cause, torn: Option<u8>, world: &World) -> Checked {
-        show_beams(&mut self.uno, world);
+        beams(world).into_iter().for_each(|(pin, high)| self.uno.set(pin, high));
         // A line on its way would otherwise reach the restarted machine.
         while self.uno.bytes_pending() > 0 {
-            self.uno.run_for_ms(1).map_err(stopped)?;
+            self.uno.run_for_ms(1)?;
         }
         match cause {
-            Cause::LoopStalled => self.uno.stall().map_err(stopped)?,
+            Cause::LoopStalled => self.uno.stall()?,
             Cause::BrownOut => self.uno.brown_out(),
             Cause::ResetPin => self.uno.reset(),
             _ => match torn {
@@ -457,7 +399,7 @@ impl Machine for Board {
         self.typed.clear();
         self.uno.take_changes();
         self.servo = ServoLine::default();
-        for line in ask(&mut self.uno, "get").map_err(unanswered)? {
+        for line in ask(&mut self.uno, "get")? {
             self.hear(&line)?;
         }
         self.in_doubt = false;

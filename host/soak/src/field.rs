@@ -8,7 +8,7 @@
 //! both overflows.
 
 use crate::board::Board;
-use crate::tally::{Plan, SoakError, Tally, chance, count, total};
+use crate::tally::{Plan, SoakError, Tally, count, total};
 use control::{measure::reset::Cause, operate::state::State, settings::Setting};
 use field::machine;
 use field::motion::mm_s;
@@ -22,7 +22,7 @@ use model_test::drive::Drive;
 use model_test::machine::{Checked, Machine, World};
 use model_test::run::{Beginning, Classification, Encoder, Run, Sight, Step, TICKS_A_MM};
 use model_test::stand::{Geometry, Score};
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
@@ -125,7 +125,9 @@ fn part<M: Machine>(
     boot: impl FnOnce(&Beginning, &World) -> Result<M, Failure>,
     mut progress: impl FnMut(f64),
 ) -> Result<Tally, SoakError> {
-    let field = Field::new(chance(plan, number), plan.faults_an_hour, boot);
+    let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
+    rng.set_stream(number);
+    let field = Field::new(rng, plan.faults_an_hour, boot);
     let field = field.map_err(|failure| SoakError::Start(failure.to_string()))?;
     let mut tally = field.work_for(seconds, &mut progress)?;
     tally.violations = tally.violations.iter().map(|what| format!("{name} {}, {what}", number + 1)).collect();
@@ -233,8 +235,10 @@ impl<M: Machine> Field<M> {
         if let Err(Failure::Fail(failure) | Failure::Reject(failure)) = outcome {
             let (fault, fault_s) = self.last_fault;
             let (row, state, time_s) = (self.tally.rows, self.drive.state(), self.drive.time_s());
-            let what = format_args!("row {row}, in {state:?}, {:.3} s after {fault}: {failure}", time_s - fault_s);
-            self.tally.violated(time_s, what);
+            self.tally.violations.push(format!(
+                "at {time_s:.3} s: row {row}, in {state:?}, {:.3} s after {fault}: {failure}",
+                time_s - fault_s
+            ));
         }
     }
 
@@ -389,7 +393,6 @@ impl<M: Machine> Field<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
 
     fn field() -> Field<Decisions> {
         Field::new(ChaCha8Rng::seed_from_u64(1), 0.0, Decisions::boot).expect("a new machine starts")

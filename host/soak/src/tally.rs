@@ -1,8 +1,6 @@
 //! The parameters of a soak, and the results of its hours or minutes, and of all of them.
 
 use field::planting::PlantingError;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -61,11 +59,6 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Adds a violation.
-    pub(super) fn violated(&mut self, time_s: f64, what: impl fmt::Display) {
-        self.violations.push(format!("at {time_s:.3} s: {what}"));
-    }
-
     /// Counts an alarm, a warning or a reset in a line that the machine wrote.
     pub(super) fn hear(&mut self, line: &str) {
         let word = |rest: &str| rest.split_whitespace().next().unwrap_or_default().to_owned();
@@ -121,13 +114,6 @@ pub fn total<E>(tallies: impl IntoIterator<Item = Result<Tally, E>>) -> Result<T
         }
     }
     Ok(total)
-}
-
-/// The random numbers of an hour or a minute.
-pub(super) fn chance(plan: Plan, number: u64) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
-    rng.set_stream(number);
-    rng
 }
 
 /// Counts a name.

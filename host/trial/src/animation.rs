@@ -9,6 +9,7 @@ use field::machine::Machine;
 use field::row::Row;
 use field::verdict::{Judgement, Verdict};
 use svg::Document;
+use svg::node::Node;
 use svg::node::element::{Animate, AnimateTransform, Circle, ClipPath, Definitions, Group};
 
 /// Length of a millimetre of ground, in pixels, and the picture's parts, downwards.
@@ -117,33 +118,26 @@ struct Run {
 impl Run {
     /// An attribute that takes these values at these shares of the row.
     fn value(&self, attribute: &str, frames: &[(f64, String)], mode: &str) -> Animate {
-        let (times, values) = times_and_values(frames);
-        Animate::new()
-            .set("attributeName", attribute)
-            .set("calcMode", mode)
-            .set("keyTimes", times)
-            .set("values", values)
-            .set("dur", format!("{:.1}s", self.seconds))
-            .set("repeatCount", "indefinite")
+        let mut animation = Animate::new().set("attributeName", attribute).set("calcMode", mode);
+        self.schedule(&mut animation, frames);
+        animation
     }
 
     /// The animation of a part's position or rotation.
     fn transform(&self, kind: &str, frames: &[(f64, String)]) -> AnimateTransform {
-        let (times, values) = times_and_values(frames);
-        AnimateTransform::new()
-            .set("attributeName", "transform")
-            .set("type", kind)
-            .set("keyTimes", times)
-            .set("values", values)
-            .set("dur", format!("{:.1}s", self.seconds))
-            .set("repeatCount", "indefinite")
+        let mut animation = AnimateTransform::new().set("attributeName", "transform").set("type", kind);
+        self.schedule(&mut animation, frames);
+        animation
     }
-}
 
-fn times_and_values(frames: &[(f64, String)]) -> (String, String) {
-    let times: Vec<String> = frames.iter().map(|(share, _)| format!("{share:.4}")).collect();
-    let values: Vec<&str> = frames.iter().map(|(_, value)| value.as_str()).collect();
-    (times.join(";"), values.join(";"))
+    fn schedule(&self, animation: &mut impl Node, frames: &[(f64, String)]) {
+        let times: Vec<String> = frames.iter().map(|(share, _)| format!("{share:.4}")).collect();
+        let values: Vec<&str> = frames.iter().map(|(_, value)| value.as_str()).collect();
+        animation.assign("keyTimes", times.join(";"));
+        animation.assign("values", values.join(";"));
+        animation.assign("dur", format!("{:.1}s", self.seconds));
+        animation.assign("repeatCount", "indefinite");
+    }
 }
 
 fn legend(speed_mm_s: f64) -> Group {

@@ -2,9 +2,12 @@
 //!
 //! The firmware answers a command by its lines and then exactly one `ok` or `error: ...` (the README's console
 //! chapter). [`link`] does the same over a serial port, by the PC's clock and without trust in its input. This module
-//! uses the virtual Uno's clock, so the same commands always come at the same cycles.
+//! uses the virtual Uno's clock, so the same commands always come at the same cycles. [`UnoPort`] makes a virtual Uno a
+//! port of the link.
 
 use link::{LineReader, Values};
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
 use thiserror::Error;
 use uno::{Uno, UnoError};
 
@@ -107,6 +110,51 @@ impl Status {
             position_ticks: values.number("pos").ok_or_else(|| missing("pos"))?,
             lost_ticks: values.number("lost").ok_or_else(|| missing("lost"))?,
         })
+    }
+}
+
+/// Longest time that a read waits for a byte, by the Uno's clock.
+const READ_MS: u64 = 20;
+
+/// A virtual Uno as a port, without a pseudo terminal. Its clock runs while it is read, as fast as possible.
+pub struct UnoPort {
+    uno: Uno,
+    received: VecDeque<u8>,
+}
+
+impl UnoPort {
+    /// A port at which this Uno is.
+    pub fn new(uno: Uno) -> Self {
+        Self { uno, received: VecDeque::new() }
+    }
+
+    /// The Uno, to drive its inputs.
+    pub fn uno(&mut self) -> &mut Uno {
+        &mut self.uno
+    }
+}
+
+impl Read for UnoPort {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        for _ in 0..READ_MS {
+            if !self.received.is_empty() {
+                return self.received.read(buffer);
+            }
+            self.uno.run_for_ms(1).map_err(io::Error::other)?;
+            self.received.extend(self.uno.received_bytes().into_iter().map(|received| received.byte));
+        }
+        Err(io::ErrorKind::TimedOut.into())
+    }
+}
+
+impl Write for UnoPort {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.uno.send(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 

@@ -48,7 +48,6 @@ const FOREIGN_SETTINGS: [&str; 9] = [
 /// messages go to standard error.
 ///
 /// # Errors
-///
 /// Where cargo cannot be started, fails, or makes no ELF.
 pub fn build() -> Result<PathBuf> {
     FIRMWARE.build_once()
@@ -57,7 +56,6 @@ pub fn build() -> Result<PathBuf> {
 /// Builds the classifier's bench, which [`bench`](mod@crate::bench) runs, and returns the path of its ELF.
 ///
 /// # Errors
-///
 /// As [`build`].
 pub fn build_bench() -> Result<PathBuf> {
     BENCH.build_once()
@@ -66,7 +64,6 @@ pub fn build_bench() -> Result<PathBuf> {
 /// Builds the firmware of the tester, the Uno that checks another one. Returns the path of its ELF.
 ///
 /// # Errors
-///
 /// As [`build`].
 pub fn build_tester() -> Result<PathBuf> {
     TESTER.build_once()

@@ -2,7 +2,7 @@
 //!
 //! - [`run()`] lets the firmware weed the row of a [`Trial`]; [`firmware`] builds it. [`report`], [`picture`] and
 //!   [`animation`] show the [`Outcome`]. [`replay`] plays a recording to the firmware instead of a row.
-//! - [`console`] operates it as an operator would, and [`port`] makes it a port for the [`link`].
+//! - [`console`] operates it as an operator would, and makes it a port for the [`link`].
 //! - [`live`] runs it in real time, at a serial port for other programs. A [`receiver`] on the machine has another
 //!   port.
 //! - [`by_the_manual`] sets up and measures the simulated machine by the manual.
@@ -18,12 +18,11 @@ pub mod console;
 pub mod firmware;
 pub mod live;
 pub mod picture;
-pub mod port;
 pub mod receiver;
 pub mod replay;
 pub mod report;
 mod run;
 
+pub use console::UnoPort;
 pub use field::trial::{Start, Trial};
-pub use port::UnoPort;
 pub use run::{Outcome, TrialError, boot, power_up, run, set_up};

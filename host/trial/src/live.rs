@@ -140,13 +140,6 @@ impl Course {
             .change_speed(0.0, ACCELERATION_MM_S2)
             .with_slip(|| self.slip)
     }
-
-    /// The pin changes of a run that begins at a cycle, the cycle at which the machine stands again, and the motion.
-    fn roll_along(&self, start_cycle: u64) -> (Vec<PinChange>, u64, Motion) {
-        let motion = self.motion();
-        let end = cycle_at(start_cycle, motion.duration_s());
-        (self.machine.pin_changes(&self.row, &motion, start_cycle), end, motion)
-    }
 }
 
 /// The distance travelled: the total before the present run, the start time of that run, and its motion.
@@ -306,7 +299,6 @@ impl LiveUno {
         })
     }
 
-    /// Runs for a slice.
     fn slice(&mut self) -> Result<()> {
         self.serve()?;
         self.roll();
@@ -330,7 +322,6 @@ impl LiveUno {
         self.keep_eeprom()
     }
 
-    /// Plugs the cable in again.
     fn plug_in(&mut self) -> Result<()> {
         let pty = terminal(self.link.as_deref())?;
         self.path = pty.path().to_owned();
@@ -371,8 +362,9 @@ impl LiveUno {
         {
             // All Unos that share the wheel use the same cycle, although their last instructions end at different
             // cycles.
-            let (changes, end, motion) = course.roll_along(self.sets_off);
-            self.uno.drive(changes);
+            let motion = course.motion();
+            self.uno.drive(course.machine.pin_changes(&course.row, &motion, self.sets_off));
+            let end = cycle_at(self.sets_off, motion.duration_s());
             let set_off_s = self.sets_off as f64 / CYCLES_PER_SECOND as f64;
             self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), since: Some((set_off_s, motion)) };
             self.sets_off = end + STANDING_S * CYCLES_PER_SECOND;
@@ -380,10 +372,7 @@ impl LiveUno {
     }
 
     fn keep_eeprom(&mut self) -> Result<()> {
-        match &mut self.eeprom {
-            Some(file) => file.keep(self.uno.eeprom()),
-            None => Ok(()),
-        }
+        self.eeprom.as_mut().map_or(Ok(()), |file| file.keep(self.uno.eeprom()))
     }
 }
 

@@ -11,7 +11,7 @@ use field::verdict::{Judgement, Verdict};
 use std::ops::Range;
 use svg::Document;
 use svg::node::element::path::Data;
-use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Line, Path, Polyline};
+use svg::node::element::{ClipPath, Definitions, Ellipse, Group, Path, Polyline};
 
 /// Ground in a lane, and pixels for a millimetre.
 const LANE_MM: f64 = 2500.0;
@@ -57,6 +57,7 @@ pub fn draw(row: &Row, judgement: &Judgement) -> Document {
 fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) -> Group {
     let x = |place_mm: f64| (place_mm - ground.start) * PIXELS_PER_MM;
     let is_here = |stretch: &Range<f64>| stretch.start < ground.end && ground.start < stretch.end;
+    let angle_y = |degrees: f64| IN_Y + (OUT_Y - IN_Y) * degrees / field::servo::OUT_DEGREES;
     let length = x(ground.end);
 
     let mut drawn = Group::new().set("clip-path", format!("url(#{clip})"));
@@ -77,7 +78,9 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
             drawn = drawn.add(rectangle(x(block.start), BEAM_Y, width, STRIP_HEIGHT, BEAM));
         }
         if thing.kind == Kind::Weed {
-            drawn = drawn.add(weed(x(thing.position_mm)));
+            let x = x(thing.position_mm);
+            let weed = line(x, CANOPY_Y - 10.0, x, CANOPY_Y + CANOPY_HALF_HEIGHT, WEED);
+            drawn = drawn.add(weed.set("stroke-width", 4));
         }
     }
     for plant in judgement.plants.iter().filter(|plant| is_here(&plant.plant.span_mm())) {
@@ -167,10 +170,6 @@ fn strokes(x: f64, y: f64, reach: f64, verdict: Verdict) -> Path {
     Path::new().set("d", drawn).set("stroke", PAPER).set("stroke-width", 2.5).set("stroke-linecap", "round")
 }
 
-fn weed(x: f64) -> Line {
-    line(x, CANOPY_Y - 10.0, x, CANOPY_Y + CANOPY_HALF_HEIGHT, WEED).set("stroke-width", 4)
-}
-
 /// The ground with a mark every half metre.
 fn scale(ground: &Range<f64>) -> Group {
     const STEP_MM: f64 = 500.0;
@@ -216,10 +215,6 @@ fn legend() -> Group {
         legend.explain(|x, y| swatch(x, y, colour), meaning);
     }
     legend.drawn()
-}
-
-fn angle_y(degrees: f64) -> f64 {
-    IN_Y + (OUT_Y - IN_Y) * degrees / field::servo::OUT_DEGREES
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@
 //! The error of a real receiver drifts over minutes instead of changing from fix to fix. The model also leaves out that
 //! a machine sways and turns.
 
+use chrono::DateTime;
 use gps::plane::{Metres, Place, Plane};
-use gps::sentence::DAY_MS;
 use gps::track::Offset;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -137,7 +137,8 @@ impl SimulatedReceiver {
             }
         }
         let utc_ms = self.setup.began_ms + (moment_s * 1000.0).round() as i64;
-        let (clock, date) = (clock(utc_ms), date(utc_ms));
+        let moment = DateTime::from_timestamp_millis(utc_ms).unwrap_or_default();
+        let (clock, date) = (moment.format("%H%M%S%.3f"), moment.format("%d%m%y"));
         if !has_fix {
             return [format!("GNRMC,{clock},V,,,,,,,{date},,,N"), format!("GNGGA,{clock},,,,,0,00,99.9,,M,,M,,")];
         }
@@ -169,16 +170,6 @@ impl SimulatedReceiver {
         }
         bytes
     }
-}
-
-fn clock(utc_ms: i64) -> String {
-    let ms = utc_ms.rem_euclid(DAY_MS);
-    format!("{:02}{:02}{:02}.{:03}", ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000)
-}
-
-fn date(utc_ms: i64) -> String {
-    let date = chrono::DateTime::from_timestamp_millis(utc_ms).unwrap_or_default();
-    date.format("%d%m%y").to_string()
 }
 
 fn coordinates(place: Place) -> String {

@@ -5,12 +5,12 @@
 //! continues.
 
 use crate::console::Status;
-use crate::run::{TrialError, boot};
+use crate::run::{PROGRESS_CYCLES, TrialError, boot};
 use control::measure::quadrature::{Channels, Quadrature, Step};
 use field::wiring;
 use std::path::Path;
+use uno::PinChange;
 use uno::capture::Capture;
-use uno::{CYCLES_PER_SECOND, PinChange};
 
 /// The firmware's count, relative to its position at the start of the recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +38,6 @@ pub struct Replay {
 
 /// Pause after each stretch of the recording, so that the firmware has served the last edge.
 const PAUSE_MS: u64 = 1;
-
-/// Simulated time between two reports of progress.
-const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
 /// Plays the recording to the firmware at `elf`. `progress` gets the share done, from 0 to 1.
 ///
@@ -113,22 +110,16 @@ fn pauses(first_levels: &[PinChange], edges: &[PinChange]) -> Vec<usize> {
         apply(&mut levels, change);
     }
     let mut decoder = Quadrature::new(levels);
-    let mut count = 0;
-    let (mut lowest, mut highest) = ((count, 0), (count, 0));
-    for (index, change) in edges.iter().enumerate() {
+    let mut counts = vec![0];
+    for change in edges {
         apply(&mut levels, change);
-        if let Step::Ticks(ticks) = decoder.step(levels) {
-            count += i64::from(ticks);
-        }
-        let here = (count, index + 1);
-        if count < lowest.0 {
-            lowest = here;
-        }
-        if count > highest.0 {
-            highest = here;
-        }
+        let ticks = if let Step::Ticks(ticks) = decoder.step(levels) { i64::from(ticks) } else { 0 };
+        counts.push(counts[counts.len() - 1] + ticks);
     }
-    let mut pauses = vec![lowest.1, highest.1, edges.len()];
+    // Of equal counts, each takes the first.
+    let lowest = (0..counts.len()).min_by_key(|&edge| counts[edge]).unwrap_or(0);
+    let highest = (0..counts.len()).rev().max_by_key(|&edge| counts[edge]).unwrap_or(0);
+    let mut pauses = vec![lowest, highest, edges.len()];
     pauses.sort_unstable();
     pauses.dedup();
     pauses
@@ -147,20 +138,18 @@ fn apply(levels: &mut Channels, change: &PinChange) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use field::machine::encoder_edge;
 
     /// The edges of these steps from AB = 00. A negative number of steps goes backwards.
-    fn edges(steps: &[i32]) -> Vec<PinChange> {
-        const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
-        let mut count = 0_i32;
+    fn edges(steps: &[i64]) -> Vec<PinChange> {
+        let mut count = 0;
         let directions = steps.iter().flat_map(|&steps| (0..steps.abs()).map(move |_| steps.signum()));
         directions
-            .enumerate()
-            .map(|(index, direction)| {
-                let before = FORWARD[count.rem_euclid(4) as usize];
+            .zip(0..)
+            .map(|(direction, index)| {
+                let before = count;
                 count += direction;
-                let (a, b) = FORWARD[count.rem_euclid(4) as usize];
-                let (pin, high) = if a == before.0 { (wiring::ENCODER_B, b) } else { (wiring::ENCODER_A, a) };
-                PinChange { cycle: index as u64 * 1000, pin, high }
+                encoder_edge(index * 1000, before, count)
             })
             .collect()
     }

@@ -123,13 +123,10 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
             judgement.weedable_share * 100.0,
         ),
     );
-    line(
-        "",
-        format!(
-            "({:.1} % of the {WORKING_WIDTH_MM:.0} mm strip that the inter-row tools weed along with it)",
-            strip_share(&trial.machine, judgement.weeded_share) * 100.0,
-        ),
-    );
+    // As the paper counted weeds: all ground beside the row, and the weeded part of the tool's width.
+    let strip_share = 1.0 - (1.0 - judgement.weeded_share) * trial.machine.tool_width_mm / WORKING_WIDTH_MM;
+    let strip = format!("{:.1} % of the {WORKING_WIDTH_MM:.0} mm strip", strip_share * 100.0);
+    line("", format!("({strip} that the inter-row tools weed along with it)"));
     line("Swings", swing_words(&judgement.plants, &trial.machine));
     if outcome.stray_pulses > 0 {
         let pulses = counted(outcome.stray_pulses, "pulse");
@@ -153,12 +150,6 @@ fn deepest_mm(plants: &[PlantOutcome]) -> Option<f64> {
         .filter(|clearance_mm| *clearance_mm < 0.0)
         .map(f64::abs)
         .max_by(f64::total_cmp)
-}
-
-/// The weeded share of the whole strip, as the paper counted weeds: all ground beside the row, and the weeded part of
-/// the tool's width.
-fn strip_share(machine: &Machine, weeded_share: f64) -> f64 {
-    1.0 - (1.0 - weeded_share) * machine.tool_width_mm / WORKING_WIDTH_MM
 }
 
 fn swing_words(plants: &[PlantOutcome], machine: &Machine) -> String {

@@ -16,8 +16,7 @@ use link::settings::name;
 use std::path::Path;
 use thiserror::Error;
 use uno::elf::Size;
-use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
-use uno::{Uno, UnoError};
+use uno::{CYCLES_PER_SECOND, PinChange, Pulse, Uno, UnoError};
 
 /// Why a trial had no outcome.
 #[derive(Debug, Error)]
@@ -64,7 +63,7 @@ const SWITCH_MS: u64 = 100;
 const STILL_MS: u64 = 50;
 
 /// Simulated time between two reports of progress.
-const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
+pub(crate) const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
 /// Powers up the firmware with these levels on its inputs, and waits for its greeting.
 ///
@@ -100,12 +99,8 @@ pub fn run(trial: &Trial, elf: &Path, mut progress: impl FnMut(f64)) -> Result<O
     let mut uno = boot(elf, &inputs)?;
     set_up(trial, &mut uno)?;
     match trial.start {
-        Start::Command => {
-            ask(&mut uno, "start")?;
-        }
-        Start::Now => {
-            ask(&mut uno, "start now")?;
-        }
+        Start::Command => drop(ask(&mut uno, "start")?),
+        Start::Now => drop(ask(&mut uno, "start now")?),
         Start::Switch => {
             let work = PinChange { cycle: uno.cycle(), pin: wiring::WORK_SWITCH, high: false };
             inputs.push(work);

@@ -1,7 +1,7 @@
 //! A trial's findings, in sentences.
 
 use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment};
-use crate::statistics::{LinearModel, SIGNIFICANCE, Share, Term, probability};
+use crate::statistics::{SIGNIFICANCE, Share, Term, probability};
 use crate::table::distinct;
 use field::counted;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -15,13 +15,16 @@ impl Analysis {
             findings.extend(response.odds());
         }
         findings.extend(self.responses.iter().flat_map(ResponseAnalysis::checked));
-        let hasty = self.faster_than_possible();
+        // Area, time, width or speed is wrong.
+        let plots = (1..).zip(&self.performances);
+        let hasty =
+            plots.filter(|(_, plot)| plot.field_efficiency_percent > 100.0).map(|(number, _)| f64::from(number));
+        let hasty: Vec<f64> = hasty.collect();
         if !hasty.is_empty() {
-            let plots: Vec<f64> = hasty.into_iter().map(|plot| plot as f64).collect();
-            let of = if plots.len() == 1 { "Plot" } else { "Plots" };
+            let of = if hasty.len() == 1 { "Plot" } else { "Plots" };
             findings.push(format!(
                 "{of} {}: more ground was covered than speed and width allow (field efficiency above 100 %), so check area, time, width and speed.",
-                list(&plots)
+                list(&hasty)
             ));
         }
         findings
@@ -61,25 +64,7 @@ impl Analysis {
             _ => format!("None of {of} plants was damaged: in truth {share} %."),
         }
     }
-}
 
-impl ResponseAnalysis {
-    /// The effects on the measure.
-    fn finding(&self) -> String {
-        let title = self.response.title();
-        match &self.model {
-            Err(reason) => format!("{title} has no model: {reason}."),
-            Ok(model) => {
-                let effect = |name, unit| model.term(name).map(|term| effect(term, self.response, name, unit));
-                let effects: Vec<String> =
-                    [effect("speed", "km/h"), effect("spacing", "cm")].into_iter().flatten().collect();
-                format!("{title} {}; {}.", effects.join(" and "), explained(model))
-            }
-        }
-    }
-}
-
-impl Analysis {
     /// Contradictions to the paper's text: a sentence for each measure whose 95 % interval of the slope excludes the
     /// paper's slope. One sentence if there is none.
     pub fn against_the_paper(&self) -> Vec<String> {
@@ -95,6 +80,21 @@ impl Analysis {
 }
 
 impl ResponseAnalysis {
+    /// The effects on the measure.
+    fn finding(&self) -> String {
+        let title = self.response.title();
+        match &self.model {
+            Err(reason) => format!("{title} has no model: {reason}."),
+            Ok(model) => {
+                let effect = |name, unit| model.term(name).map(|term| effect(term, self.response, name, unit));
+                let effects: Vec<String> =
+                    [effect("speed", "km/h"), effect("spacing", "cm")].into_iter().flatten().collect();
+                let (effects, percent) = (effects.join(" and "), 100.0 * model.r_squared);
+                format!("{title} {effects}; the model explains {percent:.1} % of its variation.")
+            }
+        }
+    }
+
     /// A contradiction to the paper's slope by speed.
     fn against_the_paper(&self) -> Option<String> {
         let paper = self.published.text.per_km_h?;
@@ -142,11 +142,6 @@ fn effect(term: &Term, response: Response, name: &str, unit: &str) -> String {
     let verb = if term.estimate < 0.0 { "falls" } else { "rises" };
     let measure = if response == Response::PerformanceIndex { "" } else { " points" };
     format!("{verb} by {:.3}{measure} for each {unit}{significance}", term.estimate.abs())
-}
-
-/// How much the model explains.
-fn explained(model: &LinearModel) -> String {
-    format!("the model explains {:.1} % of its variation", model.r_squared * 100.0)
 }
 
 /// Numbers as in a sentence.

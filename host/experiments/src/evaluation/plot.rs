@@ -1,40 +1,78 @@
 //! A plot's counts and measurements, and its measures by the paper's Eq. 22 to 27. The paper models four of them on
 //! speed and spacing.
 
+use super::table::{count, number};
+use crate::table::{fixed, short};
 use anyhow::{Result, anyhow};
+use files::FileError;
+use files::csv_table::Line;
 use serde::{Deserialize, Serialize};
 
-/// Square metres in a hectare.
 const M2_PER_HA: f64 = 10_000.0;
-
-/// Seconds in an hour.
 const S_PER_H: f64 = 3600.0;
 
-/// The counts and measurements of one plot.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PlotRecord {
+/// Declares a plot's record. Each column of a table of plots has its type, how it is read, its heading in a report, and
+/// its text there.
+macro_rules! plot_record {
+    ($(
+        $(#[doc = $about:literal])+
+        $column:ident: $type:ty = $read:ident($($least:literal)?), $heading:literal => $shown:expr;
+    )+) => {
+        /// The counts and measurements of one plot.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+        pub struct PlotRecord {
+            $($(#[doc = $about])+ pub $column: $type,)+
+        }
+
+        /// The columns of a table of plots, which carry their units.
+        pub const COLUMNS: &[&str] = &[$(stringify!($column)),+];
+
+        impl PlotRecord {
+            /// The headings of a report's columns.
+            pub(super) const HEADINGS: &[&str] = &[$($heading),+];
+
+            /// The cells of a report.
+            pub(super) fn cells(&self) -> Vec<String> {
+                let Self { $($column),+ } = *self;
+                vec![$($shown),+]
+            }
+
+            /// Each column with its value.
+            pub(crate) fn columns(&self) -> Vec<(&'static str, String)> {
+                vec![$((stringify!($column), self.$column.to_string())),+]
+            }
+
+            /// Parses a line of a table. The values are not checked yet.
+            pub(super) fn read(line: Line) -> Result<Self, FileError> {
+                Ok(Self { $($column: $read(line, stringify!($column) $(, $least)?)?),+ })
+            }
+        }
+    };
+}
+
+plot_record! {
     /// The number of its replication.
-    pub replication: u32,
+    replication: u32 = count(0), "replication" => replication.to_string();
     /// Forward speed that the machine was set to, km/h.
-    pub speed_km_h: f64,
+    speed_km_h: f64 = number(), "speed, km/h" => short(speed_km_h);
     /// Plant spacing along the row, cm.
-    pub spacing_cm: f64,
+    spacing_cm: f64 = number(), "spacing, cm" => short(spacing_cm);
     /// Weeds counted before weeding.
-    pub weeds_before: u32,
+    weeds_before: u32 = count(1), "weeds before" => weeds_before.to_string();
     /// Weeds counted after weeding, on the same ground.
-    pub weeds_after: u32,
+    weeds_after: u32 = count(0), "weeds after" => weeds_after.to_string();
     /// Crop plants in the plot.
-    pub plants: u32,
+    plants: u32 = count(1), "plants" => plants.to_string();
     /// Crop plants that the machine injured.
-    pub damaged: u32,
+    damaged: u32 = count(0), "damaged" => damaged.to_string();
     /// Area that was weeded, m2.
-    pub area_m2: f64,
+    area_m2: f64 = number(), "area, m²" => fixed(area_m2, 2);
     /// Time that this took, with turns and stops, s.
-    pub time_s: f64,
+    time_s: f64 = number(), "time, s" => fixed(time_s, 1);
     /// Working width of the machine, m.
-    pub width_m: f64,
+    width_m: f64 = number(), "width, m" => fixed(width_m, 2);
     /// Power that the machine needs, hp.
-    pub power_hp: f64,
+    power_hp: f64 = number(), "power, hp" => fixed(power_hp, 2);
 }
 
 /// The measures of one plot.

@@ -12,13 +12,11 @@
 //! engine. Eq. 30, where it falls, does not.
 
 use super::plot::Response;
+use crate::table::NOTHING;
 use serde::Serialize;
 
 /// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
 pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
-
-/// The text of a missing figure.
-const NOT_SAID: &str = "\u{2013}";
 
 /// Machines that weed in the row, those with a beam first, as measured by their authors in a field or on a test track.
 /// Each source counts weeds in its own way.
@@ -48,8 +46,8 @@ pub const MACHINES: [[&str; 7]; 6] = [
         "Cordill and Grift, two tines",
         "maize",
         "the stalk's width",
-        NOT_SAID,
-        NOT_SAID,
+        NOTHING,
+        NOTHING,
         "8.8 without weeds, 23.7 among weeds",
         "Biosystems Engineering, 2011, doi 10.1016/j.biosystemseng.2011.07.007",
     ],
@@ -91,13 +89,6 @@ pub struct Coefficients {
     pub per_km_h: Option<f64>,
     /// For each cm of spacing.
     pub per_cm: Option<f64>,
-}
-
-impl Coefficients {
-    /// The response at a speed in km/h and a spacing in cm, if all coefficients are known.
-    pub fn at(&self, speed_km_h: f64, spacing_cm: f64) -> Option<f64> {
-        Some(self.constant? + self.per_km_h? * speed_km_h + self.per_cm? * spacing_cm)
-    }
 }
 
 /// The paper's figures for one response.
@@ -191,7 +182,8 @@ const FIELD_EFFICIENCY: Published = Published {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::{Performance, PlotRecord};
+    use crate::evaluation::PlotRecord;
+    use crate::evaluation::tests::PLOT;
 
     /// The engine that was chosen, hp.
     const POWER_HP: f64 = 2.5;
@@ -201,21 +193,9 @@ mod tests {
 
     /// The index of a plot with these counts out of 10,000: the paper prints two decimals.
     fn index(capacity_ha_h: f64, damaged: u32, weeds_after: u32, power_hp: f64) -> f64 {
-        let record = PlotRecord {
-            replication: 1,
-            speed_km_h: 1.0,
-            spacing_cm: 60.0,
-            weeds_before: 10_000,
-            weeds_after,
-            plants: 10_000,
-            damaged,
-            area_m2: capacity_ha_h * 10_000.0,
-            time_s: 3600.0,
-            width_m: WIDTH_M,
-            power_hp,
-        };
-        let Performance { performance_index, .. } = record.performance();
-        performance_index
+        let (area_m2, time_s) = (capacity_ha_h * 10_000.0, 3600.0);
+        let record = PlotRecord { weeds_before: 10_000, weeds_after, plants: 10_000, damaged, ..PLOT };
+        PlotRecord { area_m2, time_s, power_hp, ..record }.performance().performance_index
     }
 
     #[test]
@@ -236,7 +216,9 @@ mod tests {
     #[test]
     fn the_printed_equations_give_the_stated_contradictions() {
         let all = |response| {
-            let of_speed = |speed| [50.0, 60.0].map(|spacing| Published::of(response).equation.at(speed, spacing));
+            let Coefficients { constant, per_km_h, per_cm } = Published::of(response).equation;
+            let at = |speed: f64, spacing: f64| Some(constant? + per_km_h? * speed + per_cm? * spacing);
+            let of_speed = |speed| [50.0, 60.0].map(|spacing| at(speed, spacing));
             [1.0, 1.5, 2.0, 2.5].into_iter().flat_map(of_speed).collect::<Option<Vec<f64>>>()
         };
         assert_eq!(all(Response::PlantDamage), None);

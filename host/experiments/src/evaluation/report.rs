@@ -3,7 +3,7 @@
 
 use super::published::Published;
 use super::{Analysis, Performance, PlotRecord, ResponseAnalysis};
-use crate::statistics::{AnalysisOfVariance, BinomialModel};
+use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
 use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use std::fmt::{self, Display, Formatter};
 
@@ -102,44 +102,13 @@ impl Analysis {
 
     /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
-        let written_down = [
-            "plot",
-            "replication",
-            "speed, km/h",
-            "spacing, cm",
-            "weeds before",
-            "weeds after",
-            "plants",
-            "damaged",
-            "area, m²",
-            "time, s",
-            "width, m",
-            "power, hp",
-        ];
-        let mut table =
-            Table::new("Each plot: counts, measurements and results", written_down.into_iter().chain(MEASURES));
-        for (index, (record, performance)) in self.records.iter().zip(&self.performances).enumerate() {
-            let cells = [(index + 1).to_string()].into_iter().chain(counted(record)).chain(measures(performance));
-            table.rows.push(cells.collect());
+        let columns = ["plot"].iter().chain(PlotRecord::HEADINGS).chain(&MEASURES).copied();
+        let mut table = Table::new("Each plot: counts, measurements and results", columns);
+        for ((record, performance), number) in self.records.iter().zip(&self.performances).zip(1_u32..) {
+            table.rows.push([vec![number.to_string()], record.cells(), measures(performance).into()].concat());
         }
         table
     }
-}
-
-fn counted(record: &PlotRecord) -> [String; 11] {
-    [
-        record.replication.to_string(),
-        short(record.speed_km_h),
-        short(record.spacing_cm),
-        record.weeds_before.to_string(),
-        record.weeds_after.to_string(),
-        record.plants.to_string(),
-        record.damaged.to_string(),
-        fixed(record.area_m2, 2),
-        fixed(record.time_s, 1),
-        fixed(record.width_m, 2),
-        fixed(record.power_hp, 2),
-    ]
 }
 
 impl ResponseAnalysis {
@@ -184,25 +153,19 @@ impl ResponseAnalysis {
         let range = |&(low, high): &(f64, f64)| format!("{} to {}", fixed(low, 2), fixed(high, 2));
         let published: Vec<String> = self.published.ranges.iter().map(range).collect();
         let share = |value| fixed(value, 4);
+        let ours = |value: fn(&LinearModel) -> f64, said: fn(f64) -> String| optional(model.map(value), said);
         let row = |what: &str, ours: String, paper: String| vec![what.to_owned(), ours, paper];
+        let nothing = || NOTHING.to_owned();
         let mut table = Table::new("Fit and range", ["", "this trial", "paper"]);
         table.rows = vec![
-            row("R²", optional(model.map(|model| model.r_squared), share), share(self.published.r_squared)),
+            row("R²", ours(|model| model.r_squared, share), share(self.published.r_squared)),
             row(
                 "adjusted R²",
-                optional(model.map(|model| model.adjusted_r_squared), share),
+                ours(|model| model.adjusted_r_squared, share),
                 optional(self.published.adjusted_r_squared, share),
             ),
-            row(
-                "residual standard error",
-                optional(model.map(|model| model.residual_standard_error), significant),
-                NOTHING.to_owned(),
-            ),
-            row(
-                "degrees of freedom",
-                optional(model.map(|model| model.degrees_of_freedom as f64), short),
-                NOTHING.to_owned(),
-            ),
+            row("residual standard error", ours(|model| model.residual_standard_error, significant), nothing()),
+            row("degrees of freedom", ours(|model| model.degrees_of_freedom as f64, short), nothing()),
             row(&format!("range, {}", self.response.unit()), range(&self.range), published.join(",\n")),
         ];
         table
@@ -231,17 +194,16 @@ impl BinomialModel {
         let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
         let mut table = Table::new("Binomial model of the counts", columns);
         for term in &self.terms {
-            let (times, least, greatest) = term.odds_ratio();
-            let (name, times) = match term.name {
-                "speed" => {
-                    ("for each km/h", format!("{} ({} to {})", fixed(times, 2), fixed(least, 2), fixed(greatest, 2)))
-                }
-                "spacing" => (
-                    "for each cm of spacing",
-                    format!("{} ({} to {})", fixed(times, 3), fixed(least, 3), fixed(greatest, 3)),
-                ),
-                name => (name, NOTHING.to_owned()),
+            let (name, decimals) = match term.name {
+                "speed" => ("for each km/h", Some(2)),
+                "spacing" => ("for each cm of spacing", Some(3)),
+                name => (name, None),
             };
+            let times = decimals.map_or(NOTHING.to_owned(), |decimals| {
+                let (times, least, greatest) = term.odds_ratio();
+                let fixed = |odds| fixed(odds, decimals);
+                format!("{} ({} to {})", fixed(times), fixed(least), fixed(greatest))
+            });
             let cells =
                 [significant(term.estimate), significant(term.standard_error), fixed(term.z, 2), probability(term.p)];
             table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());

@@ -3,26 +3,11 @@
 //! The columns are the fields of [`PlotRecord`], in any order. Other columns are ignored. Lines that begin with `#` are
 //! comments. Every line is checked before any is used.
 
-use super::plot::PlotRecord;
+use super::plot::{COLUMNS, PlotRecord};
 use files::FileError;
 use files::csv_table::{CsvTable, Line};
 use std::path::Path;
 use std::str::FromStr;
-
-/// The columns, which carry their units.
-pub const COLUMNS: [&str; 11] = [
-    "replication",
-    "speed_km_h",
-    "spacing_cm",
-    "weeds_before",
-    "weeds_after",
-    "plants",
-    "damaged",
-    "area_m2",
-    "time_s",
-    "width_m",
-    "power_hp",
-];
 
 /// Reads the plots of a trial.
 ///
@@ -31,8 +16,8 @@ pub const COLUMNS: [&str; 11] = [
 /// text in a number, a value out of range, more weeds after than before, more damaged plants than plants, and a
 /// replication of a speed and spacing that occurs twice.
 pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
-    let table = CsvTable::read(path, &COLUMNS)?;
-    let empty = |line: Line| COLUMNS.into_iter().find(|column| line.text(column).is_empty());
+    let table = CsvTable::read(path, COLUMNS)?;
+    let empty = |line: Line| COLUMNS.iter().find(|column| line.text(column).is_empty());
     let mut unfilled = table.lines().filter_map(|line| Some((line, empty(line)?)));
     if let Some((line, column)) = unfilled.next() {
         let (count, all) = (1 + unfilled.count(), table.lines().count());
@@ -41,7 +26,8 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
     }
     let mut plots: Vec<(u64, PlotRecord)> = Vec::new();
     for line in table.lines() {
-        let plot = record(line)?;
+        let plot = PlotRecord::read(line)?;
+        plot.check().map_err(|problem| line.error(problem.to_string()))?;
         let same = |other: &PlotRecord| {
             (other.replication, other.speed_km_h, other.spacing_cm)
                 == (plot.replication, plot.speed_km_h, plot.spacing_cm)
@@ -57,31 +43,12 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
     Ok(plots.into_iter().map(|(_, plot)| plot).collect())
 }
 
-/// Parses one line of the table.
-fn record(line: Line) -> Result<PlotRecord, FileError> {
-    let plot = PlotRecord {
-        replication: count(line, "replication", 0)?,
-        speed_km_h: number(line, "speed_km_h")?,
-        spacing_cm: number(line, "spacing_cm")?,
-        weeds_before: count(line, "weeds_before", 1)?,
-        weeds_after: count(line, "weeds_after", 0)?,
-        plants: count(line, "plants", 1)?,
-        damaged: count(line, "damaged", 0)?,
-        area_m2: number(line, "area_m2")?,
-        time_s: number(line, "time_s")?,
-        width_m: number(line, "width_m")?,
-        power_hp: number(line, "power_hp")?,
-    };
-    plot.check().map_err(|problem| line.error(problem.to_string()))?;
-    Ok(plot)
-}
-
 /// Parses a count. Its least value is the one in [`PlotRecord::check`].
-fn count(line: Line, column: &str, least: u32) -> Result<u32, FileError> {
+pub(super) fn count(line: Line, column: &str, least: u32) -> Result<u32, FileError> {
     line.value(column, &format!("a whole number, {least} or more"))
 }
 
-fn number(line: Line, column: &str) -> Result<f64, FileError> {
+pub(super) fn number(line: Line, column: &str) -> Result<f64, FileError> {
     let Number(value) = line.value(column, "a number, like 1.5")?;
     Ok(value)
 }

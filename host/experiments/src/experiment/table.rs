@@ -1,28 +1,19 @@
 //! An experiment's plots as a CSV table.
 
 use super::{PlotOutcome, Treatment};
+use crate::evaluation::PlotRecord;
 use field::budget::Part;
 use std::io;
 
 /// A line of [`write_csv`]: a plot's record, and what only a simulated field can tell; each cell behind its column's
 /// name.
-fn line(outcome: &PlotOutcome) -> [(&'static str, String); 31] {
+fn line(outcome: &PlotOutcome) -> Vec<(&'static str, String)> {
     let PlotOutcome { record, zones, effect, .. } = outcome;
     let percent = |share: f64| thousandth(100.0 * share).to_string();
     let lost = |part| percent(outcome.budget[part]);
-    [
-        ("controller", outcome.controller.title().to_owned()),
-        ("replication", record.replication.to_string()),
-        ("speed_km_h", record.speed_km_h.to_string()),
-        ("spacing_cm", record.spacing_cm.to_string()),
-        ("weeds_before", record.weeds_before.to_string()),
-        ("weeds_after", record.weeds_after.to_string()),
-        ("plants", record.plants.to_string()),
-        ("damaged", record.damaged.to_string()),
-        ("area_m2", record.area_m2.to_string()),
-        ("time_s", thousandth(record.time_s).to_string()),
-        ("width_m", record.width_m.to_string()),
-        ("power_hp", record.power_hp.to_string()),
+    let mut line = vec![("controller", outcome.controller.title().to_owned())];
+    line.extend(PlotRecord { time_s: thousandth(record.time_s), ..*record }.columns());
+    line.extend([
         ("zones", zones.all.to_string()),
         ("zones_reached", zones.reached.to_string()),
         ("margins_cut", zones.margins_cut.to_string()),
@@ -42,7 +33,8 @@ fn line(outcome: &PlotOutcome) -> [(&'static str, String); 31] {
         ("lost_to_swings_percent", lost(Part::Swings)),
         ("lost_to_closed_percent", lost(Part::Closed)),
         ("alarms", outcome.alarms.to_string()),
-    ]
+    ]);
+    line
 }
 
 /// Writes the results of some controllers as CSV, one line a plot. [`crate::evaluation::read_csv`] can read a table of
@@ -55,9 +47,9 @@ pub fn write_csv(outcomes: &[PlotOutcome], controllers: &[Treatment], to: impl i
     let lines = outcomes.iter().filter(|outcome| controllers.contains(&outcome.controller)).map(line);
     for (number, line) in lines.enumerate() {
         if number == 0 {
-            writer.write_record(line.each_ref().map(|(name, _)| *name))?;
+            writer.write_record(line.iter().map(|(name, _)| name))?;
         }
-        writer.write_record(line.map(|(_, cell)| cell))?;
+        writer.write_record(line.iter().map(|(_, cell)| cell))?;
     }
     writer.flush()?;
     Ok(())

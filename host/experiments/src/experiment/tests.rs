@@ -67,29 +67,17 @@ fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_fi
 }
 
 #[test]
-fn a_controller_that_damages_no_plant_weeds_no_more_than_the_bound_in_any_field() {
+fn in_every_row_of_every_preset_the_loss_budget_adds_up_and_who_damages_no_plant_keeps_below_the_bound() {
     for preset in presets() {
         for seed in 1..=3 {
-            // A row for each plot: a plot with one damaged plant may weed more than its bound.
-            let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5], preset) };
-            experiment.conditions.set("plot.rows", 1.0).unwrap();
-            for outcome in run(&experiment).iter().filter(|outcome| outcome.effect.damaged == 0) {
-                let (share, bound) = (outcome.weeded_share, outcome.undamaged_share);
-                assert!(share <= bound + 1e-3, "{preset}, {:?}: {share} of {bound}", outcome.controller);
-            }
-        }
-    }
-}
-
-#[test]
-fn the_loss_budget_of_every_row_of_every_preset_adds_up_to_the_whole_row() {
-    for preset in presets() {
-        for seed in 1..=2 {
-            // One row a plot, so that an average hides no row.
+            // One row a plot: an average would hide a row, and a plot with one damaged plant may weed more than its
+            // bound.
             let mut experiment = Experiment { seed, ..experiment(&[1.0, 2.5, 6.0], preset) };
             experiment.conditions.set("plot.rows", 1.0).unwrap();
             for outcome in run(&experiment) {
-                let PlotOutcome { controller, budget, weeded_share, .. } = outcome;
+                let PlotOutcome { controller, budget, weeded_share, undamaged_share, effect, .. } = outcome;
+                let within = weeded_share <= undamaged_share + 1e-3;
+                assert!(effect.damaged > 0 || within, "{preset}, {controller:?}: {weeded_share} of {undamaged_share}");
                 let sum: f64 = budget.shares().map(|(_, share)| share).sum();
                 assert!((sum - 1.0).abs() < 1e-9, "{preset}, {controller:?}: {sum} of {budget:?}");
                 assert!((budget[Part::Weeded] - weeded_share).abs() < 1e-12, "{preset}, {controller:?}: {budget:?}");
@@ -110,29 +98,25 @@ fn the_loss_budget_agrees_with_a_hand_calculation() {
         for (setting, value) in [("lead_out_ms", 180.0), ("stem_zone_mm", stem_zone_mm)] {
             experiment.conditions.set(setting, value).unwrap();
         }
-        is_the_loss_budget_of(totals(&run(&experiment))[0].budget, kept_mm);
-    }
-}
-
-/// Checks a budget at 2.5 km/h, with so much kept of each plant.
-fn is_the_loss_budget_of(budget: Budget, kept_mm: f64) {
-    // A margin of 50 mm on both sides, a plant every 500 mm, 694.4 mm/s.
-    let mm_s = 2.5e6 / 3600.0;
-    // Out: the command leads by 181 ms. Before the tool loses ground, 2 ms of pulse, 65 ms of dead time and 12 ms of
-    // travel pass: at 4.5 degrees the tool leaves the line. In: the command leads by 41 ms. Then come pulse, dead time
-    // and 108 ms of travel back to the line.
-    let swings_mm = mm_s * ((0.181 - 0.002 - 0.065 - 0.012) + (0.0015 + 0.065 + 0.108 - 0.041));
-    let expected = [
-        (Part::Plants, kept_mm),
-        (Part::Margins, 100.0),
-        (Part::Swings, swings_mm),
-        (Part::Weeded, 500.0 - 100.0 - kept_mm - swings_mm),
-        (Part::Weeds, 0.0),
-        (Part::Guarded, 0.0),
-        (Part::Closed, 0.0),
-    ];
-    for (part, mm) in expected {
-        assert!((500.0 * budget[part] - mm).abs() < 4.0, "{part:?}: {} mm, not {mm}", 500.0 * budget[part]);
+        let budget = totals(&run(&experiment))[0].budget;
+        // A margin of 50 mm on both sides, a plant every 500 mm, 694.4 mm/s.
+        let mm_s = 2.5e6 / 3600.0;
+        // Out: the command leads by 181 ms. Before the tool loses ground, 2 ms of pulse, 65 ms of dead time and 12 ms
+        // of travel pass: at 4.5 degrees the tool leaves the line. In: the command leads by 41 ms. Then come pulse,
+        // dead time and 108 ms of travel back to the line.
+        let swings_mm = mm_s * ((0.181 - 0.002 - 0.065 - 0.012) + (0.0015 + 0.065 + 0.108 - 0.041));
+        let expected = [
+            (Part::Plants, kept_mm),
+            (Part::Margins, 100.0),
+            (Part::Swings, swings_mm),
+            (Part::Weeded, 500.0 - 100.0 - kept_mm - swings_mm),
+            (Part::Weeds, 0.0),
+            (Part::Guarded, 0.0),
+            (Part::Closed, 0.0),
+        ];
+        for (part, mm) in expected {
+            assert!((500.0 * budget[part] - mm).abs() < 4.0, "{part:?}: {} mm, not {mm}", 500.0 * budget[part]);
+        }
     }
 }
 

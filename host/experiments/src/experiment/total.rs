@@ -1,10 +1,9 @@
 //! Totals of each controller at each speed, over all plots.
 
 use super::{PlotOutcome, Treatment, Zones};
-use crate::statistics::{Mean, Share};
+use crate::statistics::{Mean, Share, grouped, mean};
 use field::budget::Budget;
 use field::tool_path::Effect;
-use std::collections::BTreeMap;
 
 /// The total of one controller at one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,56 +60,34 @@ impl Total {
 /// The totals of each controller at each speed, over all spacings and replications: by speed, then in the order of
 /// controllers.
 pub fn totals(outcomes: &[PlotOutcome]) -> Vec<Total> {
-    let mut totals: Vec<(Total, Vec<&PlotOutcome>)> = Vec::new();
-    for outcome in outcomes {
-        let (controller, speed_km_h) = (outcome.controller, outcome.record.speed_km_h);
-        let is_its =
-            |(total, _): &(Total, Vec<&PlotOutcome>)| total.controller == controller && total.speed_km_h == speed_km_h;
-        let index = totals.iter().position(is_its).unwrap_or_else(|| {
-            let (effect, zones) = Default::default();
-            let none = Total {
-                controller,
-                speed_km_h,
-                effect,
-                zones,
-                weeded_share: 0.0,
-                weedable_share: 0.0,
-                undamaged_share: 0.0,
-                budget: Budget::default(),
-                weeded_percent: Mean::of(&[]),
-                alarms: 0,
-            };
-            totals.push((none, Vec::new()));
-            totals.len() - 1
-        });
-        let (total, plots) = &mut totals[index];
-        total.effect += outcome.effect;
-        total.zones += outcome.zones;
-        total.weeded_share += outcome.weeded_share;
-        total.weedable_share += outcome.weedable_share;
-        total.undamaged_share += outcome.undamaged_share;
-        total.budget += outcome.budget;
-        total.alarms += outcome.alarms;
-        plots.push(outcome);
-    }
-    let mean = |(total, plots): (Total, Vec<&PlotOutcome>)| Total {
-        weeded_share: total.weeded_share / plots.len() as f64,
-        weedable_share: total.weedable_share / plots.len() as f64,
-        undamaged_share: total.undamaged_share / plots.len() as f64,
-        budget: total.budget / plots.len() as f64,
-        weeded_percent: Mean::of(&by_replication(&plots)),
-        ..total
-    };
-    let mut totals: Vec<Total> = totals.into_iter().map(mean).collect();
+    let of_total = |outcome: &PlotOutcome| (outcome.controller, outcome.record.speed_km_h);
+    let groups = grouped(outcomes.iter().map(|outcome| (of_total(outcome), outcome)));
+    let mut totals: Vec<Total> = groups.iter().map(|(_, plots)| total(plots)).collect();
     totals.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
     totals
 }
 
+/// The total of some plots, at least one.
+fn total(plots: &[&PlotOutcome]) -> Total {
+    let mut sum = plots[0].clone();
+    plots[1..].iter().for_each(|plot| sum.add(plot));
+    let count = plots.len() as f64;
+    Total {
+        controller: sum.controller,
+        speed_km_h: sum.record.speed_km_h,
+        effect: sum.effect,
+        zones: sum.zones,
+        weeded_share: sum.weeded_share / count,
+        weedable_share: sum.weedable_share / count,
+        undamaged_share: sum.undamaged_share / count,
+        budget: sum.budget / count,
+        weeded_percent: Mean::of(&by_replication(plots)),
+        alarms: sum.alarms,
+    }
+}
+
 /// The weeded share of each replication in percent, its spacings together: a block each, so that they are independent.
 fn by_replication(plots: &[&PlotOutcome]) -> Vec<f64> {
-    let mut blocks: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
-    for plot in plots {
-        blocks.entry(plot.record.replication).or_default().push(100.0 * plot.weeded_share);
-    }
-    blocks.values().map(|shares| shares.iter().sum::<f64>() / shares.len() as f64).collect()
+    let blocks = grouped(plots.iter().map(|plot| (plot.record.replication, 100.0 * plot.weeded_share)));
+    blocks.iter().map(|(_, shares)| mean(shares)).collect()
 }

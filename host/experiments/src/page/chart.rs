@@ -4,6 +4,7 @@
 //! the page's style sheet replaces them for dark paper, and dashes the lines. Charts are drawn at twice their usual
 //! size on the page, because plotters works in whole pixels. Legends and titles are part of the page.
 
+use crate::table::short;
 use anyhow::{Context, Result};
 use plotters::coord::Shift;
 use plotters::element::{DynElement, IntoDynElement};
@@ -106,8 +107,8 @@ impl Chart<'_> {
                 .axis_style(AXIS.stroke_width(2))
                 .x_labels(6)
                 .y_labels(6)
-                .x_label_formatter(&|value| tick(*value))
-                .y_label_formatter(&|value| tick(*value))
+                .x_label_formatter(&|value| short(*value))
+                .y_label_formatter(&|value| short(*value))
                 .label_style(words.clone())
                 .x_desc(self.x_label)
                 .axis_desc_style(words)
@@ -179,13 +180,6 @@ impl Marker {
             Self::UpturnedTriangle => TriangleMarker::new(point, -tip, colour.filled()).into_dyn(),
         }
     }
-}
-
-/// A number at an axis, without the digits that come from counting in binary fractions.
-fn tick(value: f64) -> String {
-    let rounded = (value * 1e4).round() / 1e4;
-    // Minus zero is zero.
-    (rounded + 0.0).to_string().replace('-', "\u{2212}")
 }
 
 /// An SVG of this size with the drawing.

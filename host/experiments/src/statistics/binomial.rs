@@ -8,7 +8,7 @@
 //! is above 1, the true standard errors are larger by its root. The reported ones are those of R's binomial family,
 //! without this correction.
 
-use super::design::{Column, Design, NoModel, Remark};
+use super::design::{Column, Design, NoModel, Remark, matrix};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -87,8 +87,7 @@ impl BinomialModel {
             return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
         }
         let (columns, mut remarks) = design.columns()?;
-        let matrix = DMatrix::from_fn(counts.len(), columns.len(), |plot, column| columns[column].1[plot]);
-        let fit = fit(&matrix, counts).ok_or(NoModel::OneSided)?;
+        let fit = fit(&matrix(&columns), counts).ok_or(NoModel::OneSided)?;
         let share = all / of;
         let degrees_of_freedom = counts.len() - columns.len();
         let dispersion = pearson(counts, &fit.fitted) / degrees_of_freedom as f64;
@@ -127,18 +126,18 @@ fn fit(matrix: &DMatrix<f64>, counts: &[(u32, u32)]) -> Option<Fit> {
     let mut fitted: Vec<f64> = counts.iter().map(begin).collect();
     let (mut last, mut is_settled) = (f64::INFINITY, false);
     for _ in 0..STEPS {
-        let weight = |plot: usize| f64::from(counts[plot].1) * fitted[plot] * (1.0 - fitted[plot]);
-        let working = DVector::from_iterator(
-            counts.len(),
-            counts.iter().zip(&fitted).map(|((count, of), share)| {
-                let observed = f64::from(*count) / f64::from((*of).max(1));
-                (share / (1.0 - share)).ln() + (observed - share) / (share * (1.0 - share))
-            }),
-        );
-        let root = |plot: usize| weight(plot).sqrt();
+        let share = |plot: usize| (f64::from(counts[plot].0), f64::from(counts[plot].1), fitted[plot]);
+        let root = |plot: usize| {
+            let (_, of, share) = share(plot);
+            (of * share * (1.0 - share)).sqrt()
+        };
+        let working = DVector::from_fn(counts.len(), |plot, _| {
+            let (count, of, share) = share(plot);
+            let observed = count / of.max(1.0);
+            ((share / (1.0 - share)).ln() + (observed - share) / (share * (1.0 - share))) * root(plot)
+        });
         let weighted =
             DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |plot, column| matrix[(plot, column)] * root(plot));
-        let working = DVector::from_fn(counts.len(), |plot, _| working[plot] * root(plot));
         // By QR, which keeps digits that the normal equations lose.
         let parts = weighted.qr();
         let inverse = parts.r().try_inverse()?;
@@ -170,7 +169,6 @@ fn deviance(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
     counts.iter().zip(shares).map(of_plot).sum()
 }
 
-/// Pearson's chi-square.
 fn pearson(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
     let of_plot = |((count, of), share): (&(u32, u32), &f64)| {
         let of = f64::from(*of);

@@ -10,12 +10,11 @@
 //! Normality of the residuals is not tested. A few dozen plots are too few for such a test, and means tolerate
 //! deviations.
 
-use super::design::{Design, is_zero, scatter};
+use super::design::{Design, is_zero, matrix};
 use super::linear::LinearModel;
-use nalgebra::DMatrix;
+use super::variance::{Fit, levels, levels_fit};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
-use std::collections::BTreeMap;
 
 /// A coefficient counts as an effect, and a check has a finding, if the p-value is below this.
 pub(crate) const SIGNIFICANCE: f64 = 0.05;
@@ -48,23 +47,20 @@ impl Checks {
     /// The findings, a sentence each. `name` is the measure's.
     pub fn sentences(&self, name: &str) -> Vec<String> {
         let mut said = Vec::new();
-        let is_found = |p: &f64| *p < SIGNIFICANCE;
-        if let Some(p) = self.lack_of_fit_p.filter(is_found) {
+        let found = |p: Option<f64>| p.filter(|p| *p < SIGNIFICANCE).map(probability);
+        if let Some(p) = found(self.lack_of_fit_p) {
             said.push(format!(
-                "{name} does not follow straight lines ({}): go by the treatments' means, not by the slopes.",
-                probability(p)
+                "{name} does not follow straight lines ({p}): go by the treatments' means, not by the slopes."
             ));
         }
-        if let Some(p) = self.unequal_scatter_p.filter(is_found) {
+        if let Some(p) = found(self.unequal_scatter_p) {
             said.push(format!(
-                "{name} scatters more at some speeds or spacings than at others ({}): its p-values are too small.",
-                probability(p)
+                "{name} scatters more at some speeds or spacings than at others ({p}): its p-values are too small."
             ));
         }
-        if let Some((plot, p)) = self.farthest.filter(|(_, p)| is_found(p)) {
+        if let Some((plot, p)) = self.farthest.and_then(|(plot, p)| Some((plot, found(Some(p))?))) {
             said.push(format!(
-                "Plot {plot} is farther from the model than chance explains ({}): check what happened there.",
-                probability(p)
+                "Plot {plot} is farther from the model than chance explains ({p}): check what happened there."
             ));
         }
         let made = [self.lack_of_fit_p, self.unequal_scatter_p, self.farthest.map(|(_, p)| p)];
@@ -83,14 +79,9 @@ pub(crate) fn probability(p: f64) -> String {
 }
 
 fn lack_of_fit(design: &Design, values: &[f64], model: &LinearModel) -> Option<f64> {
-    let mut of_treatments: BTreeMap<(u64, u64), Vec<f64>> = BTreeMap::new();
-    for (plot, value) in values.iter().enumerate() {
-        let treatment = (design.speeds_km_h[plot].to_bits(), design.spacings_cm[plot].to_bits());
-        of_treatments.entry(treatment).or_default().push(*value);
-    }
-    let pure: f64 = of_treatments.values().map(|values| scatter(values)).sum();
-    let pure_freedom = values.len().checked_sub(of_treatments.len()).filter(|freedom| *freedom > 0)?;
-    let lack_freedom = of_treatments.len().checked_sub(model.terms.len()).filter(|freedom| *freedom > 0)?;
+    let Fit { parameters: treatments, sum_of_squares: pure } = levels_fit(&levels(design.treatments()), values);
+    let pure_freedom = values.len().checked_sub(treatments).filter(|freedom| *freedom > 0)?;
+    let lack_freedom = treatments.checked_sub(model.terms.len()).filter(|freedom| *freedom > 0)?;
     if is_zero(pure, values) {
         return None;
     }
@@ -108,8 +99,7 @@ fn unequal_scatter(design: &Design, model: &LinearModel) -> Option<f64> {
 
 fn farthest(design: &Design, model: &LinearModel) -> Option<(usize, f64)> {
     let (columns, _) = design.columns().ok()?;
-    let plots = design.plots();
-    let matrix = DMatrix::from_fn(plots, columns.len(), |plot, column| columns[column].1[plot]);
+    let matrix = matrix(&columns);
     let inverse = (matrix.transpose() * &matrix).try_inverse()?;
     let freedom = model.degrees_of_freedom.checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
     let residual: f64 = model.residuals.iter().map(|residual| residual * residual).sum();
@@ -122,5 +112,5 @@ fn farthest(design: &Design, model: &LinearModel) -> Option<(usize, f64)> {
     });
     let (plot, t) = of_plots.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let alone = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
-    Some((plot, (alone * plots as f64).min(1.0)))
+    Some((plot, (alone * design.plots() as f64).min(1.0)))
 }

@@ -1,5 +1,6 @@
 //! The design of a trial: the factors of each plot, the columns of a model, and the reasons why there may be no model.
 
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -26,6 +27,11 @@ impl Design {
     pub fn in_blocks(self, blocks: Vec<u32>) -> Self {
         assert_eq!(blocks.len(), self.plots(), "each plot lies in a block");
         Self { blocks, ..self }
+    }
+
+    /// The speed and the spacing of each plot.
+    pub(super) fn treatments(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.speeds_km_h.iter().copied().zip(self.spacings_cm.iter().copied())
     }
 
     /// How many plots there are.
@@ -62,6 +68,12 @@ impl Design {
 
 /// A model's column: its name, and its value in each plot.
 pub(super) type Column = (&'static str, Vec<f64>);
+
+/// The columns as a matrix, with a row for each plot.
+pub(super) fn matrix(columns: &[Column]) -> DMatrix<f64> {
+    let columns: Vec<DVector<f64>> = columns.iter().map(|(_, values)| DVector::from_row_slice(values)).collect();
+    DMatrix::from_columns(&columns)
+}
 
 /// The plots carry no model.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Serialize)]
@@ -138,8 +150,20 @@ pub(super) fn is_zero(sum_of_squares: f64, values: &[f64]) -> bool {
     sum_of_squares <= ROUNDING * values.iter().map(|value| value * value).sum::<f64>()
 }
 
+/// The items of each key, in the order in which the keys first occur.
+pub(crate) fn grouped<K: PartialEq, T>(items: impl IntoIterator<Item = (K, T)>) -> Vec<(K, Vec<T>)> {
+    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
+    for (key, item) in items {
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, group)) => group.push(item),
+            None => groups.push((key, vec![item])),
+        }
+    }
+    groups
+}
+
 /// The mean; of no values, zero.
-pub(super) fn mean(values: &[f64]) -> f64 {
+pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
@@ -149,7 +173,6 @@ pub(super) fn scatter(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum()
 }
 
-/// Whether values differ at all.
 pub(super) fn varies(values: &[f64]) -> bool {
     values.windows(2).any(|pair| pair[0] != pair[1])
 }

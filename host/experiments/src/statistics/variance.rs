@@ -5,7 +5,7 @@
 //! spacing; and of block and treatment. A source's sum of squares is the difference between the residuals of its model
 //! and of the one before. Without blocks the first model is left out.
 
-use super::design::{Design, NoModel, Remark, is_zero, mean, scatter, varies};
+use super::design::{Design, NoModel, Remark, grouped, is_zero, mean, scatter, varies};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -38,9 +38,9 @@ pub struct AnalysisOfVariance {
 
 /// The residual of a model.
 #[derive(Clone, Copy)]
-struct Fit {
-    parameters: usize,
-    sum_of_squares: f64,
+pub(super) struct Fit {
+    pub parameters: usize,
+    pub sum_of_squares: f64,
 }
 
 impl AnalysisOfVariance {
@@ -57,17 +57,15 @@ impl AnalysisOfVariance {
             return Err(NoModel::Constant { value: mean(values) });
         }
         let (has_speed, has_spacing) = (varies(&design.speeds_km_h), varies(&design.spacings_cm));
-        let speeds = Levels::of(design.speeds_km_h.iter().map(|speed| (*speed, 0.0)));
-        let spacings = Levels::of(design.spacings_cm.iter().map(|spacing| (0.0, *spacing)));
-        let treatments = Levels::of(design.speeds_km_h.iter().copied().zip(design.spacings_cm.iter().copied()));
+        let (speeds, spacings) = (levels(&design.speeds_km_h), levels(&design.spacings_cm));
+        let (treatments, blocks) = (levels(design.treatments()), levels(&design.blocks));
 
-        let blocks = Levels::of(design.blocks.iter().map(|block| (f64::from(*block), 0.0)));
         let mut remarks = Vec::new();
         let mut in_blocks: Vec<&Levels> = Vec::new();
-        if blocks.count > 1 {
-            in_blocks.push(&blocks);
-            if additive_fit(&[&blocks, &treatments], values).parameters >= values.len() {
-                in_blocks.clear();
+        if blocks.len() > 1 {
+            if additive_fit(&[&blocks, &treatments], values).parameters < values.len() {
+                in_blocks.push(&blocks);
+            } else {
                 remarks.push(Remark::NoBlocks);
             }
         }
@@ -102,7 +100,8 @@ impl AnalysisOfVariance {
             } else if each.parameters > both {
                 fits.push(("speed x spacing", each));
             }
-            if !treatments.are_balanced(speeds.count * spacings.count) {
+            let is_complete = treatments.len() == speeds.len() * spacings.len();
+            if !is_complete || treatments.iter().any(|plots| plots.len() != treatments[0].len()) {
                 remarks.push(Remark::Unbalanced);
             }
         }
@@ -138,38 +137,14 @@ impl AnalysisOfVariance {
         });
         Ok(Self { sources, remarks })
     }
-
-    /// The source with this name, if the analysis has it.
-    pub fn source(&self, name: &str) -> Option<&Source> {
-        self.sources.iter().find(|source| source.name == name)
-    }
 }
 
-/// The level of a factor that each plot has.
-struct Levels {
-    of_plot: Vec<usize>,
-    count: usize,
-}
+/// The plots of each level of a factor.
+pub(super) type Levels = Vec<Vec<usize>>;
 
-impl Levels {
-    /// The levels of the plots' factors.
-    fn of(plots: impl Iterator<Item = (f64, f64)>) -> Self {
-        let mut known: Vec<(f64, f64)> = Vec::new();
-        let of_plot = plots.map(|plot| {
-            known.iter().position(|level| *level == plot).unwrap_or_else(|| {
-                known.push(plot);
-                known.len() - 1
-            })
-        });
-        let of_plot = of_plot.collect();
-        Self { of_plot, count: known.len() }
-    }
-
-    /// Whether there are `count` levels, with equal numbers of plots.
-    fn are_balanced(&self, count: usize) -> bool {
-        let plots = |level| self.of_plot.iter().filter(|of_plot| **of_plot == level).count();
-        self.count == count && (1..count).all(|level| plots(level) == plots(0))
-    }
+/// The levels of a factor, from its value in each plot.
+pub(super) fn levels<K: PartialEq>(plots: impl IntoIterator<Item = K>) -> Levels {
+    grouped(plots.into_iter().zip(0..)).into_iter().map(|(_, plots)| plots).collect()
 }
 
 /// Effects of some factors that add up.
@@ -183,12 +158,9 @@ fn additive_fit(factors: &[&Levels], values: &[f64]) -> Fit {
     let mean = mean(values);
     let response = DVector::from_iterator(values.len(), values.iter().map(|value| value - mean));
     // A column for each level of each factor: more than needed. The singular values show the rank.
-    let columns: Vec<(&Levels, usize)> =
-        factors.iter().flat_map(|levels| (0..levels.count).map(move |level| (*levels, level))).collect();
-    let matrix = DMatrix::from_fn(values.len(), columns.len(), |plot, column| {
-        let (levels, level) = columns[column];
-        f64::from(levels.of_plot[plot] == level)
-    });
+    let columns: Vec<&Vec<usize>> = factors.iter().copied().flatten().collect();
+    let matrix =
+        DMatrix::from_fn(values.len(), columns.len(), |plot, column| f64::from(columns[column].contains(&plot)));
     let decomposition = matrix.svd(true, false);
     let smallest = decomposition.singular_values.max() * TOLERANCE;
     let mut residual = response.clone();
@@ -202,10 +174,7 @@ fn additive_fit(factors: &[&Levels], values: &[f64]) -> Fit {
 }
 
 /// A mean for each level.
-fn levels_fit(levels: &Levels, values: &[f64]) -> Fit {
-    let of_level = |level: usize| -> Vec<f64> {
-        let both = levels.of_plot.iter().zip(values);
-        both.filter(|(of_plot, _)| **of_plot == level).map(|(_, value)| *value).collect()
-    };
-    Fit { parameters: levels.count, sum_of_squares: (0..levels.count).map(|level| scatter(&of_level(level))).sum() }
+pub(super) fn levels_fit(levels: &Levels, values: &[f64]) -> Fit {
+    let of_level = |plots: &Vec<usize>| plots.iter().map(|&plot| values[plot]).collect::<Vec<f64>>();
+    Fit { parameters: levels.len(), sum_of_squares: levels.iter().map(|plots| scatter(&of_level(plots))).sum() }
 }

@@ -10,39 +10,30 @@ use trial::report::number_table;
 
 /// How many detections of each kind were classified as each class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Confusion {
-    plants: Counts,
-    weeds: Counts,
-}
+pub struct Confusion([[usize; CLASSES.len()]; 2]);
 
-/// Objects of one kind: those classified as a plant, the unknown ones, and those classified as a weed.
-type Counts = [usize; 3];
+/// All classes.
+const CLASSES: [Class; 3] = [Class::Plant, Class::Unknown, Class::Weed];
 
 impl FromIterator<(Kind, Class)> for Confusion {
     fn from_iter<I: IntoIterator<Item = (Kind, Class)>>(classified: I) -> Self {
         let mut confusion = Self::default();
         for (kind, class) in classified {
-            let counts = match kind {
-                Kind::Plant => &mut confusion.plants,
-                Kind::Weed => &mut confusion.weeds,
-            };
-            counts[match class {
-                Class::Plant => 0,
-                Class::Unknown => 1,
-                Class::Weed => 2,
-            }] += 1;
+            confusion.0[kind as usize][class as usize] += 1;
         }
         confusion
     }
 }
 
 impl Confusion {
+    /// The detections of a kind that were classified as a class.
+    fn of(&self, kind: Kind, class: Class) -> usize {
+        self.0[kind as usize][class as usize]
+    }
+
     /// The objects of a kind.
     pub fn count(&self, kind: Kind) -> usize {
-        match kind {
-            Kind::Plant => self.plants.iter().sum(),
-            Kind::Weed => self.weeds.iter().sum(),
-        }
+        self.0[kind as usize].iter().sum()
     }
 
     /// All objects.
@@ -52,17 +43,17 @@ impl Confusion {
 
     /// Plants that the machine would cut.
     pub fn plants_taken_for_weeds(&self) -> usize {
-        self.plants[2]
+        self.of(Kind::Plant, Class::Weed)
     }
 
     /// Weeds that the machine would spare, including unknown ones.
     pub fn weeds_taken_for_plants(&self) -> usize {
-        self.weeds[0] + self.weeds[1]
+        self.of(Kind::Weed, Class::Plant) + self.of(Kind::Weed, Class::Unknown)
     }
 
     /// Plants that are spared because they are unknown.
     pub fn plants_unknown(&self) -> usize {
-        self.plants[1]
+        self.of(Kind::Plant, Class::Unknown)
     }
 
     /// Share of detections that the machine treats correctly, from 0 to 1.
@@ -79,8 +70,9 @@ impl Confusion {
 impl fmt::Display for Confusion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut table = number_table(["", "classified as\nplant", "\nunknown", "classified as\nweed"], 1);
-        for (name, counts) in [("plants", self.plants), ("weeds", self.weeds)] {
-            table.add_row([name.to_owned()].into_iter().chain(counts.map(|count| count.to_string())));
+        for (name, kind) in [("plants", Kind::Plant), ("weeds", Kind::Weed)] {
+            let counts = CLASSES.map(|class| self.of(kind, class).to_string());
+            table.add_row([name.to_owned()].into_iter().chain(counts));
         }
         writeln!(f, "{table}")?;
         let percent = |part: usize, total: usize| format!("{part} of {total}, {:.2} %", 100.0 * share(part, total));

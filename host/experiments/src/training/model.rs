@@ -3,13 +3,14 @@
 use super::confusion::Confusion;
 use super::table::Recorded;
 use super::{Labelled, label_of};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table};
 use control::ground::{
     class::{Class, label},
     examples,
     features::{COUNT, Features},
 };
 use knn::{Answer, ClassifyError, Example, Scale, classify};
+use trial::report::number_table;
 
 /// The machine's class for a classifier's answer.
 pub const fn class_of<const CLASSES: usize>(answer: &Answer<CLASSES>) -> Class {
@@ -57,8 +58,7 @@ impl Model {
     /// # Errors
     /// If k does not suit the number of examples.
     pub fn table(&self, objects: &[Recorded]) -> Result<Table, ClassifyError> {
-        let mut table = Table::new();
-        table.load_style(presets::UTF8_BORDERS_ONLY).set_header([
+        let header = [
             "object",
             "speed\nmm/s",
             "spacing\nmm",
@@ -69,7 +69,8 @@ impl Model {
             "nearest\nsquared",
             "kind",
             "label",
-        ]);
+        ];
+        let mut table = number_table(header, 0);
         for (index, Recorded { features, kind }) in objects.iter().enumerate() {
             let answer = self.answer(features)?;
             table.add_row([
@@ -86,8 +87,8 @@ impl Model {
             ]);
         }
         for (index, column) in table.column_iter_mut().enumerate() {
-            if !matches!(index, 4 | 8 | 9) {
-                column.set_cell_alignment(CellAlignment::Right);
+            if matches!(index, 4 | 8 | 9) {
+                column.set_cell_alignment(CellAlignment::Left);
             }
         }
         Ok(table)

@@ -10,8 +10,8 @@
 
 use super::Labelled;
 use anyhow::{Result, ensure};
-use control::ground::class::{Class, Classifier, ExamplesFull, Listed, Vote};
-use control::ground::features::{self, Features, SPEED_CLASSES_MM_S};
+use control::ground::class::{Class, Classifier, Vote};
+use control::ground::features::{Features, SPEED_CLASSES_MM_S};
 use control::measure::readings::Readings;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
@@ -23,7 +23,6 @@ use field::planting::Planting;
 use field::row::{Kind, Row, Thing};
 use field::trial::Trial;
 use field::verdict::Timing;
-use knn::Example;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::Rig;
@@ -56,32 +55,32 @@ pub struct Crop {
     pub weed_widths_mm: RangeInclusive<f64>,
 }
 
+/// The paper's crop.
+const CHILLI: Crop = Crop {
+    name: "chilli",
+    speeds_mm_s: &SPEED_CLASSES_MM_S,
+    spacings_mm: [500.0, 600.0],
+    spacing_scatter_mm: 50.0,
+    canopy_mm: 140.0,
+    canopy_scatter_mm: 40.0,
+    is_ragged: true,
+    headlands_mm: &[300.0],
+    passes: 12,
+    weed_widths_mm: 12.0..=20.0,
+};
+
 /// The crops, the paper's first. Only the paper's spacings are measured; all else is assumed.
 pub const CROPS: [Crop; 3] = [
-    Crop {
-        name: "chilli",
-        speeds_mm_s: &SPEED_CLASSES_MM_S,
-        spacings_mm: [500.0, 600.0],
-        spacing_scatter_mm: 50.0,
-        canopy_mm: 140.0,
-        canopy_scatter_mm: 40.0,
-        is_ragged: true,
-        headlands_mm: &[300.0],
-        passes: 12,
-        weed_widths_mm: 12.0..=20.0,
-    },
+    CHILLI,
     // Heads some weeks after transplanting.
     Crop {
         name: "broccoli",
-        speeds_mm_s: &SPEED_CLASSES_MM_S,
         spacings_mm: [400.0, 500.0],
         spacing_scatter_mm: 40.0,
         canopy_mm: 220.0,
         canopy_scatter_mm: 60.0,
-        is_ragged: true,
-        headlands_mm: &[300.0],
-        passes: 12,
         weed_widths_mm: 12.0..=30.0,
+        ..CHILLI
     },
     // Stalks below their leaves, and narrower grasses. Above 1.25 km/h so narrow a spacing leaves the tool no time.
     Crop {
@@ -181,15 +180,13 @@ fn grow(crop: &Crop, spacing_mm: f64, headland_mm: f64, ragged: bool, rng: &mut 
     Ok(Row::new(things)?)
 }
 
-/// Records the features that the controller asks about, and answers with the true class.
+/// Records the features that the controller asks about, and answers with the true class. It can be taught nothing.
 struct Recorder<'a> {
     row: &'a Row,
     seen: RefCell<Vec<Labelled>>,
 }
 
 impl Classifier for &Recorder<'_> {
-    fn init(&mut self) {}
-
     fn classify(&self, features: &Features, _k: u8) -> Vote {
         let mut seen = self.seen.borrow_mut();
         // Surplus detections are an error at the end.
@@ -200,36 +197,6 @@ impl Classifier for &Recorder<'_> {
             Kind::Weed => Class::Weed,
         };
         Vote { class, votes: 0 }
-    }
-
-    // It knows the true classes, so it can be taught nothing.
-
-    fn built_in_class(&mut self, _: &Features) -> Class {
-        Class::Unknown
-    }
-
-    fn teach(&mut self, _features: &Features, _label: u8) -> Result<(), ExamplesFull> {
-        Err(ExamplesFull)
-    }
-
-    fn keep(&mut self, _: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
-        Err(ExamplesFull)
-    }
-
-    fn forget(&mut self, _number: u8) -> bool {
-        false
-    }
-
-    fn listed(&self, _place: u8) -> Option<(Listed, u8)> {
-        None
-    }
-
-    fn spoiled(&self) -> u8 {
-        0
-    }
-
-    fn carry_on(&mut self) -> bool {
-        true
     }
 }
 

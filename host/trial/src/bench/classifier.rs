@@ -3,13 +3,13 @@
 //! The bench (`bench/` in the workspace) raises D13 around each call, so the cycles between the edges are exact. It
 //! also compares every answer of the search in flash with a plain search. If they differ, no figure is returned.
 
+use crate::run::PROGRESS_CYCLES;
 use anyhow::{Context, Result, bail, ensure};
 use field::wiring;
 use knn_bench::{QUERIES, Task};
 use serde::Serialize;
 use std::path::Path;
-use uno::CYCLES_PER_SECOND;
-use uno::Uno;
+use uno::{CYCLES_PER_SECOND, Uno};
 
 /// Cycles that D13 is high in addition to the call: the instruction that raises it (`sbi`, 2).
 const EDGE_CYCLES: u64 = 2;
@@ -19,9 +19,6 @@ const BENCH_CYCLES: u64 = 20 * CYCLES_PER_SECOND;
 
 /// The advice for a wrong ELF.
 const RIGHT_ELF: &str = "run the ELF that `cargo bench-firmware` makes";
-
-/// Simulated time between two reports of progress.
-const PROGRESS_CYCLES: u64 = CYCLES_PER_SECOND / 20;
 
 /// Cycles of the calls of one task.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -20,13 +20,13 @@ use super::load::{EDGE_CYCLES, Telemetry, flicker};
 use crate::console::{ConsoleError, Status, ask};
 use crate::run;
 use anyhow::Result;
+use field::machine::encoder_edge;
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::path::Path;
-use uno::{CYCLES_PER_SECOND, PinChange};
-use uno::{Place, SENT_BYTE_CYCLES, Uno};
+use uno::{CYCLES_PER_SECOND, PinChange, Place, SENT_BYTE_CYCLES, Uno};
 
 /// Fewest counts of a trial: the count's second byte changes more than a hundred times.
 const FEWEST_COUNTS: f64 = 40_000.0;
@@ -126,13 +126,11 @@ pub fn turn(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<Counted> 
     let end = begin + (f64::from(counts) * step_cycles).ceil() as u64;
     uno.drive(edges(turning, step_cycles, begin).take(counts as usize));
     let mut telemetry = Telemetry::default();
-    match turning.load {
-        Load::Idle => uno.run_until(end)?,
-        Load::Telemetry => {
-            uno.drive(flicker(begin, end));
-            telemetry.run_until(&mut uno, end)?;
-        }
+    if turning.load == Load::Telemetry {
+        uno.drive(flicker(begin, end));
+        telemetry.run_until(&mut uno, end)?;
     }
+    uno.run_until(end)?;
     let line_share = telemetry.line_share(end - begin);
     counted(&mut uno, turning, counts.into(), line_share)
 }
@@ -183,9 +181,12 @@ pub fn turn_at_worst(elf: &Path, turning: Turning, counts_per_s: f64) -> Result<
     let step_cycles = CYCLES_PER_SECOND as f64 / counts_per_s;
     let begin = uno.cycle();
     let end = begin + WORST_CYCLES;
-    let mut world = World::new(turning.load, begin);
+    let telemetry = Telemetry::default();
+    let byte_after = begin + SENT_BYTE_CYCLES;
+    let mut world = World { load: turning.load, telemetry, beam: true, beam_after: begin, byte_after };
     // A slow first edge. Its direction lets the firmware resolve a jump.
-    uno.set(nth_edge(turning.direction, 0).pin, nth_edge(turning.direction, 0).high);
+    let PinChange { pin, high, .. } = nth_edge(turning.direction, 0);
+    uno.set(pin, high);
     uno.run_for_ms(1)?;
     // A real wheel accelerates gradually. Without a run-up the firmware would take the jumps for noise.
     let run_up = uno.cycle();
@@ -231,11 +232,6 @@ struct World {
 }
 
 impl World {
-    fn new(load: Load, begin: u64) -> Self {
-        let line = begin + SENT_BYTE_CYCLES;
-        Self { load, telemetry: Telemetry::default(), beam: true, beam_after: begin, byte_after: line }
-    }
-
     /// Runs until a handler begins or the loop is about to turn interrupts off. Returns the cycle of the handler's entry.
     /// After `sections` critical sections it causes another interrupt.
     fn worst_moment(&mut self, uno: &mut Uno, mut sections: u32) -> Result<u64> {
@@ -283,15 +279,13 @@ pub(super) fn edges(turning: Turning, step_cycles: f64, begin: u64) -> impl Iter
     })
 }
 
-/// Pin and level of an edge, counted from 0.
+/// An edge, counted from 0. Its cycle is 0.
 fn nth_edge(direction: Direction, number: u32) -> PinChange {
-    // Forward, A leads B; backward, B leads A.
-    let (first, second) = match direction {
-        Direction::Forward => (wiring::ENCODER_A, wiring::ENCODER_B),
-        Direction::Backward => (wiring::ENCODER_B, wiring::ENCODER_A),
-    };
-    let pin = if number.is_multiple_of(2) { first } else { second };
-    PinChange { cycle: 0, pin, high: number % 4 < 2 }
+    let number = i64::from(number);
+    match direction {
+        Direction::Forward => encoder_edge(0, number, number + 1),
+        Direction::Backward => encoder_edge(0, -number, -number - 1),
+    }
 }
 
 /// The highest rate without a lost count.

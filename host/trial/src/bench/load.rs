@@ -3,8 +3,7 @@
 use field::wiring;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use uno::{CYCLES_PER_SECOND, PinChange};
-use uno::{ReceivedByte, Uno, UnoError};
+use uno::{CYCLES_PER_SECOND, PinChange, ReceivedByte, Uno, UnoError};
 
 /// Bits of a byte on the line: its data, a start bit and a stop bit.
 const BITS_PER_BYTE: u64 = 10;

@@ -73,11 +73,6 @@ impl Lateness {
     pub fn mean_ticks(&self) -> f64 {
         self.errors_ticks.iter().map(|error| error.abs()).sum::<f64>() / self.errors_ticks.len() as f64
     }
-
-    /// Converts a distance to the travel time of the machine, in milliseconds.
-    pub fn milliseconds(&self, ticks: f64) -> f64 {
-        ticks / self.ticks_per_s * 1000.0
-    }
 }
 
 /// A short row for each seed: three or four plants, with tall weeds between them if there is room.

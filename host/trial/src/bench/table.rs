@@ -124,13 +124,7 @@ fn beside(theirs: String, ratio: f64) -> String {
 
 /// A whole number with a comma every three digits.
 fn thousands(number: f64) -> String {
-    let digits = format!("{number:.0}");
-    let mut grouped = String::with_capacity(digits.len() + digits.len() / 3);
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            grouped.push(',');
-        }
-        grouped.push(digit);
-    }
-    grouped
+    let backwards: Vec<char> = format!("{number:.0}").chars().rev().collect();
+    let groups: Vec<String> = backwards.chunks(3).map(String::from_iter).collect();
+    groups.join(",").chars().rev().collect()
 }
