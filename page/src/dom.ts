@@ -40,12 +40,13 @@ export class Parts {
     write(name: string, text: string): void {
         const element = this.html(name);
         show(element);
-        if (element.textContent !== text) element.textContent = text;
+        const shown = plain(text);
+        if (element.textContent !== shown) element.textContent = shown;
     }
 
     /** Sets an element's text, and sets it again after a change of language. */
     say(name: string, text: () => string): void {
-        show(this.html(name), text);
+        show(this.html(name), () => plain(text()));
     }
 
     /** Waits for work, and shows that it is done, or its error. Returns the error, if any. */
@@ -65,6 +66,9 @@ export class Parts {
         }
     }
 }
+
+/** A text as the page shows it: without the backticks around commands. */
+export const plain = (text: string): string => text.replaceAll("`", "");
 
 /** A new element with a class and children. */
 export function make<Name extends keyof HTMLElementTagNameMap>(

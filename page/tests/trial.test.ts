@@ -86,7 +86,7 @@ test("a row that the real firmware weeds has no plant damaged and no margin cut,
     assert(left.length > 0 && left.every(([number]) => losses.below.get(number) !== "weeded"), why);
     assert.match(
         why,
-        /^Left: \d+ (beside a plant|where the tool swung|taken for a plant).* Of the ground: (2[5-9]|[3-9]\d)% weeded, /,
+        /^Left: \d+ (beside a plant|where the tool swung|classified as a plant).* Of the ground: (2[5-9]|[3-9]\d)% weeded, /,
     );
 });
 

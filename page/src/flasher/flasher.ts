@@ -117,10 +117,6 @@ export class Flasher {
     #say(kind: "done" | "failed" | "", text: () => string): void {
         const said = this.parts.html("flash-said");
         said.className = kind;
-        // Commands are printed between backticks.
-        show(said, () => {
-            const plain = text().replaceAll("`", "");
-            return plain === "" ? "" : sentence(plain);
-        });
+        show(said, () => (text() === "" ? "" : sentence(text())));
     }
 }

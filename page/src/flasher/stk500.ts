@@ -189,10 +189,7 @@ export class Bootloader {
         await this.line.write(Uint8Array.of(...bytes, CRC_EOP));
         const answer = await this.#take(answerBytes + 2, ANSWER_MS);
         if (answer?.[0] === INSYNC && answer.at(-1) === OK) return answer.slice(1, -1);
-        throw new FlashError(
-            "the bootloader fell silent: flash it again, which loses nothing. If it stays silent, try another cable, " +
-                "and pull D0 and D1 free of other devices",
-        );
+        throw new FlashError(english("fellSilent"));
     }
 
     /** The next bytes; undefined if they do not come in time. */

@@ -101,7 +101,7 @@ export class Connection {
     }
 
     #say(text: () => string): void {
-        this.parts.say("connection-said", () => text().replaceAll("`", ""));
+        this.parts.say("connection-said", text);
     }
 
     #show(): void {

@@ -1,6 +1,7 @@
 // The state of the machine at the other end of the wire, updated by events, with its texts for the operator.
 
 import faults from "faults.json";
+import { plain } from "../dom.ts";
 import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
@@ -198,8 +199,8 @@ export class Machine {
     }
 }
 
-/** A text as a sentence, its commands as they are typed. */
+/** A text as a sentence. */
 export function sentence(text: string): string {
-    const plain = text.replaceAll("`", "");
-    return `${plain.charAt(0).toUpperCase()}${plain.slice(1)}${/[.!?।]$/.test(plain) ? "" : "."}`;
+    const shown = plain(text);
+    return `${shown.charAt(0).toUpperCase()}${shown.slice(1)}${/[.!?।]$/.test(shown) ? "" : "."}`;
 }

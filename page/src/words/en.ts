@@ -370,6 +370,8 @@ export const en = {
         tooLarge:
             "the firmware takes {bytes} bytes, and this board's bootloader leaves {room}: give it the Uno's bootloader, which is smaller",
         goneMidway: "{why}, and flash it again: half a firmware does not run, and the bootloader is still there",
+        fellSilent:
+            "the bootloader does not answer any more: flash it again, which loses nothing. If it stays silent, try another cable, and pull D0 and D1 free of other devices",
         readsBack:
             "byte {at} reads back as {found}, and {written} was written: flash it again; where it stays so, see to the cable and the supply, else the chip's flash is worn out",
         firmwareAnswers:

@@ -363,6 +363,8 @@ export const es: Language = {
         tooLarge:
             "el firmware ocupa {bytes} bytes, y el cargador de esta placa deja {room}: dele el cargador del Uno, que es más pequeño",
         goneMidway: "{why}, y grábelo otra vez: medio firmware no funciona, y el cargador sigue ahí",
+        fellSilent:
+            "el cargador ya no responde: grábelo otra vez, no se pierde nada. Si sigue sin responder, pruebe otro cable y deje D0 y D1 libres de otros dispositivos",
         readsBack:
             "el byte {at} se lee como {found}, y se escribió {written}: grábelo otra vez; si sigue así, revise el cable y la " +
             "alimentación, o la flash del chip está gastada",

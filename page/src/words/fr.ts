@@ -361,6 +361,8 @@ export const fr: Language = {
         tooLarge:
             "le micrologiciel prend {bytes} octets, et le chargeur de cette carte en laisse {room} : donnez-lui le chargeur de l'Uno, plus petit",
         goneMidway: "{why}, et reflashez : la moitié d'un micrologiciel ne tourne pas, et le chargeur est toujours là",
+        fellSilent:
+            "le chargeur ne répond plus : reflashez, rien n'est perdu. S'il reste muet, essayez un autre câble, et libérez D0 et D1 d'autres appareils",
         readsBack:
             "l'octet {at} se relit {found}, et {written} a été écrit : reflashez ; si cela dure, vérifiez le câble et " +
             "l'alimentation, sinon la flash de la puce est usée",
