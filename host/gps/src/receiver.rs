@@ -365,46 +365,30 @@ impl Receiver {
 mod tests {
     use super::*;
     use crate::plane::{Metres, Plane};
+    use crate::sentence::framed;
+    use crate::simulated;
     use proptest::prelude::*;
 
-    /// A day's midnight from 1970, the 31st of December 2026, and its date as sentences have it.
-    const DAYS: [(i64, &str); 2] = [(20_818, "311226"), (20_819, "010127")];
+    /// The 31st of December 2026, in days from 1970.
+    const DAY: i64 = 20_818;
 
-    fn sentence(text: &str) -> String {
-        format!("${text}*{:02X}", text.bytes().fold(0, |sum, byte| sum ^ byte))
-    }
-
-    fn angle(degrees: f64, digits: usize, sides: [&str; 2]) -> String {
-        // Whole ten millionths of a minute, so that no result is sixty minutes.
-        let units = (degrees.abs() * 60e7).round() as u64;
-        let (whole, minutes) = (units / 600_000_000, (units % 600_000_000) as f64 / 1e7);
-        format!("{whole:0digits$}{minutes:010.7},{}", sides[usize::from(degrees < 0.0)])
-    }
-
-    fn coordinates(place: Place) -> String {
-        format!("{},{}", angle(place.latitude, 2, ["N", "S"]), angle(place.longitude, 3, ["E", "W"]))
-    }
-
-    fn clock(utc_ms: i64) -> String {
-        let ms = utc_ms.rem_euclid(DAY_MS);
-        format!("{:02}{:02}{:02}.{:03}", ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000)
-    }
+    const FIELD: Place = Place { latitude: 52.1, longitude: 8.5 };
 
     fn gga(utc_ms: i64, place: Place) -> String {
-        sentence(&format!("GPGGA,{},{},4,12,0.7,10.0,M,0.0,M,,", clock(utc_ms), coordinates(place)))
+        framed(&simulated::gga(utc_ms, Some((place, Quality::Rtk))))
     }
 
-    fn rmc(utc_ms: i64, place: Place, date: &str) -> String {
-        sentence(&format!("GPRMC,{},A,{},1.0,90.0,{date},,,A", clock(utc_ms), coordinates(place)))
+    fn rmc(utc_ms: i64, place: Place) -> String {
+        framed(&simulated::rmc(utc_ms, Some((place, Quality::Rtk))))
     }
 
-    /// A receiver that rolls half a metre a second to the east of a position. It sends a fix once a second from a time
-    /// of day on.
+    /// A receiver that rolls half a metre a second to the east of a position. It sends a fix once a second from a
+    /// moment on. `change` gets the number of each second and its two lines.
     fn rolling(
         from: Place,
         start_ms: i64,
         seconds: i64,
-        change: impl Fn(i64, String) -> Vec<String>,
+        change: impl Fn(i64, [String; 2]) -> [String; 2],
     ) -> (Vec<Heard>, Receiver) {
         let plane = Plane::around(from);
         let mut receiver = Receiver::new(None);
@@ -414,8 +398,7 @@ mod tests {
             let place = plane.place(Metres { east: 0.5 * second as f64, north: 0.0 });
             let time_ms = 1000.0 * second as f64;
             receiver.rolled(time_ms, 0.5 * second as f64, 500.0);
-            let (_, date) = DAYS[usize::from(utc_ms >= DAY_MS)];
-            for line in change(second, gga(utc_ms, place)).into_iter().chain(change(second, rmc(utc_ms, place, date))) {
+            for line in change(second, [gga(utc_ms, place), rmc(utc_ms, place)]) {
                 heard.push(receiver.take(time_ms + 80.0, &line));
             }
         }
@@ -431,23 +414,21 @@ mod tests {
         heard.iter().flat_map(|heard| &heard.marks).copied().collect()
     }
 
-    const FIELD: Place = Place { latitude: 52.1, longitude: 8.5 };
-
     proptest! {
         #[test]
         fn midnight_the_antimeridian_and_either_hemisphere_change_nothing(
             latitude in -80.0..80.0_f64, near in 0..4_usize, off in -0.0001..0.0001_f64, start_s in -30..30_i64,
         ) {
             let longitude = [180.0 - off.abs(), -180.0 + off.abs(), off, 100.0][near];
-            let start_ms = DAY_MS + 1000 * start_s;
-            let (heard, receiver) = rolling(Place { latitude, longitude }, start_ms, 40, |_, line| vec![line]);
+            let start_ms = (DAY + 1) * DAY_MS + 1000 * start_s;
+            let (heard, receiver) = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
             let fixes = fixes(&heard);
             prop_assert_eq!(fixes.len(), 40);
             prop_assert_eq!(receiver.counts(), Counts { fixes: 40, ..Counts::default() });
             prop_assert_eq!(marks(&heard), vec![Mark::Found(Quality::Rtk)]);
             let midnight_ms = receiver.midnight_ms().expect("RMC has a date");
             for (second, pair) in fixes.windows(2).enumerate() {
-                prop_assert_eq!(midnight_ms + pair[0].utc_ms, DAYS[0].0 * DAY_MS + start_ms + 1000 * second as i64);
+                prop_assert_eq!(midnight_ms + pair[0].utc_ms, start_ms + 1000 * second as i64);
                 let far_m = pair[0].place.distance_m(pair[1].place);
                 prop_assert!((far_m - 0.5).abs() < 1e-3, "{}", far_m);
                 prop_assert!((pair[1].time_ms - pair[0].time_ms - 1000.0).abs() < 1e-6);
@@ -458,7 +439,7 @@ mod tests {
         fn a_stream_that_is_cut_at_any_byte_has_no_wrong_fix(from in 0..4000_usize, to in 0..4000_usize) {
             let mut stream = String::new();
             for second in 0..20 {
-                stream += &format!("{}\r\n{}\r\n", gga(1000 * second, FIELD), rmc(1000 * second, FIELD, DAYS[0].1));
+                stream += &format!("{}\r\n{}\r\n", gga(1000 * second, FIELD), rmc(1000 * second, FIELD));
             }
             let (from, to) = (from % stream.len(), to % stream.len());
             let mut receiver = Receiver::new(None);
@@ -501,12 +482,9 @@ mod tests {
 
     #[test]
     fn a_lost_fix_is_marked_once_and_so_is_the_next_one() {
-        let lost = |second: i64, line: String| {
-            if (10..15).contains(&second) {
-                vec![sentence(&format!("GPRMC,{},V,,,,,,,311226,,,N", clock(1000 * second)))]
-            } else {
-                vec![line]
-            }
+        let lost = |second: i64, lines| {
+            let none = framed(&simulated::rmc(1000 * second, None));
+            if (10..15).contains(&second) { [none.clone(), none] } else { lines }
         };
         let (heard, receiver) = rolling(FIELD, 0, 30, lost);
         assert_eq!(marks(&heard), [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
@@ -516,15 +494,9 @@ mod tests {
     /// As [`rolling`], with the fixes of some seconds two metres off.
     fn off(seconds: std::ops::Range<i64>) -> (Vec<Heard>, Receiver) {
         let plane = Plane::around(FIELD);
-        rolling(FIELD, 0, 30, |second, line| {
+        rolling(FIELD, 0, 30, |second, lines| {
             let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
-            if !seconds.contains(&second) {
-                vec![line]
-            } else if line.contains("GGA") {
-                vec![gga(1000 * second, place)]
-            } else {
-                vec![rmc(1000 * second, place, DAYS[0].1)]
-            }
+            if seconds.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
         })
     }
 
@@ -550,7 +522,7 @@ mod tests {
     fn a_receiver_without_a_fix_from_the_beginning_is_marked_so() {
         let mut receiver = Receiver::new(None);
         let heard: Vec<Heard> =
-            (0..5).map(|second| receiver.take(1000.0 * f64::from(second), &sentence("GPRMC,,V,,,,,,,,,,N"))).collect();
+            (0..5).map(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N"))).collect();
         assert_eq!(marks(&heard), [Mark::Lost]);
         assert_eq!(receiver.midnight_ms(), None);
     }

@@ -4,6 +4,8 @@ use geojson::{FeatureCollection, GeometryValue};
 use gps::job::{Did, Thing, What};
 use gps::picture::Words;
 use gps::plane::{Metres, Place, Plane};
+use gps::sentence::{Quality, framed};
+use gps::simulated::gga;
 use gps::summary::{Stand, Summary};
 use gps::{Job, Wanted, map, picture};
 use link::Class;
@@ -16,22 +18,11 @@ const TICKS_A_MM: f64 = 2.0;
 /// The machine rolls so fast, in mm/s.
 const SPEED: f64 = 500.0;
 
+/// Noon, in milliseconds of a day.
+const NOON_MS: i64 = 43_200_000;
+
 /// The antenna's first position, near the 180th meridian.
 const FROM: Place = Place { latitude: -16.8, longitude: 179.999_9 };
-
-fn sentence(text: &str) -> String {
-    format!("${text}*{:02X}", text.bytes().fold(0, |sum, byte| sum ^ byte))
-}
-
-fn gga(time_ms: u64, place: Place) -> String {
-    let angle = |degrees: f64| (degrees.abs().floor(), degrees.abs().fract() * 60.0);
-    let ((south, minutes), (east, east_minutes)) = (angle(place.latitude), angle(place.longitude));
-    let side = if place.longitude < 0.0 { "W" } else { "E" };
-    let (second, part) = (time_ms / 1000, time_ms % 1000);
-    let time = format!("12{:02}{:02}.{part:03}", second / 60, second % 60);
-    let place = format!("{south:02}{minutes:010.7},S,{east:03}{east_minutes:010.7},{side}");
-    sentence(&format!("GPGGA,{time},{place},4,12,0.7,10.0,M,0.0,M,,"))
-}
 
 /// The log of a machine that rolls 30 m to the east. It is at work from 5 m to 25 m, with a plant every half metre.
 /// `change` can change the receiver's line of each second, from 2 s on.
@@ -52,7 +43,11 @@ fn record(change: impl Fn(u64, String) -> Vec<(Kind, String)>) -> Vec<Entry> {
         let (mode, tool) = (if is_at_work { "work" } else { "hold" }, if is_out { "out" } else { "in" });
         if tenth.is_multiple_of(10) && tenth >= 20 {
             let place = plane.place(Metres { east: distance_mm / 1000.0, north: 0.0 });
-            lines.extend(change(tenth / 10, gga(time_ms, place)).into_iter().map(|(kind, line)| (time_ms, kind, line)));
+            lines.extend(
+                change(tenth / 10, framed(&gga(NOON_MS + time_ms as i64, Some((place, Quality::Rtk)))))
+                    .into_iter()
+                    .map(|(kind, line)| (time_ms, kind, line)),
+            );
         }
         let position = (TICKS_A_MM * distance_mm) as i64;
         if is_at_work && (distance_mm % 500.0 == 200.0 || distance_mm % 500.0 == 0.0) {

@@ -96,14 +96,14 @@ fn avrdude_writes_the_flash_through_the_old_bootloader_and_leaves_that_alone() {
 #[test]
 fn the_eeprom_is_kept_in_its_file_over_runs() {
     let folder = tempfile::tempdir().unwrap();
-    let setup = Setup { eeprom: Some(folder.path().join("uno.eeprom")), ..product() };
-    let uno = start(setup.clone());
+    let setup = || Setup { eeprom: Some(folder.path().join("uno.eeprom")), ..product() };
+    let uno = start(setup());
     let mut link = open(&uno);
     link.ask("set k 5").unwrap();
     link.ask("save").unwrap();
     drop((link, uno));
 
-    let uno = start(setup);
+    let uno = start(setup());
     let answer = open(&uno).ask("get k").unwrap();
     assert!(answer[0].starts_with("k=5 "), "{answer:?}");
 }

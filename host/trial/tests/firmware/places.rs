@@ -5,6 +5,7 @@ use field::machine::Machine;
 use field::motion::Motion;
 use field::row::{Kind as Grown, Row, Thing};
 use gps::job::{self, Did, Job, What};
+use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
 use gps::summary::{Stand, Summary};
 use gps::track::{Basis, Missing, Offset};
 use gps::{Antenna, Recorder, Wanted};
@@ -16,7 +17,6 @@ use std::cell::Cell;
 use std::io::{self, Read, Write};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
-use trial::receiver::{ReceiverSetup, SimulatedReceiver, Trouble};
 use trial::{UnoPort, firmware};
 use uno::CYCLES_PER_SECOND;
 
