@@ -25,6 +25,13 @@ pub fn share_of(row: &Range<f64>, union: &[Range<f64>]) -> f64 {
     covered / (row.end - row.start)
 }
 
+/// The spans between these ends, in any order, over whose middle a condition holds.
+pub(crate) fn spans_where(mut ends: Vec<f64>, holds_at: impl Fn(f64) -> bool) -> Vec<Range<f64>> {
+    ends.sort_by(f64::total_cmp);
+    let spans = ends.windows(2).map(|pair| pair[0]..pair[1]);
+    spans.filter(|span| span.start < span.end && holds_at((span.start + span.end) / 2.0)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

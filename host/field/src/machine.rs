@@ -196,20 +196,16 @@ impl Machine {
     ///
     /// The motion begins at `start_cycle`, with the encoder at rest and the beams as [`Machine::beams_before`] says.
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        let mut changes = self.encoder_changes(motion, start_cycle);
+        let mut changes = self.encoder_changes(&mut 0, 0.0, motion, start_cycle);
         changes.extend(self.beam_changes(row, motion, start_cycle));
         changes.sort_by_key(|change| change.cycle);
         changes
     }
 
-    /// Quadrature: forward is AB = 00, 10, 11, 01, 00, a count an edge.
-    fn encoder_changes(&self, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        self.encoder_changes_since(&mut 0, 0.0, motion, start_cycle)
-    }
-
-    /// As above, for the pieces of the motion that begin at a time or later. `ticks` is the count of a clean encoder
-    /// before them, and is updated to the count after them.
-    pub(crate) fn encoder_changes_since(
+    /// Quadrature: forward is AB = 00, 10, 11, 01, 00, a count an edge. The changes in the pieces of the motion that
+    /// begin at a time or later. `ticks` is the count of a clean encoder before them, and is updated to the count after
+    /// them.
+    pub(crate) fn encoder_changes(
         &self,
         ticks: &mut i64,
         from_s: f64,
@@ -217,7 +213,7 @@ impl Machine {
         start_cycle: u64,
     ) -> Vec<PinChange> {
         motion
-            .mark_passings_since(self.tick_mm(), from_s)
+            .mark_passings(self.tick_mm(), from_s)
             .into_iter()
             .filter_map(|passing| {
                 let before = *ticks;
@@ -353,7 +349,7 @@ mod tests {
     fn hidden_pulses_are_missing_from_the_pins_and_from_the_count() {
         let machine = Machine { dirt: Dirt { share: 0.05, seed: 3 }, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
-        let changes = machine.encoder_changes(&motion, START_CYCLE);
+        let changes = machine.encoder_changes(&mut 0, 0.0, &motion, START_CYCLE);
         let clean = machine.ticks(&motion, motion.duration_s());
         let missing = |ticks: i64| {
             let pulse = machine.pulse(ticks);
@@ -363,7 +359,7 @@ mod tests {
         assert!((60..160).contains(&missing(clean)), "{} of {clean}", missing(clean));
         assert_eq!(decode(&changes), clean - missing(clean));
         // Also half way, at any phase of a pulse.
-        for passing in motion.mark_passings(machine.tick_mm()).iter().skip(600).take(200) {
+        for passing in motion.mark_passings(machine.tick_mm(), 0.0).iter().skip(600).take(200) {
             let so_far = changes.iter().filter(|change| change.cycle <= cycle_at(START_CYCLE, passing.time_s));
             let ticks = machine.ticks(&motion, passing.time_s + 1e-7);
             assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), ticks - missing(ticks));

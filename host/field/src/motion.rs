@@ -12,6 +12,7 @@
 //!
 //! It knows no machine: the user defines position 0.
 
+use crate::ground::spans_where;
 use std::ops::Range;
 
 /// Walking speed in millimetres a second for a speed in kilometres an hour.
@@ -33,13 +34,8 @@ pub struct Passing {
 pub struct Motion {
     start_mm: f64,
     pieces: Vec<Piece>,
-    end_s: f64,
-    end_mm: f64,
-    end_speed_mm_s: f64,
-    /// The position of the wheel's rim at the end, and how far it turns from there on for each millimetre of the
-    /// machine.
-    wheel_end_mm: f64,
-    wheel_mm_a_mm: f64,
+    /// The piece that would follow: it begins at the end, at the speed reached there.
+    end: Piece,
 }
 
 /// A stretch of constant acceleration in which the direction does not change.
@@ -61,6 +57,23 @@ impl Piece {
     fn position_mm(&self, time_s: f64) -> f64 {
         let t = time_s - self.start_s;
         self.start_mm + self.speed_mm_s * t + self.acceleration_mm_s2 * t * t / 2.0
+    }
+
+    fn speed_at(&self, time_s: f64) -> f64 {
+        self.speed_mm_s + self.acceleration_mm_s2 * (time_s - self.start_s)
+    }
+
+    /// The piece that follows, with the same slip, at a speed.
+    fn then_at(&self, speed_mm_s: f64) -> Self {
+        Self {
+            start_s: self.end_s,
+            end_s: f64::INFINITY,
+            start_mm: self.end_mm,
+            speed_mm_s,
+            acceleration_mm_s2: 0.0,
+            wheel_start_mm: self.wheel_mm(self.end_mm),
+            ..*self
+        }
     }
 
     /// The time at which the piece reaches a position between its ends. This form of the quadratic's root adds two
@@ -90,15 +103,17 @@ impl Piece {
 impl Motion {
     /// The machine stands at `start_mm`.
     pub fn starting_at(start_mm: f64) -> Self {
-        Self {
+        let end = Piece {
+            start_s: 0.0,
+            end_s: f64::INFINITY,
             start_mm,
-            pieces: Vec::new(),
-            end_s: 0.0,
             end_mm: start_mm,
-            end_speed_mm_s: 0.0,
-            wheel_end_mm: start_mm,
+            speed_mm_s: 0.0,
+            acceleration_mm_s2: 0.0,
+            wheel_start_mm: start_mm,
             wheel_mm_a_mm: 1.0,
-        }
+        };
+        Self { start_mm, pieces: Vec::new(), end }
     }
 
     /// From standstill at `start_mm` with `acceleration_mm_s2` to a constant speed, and on to `end_mm`.
@@ -108,8 +123,8 @@ impl Motion {
 
     /// Continues at the current speed for a time. A standing machine stands.
     pub fn go_on_for(self, duration_s: f64) -> Self {
-        let end_mm = self.end_mm + self.end_speed_mm_s * duration_s;
-        let speed_mm_s = self.end_speed_mm_s;
+        let Piece { start_mm, speed_mm_s, .. } = self.end;
+        let end_mm = start_mm + speed_mm_s * duration_s;
         self.then(duration_s, 0.0, end_mm, speed_mm_s)
     }
 
@@ -119,13 +134,14 @@ impl Motion {
     /// If the acceleration is 0: the speed would never be reached.
     pub fn change_speed(self, speed_mm_s: f64, acceleration_mm_s2: f64) -> Self {
         assert!(acceleration_mm_s2 != 0.0, "a change of speed needs an acceleration");
-        if self.end_speed_mm_s * speed_mm_s < 0.0 {
+        let before = self.end;
+        if before.speed_mm_s * speed_mm_s < 0.0 {
             return self.change_speed(0.0, acceleration_mm_s2).change_speed(speed_mm_s, acceleration_mm_s2);
         }
-        let change_mm_s = speed_mm_s - self.end_speed_mm_s;
+        let change_mm_s = speed_mm_s - before.speed_mm_s;
         let acceleration_mm_s2 = acceleration_mm_s2.abs().copysign(change_mm_s);
         let duration_s = change_mm_s / acceleration_mm_s2;
-        let end_mm = self.end_mm + (self.end_speed_mm_s + speed_mm_s) / 2.0 * duration_s;
+        let end_mm = before.start_mm + (before.speed_mm_s + speed_mm_s) / 2.0 * duration_s;
         self.then(duration_s, acceleration_mm_s2, end_mm, speed_mm_s)
     }
 
@@ -134,14 +150,12 @@ impl Motion {
     /// # Panics
     /// If the machine does not roll towards this position.
     pub fn roll_to(self, place_mm: f64) -> Self {
-        let duration_s = (place_mm - self.end_mm) / self.end_speed_mm_s;
+        let Piece { start_mm, speed_mm_s, .. } = self.end;
+        let duration_s = (place_mm - start_mm) / speed_mm_s;
         assert!(
             duration_s.is_finite() && duration_s >= 0.0,
-            "at {} mm with {} mm/s the machine never reaches {place_mm} mm",
-            self.end_mm,
-            self.end_speed_mm_s
+            "at {start_mm} mm with {speed_mm_s} mm/s the machine never reaches {place_mm} mm"
         );
-        let speed_mm_s = self.end_speed_mm_s;
         self.then(duration_s, 0.0, place_mm, speed_mm_s)
     }
 
@@ -150,28 +164,18 @@ impl Motion {
     /// # Panics
     /// If the position is nearer than the braking distance.
     pub fn stop_at(self, place_mm: f64, acceleration_mm_s2: f64) -> Self {
-        let braking_mm = (self.end_speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2.abs())).copysign(self.end_speed_mm_s);
+        let speed_mm_s = self.end.speed_mm_s;
+        let braking_mm = (speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2.abs())).copysign(speed_mm_s);
         self.roll_to(place_mm - braking_mm).change_speed(0.0, acceleration_mm_s2)
     }
 
     fn then(mut self, duration_s: f64, acceleration_mm_s2: f64, end_mm: f64, end_speed_mm_s: f64) -> Self {
-        let piece = Piece {
-            start_s: self.end_s,
-            end_s: self.end_s + duration_s,
-            start_mm: self.end_mm,
-            end_mm,
-            speed_mm_s: self.end_speed_mm_s,
-            acceleration_mm_s2,
-            wheel_start_mm: self.wheel_end_mm,
-            wheel_mm_a_mm: self.wheel_mm_a_mm,
-        };
         if duration_s > 0.0 {
-            self.end_s = piece.end_s;
-            self.end_mm = end_mm;
-            self.wheel_end_mm = piece.wheel_mm(end_mm);
+            let piece = Piece { end_s: self.end.start_s + duration_s, end_mm, acceleration_mm_s2, ..self.end };
             self.pieces.push(piece);
+            self.end = piece.then_at(end_speed_mm_s);
         }
-        self.end_speed_mm_s = end_speed_mm_s;
+        self.end.speed_mm_s = end_speed_mm_s;
         self
     }
 
@@ -180,20 +184,19 @@ impl Motion {
         let kept = self.pieces.partition_point(|piece| piece.start_s <= time_s);
         self.pieces.truncate(kept);
         let Some(last) = self.pieces.last_mut().filter(|last| time_s < last.end_s) else {
-            let more_s = time_s - self.end_s;
+            let more_s = time_s - self.end.start_s;
             return self.go_on_for(more_s);
         };
         last.end_mm = last.position_mm(time_s);
         last.end_s = time_s;
-        let Piece { start_s, end_mm, speed_mm_s, acceleration_mm_s2, .. } = *last;
-        let wheel_end_mm = last.wheel_mm(end_mm);
-        let end_speed_mm_s = speed_mm_s + acceleration_mm_s2 * (time_s - start_s);
-        Self { end_s: time_s, end_mm, end_speed_mm_s, wheel_end_mm, ..self }
+        self.end = Piece { wheel_mm_a_mm: self.end.wheel_mm_a_mm, ..last.then_at(last.speed_at(time_s)) };
+        self
     }
 
     /// In the pieces that follow, the wheel loses this share of its distance, below 1.
-    pub fn slipping(self, share: f64) -> Self {
-        Self { wheel_mm_a_mm: 1.0 / (1.0 - share), ..self }
+    pub fn slipping(mut self, share: f64) -> Self {
+        self.end.wheel_mm_a_mm = 1.0 / (1.0 - share);
+        self
     }
 
     /// Removes the pieces that ended before a time. Later calls must not ask for those times.
@@ -215,14 +218,13 @@ impl Motion {
     /// The motion from a time on, as its own motion with time 0 there. Its wheel does not slip.
     pub fn since(&self, time_s: f64) -> Self {
         let first = self.pieces.partition_point(|piece| piece.end_s <= time_s);
-        self.pieces[first..].iter().fold(Self::starting_at(self.position_mm(time_s)), |motion, piece| {
+        self.pieces[first..].iter().fold(Self::starting_at(self.position_mm(time_s)), |mut motion, piece| {
             let late_s = (time_s - piece.start_s).max(0.0);
             // Its own speed, not the one before it, so that errors of rounding do not add up.
-            let end_speed_mm_s = piece.speed_mm_s + piece.acceleration_mm_s2 * late_s;
+            motion.end.speed_mm_s = piece.speed_mm_s + piece.acceleration_mm_s2 * late_s;
             let duration_s = piece.end_s - piece.start_s - late_s;
-            let after_mm_s = end_speed_mm_s + piece.acceleration_mm_s2 * duration_s;
-            let end_mm = piece.end_mm;
-            Self { end_speed_mm_s, ..motion }.then(duration_s, piece.acceleration_mm_s2, end_mm, after_mm_s)
+            let after_mm_s = motion.end.speed_mm_s + piece.acceleration_mm_s2 * duration_s;
+            motion.then(duration_s, piece.acceleration_mm_s2, piece.end_mm, after_mm_s)
         })
     }
 
@@ -235,7 +237,8 @@ impl Motion {
             piece.wheel_mm_a_mm = 1.0 / (1.0 - slip());
             wheel_mm = piece.wheel_mm(piece.end_mm);
         }
-        Self { wheel_end_mm: wheel_mm, ..self }
+        self.end.wheel_start_mm = wheel_mm;
+        self
     }
 
     /// Where the motion began.
@@ -245,22 +248,22 @@ impl Motion {
 
     /// Where the motion ended.
     pub fn end_mm(&self) -> f64 {
-        self.end_mm
+        self.end.start_mm
     }
 
     /// The speed at which the motion ended, negative backwards.
     pub fn end_speed_mm_s(&self) -> f64 {
-        self.end_speed_mm_s
+        self.end.speed_mm_s
     }
 
     /// How long the motion takes.
     pub fn duration_s(&self) -> f64 {
-        self.end_s
+        self.end.start_s
     }
 
     /// Distance of the machine for each millimetre of the wheel's rim, from the end on.
     pub fn ground_mm_a_wheel_mm(&self) -> f64 {
-        1.0 / self.wheel_mm_a_mm
+        1.0 / self.end.wheel_mm_a_mm
     }
 
     /// The position at a time. Before its beginning and after its end the machine stands.
@@ -268,7 +271,7 @@ impl Motion {
         match self.piece_at(time_s) {
             Some(piece) => piece.position_mm(time_s),
             None if time_s < 0.0 => self.start_mm,
-            None => self.end_mm,
+            None => self.end.start_mm,
         }
     }
 
@@ -277,23 +280,19 @@ impl Motion {
         match self.piece_at(time_s) {
             Some(piece) => piece.wheel_mm(piece.position_mm(time_s)),
             None if time_s < 0.0 => self.start_mm,
-            None => self.wheel_end_mm,
+            None => self.end.wheel_start_mm,
         }
     }
 
     /// The speed at a time, negative when rolling back.
     pub fn speed_mm_s(&self, time_s: f64) -> f64 {
-        self.piece_at(time_s)
-            .map_or(0.0, |piece| piece.speed_mm_s + piece.acceleration_mm_s2 * (time_s - piece.start_s))
+        self.piece_at(time_s).map_or(0.0, |piece| piece.speed_at(time_s))
     }
 
     /// The highest speed, forward or back.
     pub fn top_speed_mm_s(&self) -> f64 {
-        let ends = self.pieces.iter().flat_map(|piece| {
-            let end_speed = piece.speed_mm_s + piece.acceleration_mm_s2 * (piece.end_s - piece.start_s);
-            [piece.speed_mm_s.abs(), end_speed.abs()]
-        });
-        ends.fold(0.0, f64::max)
+        let ends = self.pieces.iter().flat_map(|piece| [piece.speed_mm_s, piece.speed_at(piece.end_s)]);
+        ends.map(f64::abs).fold(0.0, f64::max)
     }
 
     /// The stretch that the machine rolled over during a time.
@@ -326,29 +325,16 @@ impl Motion {
 
     /// The times during which the position lies within a stretch.
     pub fn times_within_s(&self, stretch_mm: &Range<f64>) -> Vec<Range<f64>> {
-        let mut times: Vec<f64> = [stretch_mm.start, stretch_mm.end]
-            .iter()
-            .flat_map(|&place_mm| self.passings(place_mm))
-            .map(|passing| passing.time_s)
-            .chain([0.0, self.end_s])
-            .collect();
-        times.sort_by(f64::total_cmp);
-        times
-            .windows(2)
-            .map(|pair| pair[0]..pair[1])
-            .filter(|span| stretch_mm.contains(&self.position_mm((span.start + span.end) / 2.0)))
-            .collect()
+        let ends = [stretch_mm.start, stretch_mm.end].into_iter().flat_map(|place_mm| self.passings(place_mm));
+        let times = ends.map(|passing| passing.time_s).chain([0.0, self.duration_s()]);
+        spans_where(times.collect(), |time_s| stretch_mm.contains(&self.position_mm(time_s)))
     }
 
-    /// The edges of a wheel with marks `pitch_mm` apart: each mark's passing, in order of time.
+    /// The edges of a wheel with marks `pitch_mm` apart: each mark's passing, in order of time, in the pieces that begin
+    /// at a time or later.
     ///
     /// The motion begins half way between two marks.
-    pub fn mark_passings(&self, pitch_mm: f64) -> Vec<Passing> {
-        self.mark_passings_since(pitch_mm, 0.0)
-    }
-
-    /// As [`mark_passings`](Self::mark_passings), in the pieces that begin at a time or later.
-    pub fn mark_passings_since(&self, pitch_mm: f64, from_s: f64) -> Vec<Passing> {
+    pub fn mark_passings(&self, pitch_mm: f64, from_s: f64) -> Vec<Passing> {
         let marks_to = |wheel_mm: f64| marks(wheel_mm - self.start_mm, pitch_mm);
         let mut passings = Vec::new();
         for piece in self.pieces_since(from_s) {
@@ -388,16 +374,7 @@ pub struct Course<'a> {
 impl<'a> Course<'a> {
     /// A motion from its beginning on.
     pub fn along(motion: &'a Motion) -> Self {
-        let end = Piece {
-            start_s: motion.end_s,
-            end_s: f64::INFINITY,
-            start_mm: motion.end_mm,
-            end_mm: motion.end_mm,
-            speed_mm_s: 0.0,
-            acceleration_mm_s2: 0.0,
-            wheel_start_mm: motion.wheel_end_mm,
-            wheel_mm_a_mm: 1.0,
-        };
+        let end = Piece { speed_mm_s: 0.0, ..motion.end };
         let mut to_come = motion.pieces.iter();
         Self { piece: *to_come.next().unwrap_or(&end), to_come, end }
     }
@@ -472,7 +449,7 @@ mod tests {
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1900.0).with_slip(|| 0.05);
         assert!((motion.wheel_mm(motion.duration_s()) - 2000.0).abs() < 1e-9);
         assert_eq!(motion.end_mm(), 1900.0);
-        let passings = motion.mark_passings(10.0);
+        let passings = motion.mark_passings(10.0, 0.0);
         assert_eq!(passings.len(), 200);
         let hundredth = motion.position_mm(passings[99].time_s);
         assert!((hundredth - 995.0 * 0.95).abs() < 1e-6, "{hundredth} mm");
@@ -539,7 +516,7 @@ mod tests {
         let motion = to_and_fro();
         let mut count = 0;
         let mut last_s = 0.0;
-        for passing in motion.mark_passings(PITCH_MM) {
+        for passing in motion.mark_passings(PITCH_MM, 0.0) {
             assert!(passing.time_s >= last_s, "marks are in order of time");
             last_s = passing.time_s;
             let mark = if passing.forward { count + 1 } else { count };

@@ -75,7 +75,7 @@ impl Rolling {
         let speed_mm_s = self.speed_mm_s;
         self.change(|motion| motion.change_speed(speed_mm_s, ACCELERATION_MM_S2).until(during_s.end));
         let Self { machine, motion, start_cycle, ticks, faults, .. } = self;
-        let mut changes = machine.encoder_changes_since(ticks, during_s.start, motion, *start_cycle);
+        let mut changes = machine.encoder_changes(ticks, during_s.start, motion, *start_cycle);
         if faults.encoder_dead {
             changes.clear();
         }

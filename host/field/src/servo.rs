@@ -10,6 +10,7 @@
 //! Widths out of range are ignored. There is no overshoot and no acceleration: dead time and travel time stand for
 //! them. If dead time and load scatter, each command has its own random values.
 
+use crate::ground::spans_where;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::{Range, RangeInclusive};
@@ -192,22 +193,14 @@ impl Stroke {
 
     /// The times within `during_s` at which the angle is below `degrees`.
     pub fn times_below_s(&self, degrees: f64, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        let mut times = vec![during_s.start];
-        times.extend(self.corners.windows(2).filter_map(|pair| {
+        let crossings = self.corners.windows(2).filter_map(|pair| {
             let (from, to) = (pair[0], pair[1]);
             let crosses = (from.degrees < degrees) != (to.degrees < degrees);
             let share = (degrees - from.degrees) / (to.degrees - from.degrees);
-            (crosses && from.time_s.is_finite())
-                .then_some(from.time_s + (to.time_s - from.time_s) * share)
-                .filter(|time_s| during_s.contains(time_s))
-        }));
-        times.push(during_s.end);
-        times
-            .windows(2)
-            .map(|pair| pair[0]..pair[1])
-            .filter(|span| span.start < span.end)
-            .filter(|span| self.degrees((span.start + span.end) / 2.0) < degrees)
-            .collect()
+            (crosses && from.time_s.is_finite()).then_some(from.time_s + (to.time_s - from.time_s) * share)
+        });
+        let times = crossings.filter(|time_s| during_s.contains(time_s)).chain([during_s.start, during_s.end]);
+        spans_where(times.collect(), |time_s| self.degrees(time_s) < degrees)
     }
 }
 
