@@ -9,12 +9,12 @@
 //!
 //! Canopies and margins play no part here. With them, [`crate::verdict::weedable_share`] is the bound.
 
+use crate::driving::Steering;
 use crate::ground::{share_of, union};
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::servo::OUT_DEGREES;
 use crate::stand::Stand;
-use crate::steering::Steering;
 use std::ops::Range;
 
 /// Distance between the positions in a zone at which the angle is calculated. A zone is round, so the positions between
@@ -33,7 +33,7 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
         for step in 1..steps {
             let place_mm = stem.along_mm - stem.protected_mm + f64::from(step) * STEP_MM;
             let beside_mm = place_mm - stem.along_mm;
-            let chord_mm = (stem.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let chord_mm = stem.half_chord_mm(beside_mm);
             let across_mm = stem.across_mm - steering.across_mm(place_mm);
             // A tool in the row that passes to the right of the zone, or to the left of one on the far side.
             if half_mm <= across_mm - chord_mm || across_mm + chord_mm <= -half_mm {

@@ -10,12 +10,11 @@
 
 use crate::ground::union;
 use files::CsvTable;
-use serde::{Deserialize, Serialize};
-use std::fmt;
+use serde::Serialize;
 use std::io;
 use std::ops::Range;
 use std::path::Path;
-use std::str::FromStr;
+use strum::{Display, EnumString};
 use thiserror::Error;
 
 pub use files::FileError;
@@ -33,30 +32,14 @@ pub const MAX_POSITION_MM: f64 = 1e7;
 pub const MAX_LENGTH_MM: f64 = 6e6;
 
 /// The kinds of thing in a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display, EnumString, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Kind {
     /// A crop plant: the tool has to go round it.
     Plant,
     /// A weed tall enough to break the beam: the tool should not go round it.
     Weed,
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Kind::Plant => "plant",
-            Kind::Weed => "weed",
-        })
-    }
-}
-
-impl FromStr for Kind {
-    type Err = ();
-
-    fn from_str(text: &str) -> Result<Self, ()> {
-        [Kind::Plant, Kind::Weed].into_iter().find(|kind| kind.to_string() == text).ok_or(())
-    }
 }
 
 /// A plant or a tall weed.
@@ -111,26 +94,6 @@ impl Thing {
         }
         Ok(())
     }
-
-    /// Whether a row from `first` to this thing is short enough.
-    fn check_length(&self, first: &Thing) -> Result<(), Problem> {
-        let length_mm = self.position_mm - first.position_mm;
-        if length_mm <= MAX_LENGTH_MM { Ok(()) } else { Err(Problem::Length(length_mm)) }
-    }
-
-    /// Whether it comes after `before`, without an overlap.
-    fn check_after(&self, before: &Thing) -> Result<(), Problem> {
-        if before.span_mm().end < self.span_mm().start {
-            Ok(())
-        } else {
-            Err(Problem::Overlap {
-                kind: self.kind,
-                position_mm: self.position_mm,
-                other: before.kind,
-                other_mm: before.position_mm,
-            })
-        }
-    }
 }
 
 /// The problem of a thing or a row, and what would be right.
@@ -165,14 +128,6 @@ pub enum Problem {
     Empty,
 }
 
-/// A line of a row's CSV file.
-#[derive(Debug, Serialize)]
-struct Record {
-    position_mm: f64,
-    width_mm: f64,
-    kind: Kind,
-}
-
 /// The columns of a row's CSV file.
 const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 
@@ -190,15 +145,35 @@ impl Row {
     ///
     /// # Errors
     /// If there are none, one is malformed, or two overlap.
-    pub fn new(mut things: Vec<Thing>) -> Result<Self, Problem> {
+    pub fn new(things: Vec<Thing>) -> Result<Self, Problem> {
         if things.is_empty() {
             return Err(Problem::Empty);
         }
         things.iter().try_for_each(Thing::check)?;
-        things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
-        things.windows(2).try_for_each(|pair| pair[1].check_after(&pair[0]))?;
-        things.iter().try_for_each(|thing| thing.check_length(&things[0]))?;
-        Ok(Self { things, dust_mm: Vec::new(), ground_mm: None })
+        Self::in_order(things.into_iter().map(|thing| ((), thing)).collect()).map_err(|((), problem)| problem)
+    }
+
+    /// A row of things in any order. An error comes with the mark of the thing that has the problem.
+    fn in_order<T: Copy>(mut things: Vec<(T, Thing)>) -> Result<Self, (T, Problem)> {
+        things.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
+        for pair in things.windows(2) {
+            let ((_, before), (mark, thing)) = (&pair[0], &pair[1]);
+            let length_mm = thing.position_mm - things[0].1.position_mm;
+            let problem = if before.span_mm().end >= thing.span_mm().start {
+                Problem::Overlap {
+                    kind: thing.kind,
+                    position_mm: thing.position_mm,
+                    other: before.kind,
+                    other_mm: before.position_mm,
+                }
+            } else if length_mm > MAX_LENGTH_MM {
+                Problem::Length(length_mm)
+            } else {
+                continue;
+            };
+            return Err((*mark, problem));
+        }
+        Ok(Self { things: things.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new(), ground_mm: None })
     }
 
     /// The same row, with the ends of this ground.
@@ -285,13 +260,7 @@ impl Row {
             thing.check().map_err(|problem| line.error(problem.to_string()))?;
             lines.push((line, thing));
         }
-        lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
-        for pair in lines.windows(2) {
-            let (line, thing) = &pair[1];
-            let checked = thing.check_after(&pair[0].1).and_then(|()| thing.check_length(&lines[0].1));
-            checked.map_err(|problem| line.error(problem.to_string()))?;
-        }
-        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new(), ground_mm: None })
+        Self::in_order(lines).map_err(|(line, problem)| line.error(problem.to_string()))
     }
 
     /// Writes the row as a CSV table that [`Row::parse_csv`] reads. Gaps within a ragged canopy, dust and the row's
@@ -301,8 +270,9 @@ impl Row {
     /// The errors of the writer.
     pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
         let mut writer = csv::Writer::from_writer(to);
+        writer.write_record(COLUMNS)?;
         for thing in &self.things {
-            writer.serialize(Record { position_mm: thing.position_mm, width_mm: thing.width_mm, kind: thing.kind })?;
+            writer.serialize((thing.position_mm, thing.width_mm, thing.kind))?;
         }
         writer.flush()?;
         Ok(())
@@ -316,7 +286,6 @@ const LONE_PLANT_SPACING_MM: f64 = 500.0;
 mod tests {
     use super::*;
     use crate::planting::Planting;
-    use files::csv_table;
 
     /// Parses a text. Returns the error's message otherwise.
     fn read(text: &str) -> Result<Row, String> {
@@ -370,19 +339,5 @@ mod tests {
                 assert!(said.starts_with(error), "{said}");
             }
         }
-    }
-
-    #[test]
-    fn a_missing_column_is_named() {
-        let said = read("position_mm,kind\n250,plant\n").unwrap_err();
-        assert!(said.starts_with("row.csv, line 1: the column `width_mm` is missing"), "{said}");
-    }
-
-    #[test]
-    fn a_missing_file_is_named() {
-        let path = Path::new("no/such/row.csv");
-        let read = csv_table::bytes(path).and_then(|text| Row::parse_csv(path, text));
-        let said = read.unwrap_err().to_string();
-        assert!(said.starts_with("no/such/row.csv cannot be read"), "{said}");
     }
 }

@@ -10,7 +10,7 @@
 //! Widths out of range are ignored. There is no overshoot and no acceleration: dead time and travel time stand for
 //! them. If dead time and load scatter, each command has its own random values.
 
-use crate::ground::spans_where;
+use crate::ground::{interpolated, spans_where};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::{Range, RangeInclusive};
@@ -132,72 +132,51 @@ impl Servo {
         let Scatter { dead_time_ms, load, seed } = self.scatter;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let rest_degrees = commands.first().map_or_else(|| self.stroke_degrees(), |command| command.degrees);
-        let mut corners = vec![Corner { time_s: f64::NEG_INFINITY, degrees: rest_degrees }];
-        let mut target_degrees = rest_degrees;
+        let mut corners: Vec<(f64, f64)> = Vec::new();
         for (index, command) in commands.iter().enumerate() {
             let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
             let late_ms = rng.random_range(-1.0..=1.0) * dead_time_ms;
             let travel_ms = self.travel_ms * slowed(rng.random_range(0.0..=1.0) * load);
-            let begin = Corner { time_s: heard_s + (self.dead_time_ms + late_ms) / 1000.0, degrees: 0.0 };
-            let begin = Corner { degrees: angle(&corners, begin.time_s, target_degrees), ..begin };
+            let begin_s = heard_s + (self.dead_time_ms + late_ms) / 1000.0;
+            let begin_degrees = interpolated(&corners, begin_s).unwrap_or(rest_degrees);
             // The new command cancels the corners after this time.
-            corners.retain(|corner| corner.time_s < begin.time_s);
-            corners.push(begin);
-            target_degrees = command.degrees;
+            corners.retain(|(time_s, _)| *time_s < begin_s);
+            corners.push((begin_s, begin_degrees));
             if index > 0 {
-                let travel_s = (target_degrees - begin.degrees).abs() / OUT_DEGREES * travel_ms / 1000.0;
-                corners.push(Corner { time_s: begin.time_s + travel_s, degrees: target_degrees });
+                let travel_s = (command.degrees - begin_degrees).abs() / OUT_DEGREES * travel_ms / 1000.0;
+                corners.push((begin_s + travel_s, command.degrees));
             }
         }
-        Stroke { corners, end_degrees: target_degrees }
-    }
-}
-
-/// The servo turns at a constant rate between two corners.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Corner {
-    time_s: f64,
-    degrees: f64,
-}
-
-/// The angle at a time: on the straight line between corners, and at rest after the last one.
-fn angle(corners: &[Corner], time_s: f64, end_degrees: f64) -> f64 {
-    let next = corners.partition_point(|corner| corner.time_s <= time_s);
-    match (next.checked_sub(1).map(|last| corners[last]), corners.get(next)) {
-        (Some(from), Some(to)) if from.time_s.is_finite() => {
-            let done = (time_s - from.time_s) / (to.time_s - from.time_s);
-            from.degrees + (to.degrees - from.degrees) * done
-        }
-        (Some(from), Some(_)) => from.degrees,
-        _ => end_degrees,
+        Stroke { corners, rest_degrees }
     }
 }
 
 /// The tool's angle over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
-    corners: Vec<Corner>,
-    end_degrees: f64,
+    /// The times at which the servo begins or ends to turn, and the angles there. It turns at a constant rate between.
+    corners: Vec<(f64, f64)>,
+    /// The angle of a servo without a command.
+    rest_degrees: f64,
 }
 
 impl Stroke {
     /// The angle at a time in seconds; 0 is in the row.
     pub fn degrees(&self, time_s: f64) -> f64 {
-        angle(&self.corners, time_s, self.end_degrees)
+        interpolated(&self.corners, time_s).unwrap_or(self.rest_degrees)
     }
 
     /// The times at which the servo begins or ends to turn. Between them the angle is a straight line.
     pub fn turns_s(&self) -> impl Iterator<Item = f64> {
-        self.corners.iter().map(|corner| corner.time_s).filter(|time_s| time_s.is_finite())
+        self.corners.iter().map(|(time_s, _)| *time_s)
     }
 
     /// The times within `during_s` at which the angle is below `degrees`.
     pub fn times_below_s(&self, degrees: f64, during_s: &Range<f64>) -> Vec<Range<f64>> {
         let crossings = self.corners.windows(2).filter_map(|pair| {
-            let (from, to) = (pair[0], pair[1]);
-            let crosses = (from.degrees < degrees) != (to.degrees < degrees);
-            let share = (degrees - from.degrees) / (to.degrees - from.degrees);
-            (crosses && from.time_s.is_finite()).then_some(from.time_s + (to.time_s - from.time_s) * share)
+            let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
+            let share = (degrees - from) / (to - from);
+            ((from < degrees) != (to < degrees)).then_some(from_s + (to_s - from_s) * share)
         });
         let times = crossings.filter(|time_s| during_s.contains(time_s)).chain([during_s.start, during_s.end]);
         spans_where(times.collect(), |time_s| self.degrees(time_s) < degrees)

@@ -32,6 +32,13 @@ pub struct Stem {
     pub is_seen: bool,
 }
 
+impl Stem {
+    /// Half of the zone's width across the row, at this distance from the stem along it; 0 beyond the zone.
+    pub(crate) fn half_chord_mm(&self, beside_mm: f64) -> f64 {
+        (self.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt()
+    }
+}
+
 /// A weed of any height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weed {

@@ -15,11 +15,11 @@
 //! ground where weeds are counted.
 
 use crate::conditions::Mechanism;
+use crate::driving::Steering;
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::servo::Stroke;
 use crate::stand::{Stand, Stem, Weed};
-use crate::steering::Steering;
 use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Range};
 use uno::Pulse;
@@ -163,7 +163,7 @@ impl Tools<'_> {
         let steps = protected_mm.ceil() as i32;
         (-steps..=steps).any(|step| {
             let beside_mm = protected_mm * f64::from(step) / f64::from(steps);
-            let chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let chord_mm = stem.half_chord_mm(beside_mm);
             let across_mm = self.across_mm(along_mm + beside_mm, across_mm).abs();
             // Touching is no cut: sweeps may run along the zones.
             across_mm + chord_mm > sweep_from_mm + TOUCH_MM && across_mm - chord_mm < to_mm - TOUCH_MM
@@ -185,7 +185,7 @@ impl Tools<'_> {
             let place_mm = self.machine.tool_mm(self.motion.position_mm(time_s));
             let across_mm = self.across_mm(place_mm, across_mm);
             let beside_mm = place_mm - along_mm;
-            let half_chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let half_chord_mm = stem.half_chord_mm(beside_mm);
             let covered = self.covered_mm(time_s);
             covered.start < across_mm + half_chord_mm && across_mm - half_chord_mm < covered.end
         };
