@@ -9,7 +9,7 @@ use control::memory::{SIZE, Volatile};
 use control::operate::saved::{COPY, SavedSettings};
 use control::settings::{Setting, Settings};
 use field::motion::mm_s;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::trial::{Start, Trial};
 use field::wiring;
 use trial::power_up;
@@ -35,7 +35,7 @@ fn greeting_with_the_tool_out_since(uno: &mut Uno, cycle: u64) -> String {
 
 /// A machine at work, with the tool in the row and the settings saved.
 fn at_work() -> Run {
-    let row = Row::new(vec![Thing::plant(1500.0, 150.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(1500.0, 150.0)]).expect("a plant is a row");
     let motion = steady(mm_s(2.0), 3000.0);
     let mut run = Run::begin(Trial { start: Start::Now, ..trial(row, motion) }, &["save"]);
     run.roll_to(1000.0);
@@ -283,7 +283,7 @@ fn nothing_happens_where_position_and_time_wrap() {
     uno.run_until_serial("\n", GREETING_CYCLES).expect("the firmware greets");
     ask(&mut uno, "clear");
 
-    let row = Row::new((0..4).map(|number| Thing::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
+    let row = Row::new((0..4).map(|number| Canopy::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
         .expect("the plants stand apart");
     let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(2.0), 2900.0)) };
     let mut run = Run::set_off(uno, trial, &[], |_, changes| changes);

@@ -171,7 +171,7 @@ fn swing(
 mod tests {
     use super::*;
     use crate::motion::mm_s;
-    use crate::row::{Row, Thing};
+    use crate::row::{Canopy, Row};
     use crate::verdict::{Timing, Verdict, judge};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -180,7 +180,7 @@ mod tests {
 
     /// Plants over whose canopy the tool was not fully out.
     fn reached_by(controller: impl Fn(&Trial) -> Weeded, speed_km_h: f64) -> usize {
-        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
+        let row = Row::new(PLACES.map(|place_mm| Canopy::plant(place_mm, 150.0)).to_vec()).unwrap();
         let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
         let Weeded { pulses, .. } = controller(&trial);
         let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_loop_that_passes_turns_over_gives_the_pulses_of_one_that_takes_them_all() {
-        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
+        let row = Row::new(PLACES.map(|place_mm| Canopy::plant(place_mm, 150.0)).to_vec()).unwrap();
         for seed in 0..200 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let machine = Machine::default();

@@ -154,7 +154,8 @@ pub fn part_of(zone_mm: &Range<f64>, row: &Row) -> Part {
     let nearest_mm = |places_mm: &mut dyn Iterator<Item = f64>| {
         places_mm.map(|place_mm| (place_mm - middle_mm).abs()).fold(f64::INFINITY, f64::min)
     };
-    let of = |kind: Kind| row.things().iter().filter(move |thing| thing.kind == kind).map(|thing| thing.position_mm);
+    let of =
+        |kind: Kind| row.canopies().iter().filter(move |canopy| canopy.kind == kind).map(|canopy| canopy.position_mm);
     let dust = row.dust_mm().iter().map(|dust_mm| (dust_mm.start + dust_mm.end) / 2.0);
     let to_plant_mm = nearest_mm(&mut of(Kind::Plant));
     let is_over_plant = of(Kind::Plant).any(|place_mm| zone_mm.contains(&place_mm));
@@ -190,7 +191,7 @@ impl Reasons {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::Thing;
+    use crate::row::Canopy;
 
     #[test]
     fn parts_in_tenths_of_a_percent_add_up_to_the_whole() {
@@ -222,8 +223,8 @@ mod tests {
 
     #[test]
     fn a_zone_is_the_plant_s_whose_middle_is_nearest_even_where_the_wheel_slips() {
-        let row =
-            Row::new(vec![Thing::plant(1000.0, 150.0), Thing::weed(1110.0, 16.0), Thing::plant(1500.0, 20.0)]).unwrap();
+        let row = Row::new(vec![Canopy::plant(1000.0, 150.0), Canopy::weed(1110.0, 16.0), Canopy::plant(1500.0, 20.0)])
+            .unwrap();
         let row = row.with_dust(vec![1300.0..1302.0]);
         let part = |zone_mm: Range<f64>| part_of(&zone_mm, &row);
         assert_eq!(part(905.0..1055.0), Part::Plants);

@@ -39,7 +39,7 @@ pub mod wiring;
 pub use conditions::Conditions;
 pub use machine::Machine;
 pub use motion::Motion;
-pub use row::{Kind, Row, Thing};
+pub use row::{Canopy, Kind, Row};
 pub use servo::Servo;
 pub use trial::{Start, Trial};
 pub use verdict::{Judgement, Timing, Verdict, judge};

@@ -311,7 +311,7 @@ pub fn time_at_s(start_cycle: u64, cycle: u64) -> f64 {
 mod tests {
     use super::*;
     use crate::motion::mm_s;
-    use crate::row::Thing;
+    use crate::row::Canopy;
 
     const START_CYCLE: u64 = 1_000_000;
 
@@ -342,7 +342,7 @@ mod tests {
     }
 
     fn row() -> Row {
-        Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(800.0, 15.0)]).unwrap()
+        Row::new(vec![Canopy::plant(500.0, 150.0), Canopy::weed(800.0, 15.0)]).unwrap()
     }
 
     #[test]
@@ -424,7 +424,7 @@ mod tests {
 
     #[test]
     fn a_gap_shorter_than_the_sensors_response_is_not_seen() {
-        let mut plant = Thing::plant(500.0, 150.0);
+        let mut plant = Canopy::plant(500.0, 150.0);
         // At 1 km/h a millisecond is 0.28 mm.
         plant.leaves = vec![425.0..470.0, 470.2..520.0, 521.0..575.0];
         let row = Row::new(vec![plant]).unwrap();

@@ -59,13 +59,13 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::{Row, Thing};
+    use crate::row::{Canopy, Row};
     use crate::stand::Stem;
 
     #[test]
     fn the_bound_is_the_row_less_each_zone_and_the_quickest_swings() {
         let stand = Stand {
-            row: Row::new(vec![Thing::plant(1000.0, 150.0)]).unwrap(),
+            row: Row::new(vec![Canopy::plant(1000.0, 150.0)]).unwrap(),
             stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 45.0, is_seen: true }],
             neighbours: Vec::new(),
             weeds: Vec::new(),

@@ -7,7 +7,7 @@
 use crate::ground::union;
 use crate::machine::{Machine, Sensor, channels, cycle_at, time_at_s};
 use crate::motion::Motion;
-use crate::row::Thing;
+use crate::row::Canopy;
 use crate::servo::Stroke;
 use crate::wiring;
 use std::ops::Range;
@@ -30,8 +30,8 @@ pub struct Faults {
 pub struct Rolling {
     /// The machine.
     pub machine: Machine,
-    /// The row so far, in ascending order and without overlaps. Things may be added at its end.
-    pub row: Vec<Thing>,
+    /// The row so far, in ascending order and without overlaps. Canopies may be added at its end.
+    pub row: Vec<Canopy>,
     /// Changes of the tool's command so far. The first is not a swing.
     pub commands: usize,
     /// The motion that is decided so far. It ends now.
@@ -51,8 +51,8 @@ pub struct Rolling {
 
 impl Rolling {
     /// A standing machine before or in a row.
-    pub fn new(machine: Machine, row: Vec<Thing>, start_mm: f64, start_cycle: u64) -> Self {
-        let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Thing::blocks_mm).collect()));
+    pub fn new(machine: Machine, row: Vec<Canopy>, start_mm: f64, start_cycle: u64) -> Self {
+        let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Canopy::blocks_mm).collect()));
         Self {
             beams: machine.beams(&leaves_mm, start_mm, start_cycle),
             row,
@@ -83,7 +83,7 @@ impl Rolling {
         for beam in &mut self.beams {
             let near_mm =
                 rolled_mm.start - beam.behind_mm - machine.beam_mm..rolled_mm.end - beam.behind_mm + machine.beam_mm;
-            let leaves_mm = machine.seen_mm(union(within(&self.row, &near_mm).flat_map(Thing::blocks_mm).collect()));
+            let leaves_mm = machine.seen_mm(union(within(&self.row, &near_mm).flat_map(Canopy::blocks_mm).collect()));
             let reports = beam.changes(&leaves_mm, motion, during_s.clone(), *start_cycle);
             if !(faults.beam_wire_torn && beam.last.pin == wiring::BEAM) {
                 changes.extend(reports);
@@ -172,7 +172,7 @@ impl Rolling {
     pub fn is_beam_broken(&self) -> bool {
         let place_mm = self.place_mm();
         within(&self.row, &(place_mm..place_mm))
-            .any(|thing| thing.blocks_mm().iter().any(|leaf| leaf.contains(&place_mm)))
+            .any(|canopy| canopy.blocks_mm().iter().any(|leaf| leaf.contains(&place_mm)))
     }
 
     /// The motion from a time on, the pulses that the servo took as commands, and the cycle at which that motion
@@ -201,10 +201,10 @@ impl Rolling {
     }
 }
 
-/// The things of a row on this ground.
-fn within<'a>(row: &'a [Thing], ground_mm: &Range<f64>) -> impl Iterator<Item = &'a Thing> {
-    let first = row.partition_point(|thing| thing.span_mm().end < ground_mm.start);
-    let behind = row.partition_point(|thing| thing.span_mm().start <= ground_mm.end);
+/// The canopies of a row on this ground.
+fn within<'a>(row: &'a [Canopy], ground_mm: &Range<f64>) -> impl Iterator<Item = &'a Canopy> {
+    let first = row.partition_point(|canopy| canopy.span_mm().end < ground_mm.start);
+    let behind = row.partition_point(|canopy| canopy.span_mm().start <= ground_mm.end);
     row.get(first..behind).unwrap_or_default().iter()
 }
 
@@ -224,7 +224,7 @@ mod tests {
     proptest! {
         #[test]
         fn rolling_piece_by_piece_equals_the_whole_motion(way in way(), slice_cycles in 1_000_u64..400_000) {
-            let row = vec![Thing::plant(300.0, 150.0), Thing::weed(500.0, 14.0), Thing::plant(800.0, 120.0)];
+            let row = vec![Canopy::plant(300.0, 150.0), Canopy::weed(500.0, 14.0), Canopy::plant(800.0, 120.0)];
             let machine = Machine { second_beam_mm: 220.0, beam_mm: 6.0, ..Machine::default() };
             let mut rolling = Rolling::new(machine, row.clone(), 0.0, START_CYCLE);
             let mut changes = Vec::new();
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_fault_shows_at_the_pins_until_it_is_mended() {
-        let mut rolling = Rolling::new(Machine::default(), vec![Thing::plant(300.0, 150.0)], 0.0, 0);
+        let mut rolling = Rolling::new(Machine::default(), vec![Canopy::plant(300.0, 150.0)], 0.0, 0);
         rolling.roll_at(500.0);
         rolling.roll_until(16_000_000);
         assert!(rolling.is_beam_broken() && rolling.levels().contains(&(wiring::BEAM, false)));

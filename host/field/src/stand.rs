@@ -11,7 +11,7 @@
 use crate::conditions::Conditions;
 use crate::ground::union;
 use crate::planting::{leaves, scatter};
-use crate::row::{Kind, Problem, Row, Thing};
+use crate::row::{Canopy, Kind, Problem, Row};
 use crate::sight::width_at;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -97,7 +97,7 @@ impl Stand {
             _ => at_mm,
         };
         let mut stems = Vec::new();
-        let mut things = Vec::new();
+        let mut canopies = Vec::new();
         let places = (span_mm.end / spacing_mm).floor() as u32;
         for place in 0..places {
             let at_mm = sown(&mut sown_rng, (f64::from(place) + 0.5) * spacing_mm);
@@ -109,13 +109,13 @@ impl Stand {
                 let width_mm = (crop.canopy_mm + scatter(rng, crop.canopy_scatter_mm)).max(MIN_CANOPY_MM);
                 let height_mm = crop.height_mm + scatter(&mut height_rng, crop.height_scatter_mm);
                 let seen_mm = width_at(sensors.beam_height_mm, height_mm, width_mm);
-                let mut plant = Thing::plant(along_mm, seen_mm.unwrap_or(width_mm).max(MIN_CANOPY_MM));
+                let mut plant = Canopy::plant(along_mm, seen_mm.unwrap_or(width_mm).max(MIN_CANOPY_MM));
                 if chance(&mut leaf_rng, crop.ragged_percent) {
                     plant.leaves = leaves(&mut leaf_rng, plant.span_mm());
                 }
                 let is_seen = !chance(rng, sensors.unseen_percent) && seen_mm.is_some();
                 if is_seen {
-                    things.push(plant);
+                    canopies.push(plant);
                 }
                 let across_mm = scatter(rng, crop.across_scatter_mm);
                 let stem_mm = along_mm + scatter(&mut stem_rng, crop.stem_off_mm);
@@ -135,14 +135,14 @@ impl Stand {
         for weed in grown.iter().filter(|weed| weed.across_mm.abs() < machine.sweep_from_mm) {
             let height_mm = about(&mut size_rng, weeds.height_mm, weeds.height_factor);
             let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
-            things.extend(weed_seen(weed.along_mm, sensors.beam_height_mm, height_mm, widest_mm));
+            canopies.extend(weed_seen(weed.along_mm, sensors.beam_height_mm, height_mm, widest_mm));
         }
         for _ in 0..count(&mut weed_rng, weeds.tall_per_m * plot.row_m) {
             let along_mm = weed_rng.random_range(span_mm.clone());
             grown.push(Weed { along_mm, across_mm: scatter(&mut weed_rng, crop.across_scatter_mm) });
             let height_mm = crop.height_mm + scatter(&mut size_rng, crop.height_scatter_mm);
             let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
-            things.extend(weed_seen(along_mm, sensors.beam_height_mm, height_mm, widest_mm));
+            canopies.extend(weed_seen(along_mm, sensors.beam_height_mm, height_mm, widest_mm));
         }
         let air_mm = span_mm.start - HEADLAND_MM..span_mm.end + HEADLAND_MM;
         let dust_mm = (0..count(&mut dust_rng, sensors.dust_per_m * (air_mm.end - air_mm.start) / 1000.0))
@@ -152,7 +152,7 @@ impl Stand {
             })
             .collect();
         stems.sort_by(|a, b| a.along_mm.total_cmp(&b.along_mm));
-        let row = Row::new(grown_together(things))?.with_dust(dust_mm).on_ground(span_mm.clone());
+        let row = Row::new(grown_together(canopies))?.with_dust(dust_mm).on_ground(span_mm.clone());
         // The next row is planted separately: it has the same planting positions, and its own random numbers.
         let next_to = |place: u32| {
             let at_mm = sown(&mut sown_next_rng, (f64::from(place) + 0.5) * spacing_mm)
@@ -174,9 +174,9 @@ fn about(rng: &mut impl Rng, median: f64, factor: f64) -> f64 {
 }
 
 /// A weed as the beam sees it. `None` if the beam passes above it. A weed wider than the widest canopy becomes several.
-fn weed_seen(along_mm: f64, beam_height_mm: f64, height_mm: f64, widest_mm: f64) -> Option<Thing> {
+fn weed_seen(along_mm: f64, beam_height_mm: f64, height_mm: f64, widest_mm: f64) -> Option<Canopy> {
     let width_mm = width_at(beam_height_mm, height_mm, widest_mm.min(MAX_WEED_MM))?;
-    Some(Thing::weed(along_mm, width_mm.max(MIN_WEED_MM)))
+    Some(Canopy::weed(along_mm, width_mm.max(MIN_WEED_MM)))
 }
 
 /// Widest weed, and narrowest stalk.
@@ -197,18 +197,18 @@ fn count(rng: &mut impl Rng, mean: f64) -> usize {
     Poisson::new(mean).map_or(0, |poisson| poisson.sample(rng) as usize)
 }
 
-/// The things as the beam sees them. Those that touch are joined, and the result is a plant if any of them is.
-fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
-    things.sort_by(|a, b| a.span_mm().start.total_cmp(&b.span_mm().start));
-    let mut together: Vec<Thing> = Vec::with_capacity(things.len());
-    for thing in things {
+/// The canopies as the beam sees them. Those that touch are joined, and the result is a plant if any of them is.
+fn grown_together(mut canopies: Vec<Canopy>) -> Vec<Canopy> {
+    canopies.sort_by(|a, b| a.span_mm().start.total_cmp(&b.span_mm().start));
+    let mut together: Vec<Canopy> = Vec::with_capacity(canopies.len());
+    for canopy in canopies {
         match together.last_mut() {
-            Some(last) if thing.span_mm().start <= last.span_mm().end => {
-                let across_mm = last.across_mm.max(thing.across_mm);
-                let span = last.span_mm().start..last.span_mm().end.max(thing.span_mm().end);
-                let blocks = union(last.blocks_mm().into_iter().chain(thing.blocks_mm()).collect());
-                let kind = if last.kind == Kind::Plant { Kind::Plant } else { thing.kind };
-                *last = Thing {
+            Some(last) if canopy.span_mm().start <= last.span_mm().end => {
+                let across_mm = last.across_mm.max(canopy.across_mm);
+                let span = last.span_mm().start..last.span_mm().end.max(canopy.span_mm().end);
+                let blocks = union(last.blocks_mm().into_iter().chain(canopy.blocks_mm()).collect());
+                let kind = if last.kind == Kind::Plant { Kind::Plant } else { canopy.kind };
+                *last = Canopy {
                     position_mm: (span.start + span.end) / 2.0,
                     width_mm: span.end - span.start,
                     across_mm,
@@ -216,7 +216,7 @@ fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
                     leaves: if blocks.len() > 1 { blocks } else { Vec::new() },
                 };
             }
-            _ => together.push(thing),
+            _ => together.push(canopy),
         }
     }
     together
@@ -374,8 +374,8 @@ mod tests {
 
     #[test]
     fn touching_canopies_are_one_and_a_plant_if_any_of_them_is() {
-        let things = vec![Thing::weed(100.0, 20.0), Thing::plant(150.0, 100.0), Thing::weed(300.0, 20.0)];
-        let together = grown_together(things);
-        assert_eq!(together, [Thing { across_mm: 100.0, ..Thing::plant(145.0, 110.0) }, Thing::weed(300.0, 20.0)]);
+        let canopies = vec![Canopy::weed(100.0, 20.0), Canopy::plant(150.0, 100.0), Canopy::weed(300.0, 20.0)];
+        let together = grown_together(canopies);
+        assert_eq!(together, [Canopy { across_mm: 100.0, ..Canopy::plant(145.0, 110.0) }, Canopy::weed(300.0, 20.0)]);
     }
 }

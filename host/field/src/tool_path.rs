@@ -227,7 +227,7 @@ impl Tools<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::{Row, Thing};
+    use crate::row::{Canopy, Row};
     use rand::SeedableRng;
     use uno::CYCLES_PER_SECOND;
 
@@ -235,7 +235,7 @@ mod tests {
     fn stand() -> Stand {
         let weed = |along_mm, across_mm| Weed { along_mm, across_mm };
         Stand {
-            row: Row::new(vec![Thing::plant(1000.0, 150.0)]).unwrap(),
+            row: Row::new(vec![Canopy::plant(1000.0, 150.0)]).unwrap(),
             stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 40.0, is_seen: true }],
             neighbours: vec![Stem { along_mm: 1000.0, across_mm: 400.0, protected_mm: 40.0, is_seen: true }],
             weeds: vec![weed(500.0, 10.0), weed(1000.0, -20.0), weed(1000.0, 100.0), weed(500.0, 35.0)],

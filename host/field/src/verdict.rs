@@ -15,7 +15,7 @@
 use crate::ground::{share_of, union};
 use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
-use crate::row::{Row, Thing};
+use crate::row::{Canopy, Row};
 use crate::servo::{Command, Stroke};
 use serde::Serialize;
 use std::fmt;
@@ -53,20 +53,20 @@ impl Timing {
 
     /// The ground that the tool must not enter for a plant, without the margin: its canopy. With a stem zone it is the
     /// part that the firmware keeps of a plant seen whole.
-    fn kept_mm(&self, plant: &Thing) -> Range<f64> {
+    fn kept_mm(&self, plant: &Canopy) -> Range<f64> {
         let (span, zone_mm) = (plant.span_mm(), f64::from(self.stem_zone_mm));
         let trim_mm = ((span.end - span.start - zone_mm) / 2.0).clamp(0.0, 3.0 / 16.0 * zone_mm);
         span.start + trim_mm..span.end - trim_mm
     }
 
     /// A plant's keep-out zone: that ground with its margins.
-    fn window_mm(&self, plant: &Thing) -> Range<f64> {
+    fn window_mm(&self, plant: &Canopy) -> Range<f64> {
         let (kept, margin_mm) = (self.kept_mm(plant), f64::from(self.margin_mm));
         kept.start - margin_mm..kept.end + margin_mm
     }
 
     /// How wide the kept ground is across the row.
-    fn kept_across_mm(&self, plant: &Thing) -> f64 {
+    fn kept_across_mm(&self, plant: &Canopy) -> f64 {
         if self.stem_zone_mm == 0 { plant.across_mm } else { plant.across_mm.min(self.stem_zone_mm.into()) }
     }
 }
@@ -97,7 +97,7 @@ impl fmt::Display for Verdict {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantOutcome {
     /// The plant.
-    pub plant: Thing,
+    pub plant: Canopy,
     /// The protected stretch: its canopy, or the zone round its stem.
     pub kept_mm: Range<f64>,
     /// Distance from the position where the tool was fully out to the leading end of `kept_mm`; negative inside it.
@@ -133,7 +133,7 @@ impl PlantOutcome {
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeedOutcome {
     /// The weed.
-    pub weed: Thing,
+    pub weed: Canopy,
     /// Whether the tool worked the row's line over the weed's middle.
     pub cut: bool,
 }
@@ -288,7 +288,7 @@ impl Swing {
 }
 
 /// Clearances and verdict of a plant, given the ground over which the tool was not fully out.
-fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
+fn plant_outcome(plant: &Canopy, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
     let span = timing.kept_mm(plant);
     // The canopy's middle divides the swing before the plant from the one behind it. If a swing began or ended beyond
     // the middle, its end divides them.
@@ -326,7 +326,7 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing
     }
 }
 
-fn weed_outcome(weed: &Thing, machine: &Machine, motion: &Motion, stroke: &Stroke) -> WeedOutcome {
+fn weed_outcome(weed: &Canopy, machine: &Machine, motion: &Motion, stroke: &Stroke) -> WeedOutcome {
     let mut passings = motion.passings(weed.position_mm + machine.beam_to_tool_mm);
     WeedOutcome {
         weed: weed.clone(),
@@ -365,7 +365,7 @@ mod tests {
 
     /// Two plants and a weed between them, passed at 2.5 km/h.
     fn row() -> Row {
-        Row::new(vec![Thing::plant(1000.0, 150.0), Thing::weed(1300.0, 15.0), Thing::plant(1600.0, 150.0)]).unwrap()
+        Row::new(vec![Canopy::plant(1000.0, 150.0), Canopy::weed(1300.0, 15.0), Canopy::plant(1600.0, 150.0)]).unwrap()
     }
 
     fn motion() -> Motion {

@@ -1,9 +1,9 @@
-//! The antenna's track along the wheel's distance, and the positions of objects on it.
+//! The antenna's track along the wheel's distance, and the positions of events on it.
 //!
-//! An object has a distance of the wheel, and an offset from the antenna, ahead and to the right.
+//! An event has a distance of the wheel, and an offset from the antenna, ahead and to the right.
 //!
 //! - **The antenna's position** at that distance lies between two fixes, at the wheel's share of the distance. The
-//!   machine may have rolled over the same distance several times: the last time before the object was recorded counts.
+//!   machine may have rolled over the same distance several times: the last time before the event was recorded counts.
 //!   Several fixes of a standing wheel are averaged.
 //! - **The heading** is the direction of a straight line, fitted by least squares over the wheel's distance. It uses as
 //!   many fixes around the position as its error needs to fall to [`HEADING_ERROR`], but at most [`LONGEST_CHORD_M`].
@@ -28,7 +28,7 @@ const NO_HEADING: f64 = 0.5;
 /// Successive fixes are at most this number of the receiver's intervals apart.
 const INTERVALS: f64 = 1.5;
 
-/// How far a machine rolls back and forth behind its farthest position, in metres. Recorded objects are searched back
+/// How far a machine rolls back and forth behind its farthest position, in metres. Recorded events are searched back
 /// to there.
 const ROLLED_BACK_M: f64 = 50.0;
 
@@ -154,7 +154,7 @@ impl Track {
         Some(Self { plane, stations, interval_ms, longest_outage_m })
     }
 
-    /// The position of an object with this offset from the antenna, at this distance of the wheel. It was recorded at
+    /// The position of an event with this offset from the antenna, at this distance of the wheel. It was recorded at
     /// this time of the log's clock.
     ///
     /// # Errors
@@ -185,7 +185,7 @@ impl Track {
         Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms: utc_ms.round() as i64 })
     }
 
-    /// The first of the two fixes between which the wheel passed this distance for the last time before the object was
+    /// The first of the two fixes between which the wheel passed this distance for the last time before the event was
     /// recorded.
     fn passed(&self, distance_m: f64, recorded_ms: f64) -> Result<usize, Missing> {
         let before = self.stations.partition_point(|station| station.time_ms <= recorded_ms + RECORDED_EARLY_MS);

@@ -8,7 +8,7 @@ use crate::put;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
 use field::rolling::{Faults, Rolling};
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::servo::Servo;
 use field::verdict::{Timing, Verdict, judge};
 use field::{Kind, Machine};
@@ -21,7 +21,7 @@ use uno::Pulse;
 const SOWN_AHEAD_MM: f64 = 2000.0;
 /// Ground behind a plant's margin before it is judged: until then the tool could come back too early.
 const BEHIND_MM: f64 = 20.0;
-/// Ground in memory before the next thing to judge: more than the tool needs to swing, at any speed.
+/// Ground in memory before the next canopy to judge: more than the tool needs to swing, at any speed.
 const BEFORE_MM: f64 = 500.0;
 /// An arm within this angle of fully out counts as fully out. It is half a millimetre at the tool's end, and 1 us of a
 /// pulse: avr8js does not time edges more exactly (docs/simulators.md).
@@ -93,18 +93,18 @@ struct Trial {
     rolling: Rolling,
     sowing: Sowing,
     faults: Faults,
-    /// The first thing without a verdict, or to be judged again.
+    /// The first canopy without a verdict, or to be judged again.
     next: usize,
     /// The verdicts by number in the row. If the tool passes again, a plant keeps the worse verdict and a weed the
     /// better one.
     fates: Vec<Option<Fate>>,
     /// Start time of the recorded motion.
     from_s: f64,
-    /// Number of things that were passed to the page.
+    /// Number of canopies that were passed to the page.
     told: usize,
 }
 
-/// The tables, by number: the machine's state, the changes at the pins (cycle, pin, level), and the sown things (0 for
+/// The tables, by number: the machine's state, the changes at the pins (cycle, pin, level), and the sown canopies (0 for
 /// a plant and 1 for a weed, position, width).
 const NOW: usize = 0;
 const CHANGES: usize = 1;
@@ -182,7 +182,7 @@ impl Different {
 }
 
 impl Kept {
-    /// Judges the things behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
+    /// Judges the canopies behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
     pub fn judge(&self) -> Result<Value, String> {
         with(|trial| json!(trial.judge(self)))
     }
@@ -235,13 +235,13 @@ impl Trial {
         put(NOW, now);
     }
 
-    /// Writes the newly sown things into their table.
+    /// Writes the newly sown canopies into their table.
     fn tell_sown(&mut self) {
         let Self { rolling, told, .. } = self;
         let kind = |kind: Kind| if kind == Kind::Plant { 0.0 } else { 1.0 };
         let sown = rolling.row[*told..]
             .iter()
-            .flat_map(|thing| [kind(thing.kind), thing.position_mm, thing.width_mm])
+            .flat_map(|canopy| [kind(canopy.kind), canopy.position_mm, canopy.width_mm])
             .collect();
         put(SOWN, sown);
         *told = rolling.row.len();
@@ -254,13 +254,13 @@ impl Trial {
 
     fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {
         let is_behind =
-            |thing: &Thing| thing.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
+            |canopy: &Canopy| canopy.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
         let behind = self.rolling.row.partition_point(is_behind);
         let first = std::mem::replace(&mut self.next, behind);
-        let (Some(things), true) = (self.rolling.row.get(first..behind), first < behind) else {
+        let (Some(canopies), true) = (self.rolling.row.get(first..behind), first < behind) else {
             return Vec::new();
         };
-        let Ok(row) = Row::new(things.to_vec()) else {
+        let Ok(row) = Row::new(canopies.to_vec()) else {
             return Vec::new();
         };
         let timing = Timing { margin_mm: kept.margin_mm, stem_zone_mm: kept.stem_zone_mm, ..Timing::default() };
@@ -269,9 +269,9 @@ impl Trial {
         let mut plants = judgement.plants.iter().map(|plant| plant.verdict);
         let mut weeds = judgement.weeds.iter().map(|weed| weed.cut);
         self.fates.resize(self.fates.len().max(behind), None);
-        let mut judged = Vec::with_capacity(things.len());
-        for (number, thing) in (first..).zip(things) {
-            let now = match thing.kind {
+        let mut judged = Vec::with_capacity(canopies.len());
+        for (number, canopy) in (first..).zip(canopies) {
+            let now = match canopy.kind {
                 Kind::Plant => plants.next().map(Fate::Plant),
                 Kind::Weed => weeds.next().map(Fate::Weed),
             };
@@ -287,7 +287,7 @@ impl Trial {
         judged
     }
 
-    /// Forgets the motion from before the tool came near the next thing to judge.
+    /// Forgets the motion from before the tool came near the next canopy to judge.
     fn forget(&mut self) {
         let tool_mm = self.rolling.tool_mm();
         let next_mm = self.rolling.row.get(self.next).map_or(tool_mm, |next| next.span_mm().start.min(tool_mm));

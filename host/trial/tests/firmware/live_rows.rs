@@ -3,7 +3,7 @@
 
 use field::machine::Machine;
 use field::planting::Planting;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use link::rows::{Heard, Hold, Opener, Rows, What};
 use link::session::Happening;
 use link::{EventLine, Link, Mode};
@@ -129,7 +129,7 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
     let folder = tempfile::tempdir().expect("there is room for links");
     let mut rows: Vec<Row> = (1..=6).map(|seed| row(40, seed)).collect();
     // The beam of the third is broken over more ground than a plant has.
-    rows[2] = Row::new(vec![Thing::plant(0.0, 150.0), Thing::plant(1000.0, 900.0)]).expect("it is a row");
+    rows[2] = Row::new(vec![Canopy::plant(0.0, 150.0), Canopy::plant(1000.0, 900.0)]).expect("it is a row");
     let link = |number| Some(folder.path().join(format!("row{number}")));
     let setups = setups(rows, false).into_iter().enumerate();
     let setups = setups.map(|(number, setup)| Setup { link: link(number), ..setup }).collect();
