@@ -20,7 +20,7 @@ use crate::machine::Machine;
 use crate::native::{Sensors, ServoLine, Turn, beams_before, turns};
 use crate::servo::Servo;
 use crate::stand::Stem;
-use crate::trial::Trial;
+use crate::trial::{Trial, Weeded};
 use control::operate::servo;
 use std::ops::Range;
 use uno::Pulse;
@@ -43,15 +43,6 @@ const TURN_S: f64 = 0.001;
 
 /// Shortest gap between two servo pulses, the firmware's default; 0 for fixed frames.
 const SERVO_GAP_MS: u8 = 3;
-
-/// The result of a baseline.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Weeded {
-    /// The first of the servo's pulses of each width.
-    pub pulses: Vec<Pulse>,
-    /// Why the tool was in the row or out of it.
-    pub reasons: Vec<Reason>,
-}
 
 /// The paper's controller weeds the trial's row.
 pub fn as_in_the_paper(trial: &Trial) -> Weeded {
@@ -95,7 +86,7 @@ pub fn as_in_the_paper(trial: &Trial) -> Weeded {
         reasons.turn_to(part, time_s);
         (kept.is_some(), time_s)
     });
-    Weeded { pulses, reasons: reasons.until(motion.duration_s()) }
+    Weeded { pulses, start_cycle: 0, alarm: false, reasons: reasons.until(motion.duration_s()) }
 }
 
 /// The ideal controller weeds the trial's row.
@@ -123,7 +114,8 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
     // If there is no time to swing in and out again, the tool stays out.
     let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
     let out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).collect();
-    Weeded { pulses: swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, out_during(out_s)), reasons }
+    let pulses = swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, out_during(out_s));
+    Weeded { pulses, start_cycle: 0, alarm: false, reasons }
 }
 
 /// For [`swing`]: out during these times, which are in ascending order.

@@ -18,6 +18,7 @@ use files::toml_entry::{self, Entry};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
 use std::io;
+use std::ops::Range;
 use std::path::Path;
 use thiserror::Error;
 
@@ -65,7 +66,7 @@ impl Conditions {
         }
     }
 
-    /// Those of a preset; none where it has another name.
+    /// The conditions of a preset. `None` if there is no preset of this name.
     pub fn preset(name: &str) -> Option<Result<Self, FileError>> {
         let (preset, text) = PRESETS.iter().find(|(preset, _)| *preset == name)?;
         Some(Self::parse(Path::new(preset), text))
@@ -104,11 +105,10 @@ impl Conditions {
 
     /// Whether the sweeps run between the zones round the stems of this row and of the next.
     fn check_sweeps(&self) -> Result<(), WrongValue> {
-        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm: from_mm, .. } = self.machine;
+        let Range { start: from_mm, end: to_mm } = self.machine.swept_mm();
         let zone_mm = self.crop.protected_mm / 2.0 + self.crop.across_scatter_mm;
-        let to_mm = from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
         let next_mm = self.plot.row_spacing_mm - zone_mm;
-        let why = if sweeps_a_side == 0 {
+        let why = if self.machine.sweeps_a_side == 0 {
             return Ok(());
         } else if from_mm < zone_mm {
             format!("the zone round a stem reaches {zone_mm:.1} mm from the row's line")
@@ -207,6 +207,13 @@ impl Conditions {
         // In the table's order, the wheel comes before its calibration. The other way round, the wheel would reset it.
         let others = Setting::all().filter(|setting| !timing.contains(setting));
         others.filter_map(|setting| Some((setting, *self.settings.get(&setting.text().to_string())?))).collect()
+    }
+}
+
+impl Mechanism {
+    /// The ground on each side of the row's line that the sweeps work.
+    pub(crate) fn swept_mm(&self) -> Range<f64> {
+        self.sweep_from_mm..self.sweep_from_mm + f64::from(self.sweeps_a_side) * self.sweep_width_mm
     }
 }
 

@@ -308,12 +308,21 @@ pub fn time_at_s(start_cycle: u64, cycle: u64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::motion::mm_s;
     use crate::row::Canopy;
 
     const START_CYCLE: u64 = 1_000_000;
+
+    /// The count of an encoder with dirt on its disc, calculated from the start of the motion.
+    pub(crate) fn count_at(machine: &Machine, motion: &Motion, time_s: f64) -> i64 {
+        let ticks = machine.ticks(motion, time_s);
+        let pulse = machine.pulse(ticks);
+        let hidden = |pulses: Range<i64>| pulses.filter(|&pulse| machine.dirt.hides(pulse)).count() as i64;
+        let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
+        ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
+    }
 
     /// Counts of a decoder that takes each pair of levels as they come.
     fn decode(changes: &[PinChange]) -> i64 {
@@ -337,8 +346,8 @@ mod tests {
         count
     }
 
-    fn beam(changes: &[PinChange]) -> Vec<PinChange> {
-        changes.iter().copied().filter(|change| change.pin == wiring::BEAM).collect()
+    fn of_pin(changes: &[PinChange], pin: Pin) -> Vec<PinChange> {
+        changes.iter().copied().filter(|change| change.pin == pin).collect()
     }
 
     fn row() -> Row {
@@ -350,66 +359,47 @@ mod tests {
         let machine = Machine { dirt: Dirt { share: 0.05, seed: 3 }, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
         let changes = machine.encoder_changes(&mut 0, 0.0, &motion, START_CYCLE);
-        let clean = machine.ticks(&motion, motion.duration_s());
-        let missing = |ticks: i64| {
-            let pulse = machine.pulse(ticks);
-            let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
-            (0..pulse).filter(|&pulse| machine.dirt.hides(pulse)).count() as i64 * PULSE_TICKS + in_pulse
-        };
-        assert!((60..160).contains(&missing(clean)), "{} of {clean}", missing(clean));
-        assert_eq!(decode(&changes), clean - missing(clean));
+        let end_s = motion.duration_s();
+        let missing = machine.ticks(&motion, end_s) - count_at(&machine, &motion, end_s);
+        assert!((60..160).contains(&missing), "{missing}");
+        assert_eq!(decode(&changes), count_at(&machine, &motion, end_s));
         // Also half way, at any phase of a pulse.
         for passing in motion.mark_passings(machine.tick_mm(), 0.0).iter().skip(600).take(200) {
             let so_far = changes.iter().filter(|change| change.cycle <= cycle_at(START_CYCLE, passing.time_s));
-            let ticks = machine.ticks(&motion, passing.time_s + 1e-7);
-            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), ticks - missing(ticks));
+            let count = count_at(&machine, &motion, passing.time_s + 1e-7);
+            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), count);
         }
     }
 
     #[test]
-    fn a_metre_is_1910_counts() {
-        let motion = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
-        let changes = Machine::default().pin_changes(&row(), &motion, START_CYCLE);
-        assert_eq!(decode(&changes), 1910);
-    }
-
-    #[test]
-    fn rolling_back_counts_down() {
-        let motion = Motion::starting_at(0.0)
-            .change_speed(500.0, 1000.0)
-            .stop_at(700.0, 1000.0)
+    fn a_metre_is_1910_counts_and_rolling_back_counts_down() {
+        let there = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
+        let back = Motion::steady(0.0, 1000.0, 500.0, 600.0)
+            .stop_at(800.0, 1000.0)
             .change_speed(-500.0, 1000.0)
             .roll_to(-1000.0);
         let machine = Machine::default();
-        let changes = machine.pin_changes(&row(), &motion, START_CYCLE);
-        assert_eq!(decode(&changes), -1910);
-        assert_eq!(machine.ticks(&motion, motion.duration_s()), -1910);
-    }
-
-    #[test]
-    fn the_beam_reports_each_plant_and_weed_at_its_edges_a_millisecond_late() {
-        let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1200.0);
-        let beam = beam(&Machine::default().pin_changes(&row(), &motion, START_CYCLE));
-        let levels: Vec<bool> = beam.iter().map(|change| change.high).collect();
-        assert_eq!(levels, [false, true, false, true]);
-        for (change, place_mm) in beam.iter().zip([425.0, 575.0, 792.5, 807.5]) {
-            let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
-            assert!((motion.position_mm(time_s) - place_mm).abs() < 0.001, "{place_mm} mm");
+        for (motion, counts) in [(there, 1910), (back, -1910)] {
+            assert_eq!(decode(&machine.pin_changes(&row(), &motion, START_CYCLE)), counts);
+            assert_eq!(machine.ticks(&motion, motion.duration_s()), counts);
         }
     }
 
     #[test]
-    fn the_second_beam_has_the_first_s_edges_at_the_beams_distance() {
+    fn each_beam_reports_each_plant_and_weed_at_its_edges_a_millisecond_late() {
         let machine = Machine { second_beam_mm: 220.0, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1300.0).with_slip(|| 0.2);
-        let mut second = machine.beam_changes(&row(), &motion, START_CYCLE);
-        second.retain(|change| change.pin == wiring::SECOND_BEAM);
         assert!(machine.beams_before(&row(), &motion)[1].high);
-        for (change, place_mm) in second.iter().zip([425.0, 575.0, 792.5, 807.5]) {
-            let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
-            assert!((motion.position_mm(time_s) - 220.0 - place_mm).abs() < 0.001, "{place_mm} mm");
+        let changes = machine.pin_changes(&row(), &motion, START_CYCLE);
+        for (pin, behind_mm) in [(wiring::BEAM, 0.0), (wiring::SECOND_BEAM, 220.0)] {
+            let beam = of_pin(&changes, pin);
+            assert_eq!(beam.iter().map(|change| change.high).collect::<Vec<_>>(), [false, true, false, true]);
+            for (change, place_mm) in beam.iter().zip([425.0, 575.0, 792.5, 807.5]) {
+                let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
+                let seen_mm = motion.position_mm(time_s) - behind_mm;
+                assert!((seen_mm - place_mm).abs() < 0.001, "{pin:?} at {place_mm} mm");
+            }
         }
-        assert_eq!(second.len(), 4);
         assert_eq!(Machine::default().beams_before(&row(), &motion).len(), 1);
     }
 
@@ -417,7 +407,7 @@ mod tests {
     fn a_beam_that_is_broken_at_the_start_is_low_from_power_up_on() {
         let motion = Motion::steady(500.0, 1000.0, mm_s(2.0), 700.0);
         let machine = Machine::default();
-        let beam = beam(&machine.pin_changes(&row(), &motion, START_CYCLE));
+        let beam = of_pin(&machine.pin_changes(&row(), &motion, START_CYCLE), wiring::BEAM);
         assert!(!machine.beams_before(&row(), &motion)[0].high);
         assert!(beam.len() == 1 && beam[0].high);
     }
@@ -429,15 +419,8 @@ mod tests {
         plant.leaves = vec![425.0..470.0, 470.2..520.0, 521.0..575.0];
         let row = Row::new(vec![plant]).unwrap();
         let motion = Motion::steady(0.0, 1000.0, mm_s(1.0), 1000.0);
-        let beam = beam(&Machine::default().pin_changes(&row, &motion, START_CYCLE));
+        let beam = of_pin(&Machine::default().pin_changes(&row, &motion, START_CYCLE), wiring::BEAM);
         assert_eq!(beam.len(), 4, "the plant and one gap of two");
-    }
-
-    #[test]
-    fn changes_come_in_order_of_time() {
-        let motion = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
-        let changes = Machine::default().pin_changes(&row(), &motion, START_CYCLE);
-        assert!(changes.is_sorted_by_key(|change| change.cycle));
     }
 
     #[test]

@@ -8,10 +8,10 @@
 //!
 //! It has no console, EEPROM, interrupts or cycles. The virtual Uno has.
 
-use crate::budget::{Part, Reason, Reasons, part_of};
+use crate::budget::{Part, Reasons, part_of};
 use crate::machine::{Machine, PULSE_TICKS, time_at_s};
 use crate::motion::{Course, Motion, marks};
-use crate::trial::{Start, Trial};
+use crate::trial::{Start, Trial, Weeded};
 use crate::wiring;
 use control::ground::AtTool;
 use control::ground::class::label;
@@ -57,17 +57,6 @@ pub struct Refused {
     command: String,
     /// The console's answer.
     answer: String,
-}
-
-/// The result of a native run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Weeded {
-    /// The servo's pulses, the first of each width.
-    pub pulses: Vec<Pulse>,
-    /// The machine's state at the end.
-    pub state: State,
-    /// Why the tool was in the row or out of it, from the beginning of the motion to its end.
-    pub reasons: Vec<Reason>,
 }
 
 /// The servo's line: the pulses for the widths that the loop commands.
@@ -330,8 +319,8 @@ fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) ->
             why.look(&mut weeder, orders.pulse != orders.pulse_out, time_s);
         }
     }
-    let reasons = why.reasons.until(trial.motion.duration_s());
-    Ok(Weeded { pulses: line.into_pulses(), state: weeder.state(), reasons })
+    let (pulses, reasons) = (line.into_pulses(), why.reasons.until(trial.motion.duration_s()));
+    Ok(Weeded { pulses, start_cycle: 0, alarm: weeder.state() != State::Work, reasons })
 }
 
 /// Why the decisions keep the tool out, turn by turn.
@@ -443,20 +432,11 @@ fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::Dirt;
+    use crate::machine::{Dirt, tests::count_at};
     use crate::planting::Planting;
     use crate::verdict::Timing;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-
-    /// The encoder's count at a time, calculated from the start of the motion.
-    fn count_at(Trial { machine, motion, .. }: &Trial, time_s: f64) -> i64 {
-        let ticks = machine.ticks(motion, time_s);
-        let pulse = machine.pulse(ticks);
-        let hidden = |pulses: std::ops::Range<i64>| pulses.filter(|&pulse| machine.dirt.hides(pulse)).count() as i64;
-        let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
-        ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
-    }
 
     #[test]
     fn counts_that_are_worked_out_together_are_those_of_each_turn_and_each_edge_by_itself() {
@@ -480,10 +460,11 @@ mod tests {
             let trial = Trial { motion, ..Trial::at_speed(row, machine, Timing::default(), speed_mm_s) };
             let mut told = 0;
             for Turn { time_s, position, edges } in Sensors::new(&trial, TURN_S).turns() {
-                assert_eq!(position, count_at(&trial, time_s), "seed {seed} at {time_s} s");
+                assert_eq!(position, count_at(&trial.machine, &trial.motion, time_s), "seed {seed} at {time_s} s");
                 for edge in edges {
                     assert!(time_s - TURN_S < edge.time_s && edge.time_s <= time_s, "seed {seed} at {time_s} s");
-                    assert_eq!(edge.position, count_at(&trial, edge.time_s), "seed {seed} at {} s", edge.time_s);
+                    let count = count_at(&trial.machine, &trial.motion, edge.time_s);
+                    assert_eq!(edge.position, count, "seed {seed} at {} s", edge.time_s);
                 }
                 told += edges.len();
             }

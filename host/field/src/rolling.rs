@@ -38,15 +38,16 @@ pub struct Rolling {
     motion: Motion,
     /// The cycle at which the motion began.
     start_cycle: u64,
-    /// The current speed, or the one that the machine changes to.
-    speed_mm_s: f64,
+    /// The speed that the machine keeps or changes to, negative backwards.
+    pub target_mm_s: f64,
     /// Net counts of a clean encoder since the beginning.
     ticks: i64,
     beams: Vec<Sensor>,
     /// The pulses that changed the tool's command.
     pulses: Vec<Pulse>,
     stroke: Stroke,
-    faults: Faults,
+    /// The faults from now on. [`levels`](Self::levels) returns the changed pins.
+    pub faults: Faults,
 }
 
 impl Rolling {
@@ -59,7 +60,7 @@ impl Rolling {
             commands: 0,
             motion: Motion::starting_at(start_mm),
             start_cycle,
-            speed_mm_s: 0.0,
+            target_mm_s: 0.0,
             ticks: 0,
             pulses: Vec::new(),
             stroke: machine.servo.stroke(&[], start_cycle),
@@ -72,8 +73,8 @@ impl Rolling {
     /// call.
     pub fn roll_until(&mut self, cycle: u64) -> Vec<PinChange> {
         let during_s = self.now_s()..time_at_s(self.start_cycle, cycle);
-        let speed_mm_s = self.speed_mm_s;
-        self.change(|motion| motion.change_speed(speed_mm_s, ACCELERATION_MM_S2).until(during_s.end));
+        let target_mm_s = self.target_mm_s;
+        self.change(|motion| motion.change_speed(target_mm_s, ACCELERATION_MM_S2).until(during_s.end));
         let Self { machine, motion, start_cycle, ticks, faults, .. } = self;
         let mut changes = machine.encoder_changes(ticks, during_s.start, motion, *start_cycle);
         if faults.encoder_dead {
@@ -94,19 +95,9 @@ impl Rolling {
         changes
     }
 
-    /// Changes to a speed, negative backwards, and rolls on at it.
-    pub fn roll_at(&mut self, speed_mm_s: f64) {
-        self.speed_mm_s = speed_mm_s;
-    }
-
     /// From now on the wheel loses this share of its distance, below 1.
     pub fn slip_by(&mut self, share: f64) {
         self.change(|motion| motion.slipping(share));
-    }
-
-    /// Sets the faults from now on. [`levels`](Self::levels) returns the changed pins.
-    pub fn have_faults(&mut self, faults: Faults) {
-        self.faults = faults;
     }
 
     /// The level of each pin that the machine drives. A dead encoder drives none.
@@ -134,7 +125,7 @@ impl Rolling {
     }
 
     /// Now, as a time of the motion.
-    pub fn now_s(&self) -> f64 {
+    fn now_s(&self) -> f64 {
         self.motion.duration_s()
     }
 
@@ -231,7 +222,7 @@ mod tests {
             let mut motion = Motion::starting_at(0.0);
             let (mut cycle, mut from_s) = (START_CYCLE, 0.0);
             for (for_s, speed_mm_s, slip) in way {
-                rolling.roll_at(speed_mm_s);
+                rolling.target_mm_s = speed_mm_s;
                 rolling.slip_by(slip);
                 let end = cycle_at(START_CYCLE, from_s + for_s);
                 from_s = time_at_s(START_CYCLE, end);
@@ -256,13 +247,13 @@ mod tests {
     #[test]
     fn a_fault_shows_at_the_pins_until_it_is_mended() {
         let mut rolling = Rolling::new(Machine::default(), vec![Canopy::plant(300.0, 150.0)], 0.0, 0);
-        rolling.roll_at(500.0);
+        rolling.target_mm_s = 500.0;
         rolling.roll_until(16_000_000);
         assert!(rolling.is_beam_broken() && rolling.levels().contains(&(wiring::BEAM, false)));
-        rolling.have_faults(Faults { beam_wire_torn: true, encoder_dead: true });
+        rolling.faults = Faults { beam_wire_torn: true, encoder_dead: true };
         assert_eq!(rolling.levels(), [(wiring::BEAM, true)]);
         assert_eq!(rolling.roll_until(32_000_000), []);
-        rolling.have_faults(Faults::default());
+        rolling.faults = Faults::default();
         assert_eq!(rolling.levels().len(), 3);
         assert!(!rolling.is_beam_broken() && rolling.levels().contains(&(wiring::BEAM, true)));
         assert!(!rolling.roll_until(33_000_000).is_empty());
@@ -271,7 +262,7 @@ mod tests {
     #[test]
     fn the_servo_takes_changes_and_past_motion_is_dropped() {
         let mut rolling = Rolling::new(Machine::default(), Vec::new(), 0.0, 0);
-        rolling.roll_at(500.0);
+        rolling.target_mm_s = 500.0;
         for frame in 0..200_u64 {
             let (rise, width_us) = (frame * 320_000, if frame / 50 % 2 == 0 { 2000 } else { 1500 });
             rolling.roll_until(rise);

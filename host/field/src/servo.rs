@@ -234,17 +234,12 @@ mod tests {
     }
 
     #[test]
-    fn only_a_changed_width_is_a_command() {
-        let commands = Servo::default().commands(&frames(&[(5, 2000), (5, 1500), (5, 2000)]));
+    fn only_a_changed_width_of_a_servo_is_a_command() {
+        let frames = frames(&[(5, 2000), (1, 3), (1, 19_900), (5, 1500), (5, 2000)]);
+        let commands = Servo::default().commands(&frames);
         let degrees: Vec<f64> = commands.iter().map(|command| command.degrees).collect();
         assert_eq!(degrees, [45.0, 0.0, 45.0]);
-        assert_eq!(commands[1].rise_cycle, 5 * 320_000);
-    }
-
-    #[test]
-    fn a_pulse_of_no_servos_width_is_no_command() {
-        let commands = Servo::default().commands(&frames(&[(5, 2000), (1, 3), (5, 2000), (1, 19_900), (5, 2000)]));
-        assert_eq!(commands.len(), 1);
+        assert_eq!(commands[1].rise_cycle, 7 * 320_000);
     }
 
     #[test]

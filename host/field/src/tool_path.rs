@@ -157,8 +157,7 @@ impl Tools<'_> {
 
     /// Whether a sweep passes through the zone round a stem.
     fn sweep_cuts(&self, stem: &Stem) -> bool {
-        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
-        let to_mm = sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
+        let swept = self.mechanism.swept_mm();
         let Stem { along_mm, across_mm, protected_mm, .. } = *stem;
         let steps = protected_mm.ceil() as i32;
         (-steps..=steps).any(|step| {
@@ -166,7 +165,7 @@ impl Tools<'_> {
             let chord_mm = stem.half_chord_mm(beside_mm);
             let across_mm = self.across_mm(along_mm + beside_mm, across_mm).abs();
             // Touching is no cut: sweeps may run along the zones.
-            across_mm + chord_mm > sweep_from_mm + TOUCH_MM && across_mm - chord_mm < to_mm - TOUCH_MM
+            across_mm + chord_mm > swept.start + TOUCH_MM && across_mm - chord_mm < swept.end - TOUCH_MM
         })
     }
 
@@ -215,11 +214,9 @@ impl Tools<'_> {
     }
 
     fn remove(&self, weed: &Weed) -> bool {
-        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
-        let swept_mm = sweep_from_mm..sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
         let passings = || self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
         let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
-        swept_mm.contains(&across_mm.abs())
+        self.mechanism.swept_mm().contains(&across_mm.abs())
             || passings().any(|passing| self.covered_mm(passing.time_s).contains(&across_mm))
     }
 }

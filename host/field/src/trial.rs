@@ -4,6 +4,7 @@
 //! and the firmware's settings. The controller is the [native run](crate::native), one of its
 //! [`baselines`](crate::baselines), or the real firmware, which is in another crate.
 
+use crate::budget::Reason;
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::row::Row;
@@ -11,6 +12,7 @@ use crate::verdict::Timing;
 use control::ground::features;
 use control::settings::Setting;
 use knn::Example;
+use uno::Pulse;
 
 /// How the firmware is put to work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +42,19 @@ pub struct Trial {
     pub settings: Vec<(Setting, u16)>,
     /// Examples that are taught in addition to the built-in ones.
     pub examples: Vec<Example<{ features::COUNT }>>,
+}
+
+/// A controller's work on a trial's row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weeded {
+    /// The servo's pulses, the first of each width.
+    pub pulses: Vec<Pulse>,
+    /// The cycle at which the motion began.
+    pub start_cycle: u64,
+    /// Whether the firmware was not at work at the end.
+    pub alarm: bool,
+    /// Why the tool was in the row or out of it, from the beginning of the motion to its end.
+    pub reasons: Vec<Reason>,
 }
 
 /// Distance that the machine rolls ahead of the row, to reach its speed and have the tool in the row.

@@ -18,8 +18,8 @@ use crate::motion::Motion;
 use crate::row::{Canopy, Row};
 use crate::servo::{Command, Stroke};
 use serde::Serialize;
-use std::fmt;
 use std::ops::Range;
+use strum::Display;
 use uno::Pulse;
 
 /// A margin that is short by less than this still counts as kept.
@@ -72,25 +72,18 @@ impl Timing {
 }
 
 /// The result for a plant, from good to bad.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Display, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Verdict {
     /// The tool kept away from it by the margin.
+    #[strum(to_string = "kept")]
     Kept,
     /// The tool came nearer than the margin allows, but not to the canopy.
+    #[strum(to_string = "margin cut")]
     MarginCut,
     /// The tool was not out of the row over its canopy.
+    #[strum(to_string = "DAMAGED")]
     Damaged,
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Verdict::Kept => "kept",
-            Verdict::MarginCut => "margin cut",
-            Verdict::Damaged => "DAMAGED",
-        })
-    }
 }
 
 /// The result for a plant.
@@ -219,6 +212,10 @@ pub fn judge(
         let ideal_mm = window_mm + machine.beam_to_tool_mm - speed_mm_s * f64::from(lead_ms) / 1000.0;
         (speed_mm_s > 0.0).then(|| (motion.position_mm(time_s) - ideal_mm) / machine.tick_mm())
     };
+    let works = |place_mm: f64| {
+        let mut passings = motion.passings(place_mm + machine.beam_to_tool_mm);
+        passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees())
+    };
     let swings = Swing::all(&commands, motion, start_cycle);
 
     let mut plants: Vec<PlantOutcome> =
@@ -246,7 +243,7 @@ pub fn judge(
     Judgement {
         plants,
         windows_mm: union(row.plants().map(|plant| timing.window_mm(plant)).collect()),
-        weeds: row.weeds().map(|weed| weed_outcome(weed, machine, motion, &stroke)).collect(),
+        weeds: row.weeds().map(|weed| WeedOutcome { weed: weed.clone(), cut: works(weed.position_mm) }).collect(),
         clear_mm: between(&closed, &run),
         path: path(machine, motion, &stroke),
         idle_swings,
@@ -323,14 +320,6 @@ fn plant_outcome(plant: &Canopy, closed: &[Range<f64>], machine: &Machine, timin
         out_error_ticks: None,
         in_error_ticks: None,
         verdict,
-    }
-}
-
-fn weed_outcome(weed: &Canopy, machine: &Machine, motion: &Motion, stroke: &Stroke) -> WeedOutcome {
-    let mut passings = motion.passings(weed.position_mm + machine.beam_to_tool_mm);
-    WeedOutcome {
-        weed: weed.clone(),
-        cut: passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees()),
     }
 }
 

@@ -7,7 +7,7 @@
 use crate::put;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
-use field::rolling::{Faults, Rolling};
+use field::rolling::Rolling;
 use field::row::{Canopy, Row};
 use field::servo::Servo;
 use field::verdict::{Timing, Verdict, judge};
@@ -92,7 +92,6 @@ enum Fate {
 struct Trial {
     rolling: Rolling,
     sowing: Sowing,
-    faults: Faults,
     /// The first canopy without a verdict, or to be judged again.
     next: usize,
     /// The verdicts by number in the row. If the tool passes again, a plant keeps the worse verdict and a weed the
@@ -145,7 +144,6 @@ impl Begun {
         let mut trial = Trial {
             rolling: Rolling::new(machine, row, 0.0, self.cycle),
             sowing,
-            faults: Faults::default(),
             next: 0,
             fates: Vec::new(),
             from_s: 0.0,
@@ -166,16 +164,15 @@ impl Different {
     /// Applies the change. Returns the levels of the machine's pins.
     pub fn take(self) -> Result<Value, String> {
         with(|trial| {
-            let Trial { rolling, sowing, faults, .. } = trial;
+            let Trial { rolling, sowing, .. } = trial;
             match self {
-                Self::SpeedKmH(speed_km_h) => rolling.roll_at(mm_s(speed_km_h)),
+                Self::SpeedKmH(speed_km_h) => rolling.target_mm_s = mm_s(speed_km_h),
                 Self::Slip(share) => rolling.slip_by(share),
-                Self::BeamWireTorn(is_torn) => faults.beam_wire_torn = is_torn,
-                Self::EncoderDead(is_dead) => faults.encoder_dead = is_dead,
+                Self::BeamWireTorn(is_torn) => rolling.faults.beam_wire_torn = is_torn,
+                Self::EncoderDead(is_dead) => rolling.faults.encoder_dead = is_dead,
                 Self::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
                 Self::WeedShare(share) => sowing.weed_share = share,
             }
-            rolling.have_faults(*faults);
             trial.levels()
         })
     }
