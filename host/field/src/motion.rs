@@ -248,7 +248,7 @@ impl Motion {
 
     /// Where the motion ended.
     pub fn end_mm(&self) -> f64 {
-        self.end.start_mm
+        self.end.end_mm
     }
 
     /// The speed at which the motion ended, negative backwards.

@@ -92,11 +92,6 @@ impl ServoLine {
         }
     }
 
-    /// Whether the line has this width, now and next.
-    pub fn shows(&self, width: HalfMicros) -> bool {
-        self.width == width
-    }
-
     fn begin(&mut self, width: HalfMicros, rise: u64) {
         (self.width, self.rise) = (width, rise);
         let cycle = rise * CYCLES_A_STEP;
