@@ -284,6 +284,19 @@ impl Motion {
         }
     }
 
+    /// [`Motion::wheel_mm`] for times that ascend from 0: it does not search for the piece each time.
+    pub fn wheel_course(&self) -> impl FnMut(f64) -> f64 {
+        let standing = Piece { speed_mm_s: 0.0, ..self.end };
+        let mut pieces = self.pieces.iter();
+        let mut piece = *pieces.next().unwrap_or(&standing);
+        move |time_s| {
+            while piece.end_s <= time_s {
+                piece = *pieces.next().unwrap_or(&standing);
+            }
+            piece.wheel_mm(piece.position_mm(time_s))
+        }
+    }
+
     /// The speed at a time, negative when rolling back.
     pub fn speed_mm_s(&self, time_s: f64) -> f64 {
         self.piece_at(time_s).map_or(0.0, |piece| piece.speed_at(time_s))
@@ -359,44 +372,6 @@ impl Motion {
     fn piece_at(&self, time_s: f64) -> Option<&Piece> {
         let index = self.pieces.partition_point(|piece| piece.end_s <= time_s);
         self.pieces.get(index).filter(|piece| piece.start_s <= time_s)
-    }
-}
-
-/// A cursor on a motion, for times that ascend: it does not search for the piece each time.
-#[derive(Clone, Debug)]
-pub struct Course<'a> {
-    /// The piece of the last call, the pieces after it, and at the end the standing machine.
-    piece: Piece,
-    to_come: std::slice::Iter<'a, Piece>,
-    end: Piece,
-}
-
-impl<'a> Course<'a> {
-    /// A motion from its beginning on.
-    pub fn along(motion: &'a Motion) -> Self {
-        let end = Piece { speed_mm_s: 0.0, ..motion.end };
-        let mut to_come = motion.pieces.iter();
-        Self { piece: *to_come.next().unwrap_or(&end), to_come, end }
-    }
-
-    /// Replaces each of these times by [`Motion::wheel_mm`]. They must ascend, and start at 0 or at the last time of
-    /// the previous call.
-    #[inline]
-    pub fn roll(&mut self, times_s: &mut [f64]) {
-        let mut rest = times_s;
-        while let Some(&first_s) = rest.first() {
-            while self.piece.end_s <= first_s {
-                self.piece = *self.to_come.next().unwrap_or(&self.end);
-            }
-            let piece = self.piece;
-            // Usually all times lie within the piece.
-            let within = rest.partition_point(|&time_s| time_s < piece.end_s);
-            let (now, later) = rest.split_at_mut(within);
-            for time_s in now {
-                *time_s = piece.wheel_mm(piece.position_mm(*time_s));
-            }
-            rest = later;
-        }
     }
 }
 

@@ -10,7 +10,7 @@
 
 use crate::budget::{Part, Reasons, part_of};
 use crate::machine::{Machine, PULSE_TICKS, time_at_s};
-use crate::motion::{Course, Motion, marks};
+use crate::motion::{Motion, marks};
 use crate::trial::{Start, Trial, Weeded};
 use crate::wiring;
 use control::ground::AtTool;
@@ -116,9 +116,6 @@ pub struct Sensors {
     edges: Vec<Seen>,
 }
 
-/// Turns whose counts are calculated together.
-const AT_ONCE: usize = 64;
-
 /// The readings of a turn.
 pub struct Turn<'a> {
     /// Its time.
@@ -154,24 +151,15 @@ impl Sensors {
         });
         let mut edges: Vec<Seen> = edges.collect();
         let mut to_come = edges.iter_mut().peekable();
-        let (mut course, mut encoder) = (Course::along(motion), Encoder::of(machine, motion));
-        let turns = 0..=turns(trial, turn_s);
-        let mut counts = Vec::with_capacity(turns.clone().count() + AT_ONCE);
-        for first in turns.step_by(AT_ONCE) {
-            let mut times_s = [0.0; AT_ONCE];
-            for (time_s, turn) in times_s.iter_mut().zip(first..) {
-                *time_s = f64::from(turn) * turn_s;
-            }
-            let mut wheel_mm = times_s;
-            course.roll(&mut wheel_mm);
-            // First all counts of a clean encoder: they are independent, so the compiler can vectorise them.
-            let ticks = wheel_mm.map(|wheel_mm| encoder.clean_ticks(wheel_mm));
-            counts.extend(ticks.map(|ticks| encoder.count(ticks) as i32));
-            let [.., last_s] = times_s;
-            while let Some(edge) = to_come.next_if(|edge| edge.time_s <= last_s) {
+        let (mut wheel_mm, mut encoder) = (motion.wheel_course(), Encoder::of(machine, motion));
+        let counts = (0..=turns(trial, turn_s)).map(|turn| {
+            let time_s = f64::from(turn) * turn_s;
+            while let Some(edge) = to_come.next_if(|edge| edge.time_s <= time_s) {
                 edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
             }
-        }
+            encoder.count(encoder.clean_ticks(wheel_mm(time_s))) as i32
+        });
+        let counts = counts.collect();
         Self { turn_s, counts, edges }
     }
 
