@@ -15,9 +15,11 @@ use crate::motion::Motion;
 use crate::row::{Kind, Row};
 use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Div, Index, Range};
+use strum::IntoStaticStr;
 
 /// The parts of a row's ground.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Part {
     /// The tool worked the row's line.
     Weeded,
@@ -42,23 +44,17 @@ impl Part {
 
     /// A name for programs.
     pub fn key(self) -> &'static str {
-        self.names().0
+        self.into()
     }
 
     /// Its name.
     pub fn title(self) -> &'static str {
-        self.names().1
-    }
-
-    fn names(self) -> (&'static str, &'static str) {
         match self {
-            Self::Weeded => ("weeded", "weeded"),
-            Self::Plants => ("plants", "stem zones and canopies"),
-            Self::Margins => ("margins", "margins"),
-            Self::Weeds => ("weeds", "tall weeds and unknowns kept"),
-            Self::Guarded => ("guarded", "guarded ground"),
-            Self::Swings => ("swings", "swings"),
-            Self::Closed => ("closed", "unseen ground, holds, alarms"),
+            Self::Plants => "stem zones and canopies",
+            Self::Weeds => "tall weeds and unknowns kept",
+            Self::Guarded => "guarded ground",
+            Self::Closed => "unseen ground, holds, alarms",
+            Self::Weeded | Self::Margins | Self::Swings => self.into(),
         }
     }
 }

@@ -386,35 +386,93 @@ pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
-    const PITCH_MM: f64 = 0.524;
-
-    /// 1 km/h, then 2.5 km/h, a stop, back over 300 mm, and forward again.
-    fn to_and_fro() -> Motion {
-        Motion::starting_at(-100.0)
-            .change_speed(mm_s(1.0), 400.0)
-            .roll_to(500.0)
-            .change_speed(mm_s(2.5), 800.0)
-            .stop_at(2000.0, 1000.0)
-            .go_on_for(1.5)
-            .change_speed(-mm_s(1.0), 400.0)
-            .stop_at(1700.0, 400.0)
-            .change_speed(mm_s(2.5), 800.0)
-            .roll_to(3000.0)
+    /// A speed is reached and kept for a time, again and again. The machine may stand, roll back and slip.
+    fn motions() -> impl Strategy<Value = Motion> {
+        let leg = (-900.0..900.0, 200.0..1500.0, 0.0..2.0, -0.1..0.2);
+        prop::collection::vec(leg, 1..8).prop_map(|legs| {
+            legs.into_iter().fold(Motion::starting_at(-100.0), |motion, (speed_mm_s, acceleration, for_s, slip)| {
+                motion.slipping(slip).change_speed(speed_mm_s, acceleration).go_on_for(for_s)
+            })
+        })
     }
 
-    #[test]
-    fn position_and_speed_are_continuous() {
-        let motion = to_and_fro();
-        let step_s = 1e-4;
-        let steps = (motion.duration_s() / step_s) as usize;
-        for step in 0..steps {
-            let time_s = step as f64 * step_s;
-            let moved_mm = motion.position_mm(time_s + step_s) - motion.position_mm(time_s);
-            let mean_mm_s = (motion.speed_mm_s(time_s) + motion.speed_mm_s(time_s + step_s)) / 2.0;
-            // The motion ends at full speed, so its very last step is left out.
-            if time_s + 2.0 * step_s < motion.duration_s() {
-                assert!((moved_mm - mean_mm_s * step_s).abs() < 1e-4, "at {time_s} s");
+    /// Times from the beginning to just before the end: after it the machine stands.
+    fn times_s(motion: &Motion) -> impl Iterator<Item = f64> {
+        let step_s = motion.duration_s() / 200.0;
+        (0..200).map(move |step| f64::from(step) * step_s)
+    }
+
+    proptest! {
+        #[test]
+        fn position_speed_and_stretches_agree(motion in motions(), share in 0.1..1.0_f64) {
+            let until_s = share * motion.duration_s();
+            let stretch = motion.stretch_mm(&(0.0..until_s));
+            let (mut least_mm, mut most_mm) = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut course = motion.wheel_course();
+            for time_s in times_s(&motion) {
+                let place_mm = motion.position_mm(time_s);
+                let moved_mm = motion.position_mm(time_s + 1e-5) - place_mm;
+                prop_assert!((moved_mm / 1e-5 - motion.speed_mm_s(time_s)).abs() < 0.02, "at {time_s} s");
+                prop_assert_eq!(course(time_s), motion.wheel_mm(time_s));
+                if time_s <= until_s {
+                    (least_mm, most_mm) = (least_mm.min(place_mm), most_mm.max(place_mm));
+                }
+            }
+            let missed_mm = motion.top_speed_mm_s() * motion.duration_s() / 200.0;
+            prop_assert!((-1e-6..=missed_mm).contains(&(least_mm - stretch.start)), "{stretch:?}, {least_mm}");
+            prop_assert!((-1e-6..=missed_mm).contains(&(stretch.end - most_mm)), "{stretch:?}, {most_mm}");
+        }
+
+        #[test]
+        fn places_and_marks_are_passed_when_the_machine_is_there(
+            motion in motions(), place_mm in -1000.0..2000.0_f64, pitch_mm in 0.4..5.0_f64,
+        ) {
+            let passings: Vec<Passing> = motion.passings(place_mm).collect();
+            for passing in &passings {
+                prop_assert!((motion.position_mm(passing.time_s) - place_mm).abs() < 1e-6);
+            }
+            prop_assert!(passings.windows(2).all(|two| two[0].time_s <= two[1].time_s && two[0].forward != two[1].forward));
+            let is_past = |position_mm: f64| position_mm >= place_mm;
+            prop_assert_eq!(passings.len() % 2 == 1, is_past(motion.start_mm()) != is_past(motion.end_mm()));
+            for times in motion.times_within_s(&(place_mm..place_mm + 300.0)) {
+                let ends_mm = [times.start, times.end].map(|time_s| motion.position_mm(time_s) - place_mm);
+                prop_assert!(ends_mm.iter().all(|end_mm| (-1e-6..300.0 + 1e-6).contains(end_mm)), "{ends_mm:?}");
+            }
+            let (mut count, mut last_s) = (0, 0.0);
+            for passing in motion.mark_passings(pitch_mm, 0.0) {
+                prop_assert!(passing.time_s >= last_s, "marks are in order of time");
+                last_s = passing.time_s;
+                let mark = if passing.forward { count + 1 } else { count };
+                let wheel_mm = motion.start_mm() + (f64::from(mark) - 0.5) * pitch_mm;
+                prop_assert!((motion.wheel_mm(passing.time_s) - wheel_mm).abs() < 1e-6);
+                count += if passing.forward { 1 } else { -1 };
+            }
+            let turned_mm = motion.wheel_mm(motion.duration_s()) - motion.start_mm();
+            prop_assert_eq!(i64::from(count), marks(turned_mm, pitch_mm));
+        }
+
+        #[test]
+        fn a_motion_that_is_cut_has_its_beginning_and_its_rest(whole in motions(), share in 0.0..0.99_f64) {
+            let cut_s = share * whole.duration_s();
+            let cut = whole.clone().until(cut_s);
+            prop_assert_eq!((cut.duration_s(), cut.end_mm()), (cut_s, whole.position_mm(cut_s)));
+            let on = cut.clone().until(cut_s + 0.5);
+            prop_assert!((on.end_mm() - cut.end_mm() - whole.speed_mm_s(cut_s) * 0.5).abs() < 1e-9);
+            let back = cut.change_speed(-250.0, 500.0).until(cut_s + 20.0);
+            prop_assert_eq!(back.speed_mm_s(cut_s + 19.0), -250.0);
+            let (left, mut kept) = (whole.since(cut_s), whole.clone());
+            kept.forget(cut_s);
+            prop_assert!((left.duration_s() + cut_s - whole.duration_s()).abs() < 1e-9);
+            for time_s in times_s(&whole) {
+                let place_mm = whole.position_mm(time_s);
+                if time_s < cut_s {
+                    prop_assert_eq!(back.position_mm(time_s), place_mm);
+                } else {
+                    prop_assert_eq!(kept.position_mm(time_s), place_mm);
+                    prop_assert!((left.position_mm(time_s - cut_s) - place_mm).abs() < 1e-6);
+                }
             }
         }
     }
@@ -428,21 +486,6 @@ mod tests {
         assert_eq!(passings.len(), 200);
         let hundredth = motion.position_mm(passings[99].time_s);
         assert!((hundredth - 995.0 * 0.95).abs() < 1e-6, "{hundredth} mm");
-    }
-
-    #[test]
-    fn a_motion_that_is_cut_goes_on_as_it_was_and_may_become_another_one() {
-        let whole = to_and_fro();
-        for time_s in [0.0, 0.3, 2.0, 5.5, whole.duration_s() - 0.1] {
-            let cut = whole.clone().until(time_s);
-            assert_eq!((cut.duration_s(), cut.end_mm()), (time_s, whole.position_mm(time_s)));
-            let on = cut.clone().until(time_s + 0.5);
-            let expected_mm = whole.position_mm(time_s) + whole.speed_mm_s(time_s) * 0.5;
-            assert!((on.end_mm() - expected_mm).abs() < 1e-9, "at {time_s} s");
-            let back = cut.change_speed(-250.0, 500.0).until(time_s + 20.0);
-            assert_eq!(back.speed_mm_s(time_s + 19.0), -250.0);
-            assert_eq!(back.position_mm(time_s / 2.0), whole.position_mm(time_s / 2.0));
-        }
     }
 
     #[test]
@@ -470,46 +513,6 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_of_a_motion_rolls_as_the_whole_does() {
-        let whole = to_and_fro();
-        for from_s in [0.0, 0.2, 3.3, 7.0] {
-            let left = whole.since(from_s);
-            let mut kept = whole.clone();
-            kept.forget(from_s);
-            for step in 0..100 {
-                let time_s = f64::from(step) / 100.0 * (whole.duration_s() - from_s);
-                assert!((left.position_mm(time_s) - whole.position_mm(from_s + time_s)).abs() < 1e-9);
-                assert!((left.speed_mm_s(time_s) - whole.speed_mm_s(from_s + time_s)).abs() < 1e-9);
-                assert_eq!(kept.position_mm(from_s + time_s), whole.position_mm(from_s + time_s));
-            }
-            assert!((left.duration_s() + from_s - whole.duration_s()).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn every_mark_is_passed_at_the_time_when_the_position_says_so() {
-        let motion = to_and_fro();
-        let mut count = 0;
-        let mut last_s = 0.0;
-        for passing in motion.mark_passings(PITCH_MM, 0.0) {
-            assert!(passing.time_s >= last_s, "marks are in order of time");
-            last_s = passing.time_s;
-            let mark = if passing.forward { count + 1 } else { count };
-            let place_mm = -100.0 + (f64::from(mark) - 0.5) * PITCH_MM;
-            assert!((motion.position_mm(passing.time_s) - place_mm).abs() < 1e-6);
-            count += if passing.forward { 1 } else { -1 };
-        }
-        assert_eq!(i64::from(count), marks(3100.0, PITCH_MM));
-    }
-
-    #[test]
-    fn rolling_back_passes_a_place_three_times() {
-        let motion = to_and_fro();
-        let directions: Vec<bool> = motion.passings(1800.0).map(|passing| passing.forward).collect();
-        assert_eq!(directions, [true, false, true]);
-    }
-
-    #[test]
     fn a_place_on_which_the_machine_turns_is_passed_there_and_back() {
         let motion = Motion::starting_at(0.0)
             .change_speed(100.0, 100.0)
@@ -519,24 +522,5 @@ mod tests {
         assert_eq!(motion.position_mm(3.0), 200.0);
         let directions: Vec<bool> = motion.passings(200.0).map(|passing| passing.forward).collect();
         assert_eq!(directions, [true, false]);
-    }
-
-    #[test]
-    fn times_within_a_stretch_end_where_the_machine_leaves_it() {
-        let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0);
-        let times = motion.times_within_s(&(400.0..600.0));
-        assert_eq!(times.len(), 1);
-        assert!((motion.position_mm(times[0].start) - 400.0).abs() < 1e-6);
-        assert!((motion.position_mm(times[0].end) - 600.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn the_stretch_of_a_turn_reaches_to_the_turning_point() {
-        let motion = to_and_fro();
-        let stretch = motion.stretch_mm(&(0.0..motion.duration_s()));
-        assert!((stretch.start - -100.0).abs() < 1e-9 && (stretch.end - 3000.0).abs() < 1e-9);
-        let times_s: Vec<f64> = motion.passings(1900.0).map(|passing| passing.time_s).collect();
-        let turn = motion.stretch_mm(&(times_s[0]..times_s[1]));
-        assert!((turn.start - 1900.0).abs() < 1e-6 && (turn.end - 2000.0).abs() < 1e-6);
     }
 }

@@ -264,21 +264,20 @@ struct Swing {
 
 impl Swing {
     fn all(commands: &[Command], motion: &Motion, start_cycle: u64) -> Vec<Self> {
-        let mut swings = Vec::new();
-        let mut out: Option<Option<f64>> = None;
+        let mut swings: Vec<Self> = Vec::new();
         for (index, command) in commands.iter().enumerate() {
             let time_s = time_at_s(start_cycle, command.rise_cycle);
-            match (command.is_out(), out) {
-                (true, None) => out = Some((index > 0).then_some(time_s)),
-                (false, Some(out_s)) => {
-                    swings.push(Self { out_s, in_s: Some(time_s), during_s: out_s.unwrap_or(0.0)..time_s });
-                    out = None;
+            match swings.last_mut().filter(|swing| swing.in_s.is_none()) {
+                Some(swing) if !command.is_out() => {
+                    swing.in_s = Some(time_s);
+                    swing.during_s.end = time_s;
+                }
+                None if command.is_out() => {
+                    let out_s = (index > 0).then_some(time_s);
+                    swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
                 }
                 _ => {}
             }
-        }
-        if let Some(out_s) = out {
-            swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
         }
         swings
     }
