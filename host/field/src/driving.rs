@@ -134,19 +134,17 @@ mod tests {
 
     #[test]
     fn without_scatter_and_stops_a_row_takes_its_length_over_its_speed() {
-        let drive = driven(&Conditions::preset("even-stand").unwrap().unwrap(), 2.0);
+        let drive = driven(&Conditions::with("even-stand", &[]), 2.0);
         assert!((drive.row_s - 36.0).abs() < 1e-9, "{} s", drive.row_s);
         // 2.8 m at 2 km/h, and 1 s more or less by half.
         assert!((5.54..6.54).contains(&drive.turn_s), "{} s", drive.turn_s);
-        let fast = driven(&Conditions::preset("even-stand").unwrap().unwrap(), 8.0);
+        let fast = driven(&Conditions::with("even-stand", &[]), 8.0);
         assert!((fast.row_s - 9.0).abs() < 1e-9, "{} s", fast.row_s);
     }
 
     #[test]
     fn speed_wanders_within_its_scatter_and_stops_take_time() {
-        let mut conditions = Conditions::default();
-        conditions.set("driving.stops_per_100_m", 50.0).unwrap();
-        let drive = driven(&conditions, 2.0);
+        let drive = driven(&Conditions::with("transplanted", &[("driving.stops_per_100_m", 50.0)]), 2.0);
         assert!(drive.motion.top_speed_mm_s() <= mm_s(2.0) * 1.08);
         assert!(drive.row_s > 36.0 / 1.08 + 10.0, "{} s", drive.row_s);
     }
@@ -164,10 +162,8 @@ mod tests {
         let slip_percent = 100.0 * (1.0 - 1.0 / turned_a_mm(&Conditions::default()));
         assert!((slip_percent - 5.0).abs() < 2.0, "{slip_percent} %");
         for slip_percent in [-30.0, -10.0, 30.0] {
-            let mut conditions = Conditions::default();
-            conditions.set("ground.slip_percent", slip_percent).unwrap();
-            conditions.set("ground.slip_scatter_percent", 0.0).unwrap();
-            let turned_a_mm = turned_a_mm(&conditions);
+            let changes = [("ground.slip_percent", slip_percent), ("ground.slip_scatter_percent", 0.0)];
+            let turned_a_mm = turned_a_mm(&Conditions::with("transplanted", &changes));
             let expected = 1.0 / (1.0 - slip_percent / 100.0);
             assert!((turned_a_mm - expected).abs() < 1e-9, "{turned_a_mm} at {slip_percent} %");
         }
@@ -175,9 +171,8 @@ mod tests {
 
     #[test]
     fn even_the_fastest_row_and_the_shortest_can_be_driven() {
-        let mut conditions = Conditions::default();
-        conditions.set("driving.stops_per_100_m", 50.0).unwrap();
-        conditions.set("driving.speed_scatter_percent", 50.0).unwrap();
+        let changes = [("driving.stops_per_100_m", 50.0), ("driving.speed_scatter_percent", 50.0)];
+        let conditions = Conditions::with("transplanted", &changes);
         for seed in 0..200 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let drive = drive(&conditions, &(0.0..2000.0), 5.0, &mut rng);
