@@ -76,7 +76,7 @@ fn a_beam_that_stays_broken_is_an_alarm_that_puts_the_tool_out() {
     assert_alarm(&mut run, "1-1 beam_blocked");
     let command = run.commands().pop().expect("a command");
     let place_mm = run.place_mm(command.rise_cycle);
-    assert!(command.is_out() && (1395.0..1410.0).contains(&place_mm), "{place_mm} mm");
+    assert!(command.is_out && (1395.0..1410.0).contains(&place_mm), "{place_mm} mm");
 }
 
 #[test]

@@ -83,7 +83,7 @@ fn a_loop_that_stalls_has_the_tool_put_out_and_the_machine_reset_and_the_cause_t
         let ms_after = |cycle: u64| (cycle - stalled) as f64 / (CYCLES_PER_SECOND as f64 / 1000.0);
         assert!((240.0..300.0).contains(&ms_after(reset)), "{} ms", ms_after(reset));
         let command = run.first_command_after(stalled);
-        assert!(command.is_out() && command.rise_cycle < reset, "{command:?}");
+        assert!(command.is_out && command.rise_cycle < reset, "{command:?}");
         assert!((195.0..225.0).contains(&ms_after(command.rise_cycle)), "{} ms", ms_after(command.rise_cycle));
         run_for_ms(&mut run.uno, 100);
         assert!(is_out_at_the_pin(&run.uno));

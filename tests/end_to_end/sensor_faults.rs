@@ -168,7 +168,7 @@ fn an_encoder_with_one_dead_channel_is_an_alarm() {
         // Within a quarter of a second.
         let command = run.commands().pop().expect("a command");
         let place_mm = run.place_mm(command.rise_cycle);
-        assert!(command.is_out() && place_mm < FAULT_MM + 150.0, "{place_mm} mm");
+        assert!(command.is_out && place_mm < FAULT_MM + 150.0, "{place_mm} mm");
     }
 }
 
@@ -246,7 +246,7 @@ fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
     let said = status(&mut run.uno);
     assert_eq!((value(&said, "state"), number(&said, "late")), ("work", 1), "{said}");
     let command = run.first_command_after(run.cycles().start);
-    assert!(command.is_out());
+    assert!(command.is_out);
     // At once: within the speed meter's window and a pulse.
     let late_ms = (run.place_mm(command.rise_cycle) - jump_mm) / mm_s(4.0) * 1000.0;
     assert!((0.0..60.0).contains(&late_ms), "{late_ms} ms");

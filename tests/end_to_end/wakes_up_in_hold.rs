@@ -68,7 +68,7 @@ fn the_tool_enters_the_row_a_margin_behind_the_start_of_the_seen_ground() {
         let begin = run.cycles().start;
         run.roll_to_the_end();
         let command = run.first_command_after(begin);
-        assert!(!command.is_out());
+        assert!(!command.is_out);
         // A plant may end where the beam stood. Led by the time that the servo takes at least.
         let ideal_mm = machine.beam_to_tool_mm + f64::from(margin_mm) - speed_mm_s * f64::from(lead_in_ms) / 1000.0;
         let error_ticks = (run.place_mm(command.rise_cycle) - ideal_mm) / machine.tick_mm();

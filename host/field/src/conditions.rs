@@ -233,17 +233,11 @@ impl WrongValue {
     }
 
     fn unknown(name: impl Into<String>) -> Self {
-        let known = names().collect::<Vec<_>>().join(", ");
+        let parameters = PARAMETERS.iter().map(|parameter| parameter.name.to_owned());
+        let known: Vec<String> = parameters.chain(Setting::all().map(|setting| setting.text().to_string())).collect();
+        let known = known.join(", ");
         Self::new(name, format!("is neither a parameter of the field nor a setting of the firmware; there are {known}"))
     }
-}
-
-/// All names that [`Conditions::set`] takes.
-fn names() -> impl Iterator<Item = String> {
-    PARAMETERS
-        .iter()
-        .map(|parameter| parameter.name.to_owned())
-        .chain(Setting::all().map(|setting| setting.text().to_string()))
 }
 
 /// The TOML reader's error at a byte, in one line. For a value of a parameter or setting: the valid values.

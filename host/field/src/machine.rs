@@ -13,7 +13,7 @@
 
 use crate::motion::{Motion, marks};
 use crate::row::Row;
-use crate::servo::{OUT_DEGREES, Servo, Stroke};
+use crate::servo::{OUT_DEGREES, Servo};
 use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -148,20 +148,16 @@ impl Machine {
         self.across_mm(self.servo.stroke_degrees()) - self.tool_width_mm / 2.0
     }
 
-    /// The times within `during_s` at which the tool is not fully out.
-    pub fn times_not_clear_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        stroke.times_below_s(self.servo.stroke_degrees() - self.clear_within_degrees, during_s)
+    /// The angle from which on the tool is fully out.
+    pub fn clear_degrees(&self) -> f64 {
+        self.servo.stroke_degrees() - self.clear_within_degrees
     }
 
-    /// The times within `during_s` at which the tool's edge is nearer than this to the row's line, which a full stroke clears.
-    pub fn times_within_s(&self, aside_mm: f64, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
+    /// The angle from which on the tool's nearer edge is this far from the row's line. A tool that is fully out is far
+    /// enough.
+    pub fn degrees_beside(&self, aside_mm: f64) -> f64 {
         let degrees = ((aside_mm + self.tool_width_mm / 2.0) / self.arm_mm).clamp(0.0, 1.0).asin().to_degrees();
-        stroke.times_below_s(degrees.min(self.servo.stroke_degrees() - self.clear_within_degrees), during_s)
-    }
-
-    /// The times within `during_s` at which the tool works the row's line.
-    pub fn times_weeding_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        stroke.times_below_s(self.line_degrees(), during_s)
+        degrees.min(self.clear_degrees())
     }
 
     /// The level of each beam's line at power-up, before the motion begins: the first beam's, and the second one's if

@@ -11,6 +11,7 @@
 //! them. If dead time and load scatter, each command has its own random values.
 
 use crate::ground::{interpolated, spans_where};
+use crate::planting::scatter;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::{Range, RangeInclusive};
@@ -71,15 +72,8 @@ pub struct Command {
     pub fall_cycle: u64,
     /// The angle asked for; 0 is in the row.
     pub degrees: f64,
-    /// Whether that is more than half of the stroke.
-    out: bool,
-}
-
-impl Command {
-    /// Whether it asks for the tool to leave the row.
-    pub fn is_out(&self) -> bool {
-        self.out
-    }
+    /// Whether it asks for the tool to leave the row: by more than half of the stroke.
+    pub is_out: bool,
 }
 
 impl Default for Servo {
@@ -117,8 +111,8 @@ impl Servo {
             if (pulse.width_us() - width_us).abs() >= DEAD_BAND_US {
                 width_us = pulse.width_us();
                 let degrees = self.degrees(pulse);
-                let out = degrees > self.stroke_degrees() / 2.0;
-                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees, out });
+                let is_out = degrees > self.stroke_degrees() / 2.0;
+                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees, is_out });
             }
         }
         commands
@@ -135,7 +129,7 @@ impl Servo {
         let mut corners: Vec<(f64, f64)> = Vec::new();
         for (index, command) in commands.iter().enumerate() {
             let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
-            let late_ms = rng.random_range(-1.0..=1.0) * dead_time_ms;
+            let late_ms = scatter(&mut rng, dead_time_ms);
             let travel_ms = self.travel_ms * slowed(rng.random_range(0.0..=1.0) * load);
             let begin_s = heard_s + (self.dead_time_ms + late_ms) / 1000.0;
             let begin_degrees = interpolated(&corners, begin_s).unwrap_or(rest_degrees);
@@ -252,7 +246,7 @@ mod tests {
         let servo = Servo { out_us: 1750.0, ..Servo::default() };
         assert_eq!(servo.stroke_degrees(), 22.5);
         let commands = servo.commands(&frames(&[(10, 1500), (20, 1750)]));
-        assert!(!commands[0].is_out() && commands[1].is_out());
+        assert!(!commands[0].is_out && commands[1].is_out);
         let stroke = servo.stroke(&commands, 0);
         // The tenth frame's pulse ends at 201.75 ms; behind 60 ms of dead time 60 ms of travel, not 120.
         assert_degrees(&stroke, 0.2917, 11.25 - 0.05 * 0.375);

@@ -196,15 +196,16 @@ pub fn judge(
     let commands = machine.servo.commands(pulses);
     let stroke = machine.servo.stroke(&commands, start_cycle);
     let whole_s = 0.0..motion.duration_s();
-    let ground_of = |times_s: &[Range<f64>]| -> Vec<Range<f64>> {
+    let ground_below = |degrees: f64| {
+        let times_s = stroke.times_below_s(degrees, &whole_s);
         union(times_s.iter().map(|times_s| machine.worked_mm(motion, times_s)).collect())
     };
-    let closed = ground_of(&machine.times_not_clear_s(&stroke, &whole_s));
+    let closed = ground_below(machine.clear_degrees());
     let over_zone = match timing.stem_zone_mm {
         0 => closed.clone(),
-        zone_mm => ground_of(&machine.times_within_s(f64::from(zone_mm) / 2.0, &stroke, &whole_s)),
+        zone_mm => ground_below(machine.degrees_beside(f64::from(zone_mm) / 2.0)),
     };
-    let weeded = ground_of(&machine.times_weeding_s(&stroke, &whole_s));
+    let weeded = ground_below(machine.line_degrees());
     let run = machine.worked_mm(motion, &whole_s);
     // How late a command was against its ideal position, in ticks. `None` unless the machine rolls forward.
     let late_ticks = |time_s: f64, window_mm: f64, lead_ms: u32| {
@@ -268,11 +269,11 @@ impl Swing {
         for (index, command) in commands.iter().enumerate() {
             let time_s = time_at_s(start_cycle, command.rise_cycle);
             match swings.last_mut().filter(|swing| swing.in_s.is_none()) {
-                Some(swing) if !command.is_out() => {
+                Some(swing) if !command.is_out => {
                     swing.in_s = Some(time_s);
                     swing.during_s.end = time_s;
                 }
-                None if command.is_out() => {
+                None if command.is_out => {
                     let out_s = (index > 0).then_some(time_s);
                     swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
                 }

@@ -152,6 +152,8 @@ pub struct Receiver {
     /// The fix's standard deviation, if the user knows it.
     error_m: Option<f64>,
     counts: Counts,
+    /// The results that are not returned yet.
+    heard: Heard,
     moment: Option<Moment>,
     /// Midnights since the first line.
     days: i64,
@@ -206,50 +208,45 @@ impl Receiver {
     pub fn take(&mut self, time_ms: f64, line: &str) -> Heard {
         match Line::parse(line) {
             Line::Report(report) => self.report(time_ms, report),
-            Line::Other => Heard::default(),
-            Line::Damaged => {
-                self.counts.damaged += 1;
-                Heard::default()
-            }
+            Line::Other => {}
+            Line::Damaged => self.counts.damaged += 1,
         }
+        std::mem::take(&mut self.heard)
     }
 
     /// The end of the log: the last moment's fix is complete.
     pub fn end(&mut self) -> Heard {
-        let mut heard = Heard::default();
-        self.complete(&mut heard);
-        heard
+        self.complete();
+        std::mem::take(&mut self.heard)
     }
 
     /// The receiver is gone or silent.
     pub fn silent(&mut self) -> Heard {
-        let mut heard = self.end();
-        self.no_fix(&mut heard);
-        heard
+        self.complete();
+        self.no_fix();
+        std::mem::take(&mut self.heard)
     }
 
-    fn report(&mut self, arrived_ms: f64, report: Report) -> Heard {
+    fn report(&mut self, arrived_ms: f64, report: Report) {
         let Some(time_ms) = report.time_ms else {
             // A receiver without a satellite so far has no time.
-            return self.silent();
+            self.complete();
+            return self.no_fix();
         };
-        let mut heard = Heard::default();
         if let Some(moment) = &self.moment {
             let before_ms = moment.utc_ms.rem_euclid(DAY_MS);
             if before_ms == time_ms && arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS {
-                self.add(report);
-                return heard;
+                return self.add(report);
             }
             // Past midnight forward, or back over it for a receiver that has only now found the time.
             self.days += i64::from(time_ms < before_ms - DAY_MS / 2) - i64::from(time_ms > before_ms + DAY_MS / 2);
         }
-        self.complete(&mut heard);
+        self.complete();
         let utc_ms = self.days * DAY_MS + time_ms;
         let wheel = self.wheel;
         self.moment =
             Some(Moment { arrived_ms, utc_ms, place: None, is_valid: true, quality: None, wheel, is_over: false });
         self.add(report);
-        heard
     }
 
     /// Adds the values of a sentence to its moment.
@@ -263,31 +260,30 @@ impl Receiver {
         moment.quality = moment.quality.max(report.quality);
     }
 
-    fn no_fix(&mut self, heard: &mut Heard) {
+    fn no_fix(&mut self) {
         if self.has_fix != Some(false) {
             self.has_fix = Some(false);
             self.counts.losses += 1;
-            heard.marks.push(Mark::Lost);
+            self.heard.marks.push(Mark::Lost);
         }
     }
 
     /// Ends the pending moment.
-    fn complete(&mut self, heard: &mut Heard) {
+    fn complete(&mut self) {
         let Some(moment) = self.moment.as_mut().filter(|moment| !moment.is_over) else { return };
         moment.is_over = true;
         let moment = *moment;
         let (Some(place), true) = (moment.place, moment.is_valid) else {
-            self.no_fix(heard);
-            return;
+            return self.no_fix();
         };
         let quality = moment.quality.unwrap_or(Quality::Satellites);
         if self.has_fix != Some(true) {
             self.has_fix = Some(true);
-            heard.marks.push(Mark::Found(quality));
+            self.heard.marks.push(Mark::Found(quality));
         }
         let time_ms = moment.utc_ms as f64 + self.ahead_ms(moment);
         let fix = Fix { time_ms, utc_ms: moment.utc_ms, place, quality, track: self.track };
-        self.judge(fix, moment.wheel, heard);
+        self.judge(fix, moment.wheel);
     }
 
     /// By how much the record's clock is ahead of UTC, and of the receiver's least delay.
@@ -306,7 +302,7 @@ impl Receiver {
     }
 
     /// Compares a fix with the last one, and with the wheel.
-    fn judge(&mut self, fix: Fix, wheel: Option<Wheel>, heard: &mut Heard) {
+    fn judge(&mut self, fix: Fix, wheel: Option<Wheel>) {
         let rolled_m = wheel.map_or(0.0, |wheel| {
             // The wheel is reported ten times a second. A line that came much too late has a position that is no longer
             // known here.
@@ -316,21 +312,19 @@ impl Receiver {
         let here = Rolled { fix, rolled_m };
         let Some(last) = self.last.filter(|_| wheel.is_some()) else {
             self.jumped.clear();
-            self.accept(here, heard);
-            return;
+            return self.accept(here);
         };
         // As the wheel rolls on, the machine could have reached the position of the jumped fixes. But these agree with
         // each other.
         let agrees = self.jumped.last().is_some_and(|jumped| self.follows(jumped, &here));
         if !agrees && self.follows(&last, &here) {
             self.jumped.clear();
-            self.accept(here, heard);
-            return;
+            return self.accept(here);
         }
         self.counts.jumps += 1;
         let far_m = last.fix.place.distance_m(fix.place);
         let rolled_m = (rolled_m - last.rolled_m).abs();
-        heard.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
+        self.heard.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
         if !agrees {
             self.jumped.clear();
         }
@@ -338,10 +332,10 @@ impl Receiver {
         let agree_ms = self.jumped.first().map_or(0.0, |first| fix.time_ms - first.fix.time_ms);
         if self.jumped.len() >= AGREEING && agree_ms >= AGREEING_MS {
             self.track += 1;
-            heard.marks.push(Mark::Stayed);
+            self.heard.marks.push(Mark::Stayed);
             for mut jumped in std::mem::take(&mut self.jumped) {
                 jumped.fix.track = self.track;
-                self.accept(jumped, heard);
+                self.accept(jumped);
             }
         }
     }
@@ -354,9 +348,9 @@ impl Receiver {
         far_m <= SKIDDING * (to.rolled_m - from.rolled_m).abs() + room_m
     }
 
-    fn accept(&mut self, here: Rolled, heard: &mut Heard) {
+    fn accept(&mut self, here: Rolled) {
         self.counts.fixes += 1;
-        heard.fixes.push(here.fix);
+        self.heard.fixes.push(here.fix);
         self.last = Some(here);
     }
 }

@@ -215,7 +215,7 @@ impl Trial {
         let machine = &rolling.machine;
         let degrees = rolling.degrees();
         let across_mm = machine.across_mm(degrees);
-        let is_clear = degrees >= machine.servo.stroke_degrees() - machine.clear_within_degrees;
+        let is_clear = degrees >= machine.clear_degrees();
         let now = vec![
             rolling.place_mm(),
             rolling.tool_mm(),
