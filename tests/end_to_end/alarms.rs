@@ -6,7 +6,7 @@ use crate::common::{
 };
 use field::machine::Machine;
 use field::motion::mm_s;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::trial::{Start, Trial};
 use field::wiring;
 use uno::Uno;
@@ -21,7 +21,7 @@ const PAUSE_CYCLES: u64 = 4 * FLASH_CYCLES;
 
 /// A run in which the beam is broken for 600 mm, more than any plant covers, while the tool is far behind in the row.
 fn with_a_blocked_beam(start: Start) -> Run {
-    let row = Row::new(vec![Thing::plant(1300.0, 600.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(1300.0, 600.0)]).expect("a plant is a row");
     let machine = Machine { beam_to_tool_mm: 900.0, ..Machine::default() };
     let motion = steady(mm_s(2.0), 1800.0);
     let mut run = Run::begin(Trial { machine, start, ..trial(row, motion) }, &[]);
@@ -76,12 +76,12 @@ fn a_beam_that_stays_broken_is_an_alarm_that_puts_the_tool_out() {
     assert_alarm(&mut run, "1-1 beam_blocked");
     let command = run.commands().pop().expect("a command");
     let place_mm = run.place_mm(command.rise_cycle);
-    assert!(command.is_out() && (1395.0..1410.0).contains(&place_mm), "{place_mm} mm");
+    assert!(command.is_out && (1395.0..1410.0).contains(&place_mm), "{place_mm} mm");
 }
 
 #[test]
 fn a_beam_that_stays_broken_at_standstill_is_no_alarm() {
-    let row = Row::new(vec![Thing::plant(300.0, 150.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(300.0, 150.0)]).expect("a plant is a row");
     let mut run = Run::begin(trial(row, steady(mm_s(1.0), 300.0).go_on_for(4.0)), &[]);
     run.roll_to_the_end();
     assert_eq!(run.events("alarm"), [""; 0]);
@@ -90,7 +90,7 @@ fn a_beam_that_stays_broken_at_standstill_is_no_alarm() {
 
 #[test]
 fn more_plants_than_the_schedule_holds_are_an_alarm() {
-    let plants = (0..20).map(|number| Thing::plant(300.0 + 110.0 * f64::from(number), 90.0));
+    let plants = (0..20).map(|number| Canopy::plant(300.0 + 110.0 * f64::from(number), 90.0));
     let row = Row::new(plants.collect()).expect("the plants stand apart");
     let machine = Machine { beam_to_tool_mm: 2000.0, ..Machine::default() };
     let mut run = Run::begin(Trial { machine, ..trial(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_mm 3"]);
@@ -105,7 +105,7 @@ fn a_crop_of_stalks_that_the_built_in_examples_do_not_know_is_an_alarm_before_th
     for (spacing_mm, before_mm, speed_km_h) in
         [(500.0, 300.0, 1.0), (600.0, 900.0, 2.0), (250.0, 500.0, 2.5), (550.0, 1400.0, 1.5)]
     {
-        let stalk = |(width_mm, number)| Thing::plant(before_mm + spacing_mm * f64::from(number), width_mm);
+        let stalk = |(width_mm, number)| Canopy::plant(before_mm + spacing_mm * f64::from(number), width_mm);
         let row = Row::new(widths_mm.into_iter().zip(0..).map(stalk).collect()).expect("the stalks stand apart");
         let mut run = Run::begin(trial(row, steady(mm_s(speed_km_h), before_mm + 5.5 * spacing_mm)), &[]);
         run.roll_to_the_end();
@@ -115,7 +115,7 @@ fn a_crop_of_stalks_that_the_built_in_examples_do_not_know_is_an_alarm_before_th
 
 #[test]
 fn stalks_are_no_alarm_where_it_is_off() {
-    let stalks = (0..9).map(|number| Thing::plant(300.0 + 250.0 * f64::from(number), 20.0));
+    let stalks = (0..9).map(|number| Canopy::plant(300.0 + 250.0 * f64::from(number), 20.0));
     let row = Row::new(stalks.collect()).expect("the stalks stand apart");
     let mut run = Run::begin(trial(row, steady(mm_s(2.0), 2700.0)), &["set misfit_after 0"]);
     run.roll_to_the_end();

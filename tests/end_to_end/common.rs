@@ -4,7 +4,7 @@
 
 use field::machine::{Machine, cycle_at, encoder_edge};
 use field::motion::Motion;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::servo::Command;
 use field::trial::{Start, Trial};
 use field::verdict::{Judgement, PlantOutcome, Timing, Verdict, judge};
@@ -100,7 +100,7 @@ pub fn steady(speed_mm_s: f64, end_mm: f64) -> Motion {
 
 /// A row that begins beyond the end of every motion.
 pub fn bare_ground() -> Row {
-    Row::new(vec![Thing::plant(100_000.0, 100.0)]).expect("a plant is a row")
+    Row::new(vec![Canopy::plant(100_000.0, 100.0)]).expect("a plant is a row")
 }
 
 /// A trial of the usual machine and timing, started by `start`.

@@ -5,7 +5,7 @@ use control::ground::field_examples::{self, FieldExamples};
 use control::memory::{ERASED, SIZE, Volatile};
 use field::machine::Machine;
 use field::motion::Motion;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::wiring;
 use knn::Example;
 use uno::CYCLES_PER_SECOND;
@@ -19,8 +19,8 @@ const ODD_WIDTH_MM: f64 = 55.0;
 
 /// Rolls past `count` unusual objects, in hold.
 fn roll_past_odd_objects(uno: &mut Uno, count: usize) {
-    let things = (0..count).map(|index| Thing::weed(300.0 + 300.0 * index as f64, ODD_WIDTH_MM)).collect();
-    let row = Row::new(things).expect("the objects stand apart");
+    let canopies = (0..count).map(|index| Canopy::weed(300.0 + 300.0 * index as f64, ODD_WIDTH_MM)).collect();
+    let row = Row::new(canopies).expect("the objects stand apart");
     let motion = Motion::steady(0.0, 3000.0, 500.0, 300.0 * (count as f64 + 1.0));
     let start = uno.cycle();
     uno.drive(Machine::default().pin_changes(&row, &motion, start));
@@ -93,7 +93,7 @@ fn an_object_that_was_labelled_is_known_when_it_comes_again() {
 #[test]
 fn a_label_that_the_built_in_examples_contradict_wants_force() {
     let mut uno = started();
-    let row = Row::new(vec![Thing::plant(600.0, 150.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(600.0, 150.0)]).expect("a plant is a row");
     let motion = Motion::steady(0.0, 3000.0, 500.0, 900.0);
     let start = uno.cycle();
     uno.drive(Machine::default().pin_changes(&row, &motion, start));

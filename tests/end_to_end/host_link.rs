@@ -4,7 +4,7 @@ use crate::common::{elf, number};
 use control::settings::{Setting, Settings};
 use field::machine::Machine;
 use field::motion::Motion;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::wiring;
 use link::settings::{self, SettingsError};
 use link::{EventLine, Link, LinkError, Mode, Status};
@@ -89,7 +89,7 @@ fn a_machine_at_work_is_not_given_another_geometry() {
 
 #[test]
 fn every_line_of_a_row_being_weeded_is_understood() {
-    let row = Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(850.0, 15.0), Thing::plant(1200.0, 150.0)]);
+    let row = Row::new(vec![Canopy::plant(500.0, 150.0), Canopy::weed(850.0, 15.0), Canopy::plant(1200.0, 150.0)]);
     let row = row.expect("plants and a weed are a row");
     let machine = Machine::default();
     let motion = Motion::steady(0.0, 1000.0, 500.0, 2200.0).change_speed(0.0, 1000.0);

@@ -26,7 +26,7 @@ fn weeding(start: Start) -> Run {
 fn time_to_swing_out_ms(run: &mut Run, cycle: u64) -> f64 {
     run.roll_to(1500.0);
     let command = run.first_command_after(cycle);
-    assert!(command.is_out());
+    assert!(command.is_out);
     assert!(is_out_at_the_pin(&run.uno), "it stays out");
     (command.rise_cycle - cycle) as f64 * 1000.0 / CYCLES_PER_SECOND as f64
 }

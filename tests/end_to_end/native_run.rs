@@ -28,8 +28,8 @@ const SHORT_S: f64 = 0.25;
 fn swings(servo: &Servo, pulses: &[Pulse]) -> Vec<Command> {
     let mut swings: Vec<Command> = Vec::new();
     // The tool is out from the beginning. On the Uno this is before the command with the setting of the width.
-    for command in servo.commands(pulses).into_iter().skip_while(Command::is_out) {
-        let entered = swings.last().filter(|last| command.is_out() && !last.is_out());
+    for command in servo.commands(pulses).into_iter().skip_while(|command| command.is_out) {
+        let entered = swings.last().filter(|last| command.is_out && !last.is_out);
         if entered.is_some_and(|entered| (command.rise_cycle - entered.rise_cycle) as f64 / 16e6 < SHORT_S) {
             swings.pop();
         } else {

@@ -3,7 +3,7 @@
 use crate::common::{Run, ask, assert_all_kept, exchange, refusal, run_for_ms, started, status, trial, value};
 use field::machine::Machine;
 use field::motion::{Motion, mm_s};
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::servo::Servo;
 use field::wiring;
 use uno::{CYCLES_PER_SECOND, Uno};
@@ -113,7 +113,7 @@ fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone
         uno.send(format!("{command}\n").as_bytes());
         run_for_ms(&mut uno, 100);
         ask(&mut uno, "hold");
-        let row = Row::new((0..4).map(|plant| Thing::plant(700.0 + 600.0 * f64::from(plant), 150.0)).collect());
+        let row = Row::new((0..4).map(|plant| Canopy::plant(700.0 + 600.0 * f64::from(plant), 150.0)).collect());
         let motion = Motion::starting_at(0.0).change_speed(mm_s(2.0), 3000.0).roll_to(3100.0);
         let mut run = Run::set_off(uno, trial(row.expect("the plants stand apart"), motion), &[], |_, changes| changes);
         run.roll_to_the_end();

@@ -9,7 +9,7 @@ use control::memory::{SIZE, Volatile};
 use control::operate::saved::{COPY, SavedSettings};
 use control::settings::{Setting, Settings};
 use field::motion::mm_s;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::trial::{Start, Trial};
 use field::wiring;
 use trial::power_up;
@@ -35,7 +35,7 @@ fn greeting_with_the_tool_out_since(uno: &mut Uno, cycle: u64) -> String {
 
 /// A machine at work, with the tool in the row and the settings saved.
 fn at_work() -> Run {
-    let row = Row::new(vec![Thing::plant(1500.0, 150.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(1500.0, 150.0)]).expect("a plant is a row");
     let motion = steady(mm_s(2.0), 3000.0);
     let mut run = Run::begin(Trial { start: Start::Now, ..trial(row, motion) }, &["save"]);
     run.roll_to(1000.0);
@@ -83,7 +83,7 @@ fn a_loop_that_stalls_has_the_tool_put_out_and_the_machine_reset_and_the_cause_t
         let ms_after = |cycle: u64| (cycle - stalled) as f64 / (CYCLES_PER_SECOND as f64 / 1000.0);
         assert!((240.0..300.0).contains(&ms_after(reset)), "{} ms", ms_after(reset));
         let command = run.first_command_after(stalled);
-        assert!(command.is_out() && command.rise_cycle < reset, "{command:?}");
+        assert!(command.is_out && command.rise_cycle < reset, "{command:?}");
         assert!((195.0..225.0).contains(&ms_after(command.rise_cycle)), "{} ms", ms_after(command.rise_cycle));
         run_for_ms(&mut run.uno, 100);
         assert!(is_out_at_the_pin(&run.uno));
@@ -283,7 +283,7 @@ fn nothing_happens_where_position_and_time_wrap() {
     uno.run_until_serial("\n", GREETING_CYCLES).expect("the firmware greets");
     ask(&mut uno, "clear");
 
-    let row = Row::new((0..4).map(|number| Thing::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
+    let row = Row::new((0..4).map(|number| Canopy::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
         .expect("the plants stand apart");
     let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(2.0), 2900.0)) };
     let mut run = Run::set_off(uno, trial, &[], |_, changes| changes);

@@ -16,7 +16,7 @@ fn follow(uno: &mut Uno, duration_ms: u64) {
         let place = (now % FOLLOWS_MS) as usize;
         uno.set(wiring::END_SWITCH, !told[place]);
         let pulses = uno.pulses(wiring::SERVO);
-        told[place] = Servo::default().commands(&pulses[pulses.len().saturating_sub(2)..])[0].is_out();
+        told[place] = Servo::default().commands(&pulses[pulses.len().saturating_sub(2)..])[0].is_out;
         run_for_ms(uno, 1);
     }
 }

@@ -4,7 +4,7 @@
 use crate::common::{Run, is_out_at_the_pin, named, number, started, status, steady, trial, value};
 use field::machine::{Machine, cycle_at};
 use field::motion::mm_s;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::trial::{Start, Trial};
 use field::verdict::{Judgement, Verdict};
 use field::wiring;
@@ -16,7 +16,7 @@ const PLANTS: usize = 7;
 
 /// Plants every 500 mm, the first at 600 mm.
 fn plants(count: usize) -> Row {
-    Row::new((0..count).map(|plant| Thing::plant(600.0 + 500.0 * plant as f64, 150.0)).collect())
+    Row::new((0..count).map(|plant| Canopy::plant(600.0 + 500.0 * plant as f64, 150.0)).collect())
         .expect("the plants stand apart")
 }
 

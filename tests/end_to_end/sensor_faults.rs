@@ -5,7 +5,7 @@ use crate::common::{
 };
 use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::trial::{Start, Trial};
 use field::verdict::Verdict;
 use field::wiring;
@@ -17,7 +17,7 @@ const FAULT_MM: f64 = 1720.0;
 
 /// Plants every 500 mm, the first at 600 mm.
 fn plants() -> Row {
-    Row::new((0..8).map(|number| Thing::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
+    Row::new((0..8).map(|number| Canopy::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
         .expect("the plants stand apart")
 }
 
@@ -168,7 +168,7 @@ fn an_encoder_with_one_dead_channel_is_an_alarm() {
         // Within a quarter of a second.
         let command = run.commands().pop().expect("a command");
         let place_mm = run.place_mm(command.rise_cycle);
-        assert!(command.is_out() && place_mm < FAULT_MM + 150.0, "{place_mm} mm");
+        assert!(command.is_out && place_mm < FAULT_MM + 150.0, "{place_mm} mm");
     }
 }
 
@@ -214,7 +214,7 @@ fn a_beam_that_flickers_in_dust_is_an_alarm() {
 
 #[test]
 fn a_beam_that_is_never_broken_is_a_warning_until_a_plant_comes() {
-    let row = Row::new(vec![Thing::plant(2500.0, 150.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(2500.0, 150.0)]).expect("a plant is a row");
     let mut run =
         Run::begin(Trial { start: Start::Now, ..trial(row, steady(mm_s(2.5), 3000.0)) }, &["set no_plant_m 1"]);
     run.roll_to(950.0);
@@ -231,7 +231,7 @@ fn a_beam_that_is_never_broken_is_a_warning_until_a_plant_comes() {
 #[test]
 fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
     // The tool's zone begins at 1075 - 50 mm. The machine is fast from 60 mm before that on.
-    let row = Row::new(vec![Thing::plant(1150.0, 150.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(1150.0, 150.0)]).expect("a plant is a row");
     let jump_mm = 1150.0 - 75.0 - 50.0 + 400.0 - 60.0;
     let motion = Motion::starting_at(0.0)
         .change_speed(mm_s(0.8), 3000.0)
@@ -246,7 +246,7 @@ fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
     let said = status(&mut run.uno);
     assert_eq!((value(&said, "state"), number(&said, "late")), ("work", 1), "{said}");
     let command = run.first_command_after(run.cycles().start);
-    assert!(command.is_out());
+    assert!(command.is_out);
     // At once: within the speed meter's window and a pulse.
     let late_ms = (run.place_mm(command.rise_cycle) - jump_mm) / mm_s(4.0) * 1000.0;
     assert!((0.0..60.0).contains(&late_ms), "{late_ms} ms");

@@ -22,7 +22,7 @@ fn set_out() -> Run {
 
 /// The commands at the pin: out or in, and the position.
 fn swings(run: &Run) -> Vec<(bool, f64)> {
-    run.commands().iter().map(|command| (command.is_out(), run.place_mm(command.rise_cycle))).collect()
+    run.commands().iter().map(|command| (command.is_out, run.place_mm(command.rise_cycle))).collect()
 }
 
 /// Weeds with `noise` on the line every 50 ms and returns the lines that the firmware sent.

@@ -2,7 +2,7 @@
 
 use crate::common::{Run, ask, run_for_ms, started, steady, trial};
 use field::motion::mm_s;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::wiring;
 use uno::Uno;
 use uno::{CYCLES_PER_SECOND, Pulse};
@@ -19,7 +19,7 @@ fn assert_width(pulse: Pulse, widths_us: &[f64]) {
 
 /// The pulses while the machine weeds past three plants with a busy console.
 fn pulses_while_weeding(gap_ms: u32) -> Vec<Pulse> {
-    let row = Row::new([300.0, 800.0, 1300.0].map(|place_mm| Thing::plant(place_mm, 140.0)).to_vec()).expect("a row");
+    let row = Row::new([300.0, 800.0, 1300.0].map(|place_mm| Canopy::plant(place_mm, 140.0)).to_vec()).expect("a row");
     let mut run =
         Run::begin(trial(row, steady(mm_s(2.5), 2000.0)), &[&format!("set servo_gap_ms {gap_ms}"), "start now"]);
     run.roll_on_asking("get", 90);

@@ -2,7 +2,7 @@
 
 use crate::common::{Run, number, trial};
 use field::motion::{Motion, mm_s};
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::verdict::{Judgement, Verdict};
 
 /// Positions of the three plants, far enough apart for a swing each.
@@ -11,7 +11,7 @@ const PLACES_MM: [f64; 3] = [800.0, 1500.0, 2200.0];
 /// Rolls past the plants.
 fn roll(motion: Motion) -> Run {
     let row =
-        Row::new(PLACES_MM.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).expect("the plants stand apart");
+        Row::new(PLACES_MM.map(|place_mm| Canopy::plant(place_mm, 150.0)).to_vec()).expect("the plants stand apart");
     let mut run = Run::begin(trial(row, motion), &[]);
     run.roll_to_the_end();
     run.uno.send(b"status\n");

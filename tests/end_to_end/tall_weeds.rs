@@ -4,7 +4,7 @@ use crate::common::{Run, assert_a_swing_each, assert_all_kept, number, status};
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::Planting;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::trial::Trial;
 use field::verdict::Timing;
 
@@ -32,8 +32,8 @@ fn a_tall_weed_does_not_lift_the_tool() {
 
 #[test]
 fn what_is_narrower_than_the_least_width_is_dust_that_is_counted_and_no_object() {
-    let dust = (0..8).map(|number| Thing::weed(450.0 + 40.0 * f64::from(number), 4.0));
-    let row = Row::new(dust.chain([Thing::plant(300.0, 150.0), Thing::weed(800.0, 18.0)]).collect());
+    let dust = (0..8).map(|number| Canopy::weed(450.0 + 40.0 * f64::from(number), 4.0));
+    let row = Row::new(dust.chain([Canopy::plant(300.0, 150.0), Canopy::weed(800.0, 18.0)]).collect());
     let row = row.expect("all of them stand apart");
     let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(2.0));
     let mut run = Run::begin(trial, &["set min_width_mm 8"]);

@@ -3,14 +3,14 @@
 
 use crate::common::{Run, is_out_at_the_pin, number, steady, trial};
 use field::motion::mm_s;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 
 /// From beam to tool.
 const X_MM: f64 = 400.0;
 
 /// A run past plants half a metre apart. The beam does not see the third plant. The row ends behind the fourth.
 fn past_an_unseen_plant(commands: &[&str]) -> Run {
-    let seen = [600.0, 1100.0, 2100.0].map(|place_mm| Thing::plant(place_mm, 150.0));
+    let seen = [600.0, 1100.0, 2100.0].map(|place_mm| Canopy::plant(place_mm, 150.0));
     let row = Row::new(seen.to_vec()).expect("the plants stand apart");
     Run::begin(trial(row, steady(mm_s(2.0), 4900.0)), commands)
 }

@@ -7,7 +7,7 @@ use crate::common::{
 };
 use field::machine::Machine;
 use field::motion::mm_s;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::trial::Start;
 use field::verdict::Timing;
 use field::wiring;
@@ -68,7 +68,7 @@ fn the_tool_enters_the_row_a_margin_behind_the_start_of_the_seen_ground() {
         let begin = run.cycles().start;
         run.roll_to_the_end();
         let command = run.first_command_after(begin);
-        assert!(!command.is_out());
+        assert!(!command.is_out);
         // A plant may end where the beam stood. Led by the time that the servo takes at least.
         let ideal_mm = machine.beam_to_tool_mm + f64::from(margin_mm) - speed_mm_s * f64::from(lead_in_ms) / 1000.0;
         let error_ticks = (run.place_mm(command.rise_cycle) - ideal_mm) / machine.tick_mm();
@@ -104,7 +104,7 @@ fn with_start_now_the_tool_enters_the_row_over_unseen_ground() {
 fn a_plant_in_the_beam_at_power_up_is_kept() {
     // Half of the canopy is left, or no more than a weed's width.
     for centre_mm in [0.0, -55.0, -60.0, -65.0] {
-        let plants = vec![Thing::plant(centre_mm, 150.0), Thing::plant(700.0, 150.0)];
+        let plants = vec![Canopy::plant(centre_mm, 150.0), Canopy::plant(700.0, 150.0)];
         let row = Row::new(plants).expect("the plants stand apart");
         let mut run = Run::begin(trial(row, steady(mm_s(2.0), 1300.0)), &[]);
         run.roll_to_the_end();
@@ -117,7 +117,7 @@ fn a_plant_in_the_beam_at_power_up_is_kept() {
 #[test]
 fn nothing_that_was_scheduled_survives_a_reset() {
     for restart in [Uno::reset, Uno::power_cycle] {
-        let row = Row::new(vec![Thing::plant(300.0, 150.0)]).expect("a plant is a row");
+        let row = Row::new(vec![Canopy::plant(300.0, 150.0)]).expect("a plant is a row");
         let mut run = Run::begin(trial(row, steady(mm_s(2.0), 500.0)), &["set margin_mm 60", "save"]);
         run.roll_to_the_end();
         let before = status(&mut run.uno);

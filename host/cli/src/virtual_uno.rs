@@ -8,12 +8,12 @@ use crate::output::{say, tell};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use field::motion::mm_s;
+use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use trial::firmware;
 use trial::live::rows::{LiveRows, Ran};
-use trial::live::{Course, Setup};
-use trial::receiver::{ReceiverSetup, Trouble};
+use trial::live::{Course, Sender, Setup};
 use uno::FileError;
 use uno::hex::Bootloader;
 
@@ -116,11 +116,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (None, Some(_)) => None,
         (None, None) => Some(firmware::build()?),
     };
-    let receiver = arguments.gps_link.clone().map(|link| {
+    let mut receiver = arguments.gps_link.clone().map(|link| {
         let trouble = arguments.gps_trouble.then(Trouble::default);
         let began_ms = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as i64);
         let (rate_hz, error_mm) = (arguments.gps_rate, arguments.gps_error);
-        (ReceiverSetup { rate_hz, error_mm, began_ms, trouble, ..ReceiverSetup::default() }, link)
+        let setup = ReceiverSetup { rate_hz, error_mm, began_ms, trouble, ..ReceiverSetup::default() };
+        let mut receiver = SimulatedReceiver::new(setup);
+        let sends: Sender = Box::new(move |time_s, distance_m| receiver.bytes_until(time_s, distance_m));
+        (sends, link)
     });
     let stop = ctrl_c()?;
 
@@ -130,8 +133,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         bootloader: bootloader.clone(),
         eeprom: of_row(&arguments.eeprom, row),
         link: of_row(&arguments.link, row),
-        // The machine has one receiver.
-        receiver: receiver.clone().filter(|_| row == 0),
+        // The machine has one receiver, on its first row.
+        receiver: receiver.take(),
         course: (!arguments.stand).then_some(course),
         fast: arguments.fast,
         keeps_running_when_opened: arguments.no_reset,

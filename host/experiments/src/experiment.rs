@@ -16,9 +16,8 @@ use crate::evaluation::PlotRecord;
 use crate::shard::{Numbered, Shard};
 use anyhow::{Result, anyhow};
 use control::ground::features;
-use control::operate::state::State;
 use field::baselines;
-use field::budget::{Budget, Reason};
+use field::budget::Budget;
 use field::conditions::Conditions;
 use field::driving::{Drive, drive};
 use field::native::{self, Sensors};
@@ -26,7 +25,7 @@ use field::optimum::undamaged_share;
 use field::row::{MAX_WIDTH_MM, Problem, Row};
 use field::stand::Stand;
 use field::tool_path::{Effect, effect};
-use field::trial::{Start, Trial};
+use field::trial::{Start, Trial, Weeded};
 use field::verdict::{Judgement, Timing, Verdict, judge};
 use knn::Example;
 use rand::{RngExt, SeedableRng};
@@ -37,7 +36,6 @@ use std::cell::LazyCell;
 use std::ops::AddAssign;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use uno::Pulse;
 
 pub use table::write_csv;
 pub use total::{Total, totals};
@@ -343,13 +341,6 @@ impl Experiment {
     }
 }
 
-struct Weeded {
-    pulses: Vec<Pulse>,
-    start_cycle: u64,
-    alarm: bool,
-    reasons: Vec<Reason>,
-}
-
 /// The sensors of a trial for native runs. They do not depend on the settings. They are calculated at first use.
 fn sensors(trial: &Trial) -> LazyCell<Sensors, impl FnOnce() -> Sensors> {
     LazyCell::new(|| Sensors::new(trial, native::TURN_S))
@@ -364,25 +355,24 @@ fn weed(
 ) -> Result<Weeded> {
     let firmware = |trial: &Trial| {
         // The ELF does not report why it swings. Its native run makes the same decisions, within a servo's frame.
-        let native::Weeded { pulses, state, reasons } = native::weed(trial, sensors)?;
+        let weeded = native::weed(trial, sensors)?;
         match engine {
-            Engine::Native => Ok(Weeded { pulses, start_cycle: 0, alarm: state != State::Work, reasons }),
+            Engine::Native => Ok(weeded),
             Engine::Uno(elf) => {
                 let outcome = trial::run(trial, elf, |_| ())?;
                 let alarm = outcome.status.state != "work";
-                Ok(Weeded { pulses: outcome.pulses, start_cycle: outcome.start_cycle, alarm, reasons })
+                Ok(Weeded { pulses: outcome.pulses, start_cycle: outcome.start_cycle, alarm, ..weeded })
             }
         }
     };
-    let baseline = |baselines::Weeded { pulses, reasons }| Ok(Weeded { pulses, start_cycle: 0, alarm: false, reasons });
     match controller {
         Treatment::Firmware => firmware(trial),
         Treatment::WithoutLookAhead => {
             let timing = Timing { lead_out_ms: 0, lead_in_ms: 0, ..trial.timing };
             firmware(&Trial { timing, ..trial.clone() })
         }
-        Treatment::Paper => baseline(baselines::as_in_the_paper(trial)),
-        Treatment::Ideal => baseline(baselines::ideal(trial, &stand.stems)),
+        Treatment::Paper => Ok(baselines::as_in_the_paper(trial)),
+        Treatment::Ideal => Ok(baselines::ideal(trial, &stand.stems)),
     }
 }
 

@@ -16,11 +16,10 @@
 
 use crate::budget::{Part, Reason, Reasons, part_of};
 use crate::ground::union;
-use crate::machine::Machine;
 use crate::native::{Sensors, ServoLine, Turn, beams_before, turns};
 use crate::servo::Servo;
 use crate::stand::Stem;
-use crate::trial::Trial;
+use crate::trial::{Trial, Weeded};
 use control::operate::servo;
 use std::ops::Range;
 use uno::Pulse;
@@ -44,22 +43,12 @@ const TURN_S: f64 = 0.001;
 /// Shortest gap between two servo pulses, the firmware's default; 0 for fixed frames.
 const SERVO_GAP_MS: u8 = 3;
 
-/// The result of a baseline.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Weeded {
-    /// The first of the servo's pulses of each width.
-    pub pulses: Vec<Pulse>,
-    /// Why the tool was in the row or out of it.
-    pub reasons: Vec<Reason>,
-}
-
 /// The paper's controller weeds the trial's row.
 pub fn as_in_the_paper(trial: &Trial) -> Weeded {
     let Trial { machine, motion, row, .. } = trial;
-    let Machine { beam_to_tool_mm, servo, .. } = *machine;
     let tick_mm = trial.machine.tick_mm();
     let ticks = |mm: f64| (mm / tick_mm).round() as i64;
-    let (delay, hold) = (ticks(beam_to_tool_mm - PAPER_MARGIN_MM), ticks(2.0 * PAPER_MARGIN_MM));
+    let (delay, hold) = (ticks(machine.beam_to_tool_mm - PAPER_MARGIN_MM), ticks(2.0 * PAPER_MARGIN_MM));
     let margin = hold / 2;
     let sensors = Sensors::new(trial, PAPER_TURN_S);
     let mut turns = sensors.turns();
@@ -67,8 +56,8 @@ pub fn as_in_the_paper(trial: &Trial) -> Weeded {
     let mut canopy: Option<Range<i64>> = None;
     let mut slot: Option<(Range<i64>, Part)> = None;
     let mut reasons = Reasons::default();
-    let pulses = swing(trial, servo, PAPER_TURN_S, 0, |time_s| {
-        let Some(Turn { position, edges, .. }) = turns.next() else { return (false, time_s) };
+    let pulses = swing(trial, PAPER_TURN_S, 0, |time_s| {
+        let Some(Turn { position, edges, .. }) = turns.next() else { return false };
         if let Some(last) = edges.last() {
             broken = last.beams.broken;
         }
@@ -93,9 +82,9 @@ pub fn as_in_the_paper(trial: &Trial) -> Weeded {
             if is_in_margin && *kept_for == Part::Plants { Part::Margins } else { *kept_for }
         });
         reasons.turn_to(part, time_s);
-        (kept.is_some(), time_s)
+        kept.is_some()
     });
-    Weeded { pulses, reasons: reasons.until(motion.duration_s()) }
+    Weeded { pulses, start_cycle: 0, alarm: false, reasons: reasons.until(motion.duration_s()) }
 }
 
 /// The ideal controller weeds the trial's row.
@@ -122,47 +111,22 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
         .collect();
     // If there is no time to swing in and out again, the tool stays out.
     let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
-    let out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).collect();
-    Weeded { pulses: swing(trial, machine.servo, TURN_S, SERVO_GAP_MS, out_during(out_s)), reasons }
+    let mut out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).peekable();
+    let pulses = swing(trial, TURN_S, SERVO_GAP_MS, |time_s| {
+        while out_s.next_if(|out| out.end <= time_s).is_some() {}
+        out_s.peek().is_some_and(|out| out.start <= time_s)
+    });
+    Weeded { pulses, start_cycle: 0, alarm: false, reasons }
 }
 
-/// For [`swing`]: out during these times, which are in ascending order.
-fn out_during(times_s: Vec<Range<f64>>) -> impl FnMut(f64) -> (bool, f64) {
-    let mut next = 0;
-    move |time_s| {
-        while times_s.get(next).is_some_and(|out| out.end <= time_s) {
-            next += 1;
-        }
-        match times_s.get(next) {
-            Some(out) if out.start <= time_s => (true, out.end),
-            Some(out) => (false, out.start),
-            None => (false, f64::INFINITY),
-        }
-    }
-}
-
-/// A loop that has the tool out while `is_out` says so at the time of a turn. `is_out` also returns the time until
-/// which its answer stays the same. The turns until then are skipped, once the line shows the answer. The tool begins
-/// in the row.
-fn swing(
-    trial: &Trial,
-    servo: Servo,
-    turn_s: f64,
-    gap_ms: u8,
-    mut is_out: impl FnMut(f64) -> (bool, f64),
-) -> Vec<Pulse> {
-    let [in_row, out] = [servo.in_us, servo.out_us].map(|microseconds| servo::from_us(microseconds.round() as u16));
+/// A loop that has the tool out while `is_out` says so at the time of a turn. The tool begins in the row.
+fn swing(trial: &Trial, turn_s: f64, gap_ms: u8, mut is_out: impl FnMut(f64) -> bool) -> Vec<Pulse> {
+    let Servo { in_us, out_us, .. } = trial.machine.servo;
+    let [in_row, out] = [in_us, out_us].map(|microseconds| servo::from_us(microseconds.round() as u16));
     let mut line = ServoLine::new(in_row, gap_ms);
-    let (mut turn, last) = (0, turns(trial, turn_s));
-    while turn <= last {
+    for turn in 0..=turns(trial, turn_s) {
         let time_s = f64::from(turn) * turn_s;
-        let (swings_out, until_s) = is_out(time_s);
-        let width = if swings_out { out } else { in_row };
-        line.command(width, time_s);
-        turn += 1;
-        if line.shows(width) {
-            turn = turn.max((until_s / turn_s) as u32);
-        }
+        line.command(if is_out(time_s) { out } else { in_row }, time_s);
     }
     line.into_pulses()
 }
@@ -170,48 +134,21 @@ fn swing(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::Machine;
     use crate::motion::mm_s;
-    use crate::row::{Row, Thing};
+    use crate::row::{Canopy, Row};
     use crate::verdict::{Timing, Verdict, judge};
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
 
     /// Plants over whose canopy the tool was not fully out.
     fn reached_by(controller: impl Fn(&Trial) -> Weeded, speed_km_h: f64) -> usize {
-        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
+        let row = Row::new(PLACES.map(|place_mm| Canopy::plant(place_mm, 150.0)).to_vec()).unwrap();
         let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
         let Weeded { pulses, .. } = controller(&trial);
         let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
         assert!(judgement.weeded_share > 0.1);
         judgement.count(Verdict::Damaged)
-    }
-
-    #[test]
-    fn a_loop_that_passes_turns_over_gives_the_pulses_of_one_that_takes_them_all() {
-        let row = Row::new(PLACES.map(|place_mm| Thing::plant(place_mm, 150.0)).to_vec()).unwrap();
-        for seed in 0..200 {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let machine = Machine::default();
-            let trial = Trial::at_speed(row.clone(), machine, Timing::default(), rng.random_range(200.0..1500.0));
-            // Times from less than a turn to many frames. Some begin with a turn.
-            let mut time_s = 0.0;
-            let out_s: Vec<Range<f64>> = (0..40)
-                .map(|_| {
-                    let start_s = time_s + rng.random_range(0.0..0.2);
-                    let start_s = if rng.random() { (start_s / TURN_S).round() * TURN_S } else { start_s };
-                    time_s = start_s.max(time_s) + rng.random_range(0.0_f64..0.6).powi(3);
-                    start_s..time_s
-                })
-                .collect();
-            let gap_ms = if rng.random() { SERVO_GAP_MS } else { 0 };
-            let mut each_turn = out_during(out_s.clone());
-            let passing_over = swing(&trial, machine.servo, TURN_S, gap_ms, out_during(out_s));
-            let taking_all = swing(&trial, machine.servo, TURN_S, gap_ms, |time_s| (each_turn(time_s).0, time_s));
-            assert!(taking_all.len() > 5);
-            assert_eq!(passing_over, taking_all, "seed {seed}");
-        }
     }
 
     #[test]

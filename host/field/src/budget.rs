@@ -15,9 +15,11 @@ use crate::motion::Motion;
 use crate::row::{Kind, Row};
 use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Div, Index, Range};
+use strum::IntoStaticStr;
 
 /// The parts of a row's ground.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Part {
     /// The tool worked the row's line.
     Weeded,
@@ -42,23 +44,17 @@ impl Part {
 
     /// A name for programs.
     pub fn key(self) -> &'static str {
-        self.names().0
+        self.into()
     }
 
     /// Its name.
     pub fn title(self) -> &'static str {
-        self.names().1
-    }
-
-    fn names(self) -> (&'static str, &'static str) {
         match self {
-            Self::Weeded => ("weeded", "weeded"),
-            Self::Plants => ("plants", "stem zones and canopies"),
-            Self::Margins => ("margins", "margins"),
-            Self::Weeds => ("weeds", "tall weeds and unknowns kept"),
-            Self::Guarded => ("guarded", "guarded ground"),
-            Self::Swings => ("swings", "swings"),
-            Self::Closed => ("closed", "unseen ground, holds, alarms"),
+            Self::Plants => "stem zones and canopies",
+            Self::Weeds => "tall weeds and unknowns kept",
+            Self::Guarded => "guarded ground",
+            Self::Closed => "unseen ground, holds, alarms",
+            Self::Weeded | Self::Margins | Self::Swings => self.into(),
         }
     }
 }
@@ -154,7 +150,8 @@ pub fn part_of(zone_mm: &Range<f64>, row: &Row) -> Part {
     let nearest_mm = |places_mm: &mut dyn Iterator<Item = f64>| {
         places_mm.map(|place_mm| (place_mm - middle_mm).abs()).fold(f64::INFINITY, f64::min)
     };
-    let of = |kind: Kind| row.things().iter().filter(move |thing| thing.kind == kind).map(|thing| thing.position_mm);
+    let of =
+        |kind: Kind| row.canopies().iter().filter(move |canopy| canopy.kind == kind).map(|canopy| canopy.position_mm);
     let dust = row.dust_mm().iter().map(|dust_mm| (dust_mm.start + dust_mm.end) / 2.0);
     let to_plant_mm = nearest_mm(&mut of(Kind::Plant));
     let is_over_plant = of(Kind::Plant).any(|place_mm| zone_mm.contains(&place_mm));
@@ -190,7 +187,7 @@ impl Reasons {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::Thing;
+    use crate::row::Canopy;
 
     #[test]
     fn parts_in_tenths_of_a_percent_add_up_to_the_whole() {
@@ -222,8 +219,8 @@ mod tests {
 
     #[test]
     fn a_zone_is_the_plant_s_whose_middle_is_nearest_even_where_the_wheel_slips() {
-        let row =
-            Row::new(vec![Thing::plant(1000.0, 150.0), Thing::weed(1110.0, 16.0), Thing::plant(1500.0, 20.0)]).unwrap();
+        let row = Row::new(vec![Canopy::plant(1000.0, 150.0), Canopy::weed(1110.0, 16.0), Canopy::plant(1500.0, 20.0)])
+            .unwrap();
         let row = row.with_dust(vec![1300.0..1302.0]);
         let part = |zone_mm: Range<f64>| part_of(&zone_mm, &row);
         assert_eq!(part(905.0..1055.0), Part::Plants);

@@ -18,6 +18,7 @@ use files::toml_entry::{self, Entry};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
 use std::io;
+use std::ops::Range;
 use std::path::Path;
 use thiserror::Error;
 
@@ -65,7 +66,7 @@ impl Conditions {
         }
     }
 
-    /// Those of a preset; none where it has another name.
+    /// The conditions of a preset. `None` if there is no preset of this name.
     pub fn preset(name: &str) -> Option<Result<Self, FileError>> {
         let (preset, text) = PRESETS.iter().find(|(preset, _)| *preset == name)?;
         Some(Self::parse(Path::new(preset), text))
@@ -82,33 +83,24 @@ impl Conditions {
 
     /// Whether every value is in its range, and the sweeps keep off the crop.
     fn check(&self) -> Result<(), WrongValue> {
-        for (&Parameter { name, meaning, least, greatest, .. }, value) in self.values() {
+        let in_range = |name: String, value: f64| match range(&name) {
+            None => Err(WrongValue::unknown(name)),
             // A number that is none is in no range.
-            if !(least..=greatest).contains(&value) {
-                return Err(WrongValue::out_of_range(name, value, (least, greatest), meaning));
-            }
-        }
+            Some((least, greatest, _)) if (least..=greatest).contains(&value) => Ok(()),
+            Some((least, greatest, meaning)) => Err(WrongValue::out_of_range(name, value, (least, greatest), meaning)),
+        };
+        self.values().try_for_each(|(parameter, value)| in_range(parameter.name.to_owned(), value))?;
         self.check_sweeps()?;
         self.check_beams()?;
-        for (key, &value) in &self.settings {
-            let name = format!("settings.{key}");
-            let Some(setting) = Setting::find(key.as_bytes()) else { return Err(WrongValue::unknown(name)) };
-            let range = setting.description();
-            if !(range.least..=range.greatest).contains(&value) {
-                let range = (range.least.into(), range.greatest.into());
-                return Err(WrongValue::out_of_range(name, value.into(), range, setting.help()));
-            }
-        }
-        Ok(())
+        self.settings.iter().try_for_each(|(key, &value)| in_range(format!("settings.{key}"), value.into()))
     }
 
     /// Whether the sweeps run between the zones round the stems of this row and of the next.
     fn check_sweeps(&self) -> Result<(), WrongValue> {
-        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm: from_mm, .. } = self.machine;
+        let Range { start: from_mm, end: to_mm } = self.machine.swept_mm();
         let zone_mm = self.crop.protected_mm / 2.0 + self.crop.across_scatter_mm;
-        let to_mm = from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
         let next_mm = self.plot.row_spacing_mm - zone_mm;
-        let why = if sweeps_a_side == 0 {
+        let why = if self.machine.sweeps_a_side == 0 {
             return Ok(());
         } else if from_mm < zone_mm {
             format!("the zone round a stem reaches {zone_mm:.1} mm from the row's line")
@@ -210,6 +202,13 @@ impl Conditions {
     }
 }
 
+impl Mechanism {
+    /// The ground on each side of the row's line that the sweeps work.
+    pub(crate) fn swept_mm(&self) -> Range<f64> {
+        self.sweep_from_mm..self.sweep_from_mm + f64::from(self.sweeps_a_side) * self.sweep_width_mm
+    }
+}
+
 /// A value that a parameter or setting cannot have.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("{name} {problem}")]
@@ -234,40 +233,43 @@ impl WrongValue {
     }
 
     fn unknown(name: impl Into<String>) -> Self {
-        let known = names().collect::<Vec<_>>().join(", ");
+        let parameters = PARAMETERS.iter().map(|parameter| parameter.name.to_owned());
+        let known: Vec<String> = parameters.chain(Setting::all().map(|setting| setting.text().to_string())).collect();
+        let known = known.join(", ");
         Self::new(name, format!("is neither a parameter of the field nor a setting of the firmware; there are {known}"))
     }
-}
-
-/// All names that [`Conditions::set`] takes.
-fn names() -> impl Iterator<Item = String> {
-    PARAMETERS
-        .iter()
-        .map(|parameter| parameter.name.to_owned())
-        .chain(Setting::all().map(|setting| setting.text().to_string()))
 }
 
 /// The TOML reader's error at a byte, in one line. For a value of a parameter or setting: the valid values.
 fn explain(text: &str, byte: usize, error: &toml::de::Error) -> String {
     let entry = toml_entry::around(text, byte).filter(|entry| entry.value.contains(&byte));
     let wrong = entry.and_then(|Entry { name, value, .. }| {
-        let (table, key) = name.split_once('.')?;
-        let (least, greatest, meaning) = range(table, key)?;
+        let (least, greatest, meaning) = range(&name)?;
         let written = &text[value];
         Some(format!("{name} is {written}, but has to be a number from {least} to {greatest}: {meaning}"))
     });
     wrong.unwrap_or_else(|| error.message().trim().replace('\n', ", "))
 }
 
-/// The range of a parameter or setting, and what it is.
-fn range(table: &str, key: &str) -> Option<(f64, f64, String)> {
-    if table == "settings" {
+/// The range of a parameter, or of a setting behind `settings.`, and its meaning. `None` if there is none of this name.
+fn range(name: &str) -> Option<(f64, f64, String)> {
+    if let Some(key) = name.strip_prefix("settings.") {
         let setting = Setting::find(key.as_bytes())?;
         let range = setting.description();
         return Some((range.least.into(), range.greatest.into(), setting.help().to_string()));
     }
-    let parameter = PARAMETERS.iter().find(|known| known.name.split_once('.') == Some((table, key)))?;
+    let parameter = PARAMETERS.iter().find(|known| known.name == name)?;
     Some((parameter.least, parameter.greatest, parameter.meaning.to_owned()))
+}
+
+#[cfg(test)]
+impl Conditions {
+    /// The conditions of a preset, with other values of some parameters.
+    pub(crate) fn with(preset: &str, changes: &[(&str, f64)]) -> Self {
+        let mut conditions = Self::preset(preset).expect("it is a preset").expect("it can be read");
+        changes.iter().for_each(|(parameter, value)| conditions.set(parameter, *value).expect("it is a value"));
+        conditions
+    }
 }
 
 #[cfg(test)]
@@ -288,11 +290,8 @@ mod tests {
     #[test]
     fn a_file_has_only_differences_from_the_default() {
         let conditions = parse("[crop]\nspacing_scatter_mm = 12.5\n[plot]\nrows = 2\n[settings]\nk = 5\n").unwrap();
-        let mut expected = Conditions::default();
-        expected.set("crop.spacing_scatter_mm", 12.5).unwrap();
-        expected.set("plot.rows", 2.0).unwrap();
-        expected.set("k", 5.0).unwrap();
-        assert_eq!(conditions, expected);
+        let changes = [("crop.spacing_scatter_mm", 12.5), ("plot.rows", 2.0), ("k", 5.0)];
+        assert_eq!(conditions, Conditions::with("transplanted", &changes));
         assert_eq!(conditions.firmware_settings(), [(Setting::K, 5)]);
     }
 
@@ -346,11 +345,10 @@ mod tests {
     #[test]
     fn every_parameter_can_be_set_to_the_ends_of_its_range_and_not_beyond() {
         for parameter in PARAMETERS {
-            let mut conditions = Conditions::default();
-            // Without sweeps: they contradict many extreme values.
-            conditions.set("machine.sweeps_a_side", 0.0).unwrap();
-            // The longest distance that a second beam allows.
-            conditions.set("machine.beam_to_tool_mm", SLIPPING_BEAM_TO_TOOL_MM.into()).unwrap();
+            // Sweeps contradict many extreme values. The distance is the longest that a second beam allows.
+            let changes =
+                [("machine.sweeps_a_side", 0.0), ("machine.beam_to_tool_mm", f64::from(SLIPPING_BEAM_TO_TOOL_MM))];
+            let mut conditions = Conditions::with("transplanted", &changes);
             for end in [parameter.least, parameter.greatest] {
                 if parameter.name == "machine.sweeps_a_side" && end > 0.0 {
                     continue;

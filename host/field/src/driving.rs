@@ -4,11 +4,16 @@
 //! The row begins after a run-up, in which the machine accelerates and the tool enters the ground. It ends when the
 //! tool has passed it. A turn at the headland takes a distance at working speed, and some extra time. It is a number,
 //! not a motion.
+//!
+//! The deviation across the row's line follows straight lines between random values at positions a metre or two apart.
+//! The machine strays as a whole, tool and sweeps together, without an angle to the row. It does not change what the
+//! beam sees.
 
 use crate::conditions::Conditions;
+use crate::ground::interpolated;
 use crate::motion::{Motion, mm_s};
 use crate::planting::scatter;
-use crate::steering::Steering;
+use crate::trial::run_up_mm;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 
@@ -16,12 +21,9 @@ use std::ops::Range;
 const ACCELERATION_MM_S2: f64 = 500.0;
 const BRAKING_MM_S2: f64 = 1000.0;
 
-/// Distance of constant speed and slip, without the distance for changing the speed.
+/// Distance between two corrections of the steering, and of constant speed and slip, without the distance for changing
+/// the speed.
 const LEG_MM: Range<f64> = 1000.0..2000.0;
-
-/// Distance and time ahead of the row in which the machine rolls at its speed and the tool swings in.
-const RUN_UP_MM: f64 = 200.0;
-const SWING_IN_S: f64 = 0.6;
 
 /// Distance that the tool rolls on behind the row.
 const RUN_OUT_MM: f64 = 300.0;
@@ -50,7 +52,7 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
     // The distance to reach the highest speed and to stop from it.
     let change_mm = fastest_mm_s.powi(2) * (0.5 / ACCELERATION_MM_S2 + 0.5 / BRAKING_MM_S2);
     let speed_mm_s = wander(rng);
-    let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
+    let run_up_mm = run_up_mm(speed_mm_s, ACCELERATION_MM_S2);
     // The machine does not brake before the tool is out of the row.
     let braking_mm = fastest_mm_s.powi(2) * 0.5 / BRAKING_MM_S2;
     let end_mm = span_mm.end + machine.beam_to_tool_mm + RUN_OUT_MM + braking_mm;
@@ -85,6 +87,41 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
     Drive { motion, row_s, turn_s, steering }
 }
 
+/// The machine's position across the row, at each position along it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Steering {
+    /// Positions, and the deviation from the line there, positive to the left. Empty for a machine that stays on the
+    /// line.
+    knots: Vec<(f64, f64)>,
+    within_mm: f64,
+}
+
+impl Steering {
+    /// A machine that strays by up to `within_mm` on this ground.
+    pub fn within(within_mm: f64, ground_mm: Range<f64>, rng: &mut impl Rng) -> Self {
+        if within_mm <= 0.0 {
+            return Self::default();
+        }
+        let mut knots = vec![(ground_mm.start, scatter(rng, within_mm))];
+        let mut place_mm = ground_mm.start;
+        while place_mm < ground_mm.end {
+            place_mm += rng.random_range(LEG_MM);
+            knots.push((place_mm, scatter(rng, within_mm)));
+        }
+        Self { knots, within_mm }
+    }
+
+    /// Deviation of the machine's middle from the row's line, when its tool works this ground.
+    pub fn across_mm(&self, place_mm: f64) -> f64 {
+        interpolated(&self.knots, place_mm).unwrap_or(0.0)
+    }
+
+    /// The farthest that it strays.
+    pub fn within_mm(&self) -> f64 {
+        self.within_mm
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,61 +134,61 @@ mod tests {
 
     #[test]
     fn without_scatter_and_stops_a_row_takes_its_length_over_its_speed() {
-        let drive = driven(&Conditions::preset("even-stand").unwrap().unwrap(), 2.0);
+        let drive = driven(&Conditions::with("even-stand", &[]), 2.0);
         assert!((drive.row_s - 36.0).abs() < 1e-9, "{} s", drive.row_s);
         // 2.8 m at 2 km/h, and 1 s more or less by half.
         assert!((5.54..6.54).contains(&drive.turn_s), "{} s", drive.turn_s);
-        let fast = driven(&Conditions::preset("even-stand").unwrap().unwrap(), 8.0);
+        let fast = driven(&Conditions::with("even-stand", &[]), 8.0);
         assert!((fast.row_s - 9.0).abs() < 1e-9, "{} s", fast.row_s);
     }
 
     #[test]
     fn speed_wanders_within_its_scatter_and_stops_take_time() {
-        let mut conditions = Conditions::default();
-        conditions.set("driving.stops_per_100_m", 50.0).unwrap();
-        let drive = driven(&conditions, 2.0);
+        let drive = driven(&Conditions::with("transplanted", &[("driving.stops_per_100_m", 50.0)]), 2.0);
         assert!(drive.motion.top_speed_mm_s() <= mm_s(2.0) * 1.08);
         assert!(drive.row_s > 36.0 / 1.08 + 10.0, "{} s", drive.row_s);
     }
 
-    #[test]
-    fn the_wheel_turns_farther_by_its_slip() {
-        let drive = driven(&Conditions::default(), 1.0);
-        let (rolled_mm, turned_mm) = (
-            drive.motion.end_mm() - drive.motion.start_mm(),
-            drive.motion.wheel_mm(drive.motion.duration_s()) - drive.motion.start_mm(),
-        );
-        let slip_percent = 100.0 * (1.0 - rolled_mm / turned_mm);
-        // The mean of some ten legs within 3 % of it.
-        assert!((slip_percent - 5.0).abs() < 2.0, "{slip_percent} %");
+    /// How far the wheel turns for each millimetre of the machine.
+    fn turned_a_mm(conditions: &Conditions) -> f64 {
+        let motion = driven(conditions, 1.0).motion;
+        let turned_mm = motion.wheel_mm(motion.duration_s()) - motion.start_mm();
+        turned_mm / (motion.end_mm() - motion.start_mm())
     }
 
     #[test]
-    fn a_wheel_that_is_dragged_and_skids_turns_less_far_than_the_machine_rolls() {
+    fn a_wheel_turns_farther_by_its_slip_and_less_far_if_it_is_dragged_and_skids() {
+        // The mean of some ten legs within 3 % of it.
+        let slip_percent = 100.0 * (1.0 - 1.0 / turned_a_mm(&Conditions::default()));
+        assert!((slip_percent - 5.0).abs() < 2.0, "{slip_percent} %");
         for slip_percent in [-30.0, -10.0, 30.0] {
-            let mut conditions = Conditions::default();
-            conditions.set("ground.slip_percent", slip_percent).unwrap();
-            conditions.set("ground.slip_scatter_percent", 0.0).unwrap();
-            let motion = driven(&conditions, 1.0).motion;
-            let turned_mm = motion.wheel_mm(motion.duration_s()) - motion.start_mm();
-            let turned_a_mm = turned_mm / (motion.end_mm() - motion.start_mm());
-            assert!(
-                (turned_a_mm - 1.0 / (1.0 - slip_percent / 100.0)).abs() < 1e-9,
-                "{turned_a_mm} at {slip_percent} %"
-            );
+            let changes = [("ground.slip_percent", slip_percent), ("ground.slip_scatter_percent", 0.0)];
+            let turned_a_mm = turned_a_mm(&Conditions::with("transplanted", &changes));
+            let expected = 1.0 / (1.0 - slip_percent / 100.0);
+            assert!((turned_a_mm - expected).abs() < 1e-9, "{turned_a_mm} at {slip_percent} %");
         }
     }
 
     #[test]
     fn even_the_fastest_row_and_the_shortest_can_be_driven() {
-        let mut conditions = Conditions::default();
-        conditions.set("driving.stops_per_100_m", 50.0).unwrap();
-        conditions.set("driving.speed_scatter_percent", 50.0).unwrap();
+        let changes = [("driving.stops_per_100_m", 50.0), ("driving.speed_scatter_percent", 50.0)];
+        let conditions = Conditions::with("transplanted", &changes);
         for seed in 0..200 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let drive = drive(&conditions, &(0.0..2000.0), 5.0, &mut rng);
             let least_s = 2.0 / (mm_s(5.0) * 1.5 / 1000.0);
             assert!(drive.row_s >= least_s, "{} s", drive.row_s);
         }
+    }
+
+    #[test]
+    fn the_machine_strays_within_its_limits_and_gradually() {
+        let steering = Steering::within(15.0, 0.0..20_000.0, &mut ChaCha8Rng::seed_from_u64(1));
+        let places: Vec<f64> = (-100..2100).map(|place| steering.across_mm(f64::from(place) * 10.0)).collect();
+        assert!(places.iter().all(|across| across.abs() <= 15.0));
+        // From one limit to the other takes a metre at least: 0.3 mm in 10.
+        assert!(places.windows(2).all(|pair| (pair[1] - pair[0]).abs() <= 0.3 + 1e-9));
+        assert!(places.iter().any(|across| across.abs() > 8.0));
+        assert_eq!(Steering::default().across_mm(5.0), 0.0);
     }
 }

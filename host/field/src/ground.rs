@@ -25,6 +25,24 @@ pub fn share_of(row: &Range<f64>, union: &[Range<f64>]) -> f64 {
     covered / (row.end - row.start)
 }
 
+/// The spans between these ends, in any order, over whose middle a condition holds.
+pub(crate) fn spans_where(mut ends: Vec<f64>, holds_at: impl Fn(f64) -> bool) -> Vec<Range<f64>> {
+    ends.sort_by(f64::total_cmp);
+    let spans = ends.windows(2).map(|pair| pair[0]..pair[1]);
+    spans.filter(|span| span.start < span.end && holds_at((span.start + span.end) / 2.0)).collect()
+}
+
+/// The value at a place on the straight lines between knots, which are in ascending order. Beyond the outermost knots
+/// it stays as it is there. `None` without a knot.
+pub(crate) fn interpolated(knots: &[(f64, f64)], place: f64) -> Option<f64> {
+    let next = knots.partition_point(|(knot, _)| *knot <= place);
+    match (next.checked_sub(1).map(|last| knots[last]), knots.get(next)) {
+        (Some((from, before)), Some((to, beyond))) => Some(before + (beyond - before) * ((place - from) / (to - from))),
+        (Some((_, value)), None) | (None, Some(&(_, value))) => Some(value),
+        (None, None) => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,7 @@
 //!
 //! - **The row**: [`row`] is its content, [`planting`] grows a random one, and [`ground`] measures covered ground.
 //!   Under some [`conditions`], [`stand`] grows everything that beam and tools meet. [`sight`] calculates what a beam
-//!   sees, [`driving`] rolls along the row, and [`steering`] strays from its line.
+//!   sees, and [`driving`] rolls along the row and strays from its line.
 //! - **The machine**: [`motion`] is its motion. [`machine`] converts motion and row into levels on the Uno's pins.
 //!   [`servo`] converts pulses into the tool's angle. [`wiring`] assigns wires to pins. A [`rolling`] machine joins
 //!   these parts, without an end.
@@ -30,19 +30,23 @@ pub mod row;
 pub mod servo;
 pub mod sight;
 pub mod stand;
-pub mod steering;
 pub mod tool_path;
 pub mod trial;
 pub mod verdict;
 pub mod wheel;
 pub mod wiring;
-mod words;
 
 pub use conditions::Conditions;
 pub use machine::Machine;
 pub use motion::Motion;
-pub use row::{Kind, Row, Thing};
+pub use row::{Canopy, Kind, Row};
 pub use servo::Servo;
 pub use trial::{Start, Trial};
 pub use verdict::{Judgement, Timing, Verdict, judge};
-pub use words::counted;
+
+/// A number and a noun, such as `1 plant` and `2 plants`.
+pub fn counted(number: impl std::fmt::Display, noun: &str) -> String {
+    let number = number.to_string();
+    let plural = if number == "1" { "" } else { "s" };
+    format!("{number} {noun}{plural}")
+}

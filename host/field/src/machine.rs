@@ -13,7 +13,7 @@
 
 use crate::motion::{Motion, marks};
 use crate::row::Row;
-use crate::servo::{OUT_DEGREES, Servo, Stroke};
+use crate::servo::{OUT_DEGREES, Servo};
 use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -148,20 +148,16 @@ impl Machine {
         self.across_mm(self.servo.stroke_degrees()) - self.tool_width_mm / 2.0
     }
 
-    /// The times within `during_s` at which the tool is not fully out.
-    pub fn times_not_clear_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        stroke.times_below_s(self.servo.stroke_degrees() - self.clear_within_degrees, during_s)
+    /// The angle from which on the tool is fully out.
+    pub fn clear_degrees(&self) -> f64 {
+        self.servo.stroke_degrees() - self.clear_within_degrees
     }
 
-    /// The times within `during_s` at which the tool's edge is nearer than this to the row's line, which a full stroke clears.
-    pub fn times_within_s(&self, aside_mm: f64, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
+    /// The angle from which on the tool's nearer edge is this far from the row's line. A tool that is fully out is far
+    /// enough.
+    pub fn degrees_beside(&self, aside_mm: f64) -> f64 {
         let degrees = ((aside_mm + self.tool_width_mm / 2.0) / self.arm_mm).clamp(0.0, 1.0).asin().to_degrees();
-        stroke.times_below_s(degrees.min(self.servo.stroke_degrees() - self.clear_within_degrees), during_s)
-    }
-
-    /// The times within `during_s` at which the tool works the row's line.
-    pub fn times_weeding_s(&self, stroke: &Stroke, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        stroke.times_below_s(self.line_degrees(), during_s)
+        degrees.min(self.clear_degrees())
     }
 
     /// The level of each beam's line at power-up, before the motion begins: the first beam's, and the second one's if
@@ -196,20 +192,16 @@ impl Machine {
     ///
     /// The motion begins at `start_cycle`, with the encoder at rest and the beams as [`Machine::beams_before`] says.
     pub fn pin_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        let mut changes = self.encoder_changes(motion, start_cycle);
+        let mut changes = self.encoder_changes(&mut 0, 0.0, motion, start_cycle);
         changes.extend(self.beam_changes(row, motion, start_cycle));
         changes.sort_by_key(|change| change.cycle);
         changes
     }
 
-    /// Quadrature: forward is AB = 00, 10, 11, 01, 00, a count an edge.
-    fn encoder_changes(&self, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        self.encoder_changes_since(&mut 0, 0.0, motion, start_cycle)
-    }
-
-    /// As above, for the pieces of the motion that begin at a time or later. `ticks` is the count of a clean encoder
-    /// before them, and is updated to the count after them.
-    pub(crate) fn encoder_changes_since(
+    /// Quadrature: forward is AB = 00, 10, 11, 01, 00, a count an edge. The changes in the pieces of the motion that
+    /// begin at a time or later. `ticks` is the count of a clean encoder before them, and is updated to the count after
+    /// them.
+    pub(crate) fn encoder_changes(
         &self,
         ticks: &mut i64,
         from_s: f64,
@@ -217,7 +209,7 @@ impl Machine {
         start_cycle: u64,
     ) -> Vec<PinChange> {
         motion
-            .mark_passings_since(self.tick_mm(), from_s)
+            .mark_passings(self.tick_mm(), from_s)
             .into_iter()
             .filter_map(|passing| {
                 let before = *ticks;
@@ -315,12 +307,21 @@ pub fn time_at_s(start_cycle: u64, cycle: u64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::motion::mm_s;
-    use crate::row::Thing;
+    use crate::row::Canopy;
 
     const START_CYCLE: u64 = 1_000_000;
+
+    /// The count of an encoder with dirt on its disc, calculated from the start of the motion.
+    pub(crate) fn count_at(machine: &Machine, motion: &Motion, time_s: f64) -> i64 {
+        let ticks = machine.ticks(motion, time_s);
+        let pulse = machine.pulse(ticks);
+        let hidden = |pulses: Range<i64>| pulses.filter(|&pulse| machine.dirt.hides(pulse)).count() as i64;
+        let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
+        ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
+    }
 
     /// Counts of a decoder that takes each pair of levels as they come.
     fn decode(changes: &[PinChange]) -> i64 {
@@ -344,79 +345,60 @@ mod tests {
         count
     }
 
-    fn beam(changes: &[PinChange]) -> Vec<PinChange> {
-        changes.iter().copied().filter(|change| change.pin == wiring::BEAM).collect()
+    fn of_pin(changes: &[PinChange], pin: Pin) -> Vec<PinChange> {
+        changes.iter().copied().filter(|change| change.pin == pin).collect()
     }
 
     fn row() -> Row {
-        Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(800.0, 15.0)]).unwrap()
+        Row::new(vec![Canopy::plant(500.0, 150.0), Canopy::weed(800.0, 15.0)]).unwrap()
     }
 
     #[test]
     fn hidden_pulses_are_missing_from_the_pins_and_from_the_count() {
         let machine = Machine { dirt: Dirt { share: 0.05, seed: 3 }, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0).change_speed(0.0, 1000.0);
-        let changes = machine.encoder_changes(&motion, START_CYCLE);
-        let clean = machine.ticks(&motion, motion.duration_s());
-        let missing = |ticks: i64| {
-            let pulse = machine.pulse(ticks);
-            let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
-            (0..pulse).filter(|&pulse| machine.dirt.hides(pulse)).count() as i64 * PULSE_TICKS + in_pulse
-        };
-        assert!((60..160).contains(&missing(clean)), "{} of {clean}", missing(clean));
-        assert_eq!(decode(&changes), clean - missing(clean));
+        let changes = machine.encoder_changes(&mut 0, 0.0, &motion, START_CYCLE);
+        let end_s = motion.duration_s();
+        let missing = machine.ticks(&motion, end_s) - count_at(&machine, &motion, end_s);
+        assert!((60..160).contains(&missing), "{missing}");
+        assert_eq!(decode(&changes), count_at(&machine, &motion, end_s));
         // Also half way, at any phase of a pulse.
-        for passing in motion.mark_passings(machine.tick_mm()).iter().skip(600).take(200) {
+        for passing in motion.mark_passings(machine.tick_mm(), 0.0).iter().skip(600).take(200) {
             let so_far = changes.iter().filter(|change| change.cycle <= cycle_at(START_CYCLE, passing.time_s));
-            let ticks = machine.ticks(&motion, passing.time_s + 1e-7);
-            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), ticks - missing(ticks));
+            let count = count_at(&machine, &motion, passing.time_s + 1e-7);
+            assert_eq!(decode(&so_far.copied().collect::<Vec<_>>()), count);
         }
     }
 
     #[test]
-    fn a_metre_is_1910_counts() {
-        let motion = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
-        let changes = Machine::default().pin_changes(&row(), &motion, START_CYCLE);
-        assert_eq!(decode(&changes), 1910);
-    }
-
-    #[test]
-    fn rolling_back_counts_down() {
-        let motion = Motion::starting_at(0.0)
-            .change_speed(500.0, 1000.0)
-            .stop_at(700.0, 1000.0)
+    fn a_metre_is_1910_counts_and_rolling_back_counts_down() {
+        let there = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
+        let back = Motion::steady(0.0, 1000.0, 500.0, 600.0)
+            .stop_at(800.0, 1000.0)
             .change_speed(-500.0, 1000.0)
             .roll_to(-1000.0);
         let machine = Machine::default();
-        let changes = machine.pin_changes(&row(), &motion, START_CYCLE);
-        assert_eq!(decode(&changes), -1910);
-        assert_eq!(machine.ticks(&motion, motion.duration_s()), -1910);
-    }
-
-    #[test]
-    fn the_beam_reports_each_plant_and_weed_at_its_edges_a_millisecond_late() {
-        let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1200.0);
-        let beam = beam(&Machine::default().pin_changes(&row(), &motion, START_CYCLE));
-        let levels: Vec<bool> = beam.iter().map(|change| change.high).collect();
-        assert_eq!(levels, [false, true, false, true]);
-        for (change, place_mm) in beam.iter().zip([425.0, 575.0, 792.5, 807.5]) {
-            let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
-            assert!((motion.position_mm(time_s) - place_mm).abs() < 0.001, "{place_mm} mm");
+        for (motion, counts) in [(there, 1910), (back, -1910)] {
+            assert_eq!(decode(&machine.pin_changes(&row(), &motion, START_CYCLE)), counts);
+            assert_eq!(machine.ticks(&motion, motion.duration_s()), counts);
         }
     }
 
     #[test]
-    fn the_second_beam_has_the_first_s_edges_at_the_beams_distance() {
+    fn each_beam_reports_each_plant_and_weed_at_its_edges_a_millisecond_late() {
         let machine = Machine { second_beam_mm: 220.0, ..Machine::default() };
         let motion = Motion::steady(0.0, 1000.0, mm_s(2.0), 1300.0).with_slip(|| 0.2);
-        let mut second = machine.beam_changes(&row(), &motion, START_CYCLE);
-        second.retain(|change| change.pin == wiring::SECOND_BEAM);
         assert!(machine.beams_before(&row(), &motion)[1].high);
-        for (change, place_mm) in second.iter().zip([425.0, 575.0, 792.5, 807.5]) {
-            let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
-            assert!((motion.position_mm(time_s) - 220.0 - place_mm).abs() < 0.001, "{place_mm} mm");
+        let changes = machine.pin_changes(&row(), &motion, START_CYCLE);
+        for (pin, behind_mm) in [(wiring::BEAM, 0.0), (wiring::SECOND_BEAM, 220.0)] {
+            let beam = of_pin(&changes, pin);
+            assert_eq!(beam.iter().map(|change| change.high).collect::<Vec<_>>(), [false, true, false, true]);
+            for (change, place_mm) in beam.iter().zip([425.0, 575.0, 792.5, 807.5]) {
+                let time_s = time_at_s(START_CYCLE, change.cycle) - 0.001;
+                let seen_mm = motion.position_mm(time_s) - behind_mm;
+                assert!((seen_mm - place_mm).abs() < 0.001, "{pin:?} at {place_mm} mm");
+            }
         }
-        assert_eq!(second.len(), 4);
         assert_eq!(Machine::default().beams_before(&row(), &motion).len(), 1);
     }
 
@@ -424,27 +406,20 @@ mod tests {
     fn a_beam_that_is_broken_at_the_start_is_low_from_power_up_on() {
         let motion = Motion::steady(500.0, 1000.0, mm_s(2.0), 700.0);
         let machine = Machine::default();
-        let beam = beam(&machine.pin_changes(&row(), &motion, START_CYCLE));
+        let beam = of_pin(&machine.pin_changes(&row(), &motion, START_CYCLE), wiring::BEAM);
         assert!(!machine.beams_before(&row(), &motion)[0].high);
         assert!(beam.len() == 1 && beam[0].high);
     }
 
     #[test]
     fn a_gap_shorter_than_the_sensors_response_is_not_seen() {
-        let mut plant = Thing::plant(500.0, 150.0);
+        let mut plant = Canopy::plant(500.0, 150.0);
         // At 1 km/h a millisecond is 0.28 mm.
         plant.leaves = vec![425.0..470.0, 470.2..520.0, 521.0..575.0];
         let row = Row::new(vec![plant]).unwrap();
         let motion = Motion::steady(0.0, 1000.0, mm_s(1.0), 1000.0);
-        let beam = beam(&Machine::default().pin_changes(&row, &motion, START_CYCLE));
+        let beam = of_pin(&Machine::default().pin_changes(&row, &motion, START_CYCLE), wiring::BEAM);
         assert_eq!(beam.len(), 4, "the plant and one gap of two");
-    }
-
-    #[test]
-    fn changes_come_in_order_of_time() {
-        let motion = Motion::steady(0.0, 1000.0, mm_s(2.5), 1000.0);
-        let changes = Machine::default().pin_changes(&row(), &motion, START_CYCLE);
-        assert!(changes.is_sorted_by_key(|change| change.cycle));
     }
 
     #[test]

@@ -12,6 +12,7 @@
 //!
 //! It knows no machine: the user defines position 0.
 
+use crate::ground::spans_where;
 use std::ops::Range;
 
 /// Walking speed in millimetres a second for a speed in kilometres an hour.
@@ -33,13 +34,8 @@ pub struct Passing {
 pub struct Motion {
     start_mm: f64,
     pieces: Vec<Piece>,
-    end_s: f64,
-    end_mm: f64,
-    end_speed_mm_s: f64,
-    /// The position of the wheel's rim at the end, and how far it turns from there on for each millimetre of the
-    /// machine.
-    wheel_end_mm: f64,
-    wheel_mm_a_mm: f64,
+    /// The piece that would follow: it begins at the end, at the speed reached there.
+    end: Piece,
 }
 
 /// A stretch of constant acceleration in which the direction does not change.
@@ -61,6 +57,23 @@ impl Piece {
     fn position_mm(&self, time_s: f64) -> f64 {
         let t = time_s - self.start_s;
         self.start_mm + self.speed_mm_s * t + self.acceleration_mm_s2 * t * t / 2.0
+    }
+
+    fn speed_at(&self, time_s: f64) -> f64 {
+        self.speed_mm_s + self.acceleration_mm_s2 * (time_s - self.start_s)
+    }
+
+    /// The piece that follows, with the same slip, at a speed.
+    fn then_at(&self, speed_mm_s: f64) -> Self {
+        Self {
+            start_s: self.end_s,
+            end_s: f64::INFINITY,
+            start_mm: self.end_mm,
+            speed_mm_s,
+            acceleration_mm_s2: 0.0,
+            wheel_start_mm: self.wheel_mm(self.end_mm),
+            ..*self
+        }
     }
 
     /// The time at which the piece reaches a position between its ends. This form of the quadratic's root adds two
@@ -90,15 +103,17 @@ impl Piece {
 impl Motion {
     /// The machine stands at `start_mm`.
     pub fn starting_at(start_mm: f64) -> Self {
-        Self {
+        let end = Piece {
+            start_s: 0.0,
+            end_s: f64::INFINITY,
             start_mm,
-            pieces: Vec::new(),
-            end_s: 0.0,
             end_mm: start_mm,
-            end_speed_mm_s: 0.0,
-            wheel_end_mm: start_mm,
+            speed_mm_s: 0.0,
+            acceleration_mm_s2: 0.0,
+            wheel_start_mm: start_mm,
             wheel_mm_a_mm: 1.0,
-        }
+        };
+        Self { start_mm, pieces: Vec::new(), end }
     }
 
     /// From standstill at `start_mm` with `acceleration_mm_s2` to a constant speed, and on to `end_mm`.
@@ -108,8 +123,8 @@ impl Motion {
 
     /// Continues at the current speed for a time. A standing machine stands.
     pub fn go_on_for(self, duration_s: f64) -> Self {
-        let end_mm = self.end_mm + self.end_speed_mm_s * duration_s;
-        let speed_mm_s = self.end_speed_mm_s;
+        let Piece { start_mm, speed_mm_s, .. } = self.end;
+        let end_mm = start_mm + speed_mm_s * duration_s;
         self.then(duration_s, 0.0, end_mm, speed_mm_s)
     }
 
@@ -119,13 +134,14 @@ impl Motion {
     /// If the acceleration is 0: the speed would never be reached.
     pub fn change_speed(self, speed_mm_s: f64, acceleration_mm_s2: f64) -> Self {
         assert!(acceleration_mm_s2 != 0.0, "a change of speed needs an acceleration");
-        if self.end_speed_mm_s * speed_mm_s < 0.0 {
+        let before = self.end;
+        if before.speed_mm_s * speed_mm_s < 0.0 {
             return self.change_speed(0.0, acceleration_mm_s2).change_speed(speed_mm_s, acceleration_mm_s2);
         }
-        let change_mm_s = speed_mm_s - self.end_speed_mm_s;
+        let change_mm_s = speed_mm_s - before.speed_mm_s;
         let acceleration_mm_s2 = acceleration_mm_s2.abs().copysign(change_mm_s);
         let duration_s = change_mm_s / acceleration_mm_s2;
-        let end_mm = self.end_mm + (self.end_speed_mm_s + speed_mm_s) / 2.0 * duration_s;
+        let end_mm = before.start_mm + (before.speed_mm_s + speed_mm_s) / 2.0 * duration_s;
         self.then(duration_s, acceleration_mm_s2, end_mm, speed_mm_s)
     }
 
@@ -134,14 +150,12 @@ impl Motion {
     /// # Panics
     /// If the machine does not roll towards this position.
     pub fn roll_to(self, place_mm: f64) -> Self {
-        let duration_s = (place_mm - self.end_mm) / self.end_speed_mm_s;
+        let Piece { start_mm, speed_mm_s, .. } = self.end;
+        let duration_s = (place_mm - start_mm) / speed_mm_s;
         assert!(
             duration_s.is_finite() && duration_s >= 0.0,
-            "at {} mm with {} mm/s the machine never reaches {place_mm} mm",
-            self.end_mm,
-            self.end_speed_mm_s
+            "at {start_mm} mm with {speed_mm_s} mm/s the machine never reaches {place_mm} mm"
         );
-        let speed_mm_s = self.end_speed_mm_s;
         self.then(duration_s, 0.0, place_mm, speed_mm_s)
     }
 
@@ -150,28 +164,18 @@ impl Motion {
     /// # Panics
     /// If the position is nearer than the braking distance.
     pub fn stop_at(self, place_mm: f64, acceleration_mm_s2: f64) -> Self {
-        let braking_mm = (self.end_speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2.abs())).copysign(self.end_speed_mm_s);
+        let speed_mm_s = self.end.speed_mm_s;
+        let braking_mm = (speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2.abs())).copysign(speed_mm_s);
         self.roll_to(place_mm - braking_mm).change_speed(0.0, acceleration_mm_s2)
     }
 
     fn then(mut self, duration_s: f64, acceleration_mm_s2: f64, end_mm: f64, end_speed_mm_s: f64) -> Self {
-        let piece = Piece {
-            start_s: self.end_s,
-            end_s: self.end_s + duration_s,
-            start_mm: self.end_mm,
-            end_mm,
-            speed_mm_s: self.end_speed_mm_s,
-            acceleration_mm_s2,
-            wheel_start_mm: self.wheel_end_mm,
-            wheel_mm_a_mm: self.wheel_mm_a_mm,
-        };
         if duration_s > 0.0 {
-            self.end_s = piece.end_s;
-            self.end_mm = end_mm;
-            self.wheel_end_mm = piece.wheel_mm(end_mm);
+            let piece = Piece { end_s: self.end.start_s + duration_s, end_mm, acceleration_mm_s2, ..self.end };
             self.pieces.push(piece);
+            self.end = piece.then_at(end_speed_mm_s);
         }
-        self.end_speed_mm_s = end_speed_mm_s;
+        self.end.speed_mm_s = end_speed_mm_s;
         self
     }
 
@@ -180,20 +184,19 @@ impl Motion {
         let kept = self.pieces.partition_point(|piece| piece.start_s <= time_s);
         self.pieces.truncate(kept);
         let Some(last) = self.pieces.last_mut().filter(|last| time_s < last.end_s) else {
-            let more_s = time_s - self.end_s;
+            let more_s = time_s - self.end.start_s;
             return self.go_on_for(more_s);
         };
         last.end_mm = last.position_mm(time_s);
         last.end_s = time_s;
-        let Piece { start_s, end_mm, speed_mm_s, acceleration_mm_s2, .. } = *last;
-        let wheel_end_mm = last.wheel_mm(end_mm);
-        let end_speed_mm_s = speed_mm_s + acceleration_mm_s2 * (time_s - start_s);
-        Self { end_s: time_s, end_mm, end_speed_mm_s, wheel_end_mm, ..self }
+        self.end = Piece { wheel_mm_a_mm: self.end.wheel_mm_a_mm, ..last.then_at(last.speed_at(time_s)) };
+        self
     }
 
     /// In the pieces that follow, the wheel loses this share of its distance, below 1.
-    pub fn slipping(self, share: f64) -> Self {
-        Self { wheel_mm_a_mm: 1.0 / (1.0 - share), ..self }
+    pub fn slipping(mut self, share: f64) -> Self {
+        self.end.wheel_mm_a_mm = 1.0 / (1.0 - share);
+        self
     }
 
     /// Removes the pieces that ended before a time. Later calls must not ask for those times.
@@ -215,14 +218,13 @@ impl Motion {
     /// The motion from a time on, as its own motion with time 0 there. Its wheel does not slip.
     pub fn since(&self, time_s: f64) -> Self {
         let first = self.pieces.partition_point(|piece| piece.end_s <= time_s);
-        self.pieces[first..].iter().fold(Self::starting_at(self.position_mm(time_s)), |motion, piece| {
+        self.pieces[first..].iter().fold(Self::starting_at(self.position_mm(time_s)), |mut motion, piece| {
             let late_s = (time_s - piece.start_s).max(0.0);
             // Its own speed, not the one before it, so that errors of rounding do not add up.
-            let end_speed_mm_s = piece.speed_mm_s + piece.acceleration_mm_s2 * late_s;
+            motion.end.speed_mm_s = piece.speed_mm_s + piece.acceleration_mm_s2 * late_s;
             let duration_s = piece.end_s - piece.start_s - late_s;
-            let after_mm_s = end_speed_mm_s + piece.acceleration_mm_s2 * duration_s;
-            let end_mm = piece.end_mm;
-            Self { end_speed_mm_s, ..motion }.then(duration_s, piece.acceleration_mm_s2, end_mm, after_mm_s)
+            let after_mm_s = motion.end.speed_mm_s + piece.acceleration_mm_s2 * duration_s;
+            motion.then(duration_s, piece.acceleration_mm_s2, piece.end_mm, after_mm_s)
         })
     }
 
@@ -235,7 +237,8 @@ impl Motion {
             piece.wheel_mm_a_mm = 1.0 / (1.0 - slip());
             wheel_mm = piece.wheel_mm(piece.end_mm);
         }
-        Self { wheel_end_mm: wheel_mm, ..self }
+        self.end.wheel_start_mm = wheel_mm;
+        self
     }
 
     /// Where the motion began.
@@ -245,22 +248,22 @@ impl Motion {
 
     /// Where the motion ended.
     pub fn end_mm(&self) -> f64 {
-        self.end_mm
+        self.end.end_mm
     }
 
     /// The speed at which the motion ended, negative backwards.
     pub fn end_speed_mm_s(&self) -> f64 {
-        self.end_speed_mm_s
+        self.end.speed_mm_s
     }
 
     /// How long the motion takes.
     pub fn duration_s(&self) -> f64 {
-        self.end_s
+        self.end.start_s
     }
 
     /// Distance of the machine for each millimetre of the wheel's rim, from the end on.
     pub fn ground_mm_a_wheel_mm(&self) -> f64 {
-        1.0 / self.wheel_mm_a_mm
+        1.0 / self.end.wheel_mm_a_mm
     }
 
     /// The position at a time. Before its beginning and after its end the machine stands.
@@ -268,7 +271,7 @@ impl Motion {
         match self.piece_at(time_s) {
             Some(piece) => piece.position_mm(time_s),
             None if time_s < 0.0 => self.start_mm,
-            None => self.end_mm,
+            None => self.end.start_mm,
         }
     }
 
@@ -277,23 +280,32 @@ impl Motion {
         match self.piece_at(time_s) {
             Some(piece) => piece.wheel_mm(piece.position_mm(time_s)),
             None if time_s < 0.0 => self.start_mm,
-            None => self.wheel_end_mm,
+            None => self.end.wheel_start_mm,
+        }
+    }
+
+    /// [`Motion::wheel_mm`] for times that ascend from 0: it does not search for the piece each time.
+    pub fn wheel_course(&self) -> impl FnMut(f64) -> f64 {
+        let standing = Piece { speed_mm_s: 0.0, ..self.end };
+        let mut pieces = self.pieces.iter();
+        let mut piece = *pieces.next().unwrap_or(&standing);
+        move |time_s| {
+            while piece.end_s <= time_s {
+                piece = *pieces.next().unwrap_or(&standing);
+            }
+            piece.wheel_mm(piece.position_mm(time_s))
         }
     }
 
     /// The speed at a time, negative when rolling back.
     pub fn speed_mm_s(&self, time_s: f64) -> f64 {
-        self.piece_at(time_s)
-            .map_or(0.0, |piece| piece.speed_mm_s + piece.acceleration_mm_s2 * (time_s - piece.start_s))
+        self.piece_at(time_s).map_or(0.0, |piece| piece.speed_at(time_s))
     }
 
     /// The highest speed, forward or back.
     pub fn top_speed_mm_s(&self) -> f64 {
-        let ends = self.pieces.iter().flat_map(|piece| {
-            let end_speed = piece.speed_mm_s + piece.acceleration_mm_s2 * (piece.end_s - piece.start_s);
-            [piece.speed_mm_s.abs(), end_speed.abs()]
-        });
-        ends.fold(0.0, f64::max)
+        let ends = self.pieces.iter().flat_map(|piece| [piece.speed_mm_s, piece.speed_at(piece.end_s)]);
+        ends.map(f64::abs).fold(0.0, f64::max)
     }
 
     /// The stretch that the machine rolled over during a time.
@@ -326,29 +338,16 @@ impl Motion {
 
     /// The times during which the position lies within a stretch.
     pub fn times_within_s(&self, stretch_mm: &Range<f64>) -> Vec<Range<f64>> {
-        let mut times: Vec<f64> = [stretch_mm.start, stretch_mm.end]
-            .iter()
-            .flat_map(|&place_mm| self.passings(place_mm))
-            .map(|passing| passing.time_s)
-            .chain([0.0, self.end_s])
-            .collect();
-        times.sort_by(f64::total_cmp);
-        times
-            .windows(2)
-            .map(|pair| pair[0]..pair[1])
-            .filter(|span| stretch_mm.contains(&self.position_mm((span.start + span.end) / 2.0)))
-            .collect()
+        let ends = [stretch_mm.start, stretch_mm.end].into_iter().flat_map(|place_mm| self.passings(place_mm));
+        let times = ends.map(|passing| passing.time_s).chain([0.0, self.duration_s()]);
+        spans_where(times.collect(), |time_s| stretch_mm.contains(&self.position_mm(time_s)))
     }
 
-    /// The edges of a wheel with marks `pitch_mm` apart: each mark's passing, in order of time.
+    /// The edges of a wheel with marks `pitch_mm` apart: each mark's passing, in order of time, in the pieces that begin
+    /// at a time or later.
     ///
     /// The motion begins half way between two marks.
-    pub fn mark_passings(&self, pitch_mm: f64) -> Vec<Passing> {
-        self.mark_passings_since(pitch_mm, 0.0)
-    }
-
-    /// As [`mark_passings`](Self::mark_passings), in the pieces that begin at a time or later.
-    pub fn mark_passings_since(&self, pitch_mm: f64, from_s: f64) -> Vec<Passing> {
+    pub fn mark_passings(&self, pitch_mm: f64, from_s: f64) -> Vec<Passing> {
         let marks_to = |wheel_mm: f64| marks(wheel_mm - self.start_mm, pitch_mm);
         let mut passings = Vec::new();
         for piece in self.pieces_since(from_s) {
@@ -376,53 +375,6 @@ impl Motion {
     }
 }
 
-/// A cursor on a motion, for times that ascend: it does not search for the piece each time.
-#[derive(Clone, Debug)]
-pub struct Course<'a> {
-    /// The piece of the last call, the pieces after it, and at the end the standing machine.
-    piece: Piece,
-    to_come: std::slice::Iter<'a, Piece>,
-    end: Piece,
-}
-
-impl<'a> Course<'a> {
-    /// A motion from its beginning on.
-    pub fn along(motion: &'a Motion) -> Self {
-        let end = Piece {
-            start_s: motion.end_s,
-            end_s: f64::INFINITY,
-            start_mm: motion.end_mm,
-            end_mm: motion.end_mm,
-            speed_mm_s: 0.0,
-            acceleration_mm_s2: 0.0,
-            wheel_start_mm: motion.wheel_end_mm,
-            wheel_mm_a_mm: 1.0,
-        };
-        let mut to_come = motion.pieces.iter();
-        Self { piece: *to_come.next().unwrap_or(&end), to_come, end }
-    }
-
-    /// Replaces each of these times by [`Motion::wheel_mm`]. They must ascend, and start at 0 or at the last time of
-    /// the previous call.
-    #[inline]
-    pub fn roll(&mut self, times_s: &mut [f64]) {
-        let mut rest = times_s;
-        while let Some(&first_s) = rest.first() {
-            while self.piece.end_s <= first_s {
-                self.piece = *self.to_come.next().unwrap_or(&self.end);
-            }
-            let piece = self.piece;
-            // Usually all times lie within the piece.
-            let within = rest.partition_point(|&time_s| time_s < piece.end_s);
-            let (now, later) = rest.split_at_mut(within);
-            for time_s in now {
-                *time_s = piece.wheel_mm(piece.position_mm(*time_s));
-            }
-            rest = later;
-        }
-    }
-}
-
 /// Net marks passed after a distance, from half way between two marks: the counts of an ideal encoder.
 pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
     // The floor without a call, because each turn of a loop calls this.
@@ -434,35 +386,93 @@ pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
-    const PITCH_MM: f64 = 0.524;
-
-    /// 1 km/h, then 2.5 km/h, a stop, back over 300 mm, and forward again.
-    fn to_and_fro() -> Motion {
-        Motion::starting_at(-100.0)
-            .change_speed(mm_s(1.0), 400.0)
-            .roll_to(500.0)
-            .change_speed(mm_s(2.5), 800.0)
-            .stop_at(2000.0, 1000.0)
-            .go_on_for(1.5)
-            .change_speed(-mm_s(1.0), 400.0)
-            .stop_at(1700.0, 400.0)
-            .change_speed(mm_s(2.5), 800.0)
-            .roll_to(3000.0)
+    /// A speed is reached and kept for a time, again and again. The machine may stand, roll back and slip.
+    fn motions() -> impl Strategy<Value = Motion> {
+        let leg = (-900.0..900.0, 200.0..1500.0, 0.0..2.0, -0.1..0.2);
+        prop::collection::vec(leg, 1..8).prop_map(|legs| {
+            legs.into_iter().fold(Motion::starting_at(-100.0), |motion, (speed_mm_s, acceleration, for_s, slip)| {
+                motion.slipping(slip).change_speed(speed_mm_s, acceleration).go_on_for(for_s)
+            })
+        })
     }
 
-    #[test]
-    fn position_and_speed_are_continuous() {
-        let motion = to_and_fro();
-        let step_s = 1e-4;
-        let steps = (motion.duration_s() / step_s) as usize;
-        for step in 0..steps {
-            let time_s = step as f64 * step_s;
-            let moved_mm = motion.position_mm(time_s + step_s) - motion.position_mm(time_s);
-            let mean_mm_s = (motion.speed_mm_s(time_s) + motion.speed_mm_s(time_s + step_s)) / 2.0;
-            // The motion ends at full speed, so its very last step is left out.
-            if time_s + 2.0 * step_s < motion.duration_s() {
-                assert!((moved_mm - mean_mm_s * step_s).abs() < 1e-4, "at {time_s} s");
+    /// Times from the beginning to just before the end: after it the machine stands.
+    fn times_s(motion: &Motion) -> impl Iterator<Item = f64> {
+        let step_s = motion.duration_s() / 200.0;
+        (0..200).map(move |step| f64::from(step) * step_s)
+    }
+
+    proptest! {
+        #[test]
+        fn position_speed_and_stretches_agree(motion in motions(), share in 0.1..1.0_f64) {
+            let until_s = share * motion.duration_s();
+            let stretch = motion.stretch_mm(&(0.0..until_s));
+            let (mut least_mm, mut most_mm) = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut course = motion.wheel_course();
+            for time_s in times_s(&motion) {
+                let place_mm = motion.position_mm(time_s);
+                let moved_mm = motion.position_mm(time_s + 1e-5) - place_mm;
+                prop_assert!((moved_mm / 1e-5 - motion.speed_mm_s(time_s)).abs() < 0.02, "at {time_s} s");
+                prop_assert_eq!(course(time_s), motion.wheel_mm(time_s));
+                if time_s <= until_s {
+                    (least_mm, most_mm) = (least_mm.min(place_mm), most_mm.max(place_mm));
+                }
+            }
+            let missed_mm = motion.top_speed_mm_s() * motion.duration_s() / 200.0;
+            prop_assert!((-1e-6..=missed_mm).contains(&(least_mm - stretch.start)), "{stretch:?}, {least_mm}");
+            prop_assert!((-1e-6..=missed_mm).contains(&(stretch.end - most_mm)), "{stretch:?}, {most_mm}");
+        }
+
+        #[test]
+        fn places_and_marks_are_passed_when_the_machine_is_there(
+            motion in motions(), place_mm in -1000.0..2000.0_f64, pitch_mm in 0.4..5.0_f64,
+        ) {
+            let passings: Vec<Passing> = motion.passings(place_mm).collect();
+            for passing in &passings {
+                prop_assert!((motion.position_mm(passing.time_s) - place_mm).abs() < 1e-6);
+            }
+            prop_assert!(passings.windows(2).all(|two| two[0].time_s <= two[1].time_s && two[0].forward != two[1].forward));
+            let is_past = |position_mm: f64| position_mm >= place_mm;
+            prop_assert_eq!(passings.len() % 2 == 1, is_past(motion.start_mm()) != is_past(motion.end_mm()));
+            for times in motion.times_within_s(&(place_mm..place_mm + 300.0)) {
+                let ends_mm = [times.start, times.end].map(|time_s| motion.position_mm(time_s) - place_mm);
+                prop_assert!(ends_mm.iter().all(|end_mm| (-1e-6..300.0 + 1e-6).contains(end_mm)), "{ends_mm:?}");
+            }
+            let (mut count, mut last_s) = (0, 0.0);
+            for passing in motion.mark_passings(pitch_mm, 0.0) {
+                prop_assert!(passing.time_s >= last_s, "marks are in order of time");
+                last_s = passing.time_s;
+                let mark = if passing.forward { count + 1 } else { count };
+                let wheel_mm = motion.start_mm() + (f64::from(mark) - 0.5) * pitch_mm;
+                prop_assert!((motion.wheel_mm(passing.time_s) - wheel_mm).abs() < 1e-6);
+                count += if passing.forward { 1 } else { -1 };
+            }
+            let turned_mm = motion.wheel_mm(motion.duration_s()) - motion.start_mm();
+            prop_assert_eq!(i64::from(count), marks(turned_mm, pitch_mm));
+        }
+
+        #[test]
+        fn a_motion_that_is_cut_has_its_beginning_and_its_rest(whole in motions(), share in 0.0..0.99_f64) {
+            let cut_s = share * whole.duration_s();
+            let cut = whole.clone().until(cut_s);
+            prop_assert_eq!((cut.duration_s(), cut.end_mm()), (cut_s, whole.position_mm(cut_s)));
+            let on = cut.clone().until(cut_s + 0.5);
+            prop_assert!((on.end_mm() - cut.end_mm() - whole.speed_mm_s(cut_s) * 0.5).abs() < 1e-9);
+            let back = cut.change_speed(-250.0, 500.0).until(cut_s + 20.0);
+            prop_assert_eq!(back.speed_mm_s(cut_s + 19.0), -250.0);
+            let (left, mut kept) = (whole.since(cut_s), whole.clone());
+            kept.forget(cut_s);
+            prop_assert!((left.duration_s() + cut_s - whole.duration_s()).abs() < 1e-9);
+            for time_s in times_s(&whole) {
+                let place_mm = whole.position_mm(time_s);
+                if time_s < cut_s {
+                    prop_assert_eq!(back.position_mm(time_s), place_mm);
+                } else {
+                    prop_assert_eq!(kept.position_mm(time_s), place_mm);
+                    prop_assert!((left.position_mm(time_s - cut_s) - place_mm).abs() < 1e-6);
+                }
             }
         }
     }
@@ -472,25 +482,10 @@ mod tests {
         let motion = Motion::steady(0.0, 1000.0, 500.0, 1900.0).with_slip(|| 0.05);
         assert!((motion.wheel_mm(motion.duration_s()) - 2000.0).abs() < 1e-9);
         assert_eq!(motion.end_mm(), 1900.0);
-        let passings = motion.mark_passings(10.0);
+        let passings = motion.mark_passings(10.0, 0.0);
         assert_eq!(passings.len(), 200);
         let hundredth = motion.position_mm(passings[99].time_s);
         assert!((hundredth - 995.0 * 0.95).abs() < 1e-6, "{hundredth} mm");
-    }
-
-    #[test]
-    fn a_motion_that_is_cut_goes_on_as_it_was_and_may_become_another_one() {
-        let whole = to_and_fro();
-        for time_s in [0.0, 0.3, 2.0, 5.5, whole.duration_s() - 0.1] {
-            let cut = whole.clone().until(time_s);
-            assert_eq!((cut.duration_s(), cut.end_mm()), (time_s, whole.position_mm(time_s)));
-            let on = cut.clone().until(time_s + 0.5);
-            let expected_mm = whole.position_mm(time_s) + whole.speed_mm_s(time_s) * 0.5;
-            assert!((on.end_mm() - expected_mm).abs() < 1e-9, "at {time_s} s");
-            let back = cut.change_speed(-250.0, 500.0).until(time_s + 20.0);
-            assert_eq!(back.speed_mm_s(time_s + 19.0), -250.0);
-            assert_eq!(back.position_mm(time_s / 2.0), whole.position_mm(time_s / 2.0));
-        }
     }
 
     #[test]
@@ -518,46 +513,6 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_of_a_motion_rolls_as_the_whole_does() {
-        let whole = to_and_fro();
-        for from_s in [0.0, 0.2, 3.3, 7.0] {
-            let left = whole.since(from_s);
-            let mut kept = whole.clone();
-            kept.forget(from_s);
-            for step in 0..100 {
-                let time_s = f64::from(step) / 100.0 * (whole.duration_s() - from_s);
-                assert!((left.position_mm(time_s) - whole.position_mm(from_s + time_s)).abs() < 1e-9);
-                assert!((left.speed_mm_s(time_s) - whole.speed_mm_s(from_s + time_s)).abs() < 1e-9);
-                assert_eq!(kept.position_mm(from_s + time_s), whole.position_mm(from_s + time_s));
-            }
-            assert!((left.duration_s() + from_s - whole.duration_s()).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn every_mark_is_passed_at_the_time_when_the_position_says_so() {
-        let motion = to_and_fro();
-        let mut count = 0;
-        let mut last_s = 0.0;
-        for passing in motion.mark_passings(PITCH_MM) {
-            assert!(passing.time_s >= last_s, "marks are in order of time");
-            last_s = passing.time_s;
-            let mark = if passing.forward { count + 1 } else { count };
-            let place_mm = -100.0 + (f64::from(mark) - 0.5) * PITCH_MM;
-            assert!((motion.position_mm(passing.time_s) - place_mm).abs() < 1e-6);
-            count += if passing.forward { 1 } else { -1 };
-        }
-        assert_eq!(i64::from(count), marks(3100.0, PITCH_MM));
-    }
-
-    #[test]
-    fn rolling_back_passes_a_place_three_times() {
-        let motion = to_and_fro();
-        let directions: Vec<bool> = motion.passings(1800.0).map(|passing| passing.forward).collect();
-        assert_eq!(directions, [true, false, true]);
-    }
-
-    #[test]
     fn a_place_on_which_the_machine_turns_is_passed_there_and_back() {
         let motion = Motion::starting_at(0.0)
             .change_speed(100.0, 100.0)
@@ -567,24 +522,5 @@ mod tests {
         assert_eq!(motion.position_mm(3.0), 200.0);
         let directions: Vec<bool> = motion.passings(200.0).map(|passing| passing.forward).collect();
         assert_eq!(directions, [true, false]);
-    }
-
-    #[test]
-    fn times_within_a_stretch_end_where_the_machine_leaves_it() {
-        let motion = Motion::steady(0.0, 1000.0, 500.0, 1000.0);
-        let times = motion.times_within_s(&(400.0..600.0));
-        assert_eq!(times.len(), 1);
-        assert!((motion.position_mm(times[0].start) - 400.0).abs() < 1e-6);
-        assert!((motion.position_mm(times[0].end) - 600.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn the_stretch_of_a_turn_reaches_to_the_turning_point() {
-        let motion = to_and_fro();
-        let stretch = motion.stretch_mm(&(0.0..motion.duration_s()));
-        assert!((stretch.start - -100.0).abs() < 1e-9 && (stretch.end - 3000.0).abs() < 1e-9);
-        let times_s: Vec<f64> = motion.passings(1900.0).map(|passing| passing.time_s).collect();
-        let turn = motion.stretch_mm(&(times_s[0]..times_s[1]));
-        assert!((turn.start - 1900.0).abs() < 1e-6 && (turn.end - 2000.0).abs() < 1e-6);
     }
 }

@@ -8,10 +8,10 @@
 //!
 //! It has no console, EEPROM, interrupts or cycles. The virtual Uno has.
 
-use crate::budget::{Part, Reason, Reasons, part_of};
+use crate::budget::{Part, Reasons, part_of};
 use crate::machine::{Machine, PULSE_TICKS, time_at_s};
-use crate::motion::{Course, Motion, marks};
-use crate::trial::{Start, Trial};
+use crate::motion::{Motion, marks};
+use crate::trial::{Start, Trial, Weeded};
 use crate::wiring;
 use control::ground::AtTool;
 use control::ground::class::label;
@@ -59,17 +59,6 @@ pub struct Refused {
     answer: String,
 }
 
-/// The result of a native run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Weeded {
-    /// The servo's pulses, the first of each width.
-    pub pulses: Vec<Pulse>,
-    /// The machine's state at the end.
-    pub state: State,
-    /// Why the tool was in the row or out of it, from the beginning of the motion to its end.
-    pub reasons: Vec<Reason>,
-}
-
 /// The servo's line: the pulses for the widths that the loop commands.
 #[derive(Clone, Debug)]
 pub struct ServoLine {
@@ -103,11 +92,6 @@ impl ServoLine {
         }
     }
 
-    /// Whether the line has this width, now and next.
-    pub fn shows(&self, width: HalfMicros) -> bool {
-        self.width == width
-    }
-
     fn begin(&mut self, width: HalfMicros, rise: u64) {
         (self.width, self.rise) = (width, rise);
         let cycle = rise * CYCLES_A_STEP;
@@ -131,9 +115,6 @@ pub struct Sensors {
     counts: Vec<i32>,
     edges: Vec<Seen>,
 }
-
-/// Turns whose counts are calculated together.
-const AT_ONCE: usize = 64;
 
 /// The readings of a turn.
 pub struct Turn<'a> {
@@ -170,24 +151,15 @@ impl Sensors {
         });
         let mut edges: Vec<Seen> = edges.collect();
         let mut to_come = edges.iter_mut().peekable();
-        let (mut course, mut encoder) = (Course::along(motion), Encoder::of(machine, motion));
-        let turns = 0..=turns(trial, turn_s);
-        let mut counts = Vec::with_capacity(turns.clone().count() + AT_ONCE);
-        for first in turns.step_by(AT_ONCE) {
-            let mut times_s = [0.0; AT_ONCE];
-            for (time_s, turn) in times_s.iter_mut().zip(first..) {
-                *time_s = f64::from(turn) * turn_s;
-            }
-            let mut wheel_mm = times_s;
-            course.roll(&mut wheel_mm);
-            // First all counts of a clean encoder: they are independent, so the compiler can vectorise them.
-            let ticks = wheel_mm.map(|wheel_mm| encoder.clean_ticks(wheel_mm));
-            counts.extend(ticks.map(|ticks| encoder.count(ticks) as i32));
-            let [.., last_s] = times_s;
-            while let Some(edge) = to_come.next_if(|edge| edge.time_s <= last_s) {
+        let (mut wheel_mm, mut encoder) = (motion.wheel_course(), Encoder::of(machine, motion));
+        let counts = (0..=turns(trial, turn_s)).map(|turn| {
+            let time_s = f64::from(turn) * turn_s;
+            while let Some(edge) = to_come.next_if(|edge| edge.time_s <= time_s) {
                 edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
             }
-        }
+            encoder.count(encoder.clean_ticks(wheel_mm(time_s))) as i32
+        });
+        let counts = counts.collect();
         Self { turn_s, counts, edges }
     }
 
@@ -330,8 +302,8 @@ fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) ->
             why.look(&mut weeder, orders.pulse != orders.pulse_out, time_s);
         }
     }
-    let reasons = why.reasons.until(trial.motion.duration_s());
-    Ok(Weeded { pulses: line.into_pulses(), state: weeder.state(), reasons })
+    let (pulses, reasons) = (line.into_pulses(), why.reasons.until(trial.motion.duration_s()));
+    Ok(Weeded { pulses, start_cycle: 0, alarm: weeder.state() != State::Work, reasons })
 }
 
 /// Why the decisions keep the tool out, turn by turn.
@@ -443,20 +415,11 @@ fn type_line(weeder: &mut Weeder, command: &str) -> Result<(), Refused> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::Dirt;
+    use crate::machine::{Dirt, tests::count_at};
     use crate::planting::Planting;
     use crate::verdict::Timing;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-
-    /// The encoder's count at a time, calculated from the start of the motion.
-    fn count_at(Trial { machine, motion, .. }: &Trial, time_s: f64) -> i64 {
-        let ticks = machine.ticks(motion, time_s);
-        let pulse = machine.pulse(ticks);
-        let hidden = |pulses: std::ops::Range<i64>| pulses.filter(|&pulse| machine.dirt.hides(pulse)).count() as i64;
-        let in_pulse = if machine.dirt.hides(pulse) { machine.hidden_in_pulse(ticks) } else { 0 };
-        ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
-    }
 
     #[test]
     fn counts_that_are_worked_out_together_are_those_of_each_turn_and_each_edge_by_itself() {
@@ -480,10 +443,11 @@ mod tests {
             let trial = Trial { motion, ..Trial::at_speed(row, machine, Timing::default(), speed_mm_s) };
             let mut told = 0;
             for Turn { time_s, position, edges } in Sensors::new(&trial, TURN_S).turns() {
-                assert_eq!(position, count_at(&trial, time_s), "seed {seed} at {time_s} s");
+                assert_eq!(position, count_at(&trial.machine, &trial.motion, time_s), "seed {seed} at {time_s} s");
                 for edge in edges {
                     assert!(time_s - TURN_S < edge.time_s && edge.time_s <= time_s, "seed {seed} at {time_s} s");
-                    assert_eq!(edge.position, count_at(&trial, edge.time_s), "seed {seed} at {} s", edge.time_s);
+                    let count = count_at(&trial.machine, &trial.motion, edge.time_s);
+                    assert_eq!(edge.position, count, "seed {seed} at {} s", edge.time_s);
                 }
                 told += edges.len();
             }

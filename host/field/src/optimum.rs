@@ -9,12 +9,12 @@
 //!
 //! Canopies and margins play no part here. With them, [`crate::verdict::weedable_share`] is the bound.
 
+use crate::driving::Steering;
 use crate::ground::{share_of, union};
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::servo::OUT_DEGREES;
 use crate::stand::Stand;
-use crate::steering::Steering;
 use std::ops::Range;
 
 /// Distance between the positions in a zone at which the angle is calculated. A zone is round, so the positions between
@@ -33,7 +33,7 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
         for step in 1..steps {
             let place_mm = stem.along_mm - stem.protected_mm + f64::from(step) * STEP_MM;
             let beside_mm = place_mm - stem.along_mm;
-            let chord_mm = (stem.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let chord_mm = stem.half_chord_mm(beside_mm);
             let across_mm = stem.across_mm - steering.across_mm(place_mm);
             // A tool in the row that passes to the right of the zone, or to the left of one on the far side.
             if half_mm <= across_mm - chord_mm || across_mm + chord_mm <= -half_mm {
@@ -59,13 +59,13 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::{Row, Thing};
+    use crate::row::{Canopy, Row};
     use crate::stand::Stem;
 
     #[test]
     fn the_bound_is_the_row_less_each_zone_and_the_quickest_swings() {
         let stand = Stand {
-            row: Row::new(vec![Thing::plant(1000.0, 150.0)]).unwrap(),
+            row: Row::new(vec![Canopy::plant(1000.0, 150.0)]).unwrap(),
             stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 45.0, is_seen: true }],
             neighbours: Vec::new(),
             weeds: Vec::new(),

@@ -4,7 +4,7 @@
 //! machine. Scatter is evenly distributed, so that it has limits that a test can check.
 
 use crate::counted;
-use crate::row::{Kind, Problem, Row, Thing};
+use crate::row::{Canopy, Kind, Problem, Row};
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -93,20 +93,20 @@ impl Planting {
             return Err(PlantingError::NoRoomForPlants { spacing_mm: self.spacing_mm, canopy_mm: self.canopy_mm });
         }
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut things = Vec::with_capacity(self.plants + self.weeds);
+        let mut canopies = Vec::with_capacity(self.plants + self.weeds);
         let mut position_mm = self.spacing_mm / 2.0;
         for _ in 0..self.plants {
             let width_mm = self.canopy_mm + scatter(&mut rng, self.canopy_scatter_mm);
-            let mut plant = Thing::plant(position_mm, width_mm);
+            let mut plant = Canopy::plant(position_mm, width_mm);
             if self.ragged {
                 plant.leaves = leaves(&mut rng, plant.span_mm());
             }
-            things.push(plant);
+            canopies.push(plant);
             position_mm += self.spacing_mm + scatter(&mut rng, self.spacing_scatter_mm);
         }
-        let weeds = self.weeds_between(&things, &mut rng)?;
-        things.extend(weeds);
-        Ok(Row::new(things)?)
+        let weeds = self.weeds_between(&canopies, &mut rng)?;
+        canopies.extend(weeds);
+        Ok(Row::new(canopies)?)
     }
 
     /// As [`Planting::grow`], but leaves out weeds that do not fit.
@@ -120,7 +120,7 @@ impl Planting {
 
     /// Distributes the weeds over the gaps between neighbouring plants. A gap gets a second weed only if each gap has
     /// one.
-    fn weeds_between(&self, plants: &[Thing], rng: &mut impl Rng) -> Result<Vec<Thing>, PlantingError> {
+    fn weeds_between(&self, plants: &[Canopy], rng: &mut impl Rng) -> Result<Vec<Canopy>, PlantingError> {
         let mut gaps: Vec<Range<f64>> =
             plants.windows(2).map(|pair| pair[0].span_mm().end..pair[1].span_mm().start).collect();
         gaps.shuffle(rng);
@@ -132,7 +132,7 @@ impl Planting {
             let width_mm = rng.random_range(WEED_WIDTHS_MM);
             let clear_mm = WEED_MARGIN_MM + width_mm / 2.0;
             let position_mm = rng.random_range(gap.start + clear_mm..gap.end - clear_mm);
-            let weed = Thing::weed(position_mm, width_mm);
+            let weed = Canopy::weed(position_mm, width_mm);
             gaps.push(gap.start..weed.span_mm().start);
             gaps.push(weed.span_mm().end..gap.end);
             weeds.push(weed);
@@ -160,7 +160,7 @@ impl Sowing {
     }
 
     /// Appends plants and weeds to a row, until it reaches a position.
-    pub fn sow(&mut self, row: &mut Vec<Thing>, until_mm: f64) {
+    pub fn sow(&mut self, row: &mut Vec<Canopy>, until_mm: f64) {
         let Self { planting, weed_share, first_mm, rng } = self;
         loop {
             let last = row.last().filter(|last| last.kind == Kind::Plant);
@@ -174,7 +174,7 @@ impl Sowing {
             let position_mm = if last.is_some() { last_mm + spacing_mm } else { *first_mm };
             // A canopy that would reach into the one before it is moved directly behind that one.
             let position_mm = position_mm.max(gap_from_mm + 1.0 + width_mm / 2.0);
-            let plant = Thing::plant(position_mm, width_mm);
+            let plant = Canopy::plant(position_mm, width_mm);
             let (weed_mm, where_in_room, grows) = (
                 rng.random_range(WEED_WIDTHS_MM),
                 rng.random_range(0.0..1.0),
@@ -183,14 +183,14 @@ impl Sowing {
             let room_mm = plant.span_mm().start - gap_from_mm - 2.0 * WEED_MARGIN_MM - weed_mm;
             if grows && room_mm.is_finite() && room_mm > 0.0 {
                 let start_mm = gap_from_mm + WEED_MARGIN_MM + where_in_room * room_mm;
-                row.push(Thing::weed(start_mm + weed_mm / 2.0, weed_mm));
+                row.push(Canopy::weed(start_mm + weed_mm / 2.0, weed_mm));
             }
             row.push(plant);
         }
     }
 }
 
-/// The narrowest gap between two things that takes a weed of any width and its margins.
+/// The narrowest gap between two canopies that takes a weed of any width and its margins.
 const NARROWEST_GAP_MM: f64 = 2.0 * WEED_MARGIN_MM + WEED_WIDTHS_MM.end;
 
 /// A deviation evenly spread over plus and minus `within`.
@@ -233,8 +233,8 @@ mod tests {
         assert!(places.windows(2).all(|pair| (460.0..=540.0).contains(&(pair[1] - pair[0]))));
         assert!(row.plants().all(|plant| (125.0..=175.0).contains(&plant.width_mm)));
         assert!(row.weeds().all(|weed| (12.0..20.0).contains(&weed.width_mm)));
-        for pair in row.things().windows(2) {
-            if pair.iter().any(|thing| thing.kind == Kind::Weed) {
+        for pair in row.canopies().windows(2) {
+            if pair.iter().any(|canopy| canopy.kind == Kind::Weed) {
                 let gap_mm = pair[1].span_mm().start - pair[0].span_mm().end;
                 assert!(gap_mm >= WEED_MARGIN_MM - 1e-9, "{gap_mm} mm");
             }
@@ -263,7 +263,7 @@ mod tests {
             let row = sown(1000.0);
             assert_eq!(row, sown(20_000.0));
             assert!(row.len() > 30 && row[row.len() - 1].position_mm >= 20_000.0);
-            assert_eq!(Row::new(row.clone()).map(|row| row.things().to_vec()), Ok(row));
+            assert_eq!(Row::new(row.clone()).map(|row| row.canopies().to_vec()), Ok(row));
         }
     }
 

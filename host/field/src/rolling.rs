@@ -7,7 +7,7 @@
 use crate::ground::union;
 use crate::machine::{Machine, Sensor, channels, cycle_at, time_at_s};
 use crate::motion::Motion;
-use crate::row::Thing;
+use crate::row::Canopy;
 use crate::servo::Stroke;
 use crate::wiring;
 use std::ops::Range;
@@ -30,36 +30,37 @@ pub struct Faults {
 pub struct Rolling {
     /// The machine.
     pub machine: Machine,
-    /// The row so far, in ascending order and without overlaps. Things may be added at its end.
-    pub row: Vec<Thing>,
+    /// The row so far, in ascending order and without overlaps. Canopies may be added at its end.
+    pub row: Vec<Canopy>,
     /// Changes of the tool's command so far. The first is not a swing.
     pub commands: usize,
     /// The motion that is decided so far. It ends now.
     motion: Motion,
     /// The cycle at which the motion began.
     start_cycle: u64,
-    /// The current speed, or the one that the machine changes to.
-    speed_mm_s: f64,
+    /// The speed that the machine keeps or changes to, negative backwards.
+    pub target_mm_s: f64,
     /// Net counts of a clean encoder since the beginning.
     ticks: i64,
     beams: Vec<Sensor>,
     /// The pulses that changed the tool's command.
     pulses: Vec<Pulse>,
     stroke: Stroke,
-    faults: Faults,
+    /// The faults from now on. [`levels`](Self::levels) returns the changed pins.
+    pub faults: Faults,
 }
 
 impl Rolling {
     /// A standing machine before or in a row.
-    pub fn new(machine: Machine, row: Vec<Thing>, start_mm: f64, start_cycle: u64) -> Self {
-        let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Thing::blocks_mm).collect()));
+    pub fn new(machine: Machine, row: Vec<Canopy>, start_mm: f64, start_cycle: u64) -> Self {
+        let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Canopy::blocks_mm).collect()));
         Self {
             beams: machine.beams(&leaves_mm, start_mm, start_cycle),
             row,
             commands: 0,
             motion: Motion::starting_at(start_mm),
             start_cycle,
-            speed_mm_s: 0.0,
+            target_mm_s: 0.0,
             ticks: 0,
             pulses: Vec::new(),
             stroke: machine.servo.stroke(&[], start_cycle),
@@ -72,10 +73,10 @@ impl Rolling {
     /// call.
     pub fn roll_until(&mut self, cycle: u64) -> Vec<PinChange> {
         let during_s = self.now_s()..time_at_s(self.start_cycle, cycle);
-        let speed_mm_s = self.speed_mm_s;
-        self.change(|motion| motion.change_speed(speed_mm_s, ACCELERATION_MM_S2).until(during_s.end));
+        let target_mm_s = self.target_mm_s;
+        self.change(|motion| motion.change_speed(target_mm_s, ACCELERATION_MM_S2).until(during_s.end));
         let Self { machine, motion, start_cycle, ticks, faults, .. } = self;
-        let mut changes = machine.encoder_changes_since(ticks, during_s.start, motion, *start_cycle);
+        let mut changes = machine.encoder_changes(ticks, during_s.start, motion, *start_cycle);
         if faults.encoder_dead {
             changes.clear();
         }
@@ -83,7 +84,7 @@ impl Rolling {
         for beam in &mut self.beams {
             let near_mm =
                 rolled_mm.start - beam.behind_mm - machine.beam_mm..rolled_mm.end - beam.behind_mm + machine.beam_mm;
-            let leaves_mm = machine.seen_mm(union(within(&self.row, &near_mm).flat_map(Thing::blocks_mm).collect()));
+            let leaves_mm = machine.seen_mm(union(within(&self.row, &near_mm).flat_map(Canopy::blocks_mm).collect()));
             let reports = beam.changes(&leaves_mm, motion, during_s.clone(), *start_cycle);
             if !(faults.beam_wire_torn && beam.last.pin == wiring::BEAM) {
                 changes.extend(reports);
@@ -94,19 +95,9 @@ impl Rolling {
         changes
     }
 
-    /// Changes to a speed, negative backwards, and rolls on at it.
-    pub fn roll_at(&mut self, speed_mm_s: f64) {
-        self.speed_mm_s = speed_mm_s;
-    }
-
     /// From now on the wheel loses this share of its distance, below 1.
     pub fn slip_by(&mut self, share: f64) {
         self.change(|motion| motion.slipping(share));
-    }
-
-    /// Sets the faults from now on. [`levels`](Self::levels) returns the changed pins.
-    pub fn have_faults(&mut self, faults: Faults) {
-        self.faults = faults;
     }
 
     /// The level of each pin that the machine drives. A dead encoder drives none.
@@ -134,7 +125,7 @@ impl Rolling {
     }
 
     /// Now, as a time of the motion.
-    pub fn now_s(&self) -> f64 {
+    fn now_s(&self) -> f64 {
         self.motion.duration_s()
     }
 
@@ -172,7 +163,7 @@ impl Rolling {
     pub fn is_beam_broken(&self) -> bool {
         let place_mm = self.place_mm();
         within(&self.row, &(place_mm..place_mm))
-            .any(|thing| thing.blocks_mm().iter().any(|leaf| leaf.contains(&place_mm)))
+            .any(|canopy| canopy.blocks_mm().iter().any(|leaf| leaf.contains(&place_mm)))
     }
 
     /// The motion from a time on, the pulses that the servo took as commands, and the cycle at which that motion
@@ -201,10 +192,10 @@ impl Rolling {
     }
 }
 
-/// The things of a row on this ground.
-fn within<'a>(row: &'a [Thing], ground_mm: &Range<f64>) -> impl Iterator<Item = &'a Thing> {
-    let first = row.partition_point(|thing| thing.span_mm().end < ground_mm.start);
-    let behind = row.partition_point(|thing| thing.span_mm().start <= ground_mm.end);
+/// The canopies of a row on this ground.
+fn within<'a>(row: &'a [Canopy], ground_mm: &Range<f64>) -> impl Iterator<Item = &'a Canopy> {
+    let first = row.partition_point(|canopy| canopy.span_mm().end < ground_mm.start);
+    let behind = row.partition_point(|canopy| canopy.span_mm().start <= ground_mm.end);
     row.get(first..behind).unwrap_or_default().iter()
 }
 
@@ -224,14 +215,14 @@ mod tests {
     proptest! {
         #[test]
         fn rolling_piece_by_piece_equals_the_whole_motion(way in way(), slice_cycles in 1_000_u64..400_000) {
-            let row = vec![Thing::plant(300.0, 150.0), Thing::weed(500.0, 14.0), Thing::plant(800.0, 120.0)];
+            let row = vec![Canopy::plant(300.0, 150.0), Canopy::weed(500.0, 14.0), Canopy::plant(800.0, 120.0)];
             let machine = Machine { second_beam_mm: 220.0, beam_mm: 6.0, ..Machine::default() };
             let mut rolling = Rolling::new(machine, row.clone(), 0.0, START_CYCLE);
             let mut changes = Vec::new();
             let mut motion = Motion::starting_at(0.0);
             let (mut cycle, mut from_s) = (START_CYCLE, 0.0);
             for (for_s, speed_mm_s, slip) in way {
-                rolling.roll_at(speed_mm_s);
+                rolling.target_mm_s = speed_mm_s;
                 rolling.slip_by(slip);
                 let end = cycle_at(START_CYCLE, from_s + for_s);
                 from_s = time_at_s(START_CYCLE, end);
@@ -255,14 +246,14 @@ mod tests {
 
     #[test]
     fn a_fault_shows_at_the_pins_until_it_is_mended() {
-        let mut rolling = Rolling::new(Machine::default(), vec![Thing::plant(300.0, 150.0)], 0.0, 0);
-        rolling.roll_at(500.0);
+        let mut rolling = Rolling::new(Machine::default(), vec![Canopy::plant(300.0, 150.0)], 0.0, 0);
+        rolling.target_mm_s = 500.0;
         rolling.roll_until(16_000_000);
         assert!(rolling.is_beam_broken() && rolling.levels().contains(&(wiring::BEAM, false)));
-        rolling.have_faults(Faults { beam_wire_torn: true, encoder_dead: true });
+        rolling.faults = Faults { beam_wire_torn: true, encoder_dead: true };
         assert_eq!(rolling.levels(), [(wiring::BEAM, true)]);
         assert_eq!(rolling.roll_until(32_000_000), []);
-        rolling.have_faults(Faults::default());
+        rolling.faults = Faults::default();
         assert_eq!(rolling.levels().len(), 3);
         assert!(!rolling.is_beam_broken() && rolling.levels().contains(&(wiring::BEAM, true)));
         assert!(!rolling.roll_until(33_000_000).is_empty());
@@ -271,7 +262,7 @@ mod tests {
     #[test]
     fn the_servo_takes_changes_and_past_motion_is_dropped() {
         let mut rolling = Rolling::new(Machine::default(), Vec::new(), 0.0, 0);
-        rolling.roll_at(500.0);
+        rolling.target_mm_s = 500.0;
         for frame in 0..200_u64 {
             let (rise, width_us) = (frame * 320_000, if frame / 50 % 2 == 0 { 2000 } else { 1500 });
             rolling.roll_until(rise);

@@ -1,21 +1,20 @@
-//! The content of a crop row, as the beam sees it: crop plants and tall weeds, each with its position along the row and
-//! its width at the beam's height.
+//! The content of a crop row, as the beam sees it: the canopies of crop plants and of tall weeds, each with its position
+//! along the row and its width at the beam's height.
 //!
 //! A [`Row`] comes from a list, from a CSV file of measured plants, or from a seed
-//! ([`Planting`](crate::planting::Planting)). Plants and weeds in a row do not overlap: canopies that touch are one detection of
-//! the beam, and one thing of the row. Weeds below the beam are not in the row: they are part of the ground that the
+//! ([`Planting`](crate::planting::Planting)). Canopies in a row do not overlap: those that touch are one detection of
+//! the beam, and one canopy of the row. Weeds below the beam are not in the row: they are part of the ground that the
 //! tool works. Dust, clods and insects that break the beam may be added ([`Row::with_dust`]).
 //!
 //! All positions are millimetres along the ground, from an origin of the row's own.
 
 use crate::ground::union;
 use files::CsvTable;
-use serde::{Deserialize, Serialize};
-use std::fmt;
+use serde::Serialize;
 use std::io;
 use std::ops::Range;
 use std::path::Path;
-use std::str::FromStr;
+use strum::{Display, EnumString};
 use thiserror::Error;
 
 pub use files::FileError;
@@ -32,9 +31,10 @@ pub const MAX_POSITION_MM: f64 = 1e7;
 /// The longest row, 6 km. A simulation stores every edge of the encoder.
 pub const MAX_LENGTH_MM: f64 = 6e6;
 
-/// The kinds of thing in a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// The kinds of canopy in a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display, EnumString, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Kind {
     /// A crop plant: the tool has to go round it.
     Plant,
@@ -42,26 +42,9 @@ pub enum Kind {
     Weed,
 }
 
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Kind::Plant => "plant",
-            Kind::Weed => "weed",
-        })
-    }
-}
-
-impl FromStr for Kind {
-    type Err = ();
-
-    fn from_str(text: &str) -> Result<Self, ()> {
-        [Kind::Plant, Kind::Weed].into_iter().find(|kind| kind.to_string() == text).ok_or(())
-    }
-}
-
-/// A plant or a tall weed.
+/// The outline of a plant or of a tall weed at the beam's height.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Thing {
+pub struct Canopy {
     /// Its centre along the row.
     pub position_mm: f64,
     /// Its width at the beam's height: for a crop plant the canopy's.
@@ -71,11 +54,11 @@ pub struct Thing {
     /// Plant or weed.
     pub kind: Kind,
     /// The parts of its width where leaves break the beam, as positions along the row in ascending order. Empty for a
-    /// thing without gaps.
+    /// canopy without gaps.
     pub leaves: Vec<Range<f64>>,
 }
 
-impl Thing {
+impl Canopy {
     /// A crop plant with a closed canopy.
     pub fn plant(position_mm: f64, width_mm: f64) -> Self {
         Self::new(position_mm, width_mm, Kind::Plant)
@@ -111,29 +94,9 @@ impl Thing {
         }
         Ok(())
     }
-
-    /// Whether a row from `first` to this thing is short enough.
-    fn check_length(&self, first: &Thing) -> Result<(), Problem> {
-        let length_mm = self.position_mm - first.position_mm;
-        if length_mm <= MAX_LENGTH_MM { Ok(()) } else { Err(Problem::Length(length_mm)) }
-    }
-
-    /// Whether it comes after `before`, without an overlap.
-    fn check_after(&self, before: &Thing) -> Result<(), Problem> {
-        if before.span_mm().end < self.span_mm().start {
-            Ok(())
-        } else {
-            Err(Problem::Overlap {
-                kind: self.kind,
-                position_mm: self.position_mm,
-                other: before.kind,
-                other_mm: before.position_mm,
-            })
-        }
-    }
 }
 
-/// The problem of a thing or a row, and what would be right.
+/// The problem of a canopy or a row, and what would be right.
 #[derive(Debug, Error, PartialEq)]
 pub enum Problem {
     /// The position is not a number, or out of range.
@@ -142,19 +105,19 @@ pub enum Problem {
     /// The width is out of range.
     #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
     Width(f64),
-    /// Two things overlap.
+    /// Two canopies overlap.
     #[error(
         "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
          each has to end before the next begins (plants that have grown together are one line)"
     )]
     Overlap {
-        /// The later thing.
+        /// The later canopy.
         kind: Kind,
-        /// The later thing's position.
+        /// The later canopy's position.
         position_mm: f64,
-        /// The earlier thing.
+        /// The earlier canopy.
         other: Kind,
-        /// The earlier thing's position.
+        /// The earlier canopy's position.
         other_mm: f64,
     },
     /// The row is too long.
@@ -165,40 +128,56 @@ pub enum Problem {
     Empty,
 }
 
-/// A line of a row's CSV file.
-#[derive(Debug, Serialize)]
-struct Record {
-    position_mm: f64,
-    width_mm: f64,
-    kind: Kind,
-}
-
 /// The columns of a row's CSV file.
 const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 
 /// Plants and tall weeds in the order in which the machine meets them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    things: Vec<Thing>,
+    canopies: Vec<Canopy>,
     dust_mm: Vec<Range<f64>>,
     /// Its ends, if they are known.
     ground_mm: Option<Range<f64>>,
 }
 
 impl Row {
-    /// A row of things, in any order.
+    /// A row of canopies, in any order.
     ///
     /// # Errors
     /// If there are none, one is malformed, or two overlap.
-    pub fn new(mut things: Vec<Thing>) -> Result<Self, Problem> {
-        if things.is_empty() {
+    pub fn new(canopies: Vec<Canopy>) -> Result<Self, Problem> {
+        if canopies.is_empty() {
             return Err(Problem::Empty);
         }
-        things.iter().try_for_each(Thing::check)?;
-        things.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
-        things.windows(2).try_for_each(|pair| pair[1].check_after(&pair[0]))?;
-        things.iter().try_for_each(|thing| thing.check_length(&things[0]))?;
-        Ok(Self { things, dust_mm: Vec::new(), ground_mm: None })
+        canopies.iter().try_for_each(Canopy::check)?;
+        Self::in_order(canopies.into_iter().map(|canopy| ((), canopy)).collect()).map_err(|((), problem)| problem)
+    }
+
+    /// A row of canopies in any order. An error comes with the mark of the canopy that has the problem.
+    fn in_order<T: Copy>(mut canopies: Vec<(T, Canopy)>) -> Result<Self, (T, Problem)> {
+        canopies.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
+        for pair in canopies.windows(2) {
+            let ((_, before), (mark, canopy)) = (&pair[0], &pair[1]);
+            let length_mm = canopy.position_mm - canopies[0].1.position_mm;
+            let problem = if before.span_mm().end >= canopy.span_mm().start {
+                Problem::Overlap {
+                    kind: canopy.kind,
+                    position_mm: canopy.position_mm,
+                    other: before.kind,
+                    other_mm: before.position_mm,
+                }
+            } else if length_mm > MAX_LENGTH_MM {
+                Problem::Length(length_mm)
+            } else {
+                continue;
+            };
+            return Err((*mark, problem));
+        }
+        Ok(Self {
+            canopies: canopies.into_iter().map(|(_, canopy)| canopy).collect(),
+            dust_mm: Vec::new(),
+            ground_mm: None,
+        })
     }
 
     /// The same row, with the ends of this ground.
@@ -213,23 +192,24 @@ impl Row {
 
     /// The stretches over which the beam is broken, in ascending order and without overlaps.
     pub fn blocks_mm(&self) -> Vec<Range<f64>> {
-        union(self.things.iter().flat_map(Thing::blocks_mm).chain(self.dust_mm.iter().cloned()).collect())
+        union(self.canopies.iter().flat_map(Canopy::blocks_mm).chain(self.dust_mm.iter().cloned()).collect())
     }
 
-    /// The things in the first `length_mm` of the row's ground. `None` if there are none.
+    /// The canopies in the first `length_mm` of the row's ground. `None` if there are none.
     pub fn beginning(&self, length_mm: f64) -> Option<Self> {
         let end_mm = self.span_mm().start + length_mm;
-        let things: Vec<Thing> = self.things.iter().filter(|thing| thing.span_mm().end < end_mm).cloned().collect();
-        (!things.is_empty()).then_some(Self {
-            things,
+        let canopies: Vec<Canopy> =
+            self.canopies.iter().filter(|canopy| canopy.span_mm().end < end_mm).cloned().collect();
+        (!canopies.is_empty()).then_some(Self {
+            canopies,
             dust_mm: Vec::new(),
             ground_mm: Some(self.span_mm().start..end_mm),
         })
     }
 
     /// Everything that stands in the row, by position.
-    pub fn things(&self) -> &[Thing] {
-        &self.things
+    pub fn canopies(&self) -> &[Canopy] {
+        &self.canopies
     }
 
     /// The stretches over which dust breaks the beam.
@@ -238,23 +218,23 @@ impl Row {
     }
 
     /// The crop plants, by position.
-    pub fn plants(&self) -> impl Iterator<Item = &Thing> {
-        self.things.iter().filter(|thing| thing.kind == Kind::Plant)
+    pub fn plants(&self) -> impl Iterator<Item = &Canopy> {
+        self.canopies.iter().filter(|canopy| canopy.kind == Kind::Plant)
     }
 
     /// The tall weeds, by position.
-    pub fn weeds(&self) -> impl Iterator<Item = &Thing> {
-        self.things.iter().filter(|thing| thing.kind == Kind::Weed)
+    pub fn weeds(&self) -> impl Iterator<Item = &Canopy> {
+        self.canopies.iter().filter(|canopy| canopy.kind == Kind::Weed)
     }
 
     /// The stretch of ground that counts as the row. If its ends were not given, it reaches half a mean spacing beyond
-    /// the outermost plants, so that every plant has the length of a spacing. It always includes every thing of the
+    /// the outermost plants, so that every plant has the length of a spacing. It always includes every canopy of the
     /// row.
     pub fn span_mm(&self) -> Range<f64> {
         if let Some(ground_mm) = &self.ground_mm {
             return ground_mm.clone();
         }
-        let (first, last) = (&self.things[0], &self.things[self.things.len() - 1]);
+        let (first, last) = (&self.canopies[0], &self.canopies[self.canopies.len() - 1]);
         let places: Vec<f64> = self.plants().map(|plant| plant.position_mm).collect();
         let around = match places.as_slice() {
             [only] => only - LONE_PLANT_SPACING_MM / 2.0..only + LONE_PLANT_SPACING_MM / 2.0,
@@ -277,21 +257,15 @@ impl Row {
         let mut lines = Vec::new();
         for line in table.lines() {
             let position_mm = line.value("position_mm", "a number of millimetres along the row")?;
-            let thing = Thing::new(
+            let canopy = Canopy::new(
                 position_mm,
                 line.value("width_mm", "a number of millimetres")?,
                 line.value("kind", "plant or weed")?,
             );
-            thing.check().map_err(|problem| line.error(problem.to_string()))?;
-            lines.push((line, thing));
+            canopy.check().map_err(|problem| line.error(problem.to_string()))?;
+            lines.push((line, canopy));
         }
-        lines.sort_by(|(_, a), (_, b)| a.position_mm.total_cmp(&b.position_mm));
-        for pair in lines.windows(2) {
-            let (line, thing) = &pair[1];
-            let checked = thing.check_after(&pair[0].1).and_then(|()| thing.check_length(&lines[0].1));
-            checked.map_err(|problem| line.error(problem.to_string()))?;
-        }
-        Ok(Self { things: lines.into_iter().map(|(_, thing)| thing).collect(), dust_mm: Vec::new(), ground_mm: None })
+        Self::in_order(lines).map_err(|(line, problem)| line.error(problem.to_string()))
     }
 
     /// Writes the row as a CSV table that [`Row::parse_csv`] reads. Gaps within a ragged canopy, dust and the row's
@@ -301,8 +275,9 @@ impl Row {
     /// The errors of the writer.
     pub fn write_csv(&self, to: impl io::Write) -> Result<(), csv::Error> {
         let mut writer = csv::Writer::from_writer(to);
-        for thing in &self.things {
-            writer.serialize(Record { position_mm: thing.position_mm, width_mm: thing.width_mm, kind: thing.kind })?;
+        writer.write_record(COLUMNS)?;
+        for canopy in &self.canopies {
+            writer.serialize((canopy.position_mm, canopy.width_mm, canopy.kind))?;
         }
         writer.flush()?;
         Ok(())
@@ -316,7 +291,6 @@ const LONE_PLANT_SPACING_MM: f64 = 500.0;
 mod tests {
     use super::*;
     use crate::planting::Planting;
-    use files::csv_table;
 
     /// Parses a text. Returns the error's message otherwise.
     fn read(text: &str) -> Result<Row, String> {
@@ -325,7 +299,8 @@ mod tests {
 
     #[test]
     fn each_plant_has_a_spacing_of_row_to_itself() {
-        let row = Row::new(vec![Thing::plant(1000.0, 150.0), Thing::plant(1480.0, 150.0), Thing::plant(2000.0, 150.0)]);
+        let row =
+            Row::new(vec![Canopy::plant(1000.0, 150.0), Canopy::plant(1480.0, 150.0), Canopy::plant(2000.0, 150.0)]);
         assert_eq!(row.unwrap().span_mm(), 750.0..2250.0);
     }
 
@@ -340,8 +315,8 @@ mod tests {
     #[test]
     fn columns_lines_and_spaces_may_come_in_any_order() {
         let row = read("kind, position_mm, width_mm\n# measured in May\nplant, 900, 150\nweed, 500, 15\n");
-        let things = vec![Thing::weed(500.0, 15.0), Thing::plant(900.0, 150.0)];
-        assert_eq!(row, Ok(Row::new(things).unwrap()));
+        let canopies = vec![Canopy::weed(500.0, 15.0), Canopy::plant(900.0, 150.0)];
+        assert_eq!(row, Ok(Row::new(canopies).unwrap()));
     }
 
     #[test]
@@ -370,19 +345,5 @@ mod tests {
                 assert!(said.starts_with(error), "{said}");
             }
         }
-    }
-
-    #[test]
-    fn a_missing_column_is_named() {
-        let said = read("position_mm,kind\n250,plant\n").unwrap_err();
-        assert!(said.starts_with("row.csv, line 1: the column `width_mm` is missing"), "{said}");
-    }
-
-    #[test]
-    fn a_missing_file_is_named() {
-        let path = Path::new("no/such/row.csv");
-        let read = csv_table::bytes(path).and_then(|text| Row::parse_csv(path, text));
-        let said = read.unwrap_err().to_string();
-        assert!(said.starts_with("no/such/row.csv cannot be read"), "{said}");
     }
 }

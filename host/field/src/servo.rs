@@ -10,6 +10,8 @@
 //! Widths out of range are ignored. There is no overshoot and no acceleration: dead time and travel time stand for
 //! them. If dead time and load scatter, each command has its own random values.
 
+use crate::ground::{interpolated, spans_where};
+use crate::planting::scatter;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::{Range, RangeInclusive};
@@ -70,15 +72,8 @@ pub struct Command {
     pub fall_cycle: u64,
     /// The angle asked for; 0 is in the row.
     pub degrees: f64,
-    /// Whether that is more than half of the stroke.
-    out: bool,
-}
-
-impl Command {
-    /// Whether it asks for the tool to leave the row.
-    pub fn is_out(&self) -> bool {
-        self.out
-    }
+    /// Whether it asks for the tool to leave the row: by more than half of the stroke.
+    pub is_out: bool,
 }
 
 impl Default for Servo {
@@ -116,8 +111,8 @@ impl Servo {
             if (pulse.width_us() - width_us).abs() >= DEAD_BAND_US {
                 width_us = pulse.width_us();
                 let degrees = self.degrees(pulse);
-                let out = degrees > self.stroke_degrees() / 2.0;
-                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees, out });
+                let is_out = degrees > self.stroke_degrees() / 2.0;
+                commands.push(Command { rise_cycle: pulse.rise, fall_cycle: pulse.fall, degrees, is_out });
             }
         }
         commands
@@ -131,83 +126,54 @@ impl Servo {
         let Scatter { dead_time_ms, load, seed } = self.scatter;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let rest_degrees = commands.first().map_or_else(|| self.stroke_degrees(), |command| command.degrees);
-        let mut corners = vec![Corner { time_s: f64::NEG_INFINITY, degrees: rest_degrees }];
-        let mut target_degrees = rest_degrees;
+        let mut corners: Vec<(f64, f64)> = Vec::new();
         for (index, command) in commands.iter().enumerate() {
             let heard_s = (command.fall_cycle as f64 - start_cycle as f64) / CYCLES_PER_SECOND as f64;
-            let late_ms = rng.random_range(-1.0..=1.0) * dead_time_ms;
+            let late_ms = scatter(&mut rng, dead_time_ms);
             let travel_ms = self.travel_ms * slowed(rng.random_range(0.0..=1.0) * load);
-            let begin = Corner { time_s: heard_s + (self.dead_time_ms + late_ms) / 1000.0, degrees: 0.0 };
-            let begin = Corner { degrees: angle(&corners, begin.time_s, target_degrees), ..begin };
+            let begin_s = heard_s + (self.dead_time_ms + late_ms) / 1000.0;
+            let begin_degrees = interpolated(&corners, begin_s).unwrap_or(rest_degrees);
             // The new command cancels the corners after this time.
-            corners.retain(|corner| corner.time_s < begin.time_s);
-            corners.push(begin);
-            target_degrees = command.degrees;
+            corners.retain(|(time_s, _)| *time_s < begin_s);
+            corners.push((begin_s, begin_degrees));
             if index > 0 {
-                let travel_s = (target_degrees - begin.degrees).abs() / OUT_DEGREES * travel_ms / 1000.0;
-                corners.push(Corner { time_s: begin.time_s + travel_s, degrees: target_degrees });
+                let travel_s = (command.degrees - begin_degrees).abs() / OUT_DEGREES * travel_ms / 1000.0;
+                corners.push((begin_s + travel_s, command.degrees));
             }
         }
-        Stroke { corners, end_degrees: target_degrees }
-    }
-}
-
-/// The servo turns at a constant rate between two corners.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Corner {
-    time_s: f64,
-    degrees: f64,
-}
-
-/// The angle at a time: on the straight line between corners, and at rest after the last one.
-fn angle(corners: &[Corner], time_s: f64, end_degrees: f64) -> f64 {
-    let next = corners.partition_point(|corner| corner.time_s <= time_s);
-    match (next.checked_sub(1).map(|last| corners[last]), corners.get(next)) {
-        (Some(from), Some(to)) if from.time_s.is_finite() => {
-            let done = (time_s - from.time_s) / (to.time_s - from.time_s);
-            from.degrees + (to.degrees - from.degrees) * done
-        }
-        (Some(from), Some(_)) => from.degrees,
-        _ => end_degrees,
+        Stroke { corners, rest_degrees }
     }
 }
 
 /// The tool's angle over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
-    corners: Vec<Corner>,
-    end_degrees: f64,
+    /// The times at which the servo begins or ends to turn, and the angles there. It turns at a constant rate between.
+    corners: Vec<(f64, f64)>,
+    /// The angle of a servo without a command.
+    rest_degrees: f64,
 }
 
 impl Stroke {
     /// The angle at a time in seconds; 0 is in the row.
     pub fn degrees(&self, time_s: f64) -> f64 {
-        angle(&self.corners, time_s, self.end_degrees)
+        interpolated(&self.corners, time_s).unwrap_or(self.rest_degrees)
     }
 
     /// The times at which the servo begins or ends to turn. Between them the angle is a straight line.
     pub fn turns_s(&self) -> impl Iterator<Item = f64> {
-        self.corners.iter().map(|corner| corner.time_s).filter(|time_s| time_s.is_finite())
+        self.corners.iter().map(|(time_s, _)| *time_s)
     }
 
     /// The times within `during_s` at which the angle is below `degrees`.
     pub fn times_below_s(&self, degrees: f64, during_s: &Range<f64>) -> Vec<Range<f64>> {
-        let mut times = vec![during_s.start];
-        times.extend(self.corners.windows(2).filter_map(|pair| {
-            let (from, to) = (pair[0], pair[1]);
-            let crosses = (from.degrees < degrees) != (to.degrees < degrees);
-            let share = (degrees - from.degrees) / (to.degrees - from.degrees);
-            (crosses && from.time_s.is_finite())
-                .then_some(from.time_s + (to.time_s - from.time_s) * share)
-                .filter(|time_s| during_s.contains(time_s))
-        }));
-        times.push(during_s.end);
-        times
-            .windows(2)
-            .map(|pair| pair[0]..pair[1])
-            .filter(|span| span.start < span.end)
-            .filter(|span| self.degrees((span.start + span.end) / 2.0) < degrees)
-            .collect()
+        let crossings = self.corners.windows(2).filter_map(|pair| {
+            let ((from_s, from), (to_s, to)) = (pair[0], pair[1]);
+            let share = (degrees - from) / (to - from);
+            ((from < degrees) != (to < degrees)).then_some(from_s + (to_s - from_s) * share)
+        });
+        let times = crossings.filter(|time_s| during_s.contains(time_s)).chain([during_s.start, during_s.end]);
+        spans_where(times.collect(), |time_s| self.degrees(time_s) < degrees)
     }
 }
 
@@ -262,17 +228,12 @@ mod tests {
     }
 
     #[test]
-    fn only_a_changed_width_is_a_command() {
-        let commands = Servo::default().commands(&frames(&[(5, 2000), (5, 1500), (5, 2000)]));
+    fn only_a_changed_width_of_a_servo_is_a_command() {
+        let frames = frames(&[(5, 2000), (1, 3), (1, 19_900), (5, 1500), (5, 2000)]);
+        let commands = Servo::default().commands(&frames);
         let degrees: Vec<f64> = commands.iter().map(|command| command.degrees).collect();
         assert_eq!(degrees, [45.0, 0.0, 45.0]);
-        assert_eq!(commands[1].rise_cycle, 5 * 320_000);
-    }
-
-    #[test]
-    fn a_pulse_of_no_servos_width_is_no_command() {
-        let commands = Servo::default().commands(&frames(&[(5, 2000), (1, 3), (5, 2000), (1, 19_900), (5, 2000)]));
-        assert_eq!(commands.len(), 1);
+        assert_eq!(commands[1].rise_cycle, 7 * 320_000);
     }
 
     #[test]
@@ -285,7 +246,7 @@ mod tests {
         let servo = Servo { out_us: 1750.0, ..Servo::default() };
         assert_eq!(servo.stroke_degrees(), 22.5);
         let commands = servo.commands(&frames(&[(10, 1500), (20, 1750)]));
-        assert!(!commands[0].is_out() && commands[1].is_out());
+        assert!(!commands[0].is_out && commands[1].is_out);
         let stroke = servo.stroke(&commands, 0);
         // The tenth frame's pulse ends at 201.75 ms; behind 60 ms of dead time 60 ms of travel, not 120.
         assert_degrees(&stroke, 0.2917, 11.25 - 0.05 * 0.375);

@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn a_beam_is_broken_while_more_than_half_of_it_is_covered() {
         assert_eq!(half_covered(vec![0.0..3.0], 0.0), [0.0..3.0]);
-        // Wide things keep their ends. Things narrower than half of the beam are not seen.
+        // Wide blocks keep their ends. Blocks narrower than half of the beam are not seen.
         assert_eq!(half_covered(vec![0.0..100.0], 6.0), [0.0..100.0]);
         assert_eq!(half_covered(vec![0.0..2.5], 6.0), []);
         // A gap narrower than half of it is not seen either; a wider one is.

@@ -11,7 +11,7 @@
 use crate::conditions::Conditions;
 use crate::ground::union;
 use crate::planting::{leaves, scatter};
-use crate::row::{Kind, Problem, Row, Thing};
+use crate::row::{Canopy, Kind, Problem, Row};
 use crate::sight::width_at;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -30,6 +30,13 @@ pub struct Stem {
     pub protected_mm: f64,
     /// Whether its plant breaks the beam.
     pub is_seen: bool,
+}
+
+impl Stem {
+    /// Half of the zone's width across the row, at this distance from the stem along it; 0 beyond the zone.
+    pub(crate) fn half_chord_mm(&self, beside_mm: f64) -> f64 {
+        (self.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt()
+    }
 }
 
 /// A weed of any height.
@@ -90,7 +97,7 @@ impl Stand {
             _ => at_mm,
         };
         let mut stems = Vec::new();
-        let mut things = Vec::new();
+        let mut canopies = Vec::new();
         let places = (span_mm.end / spacing_mm).floor() as u32;
         for place in 0..places {
             let at_mm = sown(&mut sown_rng, (f64::from(place) + 0.5) * spacing_mm);
@@ -102,13 +109,13 @@ impl Stand {
                 let width_mm = (crop.canopy_mm + scatter(rng, crop.canopy_scatter_mm)).max(MIN_CANOPY_MM);
                 let height_mm = crop.height_mm + scatter(&mut height_rng, crop.height_scatter_mm);
                 let seen_mm = width_at(sensors.beam_height_mm, height_mm, width_mm);
-                let mut plant = Thing::plant(along_mm, seen_mm.unwrap_or(width_mm).max(MIN_CANOPY_MM));
+                let mut plant = Canopy::plant(along_mm, seen_mm.unwrap_or(width_mm).max(MIN_CANOPY_MM));
                 if chance(&mut leaf_rng, crop.ragged_percent) {
                     plant.leaves = leaves(&mut leaf_rng, plant.span_mm());
                 }
                 let is_seen = !chance(rng, sensors.unseen_percent) && seen_mm.is_some();
                 if is_seen {
-                    things.push(plant);
+                    canopies.push(plant);
                 }
                 let across_mm = scatter(rng, crop.across_scatter_mm);
                 let stem_mm = along_mm + scatter(&mut stem_rng, crop.stem_off_mm);
@@ -128,14 +135,14 @@ impl Stand {
         for weed in grown.iter().filter(|weed| weed.across_mm.abs() < machine.sweep_from_mm) {
             let height_mm = about(&mut size_rng, weeds.height_mm, weeds.height_factor);
             let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
-            things.extend(weed_seen(weed.along_mm, sensors.beam_height_mm, height_mm, widest_mm));
+            canopies.extend(weed_seen(weed.along_mm, sensors.beam_height_mm, height_mm, widest_mm));
         }
         for _ in 0..count(&mut weed_rng, weeds.tall_per_m * plot.row_m) {
             let along_mm = weed_rng.random_range(span_mm.clone());
             grown.push(Weed { along_mm, across_mm: scatter(&mut weed_rng, crop.across_scatter_mm) });
             let height_mm = crop.height_mm + scatter(&mut size_rng, crop.height_scatter_mm);
             let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
-            things.extend(weed_seen(along_mm, sensors.beam_height_mm, height_mm, widest_mm));
+            canopies.extend(weed_seen(along_mm, sensors.beam_height_mm, height_mm, widest_mm));
         }
         let air_mm = span_mm.start - HEADLAND_MM..span_mm.end + HEADLAND_MM;
         let dust_mm = (0..count(&mut dust_rng, sensors.dust_per_m * (air_mm.end - air_mm.start) / 1000.0))
@@ -145,7 +152,7 @@ impl Stand {
             })
             .collect();
         stems.sort_by(|a, b| a.along_mm.total_cmp(&b.along_mm));
-        let row = Row::new(grown_together(things))?.with_dust(dust_mm).on_ground(span_mm.clone());
+        let row = Row::new(grown_together(canopies))?.with_dust(dust_mm).on_ground(span_mm.clone());
         // The next row is planted separately: it has the same planting positions, and its own random numbers.
         let next_to = |place: u32| {
             let at_mm = sown(&mut sown_next_rng, (f64::from(place) + 0.5) * spacing_mm)
@@ -167,9 +174,9 @@ fn about(rng: &mut impl Rng, median: f64, factor: f64) -> f64 {
 }
 
 /// A weed as the beam sees it. `None` if the beam passes above it. A weed wider than the widest canopy becomes several.
-fn weed_seen(along_mm: f64, beam_height_mm: f64, height_mm: f64, widest_mm: f64) -> Option<Thing> {
+fn weed_seen(along_mm: f64, beam_height_mm: f64, height_mm: f64, widest_mm: f64) -> Option<Canopy> {
     let width_mm = width_at(beam_height_mm, height_mm, widest_mm.min(MAX_WEED_MM))?;
-    Some(Thing::weed(along_mm, width_mm.max(MIN_WEED_MM)))
+    Some(Canopy::weed(along_mm, width_mm.max(MIN_WEED_MM)))
 }
 
 /// Widest weed, and narrowest stalk.
@@ -190,18 +197,18 @@ fn count(rng: &mut impl Rng, mean: f64) -> usize {
     Poisson::new(mean).map_or(0, |poisson| poisson.sample(rng) as usize)
 }
 
-/// The things as the beam sees them. Those that touch are joined, and the result is a plant if any of them is.
-fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
-    things.sort_by(|a, b| a.span_mm().start.total_cmp(&b.span_mm().start));
-    let mut together: Vec<Thing> = Vec::with_capacity(things.len());
-    for thing in things {
+/// The canopies as the beam sees them. Those that touch are joined, and the result is a plant if any of them is.
+fn grown_together(mut canopies: Vec<Canopy>) -> Vec<Canopy> {
+    canopies.sort_by(|a, b| a.span_mm().start.total_cmp(&b.span_mm().start));
+    let mut together: Vec<Canopy> = Vec::with_capacity(canopies.len());
+    for canopy in canopies {
         match together.last_mut() {
-            Some(last) if thing.span_mm().start <= last.span_mm().end => {
-                let across_mm = last.across_mm.max(thing.across_mm);
-                let span = last.span_mm().start..last.span_mm().end.max(thing.span_mm().end);
-                let blocks = union(last.blocks_mm().into_iter().chain(thing.blocks_mm()).collect());
-                let kind = if last.kind == Kind::Plant { Kind::Plant } else { thing.kind };
-                *last = Thing {
+            Some(last) if canopy.span_mm().start <= last.span_mm().end => {
+                let across_mm = last.across_mm.max(canopy.across_mm);
+                let span = last.span_mm().start..last.span_mm().end.max(canopy.span_mm().end);
+                let blocks = union(last.blocks_mm().into_iter().chain(canopy.blocks_mm()).collect());
+                let kind = if last.kind == Kind::Plant { Kind::Plant } else { canopy.kind };
+                *last = Canopy {
                     position_mm: (span.start + span.end) / 2.0,
                     width_mm: span.end - span.start,
                     across_mm,
@@ -209,7 +216,7 @@ fn grown_together(mut things: Vec<Thing>) -> Vec<Thing> {
                     leaves: if blocks.len() > 1 { blocks } else { Vec::new() },
                 };
             }
-            _ => together.push(thing),
+            _ => together.push(canopy),
         }
     }
     together
@@ -223,20 +230,25 @@ mod tests {
     const MAIZE_SD_MM: [f64; 2] = [73.0, 88.0];
     const MAIZE_UNEVEN_SD_MM: [f64; 2] = [114.0, 128.0];
 
-    fn grow(conditions: &Conditions, seed: u64) -> Stand {
-        Stand::grow(conditions, 500.0, &mut ChaCha8Rng::seed_from_u64(seed)).expect("a row")
+    fn try_grow(preset: &str, changes: &[(&str, f64)], spacing_mm: f64, seed: u64) -> Result<Stand, Problem> {
+        Stand::grow(&Conditions::with(preset, changes), spacing_mm, &mut ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    /// A stand with plants half a metre apart. The preset `transplanted` has the default values.
+    fn grow(preset: &str, changes: &[(&str, f64)], seed: u64) -> Stand {
+        try_grow(preset, changes, 500.0, seed).expect("a row")
     }
 
     #[test]
     fn the_same_seed_grows_the_same_stand_and_another_seed_another() {
-        let conditions = Conditions::default();
-        assert_eq!(grow(&conditions, 1), grow(&conditions, 1));
-        assert_ne!(grow(&conditions, 1), grow(&conditions, 2));
+        let default = |seed| grow("transplanted", &[], seed);
+        assert_eq!(default(1), default(1));
+        assert_ne!(default(1), default(2));
     }
 
     #[test]
     fn an_even_stand_has_a_plant_in_every_place_and_nothing_else_in_the_beam() {
-        let stand = grow(&Conditions::preset("even-stand").unwrap().unwrap(), 1);
+        let stand = grow("even-stand", &[], 1);
         let places: Vec<f64> = stand.stems.iter().map(|stem| stem.along_mm).collect();
         let expected: Vec<f64> = (0..40).map(|place| 250.0 + 500.0 * f64::from(place)).collect();
         assert_eq!(places, expected);
@@ -246,9 +258,7 @@ mod tests {
 
     #[test]
     fn missing_and_double_plants_come_as_often_as_asked_for() {
-        let mut conditions = Conditions::preset("direct-sown").unwrap().unwrap();
-        conditions.set("plot.row_m", 1000.0).unwrap();
-        let stand = grow(&conditions, 3);
+        let stand = grow("direct-sown", &[("plot.row_m", 1000.0)], 3);
         // 2000 planting positions less 12 %; a tenth of them are double. Three standard deviations are about 60.
         let expected = 2000.0 * 0.88 * 1.1;
         assert!((stand.stems.len() as f64 - expected).abs() < 60.0, "{}", stand.stems.len());
@@ -264,11 +274,9 @@ mod tests {
 
     #[test]
     fn plants_are_sown_as_unevenly_as_the_deviation_of_their_spacing_says() {
-        let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
-        conditions.set("plot.row_m", 1000.0).unwrap();
         for sd_mm in [0.0, 20.0, 60.0] {
-            conditions.set("crop.spacing_sd_mm", sd_mm).unwrap();
-            let sown_mm = spacing_sd_mm(&grow(&conditions, 5));
+            let changes = [("plot.row_m", 1000.0), ("crop.spacing_sd_mm", sd_mm)];
+            let sown_mm = spacing_sd_mm(&grow("even-stand", &changes, 5));
             assert!((sown_mm - sd_mm).abs() <= 0.05 * sd_mm, "{sown_mm} mm, not {sd_mm}");
         }
     }
@@ -276,11 +284,9 @@ mod tests {
     #[test]
     fn the_maize_presets_stand_as_unevenly_as_they_say() {
         for (preset, sd_mm) in [("maize", MAIZE_SD_MM), ("maize-uneven", MAIZE_UNEVEN_SD_MM)] {
-            let mut conditions = Conditions::preset(preset).unwrap().unwrap();
-            conditions.set("plot.row_m", 1000.0).unwrap();
             for (spacing_mm, sd_mm) in [200.0, 250.0].into_iter().zip(sd_mm) {
-                let stand = Stand::grow(&conditions, spacing_mm, &mut ChaCha8Rng::seed_from_u64(5)).unwrap();
-                let sown_mm = spacing_sd_mm(&stand);
+                let stand = try_grow(preset, &[("plot.row_m", 1000.0)], spacing_mm, 5);
+                let sown_mm = spacing_sd_mm(&stand.unwrap());
                 assert!((sown_mm - sd_mm).abs() < 4.0, "{preset} at {spacing_mm} mm: {sown_mm} mm");
             }
         }
@@ -288,9 +294,7 @@ mod tests {
 
     #[test]
     fn weeds_are_as_many_as_their_density_says_and_lie_in_the_plot() {
-        let mut conditions = Conditions::preset("weedy").unwrap().unwrap();
-        conditions.set("plot.row_m", 100.0).unwrap();
-        let stand = grow(&conditions, 3);
+        let stand = grow("weedy", &[("plot.row_m", 100.0)], 3);
         let expected = 200.0 * 100.0 * 0.4 + 1.2 * 100.0;
         assert!((stand.weeds.len() as f64 - expected).abs() < 3.0 * f64::sqrt(expected), "{}", stand.weeds.len());
         assert!(stand.weeds.iter().all(|weed| stand.span_mm.contains(&weed.along_mm) && weed.across_mm.abs() <= 200.0));
@@ -298,33 +302,23 @@ mod tests {
 
     #[test]
     fn a_parameter_of_one_leaves_the_others_as_they_are() {
-        let closed = grow(&Conditions::default(), 1);
-        let mut conditions = Conditions::default();
-        conditions.set("crop.ragged_percent", 100.0).unwrap();
-        conditions.set("sensors.dust_per_m", 1.0).unwrap();
-        let ragged = grow(&conditions, 1);
+        let closed = grow("transplanted", &[], 1);
+        let ragged = grow("transplanted", &[("crop.ragged_percent", 100.0), ("sensors.dust_per_m", 1.0)], 1);
         assert_eq!((&closed.stems, &closed.weeds), (&ragged.stems, &ragged.weeds));
         assert_ne!(closed.row, ragged.row);
     }
 
     #[test]
     fn a_row_shorter_than_its_spacing_is_none() {
-        let mut conditions = Conditions::default();
-        conditions.set("plot.row_m", 2.0).unwrap();
-        conditions.set("weeds.tall_per_m", 0.0).unwrap();
-        let grown = Stand::grow(&conditions, 2500.0, &mut ChaCha8Rng::seed_from_u64(1));
-        assert_eq!(grown, Err(Problem::Empty));
+        let changes = [("plot.row_m", 2.0), ("weeds.tall_per_m", 0.0)];
+        assert_eq!(try_grow("transplanted", &changes, 2500.0, 1), Err(Problem::Empty));
     }
 
     #[test]
     fn plants_lower_than_the_beam_are_not_in_the_row_and_their_stems_are() {
-        let mut conditions = Conditions::default();
-        conditions.set("weeds.tall_per_m", 0.0).unwrap();
-        conditions.set("plot.row_m", 500.0).unwrap();
-        conditions.set("crop.double_percent", 0.0).unwrap();
+        let single = [("plot.row_m", 500.0), ("weeds.tall_per_m", 0.0), ("crop.double_percent", 0.0)];
         // Plants of 250 to 350 mm: a beam at 275 mm passes above a quarter of them.
-        conditions.set("sensors.beam_height_mm", 275.0).unwrap();
-        let stand = grow(&conditions, 2);
+        let stand = grow("transplanted", &[&single[..], &[("sensors.beam_height_mm", 275.0)]].concat(), 2);
         let seen = stand.row.plants().count() as f64 / stand.stems.len() as f64;
         assert!((seen - 0.75).abs() < 0.05, "{seen}");
         let widest_mm = stand.row.plants().map(|plant| plant.width_mm).fold(0.0, f64::max);
@@ -333,14 +327,10 @@ mod tests {
 
     #[test]
     fn weeds_that_outgrow_the_beam_break_it_and_some_are_as_wide_as_plants() {
-        let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
-        conditions.set("plot.row_m", 500.0).unwrap();
-        let low = grow(&conditions, 2);
+        let low = grow("even-stand", &[("plot.row_m", 500.0)], 2);
         assert_eq!(low.row.weeds().count(), 0);
-        for (name, value) in [("weeds.height_mm", 150.0), ("weeds.height_factor", 1.5), ("weeds.width_factor", 2.5)] {
-            conditions.set(name, value).unwrap();
-        }
-        let high = grow(&conditions, 2);
+        let tall = [("weeds.height_mm", 150.0), ("weeds.height_factor", 1.5), ("weeds.width_factor", 2.5)];
+        let high = grow("even-stand", &[&[("plot.row_m", 500.0)], &tall[..]].concat(), 2);
         let seen = high.row.weeds().count();
         // Half of the weeds in the row's 100 mm: 60 a square metre on 50 m2, without those hidden by canopies.
         assert!((800..1500).contains(&seen), "{seen}");
@@ -350,16 +340,14 @@ mod tests {
 
     #[test]
     fn stems_stand_off_the_middle_of_their_canopies_by_the_given_distance() {
-        let mut conditions = Conditions::preset("even-stand").unwrap().unwrap();
-        conditions.set("crop.stem_off_mm", 20.0).unwrap();
-        let stand = grow(&conditions, 4);
+        let stand = grow("even-stand", &[("crop.stem_off_mm", 20.0)], 4);
         let off = || stand.stems.iter().zip(stand.row.plants()).map(|(stem, plant)| stem.along_mm - plant.position_mm);
         assert!(off().all(|mm| mm.abs() <= 20.0) && off().any(|mm| mm > 10.0) && off().any(|mm| mm < -10.0));
     }
 
     #[test]
     fn the_counted_ground_is_a_square_metre_a_plot_and_lies_in_the_row() {
-        let stand = grow(&Conditions::default(), 1);
+        let stand = grow("transplanted", &[], 1);
         // Three rows of 0.4 m share it.
         assert!((stand.counted_mm.end - stand.counted_mm.start - 1000.0 / 1.2).abs() < 1e-6);
         assert!(stand.counted_mm.start >= 0.0 && stand.counted_mm.end <= 20_000.0);
@@ -367,8 +355,8 @@ mod tests {
 
     #[test]
     fn touching_canopies_are_one_and_a_plant_if_any_of_them_is() {
-        let things = vec![Thing::weed(100.0, 20.0), Thing::plant(150.0, 100.0), Thing::weed(300.0, 20.0)];
-        let together = grown_together(things);
-        assert_eq!(together, [Thing { across_mm: 100.0, ..Thing::plant(145.0, 110.0) }, Thing::weed(300.0, 20.0)]);
+        let canopies = vec![Canopy::weed(100.0, 20.0), Canopy::plant(150.0, 100.0), Canopy::weed(300.0, 20.0)];
+        let together = grown_together(canopies);
+        assert_eq!(together, [Canopy { across_mm: 100.0, ..Canopy::plant(145.0, 110.0) }, Canopy::weed(300.0, 20.0)]);
     }
 }

@@ -15,11 +15,11 @@
 //! ground where weeds are counted.
 
 use crate::conditions::Mechanism;
+use crate::driving::Steering;
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::servo::Stroke;
 use crate::stand::{Stand, Stem, Weed};
-use crate::steering::Steering;
 use serde::{Deserialize, Serialize};
 use std::ops::{AddAssign, Range};
 use uno::Pulse;
@@ -157,16 +157,15 @@ impl Tools<'_> {
 
     /// Whether a sweep passes through the zone round a stem.
     fn sweep_cuts(&self, stem: &Stem) -> bool {
-        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
-        let to_mm = sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
+        let swept = self.mechanism.swept_mm();
         let Stem { along_mm, across_mm, protected_mm, .. } = *stem;
         let steps = protected_mm.ceil() as i32;
         (-steps..=steps).any(|step| {
             let beside_mm = protected_mm * f64::from(step) / f64::from(steps);
-            let chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let chord_mm = stem.half_chord_mm(beside_mm);
             let across_mm = self.across_mm(along_mm + beside_mm, across_mm).abs();
             // Touching is no cut: sweeps may run along the zones.
-            across_mm + chord_mm > sweep_from_mm + TOUCH_MM && across_mm - chord_mm < to_mm - TOUCH_MM
+            across_mm + chord_mm > swept.start + TOUCH_MM && across_mm - chord_mm < swept.end - TOUCH_MM
         })
     }
 
@@ -185,7 +184,7 @@ impl Tools<'_> {
             let place_mm = self.machine.tool_mm(self.motion.position_mm(time_s));
             let across_mm = self.across_mm(place_mm, across_mm);
             let beside_mm = place_mm - along_mm;
-            let half_chord_mm = (protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt();
+            let half_chord_mm = stem.half_chord_mm(beside_mm);
             let covered = self.covered_mm(time_s);
             covered.start < across_mm + half_chord_mm && across_mm - half_chord_mm < covered.end
         };
@@ -215,11 +214,9 @@ impl Tools<'_> {
     }
 
     fn remove(&self, weed: &Weed) -> bool {
-        let Mechanism { sweeps_a_side, sweep_width_mm, sweep_from_mm, .. } = *self.mechanism;
-        let swept_mm = sweep_from_mm..sweep_from_mm + f64::from(sweeps_a_side) * sweep_width_mm;
         let passings = || self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
         let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
-        swept_mm.contains(&across_mm.abs())
+        self.mechanism.swept_mm().contains(&across_mm.abs())
             || passings().any(|passing| self.covered_mm(passing.time_s).contains(&across_mm))
     }
 }
@@ -227,7 +224,7 @@ impl Tools<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::{Row, Thing};
+    use crate::row::{Canopy, Row};
     use rand::SeedableRng;
     use uno::CYCLES_PER_SECOND;
 
@@ -235,7 +232,7 @@ mod tests {
     fn stand() -> Stand {
         let weed = |along_mm, across_mm| Weed { along_mm, across_mm };
         Stand {
-            row: Row::new(vec![Thing::plant(1000.0, 150.0)]).unwrap(),
+            row: Row::new(vec![Canopy::plant(1000.0, 150.0)]).unwrap(),
             stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 40.0, is_seen: true }],
             neighbours: vec![Stem { along_mm: 1000.0, across_mm: 400.0, protected_mm: 40.0, is_seen: true }],
             weeds: vec![weed(500.0, 10.0), weed(1000.0, -20.0), weed(1000.0, 100.0), weed(500.0, 35.0)],

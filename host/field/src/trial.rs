@@ -4,6 +4,7 @@
 //! and the firmware's settings. The controller is the [native run](crate::native), one of its
 //! [`baselines`](crate::baselines), or the real firmware, which is in another crate.
 
+use crate::budget::Reason;
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::row::Row;
@@ -11,6 +12,7 @@ use crate::verdict::Timing;
 use control::ground::features;
 use control::settings::Setting;
 use knn::Example;
+use uno::Pulse;
 
 /// How the firmware is put to work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,10 +44,25 @@ pub struct Trial {
     pub examples: Vec<Example<{ features::COUNT }>>,
 }
 
-/// Distance that the machine rolls ahead of the row, to reach its speed and have the tool in the row. The time of the
-/// swing in adds to it at speed.
-const RUN_UP_MM: f64 = 200.0;
-const SWING_IN_S: f64 = 0.6;
+/// A controller's work on a trial's row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weeded {
+    /// The servo's pulses, the first of each width.
+    pub pulses: Vec<Pulse>,
+    /// The cycle at which the motion began.
+    pub start_cycle: u64,
+    /// Whether the firmware was not at work at the end.
+    pub alarm: bool,
+    /// Why the tool was in the row or out of it, from the beginning of the motion to its end.
+    pub reasons: Vec<Reason>,
+}
+
+/// Distance that the machine rolls ahead of the row, to reach its speed and have the tool in the row.
+pub(crate) fn run_up_mm(speed_mm_s: f64, acceleration_mm_s2: f64) -> f64 {
+    const LEAST_MM: f64 = 200.0;
+    const SWING_IN_S: f64 = 0.6;
+    LEAST_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2)
+}
 
 /// How fast the machine gains its speed.
 const ACCELERATION_MM_S2: f64 = 1000.0;
@@ -67,9 +84,8 @@ impl Trial {
     /// A trial of the whole row at one speed, from a standstill ahead of it until the tool has passed its end.
     pub fn at_speed(row: Row, machine: Machine, timing: Timing, speed_mm_s: f64) -> Self {
         let span = row.span_mm();
-        let run_up_mm = RUN_UP_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
         let motion = Motion::steady(
-            span.start - run_up_mm,
+            span.start - run_up_mm(speed_mm_s, ACCELERATION_MM_S2),
             ACCELERATION_MM_S2,
             speed_mm_s,
             span.end + machine.beam_to_tool_mm + RUN_OUT_MM,

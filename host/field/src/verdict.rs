@@ -15,11 +15,11 @@
 use crate::ground::{share_of, union};
 use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
-use crate::row::{Row, Thing};
+use crate::row::{Canopy, Row};
 use crate::servo::{Command, Stroke};
 use serde::Serialize;
-use std::fmt;
 use std::ops::Range;
+use strum::Display;
 use uno::Pulse;
 
 /// A margin that is short by less than this still counts as kept.
@@ -53,51 +53,44 @@ impl Timing {
 
     /// The ground that the tool must not enter for a plant, without the margin: its canopy. With a stem zone it is the
     /// part that the firmware keeps of a plant seen whole.
-    fn kept_mm(&self, plant: &Thing) -> Range<f64> {
+    fn kept_mm(&self, plant: &Canopy) -> Range<f64> {
         let (span, zone_mm) = (plant.span_mm(), f64::from(self.stem_zone_mm));
         let trim_mm = ((span.end - span.start - zone_mm) / 2.0).clamp(0.0, 3.0 / 16.0 * zone_mm);
         span.start + trim_mm..span.end - trim_mm
     }
 
     /// A plant's keep-out zone: that ground with its margins.
-    fn window_mm(&self, plant: &Thing) -> Range<f64> {
+    fn window_mm(&self, plant: &Canopy) -> Range<f64> {
         let (kept, margin_mm) = (self.kept_mm(plant), f64::from(self.margin_mm));
         kept.start - margin_mm..kept.end + margin_mm
     }
 
     /// How wide the kept ground is across the row.
-    fn kept_across_mm(&self, plant: &Thing) -> f64 {
+    fn kept_across_mm(&self, plant: &Canopy) -> f64 {
         if self.stem_zone_mm == 0 { plant.across_mm } else { plant.across_mm.min(self.stem_zone_mm.into()) }
     }
 }
 
 /// The result for a plant, from good to bad.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Display, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Verdict {
     /// The tool kept away from it by the margin.
+    #[strum(to_string = "kept")]
     Kept,
     /// The tool came nearer than the margin allows, but not to the canopy.
+    #[strum(to_string = "margin cut")]
     MarginCut,
     /// The tool was not out of the row over its canopy.
+    #[strum(to_string = "DAMAGED")]
     Damaged,
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Verdict::Kept => "kept",
-            Verdict::MarginCut => "margin cut",
-            Verdict::Damaged => "DAMAGED",
-        })
-    }
 }
 
 /// The result for a plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantOutcome {
     /// The plant.
-    pub plant: Thing,
+    pub plant: Canopy,
     /// The protected stretch: its canopy, or the zone round its stem.
     pub kept_mm: Range<f64>,
     /// Distance from the position where the tool was fully out to the leading end of `kept_mm`; negative inside it.
@@ -133,7 +126,7 @@ impl PlantOutcome {
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeedOutcome {
     /// The weed.
-    pub weed: Thing,
+    pub weed: Canopy,
     /// Whether the tool worked the row's line over the weed's middle.
     pub cut: bool,
 }
@@ -203,21 +196,26 @@ pub fn judge(
     let commands = machine.servo.commands(pulses);
     let stroke = machine.servo.stroke(&commands, start_cycle);
     let whole_s = 0.0..motion.duration_s();
-    let ground_of = |times_s: &[Range<f64>]| -> Vec<Range<f64>> {
+    let ground_below = |degrees: f64| {
+        let times_s = stroke.times_below_s(degrees, &whole_s);
         union(times_s.iter().map(|times_s| machine.worked_mm(motion, times_s)).collect())
     };
-    let closed = ground_of(&machine.times_not_clear_s(&stroke, &whole_s));
+    let closed = ground_below(machine.clear_degrees());
     let over_zone = match timing.stem_zone_mm {
         0 => closed.clone(),
-        zone_mm => ground_of(&machine.times_within_s(f64::from(zone_mm) / 2.0, &stroke, &whole_s)),
+        zone_mm => ground_below(machine.degrees_beside(f64::from(zone_mm) / 2.0)),
     };
-    let weeded = ground_of(&machine.times_weeding_s(&stroke, &whole_s));
+    let weeded = ground_below(machine.line_degrees());
     let run = machine.worked_mm(motion, &whole_s);
     // How late a command was against its ideal position, in ticks. `None` unless the machine rolls forward.
     let late_ticks = |time_s: f64, window_mm: f64, lead_ms: u32| {
         let speed_mm_s = motion.speed_mm_s(time_s);
         let ideal_mm = window_mm + machine.beam_to_tool_mm - speed_mm_s * f64::from(lead_ms) / 1000.0;
         (speed_mm_s > 0.0).then(|| (motion.position_mm(time_s) - ideal_mm) / machine.tick_mm())
+    };
+    let works = |place_mm: f64| {
+        let mut passings = motion.passings(place_mm + machine.beam_to_tool_mm);
+        passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees())
     };
     let swings = Swing::all(&commands, motion, start_cycle);
 
@@ -246,7 +244,7 @@ pub fn judge(
     Judgement {
         plants,
         windows_mm: union(row.plants().map(|plant| timing.window_mm(plant)).collect()),
-        weeds: row.weeds().map(|weed| weed_outcome(weed, machine, motion, &stroke)).collect(),
+        weeds: row.weeds().map(|weed| WeedOutcome { weed: weed.clone(), cut: works(weed.position_mm) }).collect(),
         clear_mm: between(&closed, &run),
         path: path(machine, motion, &stroke),
         idle_swings,
@@ -267,28 +265,27 @@ struct Swing {
 
 impl Swing {
     fn all(commands: &[Command], motion: &Motion, start_cycle: u64) -> Vec<Self> {
-        let mut swings = Vec::new();
-        let mut out: Option<Option<f64>> = None;
+        let mut swings: Vec<Self> = Vec::new();
         for (index, command) in commands.iter().enumerate() {
             let time_s = time_at_s(start_cycle, command.rise_cycle);
-            match (command.is_out(), out) {
-                (true, None) => out = Some((index > 0).then_some(time_s)),
-                (false, Some(out_s)) => {
-                    swings.push(Self { out_s, in_s: Some(time_s), during_s: out_s.unwrap_or(0.0)..time_s });
-                    out = None;
+            match swings.last_mut().filter(|swing| swing.in_s.is_none()) {
+                Some(swing) if !command.is_out => {
+                    swing.in_s = Some(time_s);
+                    swing.during_s.end = time_s;
+                }
+                None if command.is_out => {
+                    let out_s = (index > 0).then_some(time_s);
+                    swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
                 }
                 _ => {}
             }
-        }
-        if let Some(out_s) = out {
-            swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
         }
         swings
     }
 }
 
 /// Clearances and verdict of a plant, given the ground over which the tool was not fully out.
-fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
+fn plant_outcome(plant: &Canopy, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
     let span = timing.kept_mm(plant);
     // The canopy's middle divides the swing before the plant from the one behind it. If a swing began or ended beyond
     // the middle, its end divides them.
@@ -326,14 +323,6 @@ fn plant_outcome(plant: &Thing, closed: &[Range<f64>], machine: &Machine, timing
     }
 }
 
-fn weed_outcome(weed: &Thing, machine: &Machine, motion: &Motion, stroke: &Stroke) -> WeedOutcome {
-    let mut passings = motion.passings(weed.position_mm + machine.beam_to_tool_mm);
-    WeedOutcome {
-        weed: weed.clone(),
-        cut: passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees()),
-    }
-}
-
 /// The parts of `whole` between the stretches of a union.
 fn between(union: &[Range<f64>], whole: &Range<f64>) -> Vec<Range<f64>> {
     let starts = std::iter::once(whole.start).chain(union.iter().map(|stretch| stretch.end));
@@ -365,7 +354,7 @@ mod tests {
 
     /// Two plants and a weed between them, passed at 2.5 km/h.
     fn row() -> Row {
-        Row::new(vec![Thing::plant(1000.0, 150.0), Thing::weed(1300.0, 15.0), Thing::plant(1600.0, 150.0)]).unwrap()
+        Row::new(vec![Canopy::plant(1000.0, 150.0), Canopy::weed(1300.0, 15.0), Canopy::plant(1600.0, 150.0)]).unwrap()
     }
 
     fn motion() -> Motion {

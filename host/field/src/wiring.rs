@@ -8,43 +8,6 @@
 use std::fmt::Write;
 use uno::{Pin, Wire};
 
-/// Encoder channel A.
-pub const ENCODER_A: Pin = Pin::D2;
-
-/// Encoder channel B.
-pub const ENCODER_B: Pin = Pin::D3;
-
-/// Work switch, low = work.
-pub const WORK_SWITCH: Pin = Pin::D4;
-
-/// Optional end switch, low = tool out.
-pub const END_SWITCH: Pin = Pin::D5;
-
-/// Beam, low = broken.
-pub const BEAM: Pin = Pin::D8;
-
-/// Optional second beam, low = broken.
-pub const SECOND_BEAM: Pin = Pin::D10;
-
-/// Servo signal, an output.
-pub const SERVO: Pin = Pin::D9;
-
-/// Status LED, an output.
-pub const LED: Pin = Pin::D13;
-
-/// The wires of the pins, in the order of the board's numbering. At rest both channels of the encoder are low and the
-/// beam is clear. The switches are open on their pull-ups, and the outputs are not driven yet.
-pub const WIRES: [Wire; 8] = [
-    Wire { pin: ENCODER_A, name: "encoder_a", high_at_rest: false },
-    Wire { pin: ENCODER_B, name: "encoder_b", high_at_rest: false },
-    Wire { pin: WORK_SWITCH, name: "work_switch", high_at_rest: true },
-    Wire { pin: END_SWITCH, name: "end_switch", high_at_rest: true },
-    Wire { pin: BEAM, name: "beam", high_at_rest: true },
-    Wire { pin: SERVO, name: "servo", high_at_rest: false },
-    Wire { pin: SECOND_BEAM, name: "second_beam", high_at_rest: true },
-    Wire { pin: LED, name: "led", high_at_rest: false },
-];
-
 /// A connection of one contact of the Uno, or of a pair of them.
 #[derive(Clone, Copy, Debug)]
 pub struct Connection {
@@ -65,26 +28,48 @@ pub const EXTERNAL: &str = "4.7 k to 5 V";
 /// The chip's own pull-up.
 const INTERNAL: &str = "in the chip";
 
-/// Every connection of a contact that carries a signal, in the order of the board's numbering.
-pub const CONNECTIONS: [Connection; 9] = [
-    of_pin(ENCODER_A, "encoder A", EXTERNAL, "forward is A before B"),
-    of_pin(ENCODER_B, "encoder B", EXTERNAL, "swap A and B if the position counts backwards"),
-    of_pin(WORK_SWITCH, "work switch to ground", INTERNAL, "closed = work"),
-    of_pin(END_SWITCH, "end switch to ground, optional", INTERNAL, "closed = tool out; `set end_switch on` enables it"),
-    of_pin(BEAM, "beam's output", EXTERNAL, "low = broken; never above 5 V, or use an optocoupler"),
-    of_pin(SERVO, "servo's signal", "", "1500 us = 0 degrees, tool in the row; 2000 us = 45 degrees, out"),
-    of_pin(SECOND_BEAM, "second beam's output, optional", EXTERNAL, "low = broken; `set second_beam_mm` enables it"),
-    of_pin(LED, "the Uno's own LED", "", "on = work; one flash a second = hold; groups of flashes = alarm code"),
-    Connection {
-        pin: None,
-        goes_to: "serial, 115200 baud 8N1",
-        pull_up: "",
-        note: "through the Uno's USB; connect nothing else",
-    },
-];
+/// Makes the constants, [`WIRES`] and [`CONNECTIONS`] from the one table of pins.
+macro_rules! pins {
+    ($($(#[doc = $about:literal])*
+    $PIN:ident: $pin:ident $name:literal $high_at_rest:literal, $goes_to:literal, $pull_up:expr, $note:literal;)*) => {
+        $($(#[doc = $about])* pub const $PIN: Pin = Pin::$pin;)*
 
-const fn of_pin(pin: Pin, goes_to: &'static str, pull_up: &'static str, note: &'static str) -> Connection {
-    Connection { pin: Some(pin), goes_to, pull_up, note }
+        /// The wires of the pins, in the order of the board's numbering. At rest both channels of the encoder are low
+        /// and the beam is clear. The switches are open on their pull-ups, and the outputs are not driven yet.
+        pub const WIRES: [Wire; 8] = [$(Wire { pin: Pin::$pin, name: $name, high_at_rest: $high_at_rest },)*];
+
+        /// Every connection of a contact that carries a signal, in the order of the board's numbering.
+        pub const CONNECTIONS: [Connection; 9] = [
+            $(Connection { pin: Some(Pin::$pin), goes_to: $goes_to, pull_up: $pull_up, note: $note },)*
+            Connection {
+                pin: None,
+                goes_to: "serial, 115200 baud 8N1",
+                pull_up: "",
+                note: "through the Uno's USB; connect nothing else",
+            },
+        ];
+    };
+}
+
+pins! {
+    /// Encoder channel A.
+    ENCODER_A: D2 "encoder_a" false, "encoder A", EXTERNAL, "forward is A before B";
+    /// Encoder channel B.
+    ENCODER_B: D3 "encoder_b" false, "encoder B", EXTERNAL, "swap A and B if the position counts backwards";
+    /// Work switch, low = work.
+    WORK_SWITCH: D4 "work_switch" true, "work switch to ground", INTERNAL, "closed = work";
+    /// Optional end switch, low = tool out.
+    END_SWITCH: D5 "end_switch" true, "end switch to ground, optional", INTERNAL,
+        "closed = tool out; `set end_switch on` enables it";
+    /// Beam, low = broken.
+    BEAM: D8 "beam" true, "beam's output", EXTERNAL, "low = broken; never above 5 V, or use an optocoupler";
+    /// Servo signal, an output.
+    SERVO: D9 "servo" false, "servo's signal", "", "1500 us = 0 degrees, tool in the row; 2000 us = 45 degrees, out";
+    /// Optional second beam, low = broken.
+    SECOND_BEAM: D10 "second_beam" true, "second beam's output, optional", EXTERNAL,
+        "low = broken; `set second_beam_mm` enables it";
+    /// Status LED, an output.
+    LED: D13 "led" false, "the Uno's own LED", "", "on = work; one flash a second = hold; groups of flashes = alarm code";
 }
 
 /// The connections as a table in Markdown.
@@ -96,17 +81,4 @@ pub fn table() -> String {
         let _ = writeln!(table, "| {contact} | {goes_to} | {pull_up} | {note} |");
     }
     table
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_pin_is_wired_once() {
-        for Wire { pin, .. } in WIRES {
-            let wired = CONNECTIONS.iter().filter(|connection| connection.pin == Some(pin));
-            assert_eq!(wired.count(), 1, "{pin:?}");
-        }
-    }
 }

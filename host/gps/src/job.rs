@@ -15,7 +15,7 @@
 use crate::antenna::Antenna;
 use crate::plane::Place;
 use crate::receiver::{Counts, Fix, Heard, Jump, Mark, Receiver};
-use crate::track::{Basis, Found, Missing, Offset, Track};
+use crate::track::{Found, Missing, Offset, Track};
 use link::log::{Entry, Kind};
 use link::settings::{Setting, Settings, shown};
 use link::{Class, ConsoleLine, EventLine, Mode, Status};
@@ -45,11 +45,11 @@ impl Default for Wanted {
     }
 }
 
-/// The kinds of a position.
+/// The kinds of event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum What {
+pub enum EventKind {
     /// A detection that the beam has seen.
-    Object {
+    Detection {
         /// Its class.
         class: Class,
         /// Votes for that.
@@ -67,13 +67,13 @@ pub enum What {
     Alarm,
 }
 
-impl What {
+impl EventKind {
     /// Its word on the map.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Object { class: Class::Plant, .. } => "plant",
-            Self::Object { class: Class::Weed, .. } => "weed",
-            Self::Object { class: Class::Unknown, .. } => "unknown",
+            Self::Detection { class: Class::Plant, .. } => "plant",
+            Self::Detection { class: Class::Weed, .. } => "weed",
+            Self::Detection { class: Class::Unknown, .. } => "unknown",
             Self::Guarded => "guarded",
             Self::Label(Class::Plant) => "label_plant",
             Self::Label(_) => "label_weed",
@@ -86,9 +86,9 @@ impl What {
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Thing {
+pub struct Event {
     /// Its kind.
-    pub what: What,
+    pub kind: EventKind,
     /// The log's line.
     pub line: u64,
     /// As it stands there.
@@ -138,7 +138,7 @@ impl Ground {
 #[derive(Clone, Debug, Default)]
 pub struct Stretch {
     /// The events, in the log's order.
-    pub things: Vec<Thing>,
+    pub events: Vec<Event>,
     /// The ground that was passed.
     pub ground: Vec<Ground>,
     /// Its beginning and end, by the log's clock.
@@ -172,7 +172,7 @@ struct Reading {
     last_position: Option<i32>,
     last_status: Option<Status>,
     fixes: Vec<Fix>,
-    things: Vec<Thing>,
+    events: Vec<Event>,
     ground: Vec<Ground>,
     /// Commands without an answer so far: the line, its time, and the text.
     unanswered: VecDeque<(u64, u64, String)>,
@@ -287,24 +287,24 @@ impl Job {
         };
         let beam_to_tool_mm = read.settings.as_ref().map_or(0.0, |to| f64::from(to.get(Setting::BeamToToolMm)));
         let (beam, tool) = (self.antenna.beam(), self.antenna.tool(beam_to_tool_mm));
-        let (mut things, mut ground) = (read.things, read.ground);
-        for thing in &mut things {
-            let offset = match thing.what {
-                What::Object { .. } | What::Guarded | What::Label(_) => beam,
-                What::SwingOut | What::SwingIn | What::Alarm => tool,
+        let (mut events, mut ground) = (read.events, read.ground);
+        for event in &mut events {
+            let offset = match event.kind {
+                EventKind::Detection { .. } | EventKind::Guarded | EventKind::Label(_) => beam,
+                EventKind::SwingOut | EventKind::SwingIn | EventKind::Alarm => tool,
             };
-            thing.found = find(thing.distance_m, thing.time_ms, offset);
+            event.found = find(event.distance_m, event.time_ms, offset);
         }
         for ground in ground.iter_mut().filter(|ground| ground.did != Did::Rolled) {
             let until_ms = ground.time_ms.end;
             ground.lines = lines(&ground.distance_m, |distance_m| find(distance_m, until_ms, tool));
         }
-        self.stretches.push(Stretch { things, ground, time_ms: read.time_ms.unwrap_or_default() });
+        self.stretches.push(Stretch { events, ground, time_ms: read.time_ms.unwrap_or_default() });
     }
 
     /// Everything that happened.
-    pub fn things(&self) -> impl Iterator<Item = &Thing> {
-        self.stretches.iter().flat_map(|stretch| &stretch.things)
+    pub fn events(&self) -> impl Iterator<Item = &Event> {
+        self.stretches.iter().flat_map(|stretch| &stretch.events)
     }
 }
 
@@ -415,22 +415,22 @@ impl Reading {
 
     fn event(&mut self, entry: &Entry) {
         let Some(event) = EventLine::parse(&entry.text) else { return };
-        let (what, position, behind_mm, width_mm) = match event {
+        let (kind, position, behind_mm, width_mm) = match event {
             EventLine::Detection { class, position, votes, hold, .. } => {
                 let hold_mm = f64::from(hold) * self.tick_mm();
                 let width_mm = (hold_mm - 2.0 * self.mm(Setting::MarginMm)).max(0.0);
-                (What::Object { class, votes }, position, width_mm / 2.0, width_mm)
+                (EventKind::Detection { class, votes }, position, width_mm / 2.0, width_mm)
             }
-            EventLine::Guarded { position } => (What::Guarded, position, 0.0, 0.0),
+            EventLine::Guarded { position } => (EventKind::Guarded, position, 0.0, 0.0),
             EventLine::Swing { out, position } => {
                 let is_at_work = self.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work)
                     || self.ground.last().is_some_and(|passed| passed.did != Did::Rolled);
                 if let Some(ticks) = self.ticks(position).filter(|_| is_at_work) {
                     self.turn_to(if out { Did::Spared } else { Did::Weeded }, ticks, entry.time_ms);
                 }
-                (if out { What::SwingOut } else { What::SwingIn }, position, 0.0, 0.0)
+                (if out { EventKind::SwingOut } else { EventKind::SwingIn }, position, 0.0, 0.0)
             }
-            EventLine::Alarm { position, .. } => (What::Alarm, position, 0.0, 0.0),
+            EventLine::Alarm { position, .. } => (EventKind::Alarm, position, 0.0, 0.0),
             EventLine::State { mode } => {
                 if let Some(status) = &mut self.last_status {
                     status.mode = mode;
@@ -445,8 +445,8 @@ impl Reading {
             _ => return,
         };
         let Some(ticks) = self.ticks(position) else { return };
-        self.things.push(Thing {
-            what,
+        self.events.push(Event {
+            kind,
             line: entry.number,
             text: entry.text.clone(),
             time_ms: entry.time_ms,
@@ -481,14 +481,14 @@ impl Reading {
 
     fn label(&mut self, class: &str, line: u64, time_ms: u64, command: &str) {
         let class = if class == "plant" { Class::Plant } else { Class::Weed };
-        let is_object = |thing: &&Thing| matches!(thing.what, What::Object { .. });
-        let Some(object) = self.things.iter().rev().find(is_object).cloned() else { return };
-        self.things.push(Thing { what: What::Label(class), line, text: command.to_owned(), time_ms, ..object });
+        let is_detection = |event: &&Event| matches!(event.kind, EventKind::Detection { .. });
+        let Some(detection) = self.events.iter().rev().find(is_detection).cloned() else { return };
+        self.events.push(Event { kind: EventKind::Label(class), line, text: command.to_owned(), time_ms, ..detection });
     }
 }
 
 /// Millimetres in a tick of the encoder.
-pub(crate) fn tick_mm(settings: &Settings) -> f64 {
+pub fn tick_mm(settings: &Settings) -> f64 {
     let value = |setting| f64::from(settings.get(setting));
     match value(Setting::TicksPerM) {
         0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
@@ -508,9 +508,4 @@ fn did(status: &Status) -> Did {
         (Mode::Work, true) => Did::Spared,
         (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
     }
-}
-
-/// Whether a position was interpolated over an outage.
-pub fn is_interpolated(thing: &Thing) -> bool {
-    thing.found.is_ok_and(|found| found.basis == Basis::Interpolated)
 }

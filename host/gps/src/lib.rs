@@ -5,6 +5,7 @@
 //!   positions between fixes by the wheel's distance. [`plane`] has the earth's shape.
 //! - [`recorder`] makes a log's lines from the receiver's output. [`job`] reads a log, and [`summary`] counts it.
 //!   [`map`] exports it as GeoJSON, and [`picture`] draws it.
+//! - [`simulated`] is a receiver on a simulated machine.
 //!
 //! It opens no file and no port: the caller passes a log's lines. Like [`link`], it compiles for a browser.
 
@@ -16,6 +17,7 @@ pub mod plane;
 pub mod receiver;
 pub mod recorder;
 pub mod sentence;
+pub mod simulated;
 pub mod summary;
 pub mod track;
 

@@ -1,10 +1,10 @@
 //! A job as GeoJSON (RFC 7946), for QGIS and other map programs.
 //!
 //! It is one FeatureCollection. A plant, weed, swing, alarm, label or jump of the receiver is a point. A piece of
-//! ground, weeded or not, is a line. An object without a position has no geometry, and gives the reason. The crate
+//! ground, weeded or not, is a line. An event without a position has no geometry, and gives the reason. The crate
 //! `geojson` writes the file.
 
-use crate::job::{Did, Ground, Job, Thing, What};
+use crate::job::{Did, Event, EventKind, Ground, Job};
 use crate::plane::Place;
 use chrono::DateTime;
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue, Position};
@@ -27,7 +27,7 @@ fn of_job(name: &str, job: &Job) -> Vec<Feature> {
             features.push(feature);
         };
         stretch.ground.iter().filter_map(ground).for_each(&mut add);
-        stretch.things.iter().map(|it| thing(job, it)).for_each(&mut add);
+        stretch.events.iter().map(|it| event(job, it)).for_each(&mut add);
     }
     for (line, jump) in &job.jumps {
         let mut feature = feature("gps_jump", Some(Geometry::new_point(position(jump.place))));
@@ -46,16 +46,16 @@ fn feature(kind: &str, geometry: Option<Geometry>) -> Feature {
     feature
 }
 
-fn thing(job: &Job, thing: &Thing) -> Feature {
-    let geometry = thing.found.ok().map(|found| Geometry::new_point(position(found.place)));
-    let mut feature = feature(thing.what.name(), geometry);
-    let found = thing.found.ok();
+fn event(job: &Job, event: &Event) -> Feature {
+    let geometry = event.found.ok().map(|found| Geometry::new_point(position(found.place)));
+    let mut feature = feature(event.kind.name(), geometry);
+    let found = event.found.ok();
     let time = found.zip(job.midnight_ms).and_then(|(found, midnight)| utc(midnight + found.utc_ms));
     feature.set_property("time", time.map_or(JsonValue::Null, JsonValue::from));
-    feature.set_property("record_s", rounded(thing.time_ms as f64 / 1000.0, 3));
-    feature.set_property("distance_m", rounded(thing.distance_m, 3));
-    feature.set_property("line", thing.line);
-    match thing.found {
+    feature.set_property("record_s", rounded(event.time_ms as f64 / 1000.0, 3));
+    feature.set_property("distance_m", rounded(event.distance_m, 3));
+    feature.set_property("line", event.line);
+    match event.found {
         Ok(found) => {
             feature.set_property("place", <&str>::from(found.basis));
             feature.set_property("error_m", rounded(found.error_m, 3));
@@ -65,14 +65,14 @@ fn thing(job: &Job, thing: &Thing) -> Feature {
             feature.set_property("why", missing.to_string());
         }
     }
-    if let What::Object { votes, .. } = thing.what {
+    if let EventKind::Detection { votes, .. } = event.kind {
         feature.set_property("votes", votes);
     }
-    if thing.width_mm > 0.0 {
-        feature.set_property("width_mm", thing.width_mm.round());
+    if event.width_mm > 0.0 {
+        feature.set_property("width_mm", event.width_mm.round());
     }
-    if thing.what == What::Alarm {
-        feature.set_property("said", thing.text.as_str());
+    if event.kind == EventKind::Alarm {
+        feature.set_property("said", event.text.as_str());
     }
     feature
 }

@@ -1,9 +1,9 @@
 //! A job as a drawing: weeded and unweeded ground, plants, weeds and alarms from above, north at the top.
 //!
-//! Points less than a pixel apart are drawn once. Objects without a position are not drawn; the legend has their
+//! Points less than a pixel apart are drawn once. Events without a position are not drawn; the legend has their
 //! number.
 
-use crate::job::{Did, Job, What};
+use crate::job::{Did, EventKind, Job};
 use crate::plane::{Metres, Place, Plane};
 use drawing::{
     DOUBTFUL, INK, LEFT_ALONE, Legend, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG, document, line, paper, swatch,
@@ -29,7 +29,7 @@ pub struct Words {
     /// The legend of the colours: ground weeded and not weeded, a plant, one that is unknown, a tall weed, a label, an
     /// alarm.
     pub legend: [String; 7],
-    /// The text before the number of objects without a position.
+    /// The text before the number of events without a position.
     pub without_place: String,
     /// The text after the scale's metres.
     pub north: String,
@@ -44,14 +44,14 @@ impl Default for Words {
 }
 
 /// The colour and the size of a point.
-fn mark(what: What) -> Option<(&'static str, f64)> {
-    match what {
-        What::Object { class: Class::Plant, .. } => Some((PLANT, 2.5)),
-        What::Object { class: Class::Unknown, .. } => Some((DOUBTFUL, 2.5)),
-        What::Object { class: Class::Weed, .. } => Some((WEED, 2.0)),
-        What::Label(_) => Some((NOTE, 3.0)),
-        What::Alarm => Some((WRONG, 4.0)),
-        What::Guarded | What::SwingOut | What::SwingIn => None,
+fn mark(kind: EventKind) -> Option<(&'static str, f64)> {
+    match kind {
+        EventKind::Detection { class: Class::Plant, .. } => Some((PLANT, 2.5)),
+        EventKind::Detection { class: Class::Unknown, .. } => Some((DOUBTFUL, 2.5)),
+        EventKind::Detection { class: Class::Weed, .. } => Some((WEED, 2.0)),
+        EventKind::Label(_) => Some((NOTE, 3.0)),
+        EventKind::Alarm => Some((WRONG, 4.0)),
+        EventKind::Guarded | EventKind::SwingOut | EventKind::SwingIn => None,
     }
 }
 
@@ -59,10 +59,10 @@ fn mark(what: What) -> Option<(&'static str, f64)> {
 pub fn draw(jobs: &[&Job], words: &Words) -> Option<Document> {
     let stretches = || jobs.iter().flat_map(|job| &job.stretches);
     let grounds = || stretches().flat_map(|stretch| &stretch.ground);
-    let things = || stretches().flat_map(|stretch| &stretch.things);
+    let events = || stretches().flat_map(|stretch| &stretch.events);
     let of_lines = grounds().flat_map(|ground| ground.lines.iter().flatten().copied());
-    let of_things = things().filter_map(|thing| Some(thing.found.ok()?.place));
-    let places: Vec<Place> = of_lines.chain(of_things).collect();
+    let of_events = events().filter_map(|event| Some(event.found.ok()?.place));
+    let places: Vec<Place> = of_lines.chain(of_events).collect();
     let plane = Plane::around(*places.first()?);
     let metres: Vec<Metres> = places.iter().map(|&place| plane.metres(place)).collect();
     let bound = |value: fn(&Metres) -> f64| {
@@ -93,15 +93,15 @@ pub fn draw(jobs: &[&Job], words: &Words) -> Option<Document> {
     }
     let mut drawn_at = HashSet::new();
     let mut points = Group::new();
-    for thing in things() {
-        let (Some((colour, radius)), Ok(found)) = (mark(thing.what), thing.found) else { continue };
+    for event in events() {
+        let (Some((colour, radius)), Ok(found)) = (mark(event.kind), event.found) else { continue };
         let (x, y) = pixel(found.place);
         if drawn_at.insert((colour, x.round() as i64, y.round() as i64)) {
             points =
                 points.add(Circle::new().set("cx", tenth(x)).set("cy", tenth(y)).set("r", radius).set("fill", colour));
         }
     }
-    let missing = things().filter(|thing| thing.found.is_err()).count();
+    let missing = events().filter(|event| event.found.is_err()).count();
     let mut legend = Legend::new(FRAME, 16.0);
     let colours = [WEEDED, LEFT_ALONE, PLANT, DOUBTFUL, WEED, NOTE, WRONG];
     for (colour, meaning) in colours.into_iter().zip(&words.legend) {

@@ -152,6 +152,8 @@ pub struct Receiver {
     /// The fix's standard deviation, if the user knows it.
     error_m: Option<f64>,
     counts: Counts,
+    /// The results that are not returned yet.
+    heard: Heard,
     moment: Option<Moment>,
     /// Midnights since the first line.
     days: i64,
@@ -206,50 +208,45 @@ impl Receiver {
     pub fn take(&mut self, time_ms: f64, line: &str) -> Heard {
         match Line::parse(line) {
             Line::Report(report) => self.report(time_ms, report),
-            Line::Other => Heard::default(),
-            Line::Damaged => {
-                self.counts.damaged += 1;
-                Heard::default()
-            }
+            Line::Other => {}
+            Line::Damaged => self.counts.damaged += 1,
         }
+        std::mem::take(&mut self.heard)
     }
 
     /// The end of the log: the last moment's fix is complete.
     pub fn end(&mut self) -> Heard {
-        let mut heard = Heard::default();
-        self.complete(&mut heard);
-        heard
+        self.complete();
+        std::mem::take(&mut self.heard)
     }
 
     /// The receiver is gone or silent.
     pub fn silent(&mut self) -> Heard {
-        let mut heard = self.end();
-        self.no_fix(&mut heard);
-        heard
+        self.complete();
+        self.no_fix();
+        std::mem::take(&mut self.heard)
     }
 
-    fn report(&mut self, arrived_ms: f64, report: Report) -> Heard {
+    fn report(&mut self, arrived_ms: f64, report: Report) {
         let Some(time_ms) = report.time_ms else {
             // A receiver without a satellite so far has no time.
-            return self.silent();
+            self.complete();
+            return self.no_fix();
         };
-        let mut heard = Heard::default();
         if let Some(moment) = &self.moment {
             let before_ms = moment.utc_ms.rem_euclid(DAY_MS);
             if before_ms == time_ms && arrived_ms - moment.arrived_ms < LONGEST_DELAY_MS {
-                self.add(report);
-                return heard;
+                return self.add(report);
             }
             // Past midnight forward, or back over it for a receiver that has only now found the time.
             self.days += i64::from(time_ms < before_ms - DAY_MS / 2) - i64::from(time_ms > before_ms + DAY_MS / 2);
         }
-        self.complete(&mut heard);
+        self.complete();
         let utc_ms = self.days * DAY_MS + time_ms;
         let wheel = self.wheel;
         self.moment =
             Some(Moment { arrived_ms, utc_ms, place: None, is_valid: true, quality: None, wheel, is_over: false });
         self.add(report);
-        heard
     }
 
     /// Adds the values of a sentence to its moment.
@@ -263,31 +260,30 @@ impl Receiver {
         moment.quality = moment.quality.max(report.quality);
     }
 
-    fn no_fix(&mut self, heard: &mut Heard) {
+    fn no_fix(&mut self) {
         if self.has_fix != Some(false) {
             self.has_fix = Some(false);
             self.counts.losses += 1;
-            heard.marks.push(Mark::Lost);
+            self.heard.marks.push(Mark::Lost);
         }
     }
 
     /// Ends the pending moment.
-    fn complete(&mut self, heard: &mut Heard) {
+    fn complete(&mut self) {
         let Some(moment) = self.moment.as_mut().filter(|moment| !moment.is_over) else { return };
         moment.is_over = true;
         let moment = *moment;
         let (Some(place), true) = (moment.place, moment.is_valid) else {
-            self.no_fix(heard);
-            return;
+            return self.no_fix();
         };
         let quality = moment.quality.unwrap_or(Quality::Satellites);
         if self.has_fix != Some(true) {
             self.has_fix = Some(true);
-            heard.marks.push(Mark::Found(quality));
+            self.heard.marks.push(Mark::Found(quality));
         }
         let time_ms = moment.utc_ms as f64 + self.ahead_ms(moment);
         let fix = Fix { time_ms, utc_ms: moment.utc_ms, place, quality, track: self.track };
-        self.judge(fix, moment.wheel, heard);
+        self.judge(fix, moment.wheel);
     }
 
     /// By how much the record's clock is ahead of UTC, and of the receiver's least delay.
@@ -306,7 +302,7 @@ impl Receiver {
     }
 
     /// Compares a fix with the last one, and with the wheel.
-    fn judge(&mut self, fix: Fix, wheel: Option<Wheel>, heard: &mut Heard) {
+    fn judge(&mut self, fix: Fix, wheel: Option<Wheel>) {
         let rolled_m = wheel.map_or(0.0, |wheel| {
             // The wheel is reported ten times a second. A line that came much too late has a position that is no longer
             // known here.
@@ -316,21 +312,19 @@ impl Receiver {
         let here = Rolled { fix, rolled_m };
         let Some(last) = self.last.filter(|_| wheel.is_some()) else {
             self.jumped.clear();
-            self.accept(here, heard);
-            return;
+            return self.accept(here);
         };
         // As the wheel rolls on, the machine could have reached the position of the jumped fixes. But these agree with
         // each other.
         let agrees = self.jumped.last().is_some_and(|jumped| self.follows(jumped, &here));
         if !agrees && self.follows(&last, &here) {
             self.jumped.clear();
-            self.accept(here, heard);
-            return;
+            return self.accept(here);
         }
         self.counts.jumps += 1;
         let far_m = last.fix.place.distance_m(fix.place);
         let rolled_m = (rolled_m - last.rolled_m).abs();
-        heard.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
+        self.heard.marks.push(Mark::Jumped(Jump { place: fix.place, time_ms: fix.time_ms, far_m, rolled_m }));
         if !agrees {
             self.jumped.clear();
         }
@@ -338,10 +332,10 @@ impl Receiver {
         let agree_ms = self.jumped.first().map_or(0.0, |first| fix.time_ms - first.fix.time_ms);
         if self.jumped.len() >= AGREEING && agree_ms >= AGREEING_MS {
             self.track += 1;
-            heard.marks.push(Mark::Stayed);
+            self.heard.marks.push(Mark::Stayed);
             for mut jumped in std::mem::take(&mut self.jumped) {
                 jumped.fix.track = self.track;
-                self.accept(jumped, heard);
+                self.accept(jumped);
             }
         }
     }
@@ -354,9 +348,9 @@ impl Receiver {
         far_m <= SKIDDING * (to.rolled_m - from.rolled_m).abs() + room_m
     }
 
-    fn accept(&mut self, here: Rolled, heard: &mut Heard) {
+    fn accept(&mut self, here: Rolled) {
         self.counts.fixes += 1;
-        heard.fixes.push(here.fix);
+        self.heard.fixes.push(here.fix);
         self.last = Some(here);
     }
 }
@@ -365,46 +359,30 @@ impl Receiver {
 mod tests {
     use super::*;
     use crate::plane::{Metres, Plane};
+    use crate::sentence::framed;
+    use crate::simulated;
     use proptest::prelude::*;
 
-    /// A day's midnight from 1970, the 31st of December 2026, and its date as sentences have it.
-    const DAYS: [(i64, &str); 2] = [(20_818, "311226"), (20_819, "010127")];
+    /// The 31st of December 2026, in days from 1970.
+    const DAY: i64 = 20_818;
 
-    fn sentence(text: &str) -> String {
-        format!("${text}*{:02X}", text.bytes().fold(0, |sum, byte| sum ^ byte))
-    }
-
-    fn angle(degrees: f64, digits: usize, sides: [&str; 2]) -> String {
-        // Whole ten millionths of a minute, so that no result is sixty minutes.
-        let units = (degrees.abs() * 60e7).round() as u64;
-        let (whole, minutes) = (units / 600_000_000, (units % 600_000_000) as f64 / 1e7);
-        format!("{whole:0digits$}{minutes:010.7},{}", sides[usize::from(degrees < 0.0)])
-    }
-
-    fn coordinates(place: Place) -> String {
-        format!("{},{}", angle(place.latitude, 2, ["N", "S"]), angle(place.longitude, 3, ["E", "W"]))
-    }
-
-    fn clock(utc_ms: i64) -> String {
-        let ms = utc_ms.rem_euclid(DAY_MS);
-        format!("{:02}{:02}{:02}.{:03}", ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000)
-    }
+    const FIELD: Place = Place { latitude: 52.1, longitude: 8.5 };
 
     fn gga(utc_ms: i64, place: Place) -> String {
-        sentence(&format!("GPGGA,{},{},4,12,0.7,10.0,M,0.0,M,,", clock(utc_ms), coordinates(place)))
+        framed(&simulated::gga(utc_ms, Some((place, Quality::Rtk))))
     }
 
-    fn rmc(utc_ms: i64, place: Place, date: &str) -> String {
-        sentence(&format!("GPRMC,{},A,{},1.0,90.0,{date},,,A", clock(utc_ms), coordinates(place)))
+    fn rmc(utc_ms: i64, place: Place) -> String {
+        framed(&simulated::rmc(utc_ms, Some((place, Quality::Rtk))))
     }
 
-    /// A receiver that rolls half a metre a second to the east of a position. It sends a fix once a second from a time
-    /// of day on.
+    /// A receiver that rolls half a metre a second to the east of a position. It sends a fix once a second from a
+    /// moment on. `change` gets the number of each second and its two lines.
     fn rolling(
         from: Place,
         start_ms: i64,
         seconds: i64,
-        change: impl Fn(i64, String) -> Vec<String>,
+        change: impl Fn(i64, [String; 2]) -> [String; 2],
     ) -> (Vec<Heard>, Receiver) {
         let plane = Plane::around(from);
         let mut receiver = Receiver::new(None);
@@ -414,8 +392,7 @@ mod tests {
             let place = plane.place(Metres { east: 0.5 * second as f64, north: 0.0 });
             let time_ms = 1000.0 * second as f64;
             receiver.rolled(time_ms, 0.5 * second as f64, 500.0);
-            let (_, date) = DAYS[usize::from(utc_ms >= DAY_MS)];
-            for line in change(second, gga(utc_ms, place)).into_iter().chain(change(second, rmc(utc_ms, place, date))) {
+            for line in change(second, [gga(utc_ms, place), rmc(utc_ms, place)]) {
                 heard.push(receiver.take(time_ms + 80.0, &line));
             }
         }
@@ -431,23 +408,21 @@ mod tests {
         heard.iter().flat_map(|heard| &heard.marks).copied().collect()
     }
 
-    const FIELD: Place = Place { latitude: 52.1, longitude: 8.5 };
-
     proptest! {
         #[test]
         fn midnight_the_antimeridian_and_either_hemisphere_change_nothing(
             latitude in -80.0..80.0_f64, near in 0..4_usize, off in -0.0001..0.0001_f64, start_s in -30..30_i64,
         ) {
             let longitude = [180.0 - off.abs(), -180.0 + off.abs(), off, 100.0][near];
-            let start_ms = DAY_MS + 1000 * start_s;
-            let (heard, receiver) = rolling(Place { latitude, longitude }, start_ms, 40, |_, line| vec![line]);
+            let start_ms = (DAY + 1) * DAY_MS + 1000 * start_s;
+            let (heard, receiver) = rolling(Place { latitude, longitude }, start_ms, 40, |_, lines| lines);
             let fixes = fixes(&heard);
             prop_assert_eq!(fixes.len(), 40);
             prop_assert_eq!(receiver.counts(), Counts { fixes: 40, ..Counts::default() });
             prop_assert_eq!(marks(&heard), vec![Mark::Found(Quality::Rtk)]);
             let midnight_ms = receiver.midnight_ms().expect("RMC has a date");
             for (second, pair) in fixes.windows(2).enumerate() {
-                prop_assert_eq!(midnight_ms + pair[0].utc_ms, DAYS[0].0 * DAY_MS + start_ms + 1000 * second as i64);
+                prop_assert_eq!(midnight_ms + pair[0].utc_ms, start_ms + 1000 * second as i64);
                 let far_m = pair[0].place.distance_m(pair[1].place);
                 prop_assert!((far_m - 0.5).abs() < 1e-3, "{}", far_m);
                 prop_assert!((pair[1].time_ms - pair[0].time_ms - 1000.0).abs() < 1e-6);
@@ -458,7 +433,7 @@ mod tests {
         fn a_stream_that_is_cut_at_any_byte_has_no_wrong_fix(from in 0..4000_usize, to in 0..4000_usize) {
             let mut stream = String::new();
             for second in 0..20 {
-                stream += &format!("{}\r\n{}\r\n", gga(1000 * second, FIELD), rmc(1000 * second, FIELD, DAYS[0].1));
+                stream += &format!("{}\r\n{}\r\n", gga(1000 * second, FIELD), rmc(1000 * second, FIELD));
             }
             let (from, to) = (from % stream.len(), to % stream.len());
             let mut receiver = Receiver::new(None);
@@ -501,12 +476,9 @@ mod tests {
 
     #[test]
     fn a_lost_fix_is_marked_once_and_so_is_the_next_one() {
-        let lost = |second: i64, line: String| {
-            if (10..15).contains(&second) {
-                vec![sentence(&format!("GPRMC,{},V,,,,,,,311226,,,N", clock(1000 * second)))]
-            } else {
-                vec![line]
-            }
+        let lost = |second: i64, lines| {
+            let none = framed(&simulated::rmc(1000 * second, None));
+            if (10..15).contains(&second) { [none.clone(), none] } else { lines }
         };
         let (heard, receiver) = rolling(FIELD, 0, 30, lost);
         assert_eq!(marks(&heard), [Mark::Found(Quality::Rtk), Mark::Lost, Mark::Found(Quality::Rtk)]);
@@ -516,15 +488,9 @@ mod tests {
     /// As [`rolling`], with the fixes of some seconds two metres off.
     fn off(seconds: std::ops::Range<i64>) -> (Vec<Heard>, Receiver) {
         let plane = Plane::around(FIELD);
-        rolling(FIELD, 0, 30, |second, line| {
+        rolling(FIELD, 0, 30, |second, lines| {
             let place = plane.place(Metres { east: 0.5 * second as f64, north: 2.0 });
-            if !seconds.contains(&second) {
-                vec![line]
-            } else if line.contains("GGA") {
-                vec![gga(1000 * second, place)]
-            } else {
-                vec![rmc(1000 * second, place, DAYS[0].1)]
-            }
+            if seconds.contains(&second) { [gga(1000 * second, place), rmc(1000 * second, place)] } else { lines }
         })
     }
 
@@ -550,7 +516,7 @@ mod tests {
     fn a_receiver_without_a_fix_from_the_beginning_is_marked_so() {
         let mut receiver = Receiver::new(None);
         let heard: Vec<Heard> =
-            (0..5).map(|second| receiver.take(1000.0 * f64::from(second), &sentence("GPRMC,,V,,,,,,,,,,N"))).collect();
+            (0..5).map(|second| receiver.take(1000.0 * f64::from(second), &framed("GPRMC,,V,,,,,,,,,,N"))).collect();
         assert_eq!(marks(&heard), [Mark::Lost]);
         assert_eq!(receiver.midnight_ms(), None);
     }

@@ -126,13 +126,22 @@ fn quality(fix: FixType) -> Option<Quality> {
     }
 }
 
-/// Whether a line is `$`, a text, and after `*` the exclusive or of the text's bytes. `nmea` checks this only for
-/// sentences that it knows.
+/// The line of a sentence with this text, without its end.
+pub fn framed(text: &str) -> String {
+    format!("${text}*{:02X}", checksum(text))
+}
+
+/// The exclusive or of the text's bytes.
+fn checksum(text: &str) -> u8 {
+    text.bytes().fold(0, |sum, byte| sum ^ byte)
+}
+
+/// Whether a line is `$`, a text, and after `*` its checksum. `nmea` checks this only for sentences that it knows.
 fn has_right_checksum(line: &str) -> bool {
     let parts = line.strip_prefix('$').and_then(|line| line.split_once('*'));
-    let Some((text, checksum)) = parts.filter(|(_, checksum)| checksum.len() == 2) else { return false };
+    let Some((text, told)) = parts.filter(|(_, told)| told.len() == 2) else { return false };
     let is_text = text.bytes().all(|byte| matches!(byte, b' '..=b'~') && byte != b'$');
-    is_text && u8::from_str_radix(checksum, 16) == Ok(text.bytes().fold(0, |sum, byte| sum ^ byte))
+    is_text && u8::from_str_radix(told, 16) == Ok(checksum(text))
 }
 
 #[cfg(test)]
@@ -140,14 +149,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A sentence with its checksum.
-    fn sentence(text: &str) -> String {
-        format!("${text}*{:02X}", text.bytes().fold(0, |sum, byte| sum ^ byte))
-    }
-
     #[track_caller]
     fn report(text: &str) -> Report {
-        match Line::parse(&sentence(text)) {
+        match Line::parse(&framed(text)) {
             Line::Report(report) => report,
             other => panic!("{other:?}"),
         }
@@ -190,12 +194,12 @@ mod tests {
     #[test]
     fn other_sentences_are_passed_over_and_other_lines_are_damaged() {
         for text in ["GPGSV,1,1,00", "PUBX,00,1", "AIVDM,1,1,,A,0", "X"] {
-            assert_eq!(Line::parse(&sentence(text)), Line::Other, "{text}");
+            assert_eq!(Line::parse(&framed(text)), Line::Other, "{text}");
         }
         for line in ["", "$", "hello", "$*", "$GPGSV,1,1,00", "$GPGSV,1,1,00*7", "$GPGSV,1,1,00*7B0", "$\u{FFFD}*00"] {
             assert_eq!(Line::parse(line), Line::Damaged, "{line}");
         }
-        assert_eq!(Line::parse(&format!("{}\r", sentence(GGA))), Line::parse(&sentence(GGA)));
+        assert_eq!(Line::parse(&format!("{}\r", framed(GGA))), Line::parse(&framed(GGA)));
     }
 
     proptest! {
@@ -203,7 +207,7 @@ mod tests {
         fn a_sentence_with_a_changed_character_or_without_its_end_is_damaged(
             which in 0..2_usize, at in 0..200_usize, by in 1..127_u8, cut in any::<bool>(),
         ) {
-            let whole = sentence([GGA, RMC][which]);
+            let whole = framed([GGA, RMC][which]);
             let at = at % whole.len();
             let line = if cut {
                 whole[..at].to_owned()
@@ -221,7 +225,7 @@ mod tests {
         fn any_line_is_read_or_refused(line in ".{0,120}", kind in 0..3_usize) {
             Line::parse(&line);
             let text: String = line.chars().filter(|letter| matches!(letter, ' '..='~') && !"$*".contains(*letter)).collect();
-            Line::parse(&sentence(&format!("{}{text}", ["GPRMC,", "GPGGA,", "P"][kind])));
+            Line::parse(&framed(&format!("{}{text}", ["GPRMC,", "GPGGA,", "P"][kind])));
         }
     }
 }

@@ -4,7 +4,8 @@
 //! headland is no gap in the stand: the work switch marks the row end. If a spacing is longer than one and a half of
 //! the usual one, plants are missing in it. Unknown detections count as plants.
 
-use crate::job::{Did, Job, Thing, What, is_interpolated};
+use crate::job::{Did, Event, EventKind, Job};
+use crate::track::{Basis, Found};
 use link::Class;
 use serde::Serialize;
 
@@ -53,11 +54,11 @@ pub struct Summary {
     pub work_h: f64,
     /// Hours of the record.
     pub record_h: f64,
-    /// Objects with a position between two successive fixes.
+    /// Events with a position between two successive fixes.
     pub measured: u64,
-    /// Objects with a position over an outage.
+    /// Events with a position over an outage.
     pub interpolated: u64,
-    /// Things without a place.
+    /// Events without a position.
     pub without_place: u64,
     /// Fixes that are used.
     pub fixes: u64,
@@ -82,21 +83,21 @@ impl Summary {
             receiver_losses: job.unplugged,
             ..Self::default()
         };
-        for thing in job.things() {
-            match thing.what {
-                What::Object { class: Class::Weed, .. } => summary.weeds += 1,
-                What::Object { class, .. } => {
+        for event in job.events() {
+            match event.kind {
+                EventKind::Detection { class: Class::Weed, .. } => summary.weeds += 1,
+                EventKind::Detection { class, .. } => {
                     summary.plants += 1;
                     summary.unknown += u64::from(class == Class::Unknown);
                 }
-                What::SwingOut => summary.swings += 1,
-                What::Alarm => summary.alarms += 1,
-                What::Label(_) => summary.labels += 1,
-                What::SwingIn | What::Guarded => {}
+                EventKind::SwingOut => summary.swings += 1,
+                EventKind::Alarm => summary.alarms += 1,
+                EventKind::Label(_) => summary.labels += 1,
+                EventKind::SwingIn | EventKind::Guarded => {}
             }
-            match thing.found {
+            match event.found {
                 Err(_) => summary.without_place += 1,
-                Ok(_) if is_interpolated(thing) => summary.interpolated += 1,
+                Ok(Found { basis: Basis::Interpolated, .. }) => summary.interpolated += 1,
                 Ok(_) => summary.measured += 1,
             }
         }
@@ -149,8 +150,9 @@ fn hours(time_ms: u64) -> f64 {
 fn spacings_mm(job: &Job) -> Vec<f64> {
     let mut spacings = Vec::new();
     for stretch in &job.stretches {
-        let is_plant = |thing: &&Thing| matches!(thing.what, What::Object { class: Class::Plant | Class::Unknown, .. });
-        let plants: Vec<f64> = stretch.things.iter().filter(is_plant).map(|plant| plant.distance_m).collect();
+        let is_plant =
+            |event: &&Event| matches!(event.kind, EventKind::Detection { class: Class::Plant | Class::Unknown, .. });
+        let plants: Vec<f64> = stretch.events.iter().filter(is_plant).map(|plant| plant.distance_m).collect();
         // Both are known by the wheel's distance.
         let rests: Vec<_> = stretch.ground.iter().filter(|ground| ground.did == Did::Rolled).collect();
         for pair in plants.windows(2) {

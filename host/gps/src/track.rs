@@ -1,9 +1,9 @@
-//! The antenna's track along the wheel's distance, and the positions of objects on it.
+//! The antenna's track along the wheel's distance, and the positions of events on it.
 //!
-//! An object has a distance of the wheel, and an offset from the antenna, ahead and to the right.
+//! An event has a distance of the wheel, and an offset from the antenna, ahead and to the right.
 //!
 //! - **The antenna's position** at that distance lies between two fixes, at the wheel's share of the distance. The
-//!   machine may have rolled over the same distance several times: the last time before the object was recorded counts.
+//!   machine may have rolled over the same distance several times: the last time before the event was recorded counts.
 //!   Several fixes of a standing wheel are averaged.
 //! - **The heading** is the direction of a straight line, fitted by least squares over the wheel's distance. It uses as
 //!   many fixes around the position as its error needs to fall to [`HEADING_ERROR`], but at most [`LONGEST_CHORD_M`].
@@ -28,7 +28,7 @@ const NO_HEADING: f64 = 0.5;
 /// Successive fixes are at most this number of the receiver's intervals apart.
 const INTERVALS: f64 = 1.5;
 
-/// How far a machine rolls back and forth behind its farthest position, in metres. Recorded objects are searched back
+/// How far a machine rolls back and forth behind its farthest position, in metres. Recorded events are searched back
 /// to there.
 const ROLLED_BACK_M: f64 = 50.0;
 
@@ -154,7 +154,7 @@ impl Track {
         Some(Self { plane, stations, interval_ms, longest_outage_m })
     }
 
-    /// The position of an object with this offset from the antenna, at this distance of the wheel. It was recorded at
+    /// The position of an event with this offset from the antenna, at this distance of the wheel. It was recorded at
     /// this time of the log's clock.
     ///
     /// # Errors
@@ -185,7 +185,7 @@ impl Track {
         Ok(Found { place: self.plane.place(at), basis, error_m, utc_ms: utc_ms.round() as i64 })
     }
 
-    /// The first of the two fixes between which the wheel passed this distance for the last time before the object was
+    /// The first of the two fixes between which the wheel passed this distance for the last time before the event was
     /// recorded.
     fn passed(&self, distance_m: f64, recorded_ms: f64) -> Result<usize, Missing> {
         let before = self.stations.partition_point(|station| station.time_ms <= recorded_ms + RECORDED_EARLY_MS);
@@ -274,6 +274,14 @@ mod tests {
         distances_m.into_iter().enumerate().map(fix).collect()
     }
 
+    fn eastward(distance_m: f64) -> Metres {
+        Metres { east: distance_m, north: 0.0 }
+    }
+
+    fn track(fixes: &[(f64, Fix)]) -> Track {
+        Track::through(fixes, None, 20.0).expect("there are fixes")
+    }
+
     fn every_half_metre(count: u32) -> impl Iterator<Item = f64> {
         (0..count).map(|second| 0.5 * f64::from(second))
     }
@@ -287,14 +295,10 @@ mod tests {
     fn the_track_reaches_to_where_the_machine_stands_at_its_end() {
         // The fixes of the standstill are one station, at the first of them.
         let distances_m = every_half_metre(10).chain([4.998, 5.0, 5.0]);
-        let track =
-            Track::through(&driven(distances_m, |distance_m| Metres { east: distance_m, north: 0.0 }), None, 20.0)
-                .expect("it has fixes");
+        let track = track(&driven(distances_m, eastward));
         for distance_m in [4.998, 5.0, 5.002] {
-            assert!(
-                off_m(track.find(distance_m, 12_000.0, Offset::default()), Metres { east: distance_m, north: 0.0 })
-                    < 0.005
-            );
+            let found = track.find(distance_m, 12_000.0, Offset::default());
+            assert!(off_m(found, eastward(distance_m)) < 0.005);
         }
         assert_eq!(track.find(5.01, 12_000.0, Offset::default()), Err(Missing::NoFixBehind));
     }
@@ -306,7 +310,7 @@ mod tests {
         ) {
             let forward = Metres { east: direction.sin(), north: direction.cos() };
             let fixes = driven(every_half_metre(60), |distance_m| forward.times(distance_m));
-            let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+            let track = track(&fixes);
             let found = track.find(distance_m, 2000.0 * distance_m, Offset { ahead_m, right_m });
             let expected = forward.times(distance_m + ahead_m).plus(forward.turned_right().times(right_m));
             prop_assert!(off_m(found, expected) < 1e-4);
@@ -317,13 +321,13 @@ mod tests {
         fn events_in_an_outage_are_between_the_fixes_on_both_sides_if_the_distance_allows(
             lost in 2..50_u32, length in 1..40_u32, distance_m in 0.0..29.0_f64,
         ) {
-            let fixes = driven(every_half_metre(60), |distance_m| Metres { east: distance_m, north: 0.0 });
+            let fixes = driven(every_half_metre(60), eastward);
             let kept: Vec<_> =
                 fixes.iter().enumerate().filter(|(at, _)| !(lost..lost + length).contains(&(*at as u32))).map(|(_, it)| *it).collect();
             let track = Track::through(&kept, None, 10.0).expect("there are fixes");
             let found = track.find(distance_m, 2000.0 * distance_m, Offset::default());
             let outage = 0.5 * f64::from(lost - 1)..0.5 * f64::from(lost + length);
-            let expected = Metres { east: distance_m, north: 0.0 };
+            let expected = eastward(distance_m);
             if !outage.contains(&distance_m) {
                 prop_assert_eq!(found.map(|found| found.basis), Ok(Basis::Measured));
                 prop_assert!(off_m(found, expected) < 1e-4);
@@ -340,8 +344,8 @@ mod tests {
 
     #[test]
     fn before_the_first_fix_and_behind_the_last_there_is_no_place() {
-        let fixes = driven(every_half_metre(10), |distance_m| Metres { east: distance_m, north: 0.0 });
-        let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+        let fixes = driven(every_half_metre(10), eastward);
+        let track = track(&fixes);
         assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
         assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
         assert_eq!(track.find(1.0, -1500.0, Offset::default()), Err(Missing::NoFixBefore));
@@ -352,31 +356,31 @@ mod tests {
     fn a_machine_that_rolls_back_keeps_its_heading_and_the_last_pass_counts() {
         // Four metres forward, two back on the same line, and forward on another line, a metre to the north.
         let ways = (0..=8).chain((4..8).rev()).chain(5..=12).map(|step| 0.5 * f64::from(step));
-        let mut fixes = driven(ways, |distance_m| Metres { east: distance_m, north: 0.0 });
+        let mut fixes = driven(ways, eastward);
         let plane = Plane::around(FIELD);
         for (distance_m, fix) in &mut fixes[13..] {
             fix.place = plane.place(Metres { east: *distance_m, north: 1.0 });
         }
-        let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+        let track = track(&fixes);
         let ahead = Offset { ahead_m: 1.0, right_m: 0.0 };
-        assert!(off_m(track.find(3.25, 7000.0, ahead), Metres { east: 4.25, north: 0.0 }) < 1e-3);
-        assert!(off_m(track.find(3.25, 10_400.0, ahead), Metres { east: 4.25, north: 0.0 }) < 1e-3, "on the way back");
+        assert!(off_m(track.find(3.25, 7000.0, ahead), eastward(4.25)) < 1e-3);
+        assert!(off_m(track.find(3.25, 10_400.0, ahead), eastward(4.25)) < 1e-3, "on the way back");
         let later = track.find(3.25, 16_000.0, Offset::default());
         assert!(off_m(later, Metres { east: 3.25, north: 1.0 }) < 1e-3);
     }
 
     #[test]
     fn where_the_fixes_have_jumped_for_good_nothing_is_interpolated() {
-        let mut fixes = driven(every_half_metre(20), |distance_m| Metres { east: distance_m, north: 0.0 });
+        let mut fixes = driven(every_half_metre(20), eastward);
         fixes[10..].iter_mut().for_each(|(_, fix)| fix.track = 1);
-        let track = Track::through(&fixes, None, 20.0).expect("there are fixes");
+        let track = track(&fixes);
         assert_eq!(track.find(4.75, 9500.0, Offset::default()), Err(Missing::Jumped));
         assert!(track.find(4.25, 9500.0, Offset { ahead_m: 1.0, right_m: 0.0 }).is_ok());
     }
 
     #[test]
     fn a_standing_machine_is_at_the_mean_of_its_fixes_and_two_noisy_fixes_give_no_heading() {
-        let mut fixes = driven([0.0, 0.0, 0.0, 0.5], |distance_m| Metres { east: distance_m, north: 0.0 });
+        let mut fixes = driven([0.0, 0.0, 0.0, 0.5], eastward);
         let plane = Plane::around(FIELD);
         for (at, north) in [(0, 0.3), (1, -0.3), (2, 0.6)] {
             fixes[at].1.place = plane.place(Metres { east: 0.0, north });

@@ -1,9 +1,11 @@
 //! Logs as jobs, and their maps: a machine that rolls along a row, with a receiver's lines between the machine's.
 
 use geojson::{FeatureCollection, GeometryValue};
-use gps::job::{Did, Thing, What};
+use gps::job::{Did, Event, EventKind};
 use gps::picture::Words;
 use gps::plane::{Metres, Place, Plane};
+use gps::sentence::{Quality, framed};
+use gps::simulated::gga;
 use gps::summary::{Stand, Summary};
 use gps::{Job, Wanted, map, picture};
 use link::Class;
@@ -16,22 +18,11 @@ const TICKS_A_MM: f64 = 2.0;
 /// The machine rolls so fast, in mm/s.
 const SPEED: f64 = 500.0;
 
+/// Noon, in milliseconds of a day.
+const NOON_MS: i64 = 43_200_000;
+
 /// The antenna's first position, near the 180th meridian.
 const FROM: Place = Place { latitude: -16.8, longitude: 179.999_9 };
-
-fn sentence(text: &str) -> String {
-    format!("${text}*{:02X}", text.bytes().fold(0, |sum, byte| sum ^ byte))
-}
-
-fn gga(time_ms: u64, place: Place) -> String {
-    let angle = |degrees: f64| (degrees.abs().floor(), degrees.abs().fract() * 60.0);
-    let ((south, minutes), (east, east_minutes)) = (angle(place.latitude), angle(place.longitude));
-    let side = if place.longitude < 0.0 { "W" } else { "E" };
-    let (second, part) = (time_ms / 1000, time_ms % 1000);
-    let time = format!("12{:02}{:02}.{part:03}", second / 60, second % 60);
-    let place = format!("{south:02}{minutes:010.7},S,{east:03}{east_minutes:010.7},{side}");
-    sentence(&format!("GPGGA,{time},{place},4,12,0.7,10.0,M,0.0,M,,"))
-}
 
 /// The log of a machine that rolls 30 m to the east. It is at work from 5 m to 25 m, with a plant every half metre.
 /// `change` can change the receiver's line of each second, from 2 s on.
@@ -52,7 +43,11 @@ fn record(change: impl Fn(u64, String) -> Vec<(Kind, String)>) -> Vec<Entry> {
         let (mode, tool) = (if is_at_work { "work" } else { "hold" }, if is_out { "out" } else { "in" });
         if tenth.is_multiple_of(10) && tenth >= 20 {
             let place = plane.place(Metres { east: distance_mm / 1000.0, north: 0.0 });
-            lines.extend(change(tenth / 10, gga(time_ms, place)).into_iter().map(|(kind, line)| (time_ms, kind, line)));
+            lines.extend(
+                change(tenth / 10, framed(&gga(NOON_MS + time_ms as i64, Some((place, Quality::Rtk)))))
+                    .into_iter()
+                    .map(|(kind, line)| (time_ms, kind, line)),
+            );
         }
         let position = (TICKS_A_MM * distance_mm) as i64;
         if is_at_work && (distance_mm % 500.0 == 200.0 || distance_mm % 500.0 == 0.0) {
@@ -84,8 +79,8 @@ fn insert(log: &mut Vec<Entry>, lines: Vec<(Kind, &str)>) {
     log.splice(middle..middle, entries);
 }
 
-fn is_object(thing: &&Thing) -> bool {
-    matches!(thing.what, What::Object { .. })
+fn is_detection(event: &&Event) -> bool {
+    matches!(event.kind, EventKind::Detection { .. })
 }
 
 /// Plants, and the swings between.
@@ -96,7 +91,7 @@ const SWINGS: usize = 80;
 fn a_plant_is_the_middle_of_its_canopy_and_stands_where_the_beam_was() {
     let job = Job::read(&whole(), &Wanted::default());
     let plane = Plane::around(FROM);
-    let plants: Vec<_> = job.things().filter(is_object).collect();
+    let plants: Vec<_> = job.events().filter(is_detection).collect();
     assert_eq!(plants.len(), PLANTS);
     for (number, plant) in plants.iter().enumerate() {
         // The leading edge was 100 mm before, the middle is 50 mm behind that, and the beam is a metre ahead of the
@@ -180,7 +175,7 @@ fn the_drawing_has_a_circle_for_each_plant_and_none_without_a_place() {
 #[test]
 fn a_log_that_was_opened_again_and_an_uno_that_was_reset_restart_the_distance() {
     let job = Job::read(&[whole(), whole()].concat(), &Wanted::default());
-    assert_eq!(job.things().filter(|thing| thing.found.is_ok()).count(), 2 * (PLANTS + SWINGS));
+    assert_eq!(job.events().filter(|event| event.found.is_ok()).count(), 2 * (PLANTS + SWINGS));
     assert_eq!(job.stretches.len(), 2);
     let mut log = whole();
     let reset = vec![
@@ -191,9 +186,9 @@ fn a_log_that_was_opened_again_and_an_uno_that_was_reset_restart_the_distance() 
     ];
     insert(&mut log, reset);
     let job = Job::read(&log, &Wanted::default());
-    assert_eq!((job.stretches.len(), job.things().count()), (2, PLANTS + SWINGS));
+    assert_eq!((job.stretches.len(), job.events().count()), (2, PLANTS + SWINGS));
     // Objects between the last fix before it and the first after it have no position.
-    let missing = job.things().filter(|thing| thing.found.is_err()).count();
+    let missing = job.events().filter(|event| event.found.is_err()).count();
     assert!((1..=8).contains(&missing), "{missing}");
 }
 
@@ -209,13 +204,13 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
     ];
     insert(&mut log, set);
     let job = Job::read(&log, &Wanted::default());
-    assert_eq!(job.things().count(), PLANTS + SWINGS + 1, "nothing told is left out");
+    assert_eq!(job.events().count(), PLANTS + SWINGS + 1, "nothing told is left out");
     let [one, other] = job.stretches.as_slice() else { panic!("{}", job.stretches.len()) };
-    let spacing_m = |things: &[Thing]| {
-        let plants: Vec<f64> = things.iter().filter(is_object).map(|plant| plant.distance_m).collect();
+    let spacing_m = |events: &[Event]| {
+        let plants: Vec<f64> = events.iter().filter(is_detection).map(|plant| plant.distance_m).collect();
         plants[2] - plants[1]
     };
-    assert!((spacing_m(&one.things) - 0.5).abs() < 1e-9 && (spacing_m(&other.things) - 1.0).abs() < 1e-9);
+    assert!((spacing_m(&one.events) - 0.5).abs() < 1e-9 && (spacing_m(&other.events) - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -245,12 +240,12 @@ fn a_label_lies_where_the_last_object_does_and_a_refused_one_is_none() {
     ];
     insert(&mut log, said);
     let job = Job::read(&log, &Wanted::default());
-    let things: Vec<_> = job.things().collect();
-    let at = things.iter().position(|thing| matches!(thing.what, What::Label(_))).expect("a label");
-    assert_eq!(things[at].what, What::Label(Class::Weed));
-    let object = things[..at].iter().rev().find(|thing| is_object(thing)).expect("an object");
-    assert_eq!((object.found, object.distance_m), (things[at].found, things[at].distance_m));
-    assert_eq!(things.iter().filter(|thing| matches!(thing.what, What::Label(_))).count(), 1);
+    let events: Vec<_> = job.events().collect();
+    let at = events.iter().position(|event| matches!(event.kind, EventKind::Label(_))).expect("a label");
+    assert_eq!(events[at].kind, EventKind::Label(Class::Weed));
+    let object = events[..at].iter().rev().find(|event| is_detection(event)).expect("an object");
+    assert_eq!((object.found, object.distance_m), (events[at].found, events[at].distance_m));
+    assert_eq!(events.iter().filter(|event| matches!(event.kind, EventKind::Label(_))).count(), 1);
 }
 
 proptest! {
@@ -275,13 +270,13 @@ proptest! {
             vec![(kind, String::from_utf8_lossy(&line).into_owned())]
         };
         let job = Job::read(&record(change), &Wanted::default());
-        prop_assert_eq!(job.things().count(), PLANTS + SWINGS);
+        prop_assert_eq!(job.events().count(), PLANTS + SWINGS);
         let plane = Plane::around(FROM);
-        for thing in job.things() {
-            let Ok(found) = thing.found else { continue };
-            let ahead_m = if is_object(&thing) { 1.0 } else { 0.6 };
+        for event in job.events() {
+            let Ok(found) = event.found else { continue };
+            let ahead_m = if is_detection(&event) { 1.0 } else { 0.6 };
             let at = plane.metres(found.place);
-            prop_assert!((at.east - thing.distance_m - ahead_m).abs() < 2e-3 && at.north.abs() < 2e-3, "{:?}", thing);
+            prop_assert!((at.east - event.distance_m - ahead_m).abs() < 2e-3 && at.north.abs() < 2e-3, "{:?}", event);
         }
         prop_assert!(map::features(&[("a record", &job)]).features.len() >= PLANTS + SWINGS);
     }

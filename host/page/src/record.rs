@@ -7,7 +7,7 @@
 //! another machine, the ground continues one metre farther. An event without a position has that of the line before.
 
 use control::say::command::{self, Command};
-use gps::job::{Job, Wanted};
+use gps::job::{Job, Wanted, tick_mm};
 use gps::picture::{Words, draw};
 use link::log::{Entry, Kind, Pieces};
 use link::settings::{Setting, Settings, shown};
@@ -15,7 +15,6 @@ use link::{Class, EventLine, Mode, Status, Values, replay};
 use serde_json::{Value, json};
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::f64::consts::PI;
 use std::path::Path;
 
 /// Distance between two stored speeds, and the time after a status in which others are skipped.
@@ -36,15 +35,9 @@ struct Ground {
 }
 
 impl Ground {
-    fn tick_mm(&self) -> f64 {
-        let value = |setting| f64::from(self.settings.get(setting));
-        let per_metre = value(Setting::TicksPerM);
-        if per_metre > 0.0 { 1000.0 / per_metre } else { PI * value(Setting::WheelMm) / value(Setting::TicksPerRev) }
-    }
-
     /// The tool's position at a count.
     fn tool_mm(&mut self, position: i32) -> f64 {
-        let rolled_mm = f64::from(position) * self.tick_mm();
+        let rolled_mm = f64::from(position) * tick_mm(&self.settings);
         let zero_mm = *self.zero_mm.get_or_insert(self.end_mm - rolled_mm);
         let tool_mm = zero_mm + rolled_mm;
         self.end_mm = self.end_mm.max(tool_mm);
@@ -141,7 +134,7 @@ impl Picture {
         let ground = &mut self.ground;
         match *event {
             EventLine::Detection { class, position, delay, hold, .. } => {
-                let tick_mm = ground.tick_mm();
+                let tick_mm = tick_mm(&ground.settings);
                 // The tool reaches the zone after this number of counts.
                 let zone_mm = ground.tool_mm(position.wrapping_add(delay));
                 let zone_end_mm = zone_mm + f64::from(hold) * tick_mm;
@@ -304,7 +297,7 @@ pub fn job() -> Value {
 pub fn map(words: &Words) -> Value {
     let jobs = JOBS.take();
     let drawn = draw(&jobs.iter().collect::<Vec<_>>(), words);
-    let placed = jobs.iter().flat_map(Job::things).filter(|thing| thing.found.is_ok()).count();
+    let placed = jobs.iter().flat_map(Job::events).filter(|event| event.found.is_ok()).count();
     json!({ "svg": drawn.map(|drawn| drawn.to_string()), "placed": placed })
 }
 

@@ -7,8 +7,8 @@
 use crate::put;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
-use field::rolling::{Faults, Rolling};
-use field::row::{Row, Thing};
+use field::rolling::Rolling;
+use field::row::{Canopy, Row};
 use field::servo::Servo;
 use field::verdict::{Timing, Verdict, judge};
 use field::{Kind, Machine};
@@ -21,7 +21,7 @@ use uno::Pulse;
 const SOWN_AHEAD_MM: f64 = 2000.0;
 /// Ground behind a plant's margin before it is judged: until then the tool could come back too early.
 const BEHIND_MM: f64 = 20.0;
-/// Ground in memory before the next thing to judge: more than the tool needs to swing, at any speed.
+/// Ground in memory before the next canopy to judge: more than the tool needs to swing, at any speed.
 const BEFORE_MM: f64 = 500.0;
 /// An arm within this angle of fully out counts as fully out. It is half a millimetre at the tool's end, and 1 us of a
 /// pulse: avr8js does not time edges more exactly (docs/simulators.md).
@@ -93,18 +93,17 @@ enum Fate {
 struct Trial {
     rolling: Rolling,
     sowing: Sowing,
-    faults: Faults,
-    /// The first thing without a verdict, or to be judged again.
+    /// The first canopy without a verdict, or to be judged again.
     next: usize,
     /// The verdicts by number in the row.
     fates: Vec<Option<Fate>>,
     /// Start time of the recorded motion.
     from_s: f64,
-    /// Number of things that were passed to the page.
+    /// Number of canopies that were passed to the page.
     told: usize,
 }
 
-/// The tables, by number: the machine's state, the changes at the pins (cycle, pin, level), and the sown things (0 for
+/// The tables, by number: the machine's state, the changes at the pins (cycle, pin, level), and the sown canopies (0 for
 /// a plant and 1 for a weed, position, width).
 const NOW: usize = 0;
 const CHANGES: usize = 1;
@@ -145,7 +144,6 @@ impl Begun {
         let mut trial = Trial {
             rolling: Rolling::new(machine, row, 0.0, self.cycle),
             sowing,
-            faults: Faults::default(),
             next: 0,
             fates: Vec::new(),
             from_s: 0.0,
@@ -166,23 +164,22 @@ impl Different {
     /// Applies the change. Returns the levels of the machine's pins.
     pub fn take(self) -> Result<Value, String> {
         with(|trial| {
-            let Trial { rolling, sowing, faults, .. } = trial;
+            let Trial { rolling, sowing, .. } = trial;
             match self {
-                Self::SpeedKmH(speed_km_h) => rolling.roll_at(mm_s(speed_km_h)),
+                Self::SpeedKmH(speed_km_h) => rolling.target_mm_s = mm_s(speed_km_h),
                 Self::Slip(share) => rolling.slip_by(share),
-                Self::BeamWireTorn(is_torn) => faults.beam_wire_torn = is_torn,
-                Self::EncoderDead(is_dead) => faults.encoder_dead = is_dead,
+                Self::BeamWireTorn(is_torn) => rolling.faults.beam_wire_torn = is_torn,
+                Self::EncoderDead(is_dead) => rolling.faults.encoder_dead = is_dead,
                 Self::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
                 Self::WeedShare(share) => sowing.weed_share = share,
             }
-            rolling.have_faults(*faults);
             trial.levels()
         })
     }
 }
 
 impl Kept {
-    /// Judges the things behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
+    /// Judges the canopies behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
     pub fn judge(&self) -> Result<Value, String> {
         with(|trial| json!(trial.judge(self)))
     }
@@ -216,7 +213,7 @@ impl Trial {
         let machine = &rolling.machine;
         let degrees = rolling.degrees();
         let across_mm = machine.across_mm(degrees);
-        let is_clear = degrees >= machine.servo.stroke_degrees() - machine.clear_within_degrees;
+        let is_clear = degrees >= machine.clear_degrees();
         let now = vec![
             rolling.place_mm(),
             rolling.tool_mm(),
@@ -233,10 +230,10 @@ impl Trial {
         put(NOW, now);
     }
 
-    /// Writes the newly sown things into their table.
+    /// Writes the newly sown canopies into their table.
     fn tell_sown(&mut self) {
         let Self { rolling, told, .. } = self;
-        let numbers = |thing: &Thing| [f64::from(thing.kind == Kind::Weed), thing.position_mm, thing.width_mm];
+        let numbers = |canopy: &Canopy| [f64::from(canopy.kind == Kind::Weed), canopy.position_mm, canopy.width_mm];
         put(SOWN, rolling.row[*told..].iter().flat_map(numbers).collect());
         *told = rolling.row.len();
     }
@@ -248,13 +245,13 @@ impl Trial {
 
     fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {
         let is_behind =
-            |thing: &Thing| thing.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
+            |canopy: &Canopy| canopy.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
         let behind = self.rolling.row.partition_point(is_behind);
         let first = std::mem::replace(&mut self.next, behind);
-        let (Some(things), true) = (self.rolling.row.get(first..behind), first < behind) else {
+        let (Some(canopies), true) = (self.rolling.row.get(first..behind), first < behind) else {
             return Vec::new();
         };
-        let Ok(row) = Row::new(things.to_vec()) else {
+        let Ok(row) = Row::new(canopies.to_vec()) else {
             return Vec::new();
         };
         let timing = Timing { margin_mm: kept.margin_mm, stem_zone_mm: kept.stem_zone_mm, ..Timing::default() };
@@ -263,9 +260,9 @@ impl Trial {
         let mut plants = judgement.plants.iter().map(|plant| plant.verdict);
         let mut weeds = judgement.weeds.iter().map(|weed| weed.cut);
         self.fates.resize(self.fates.len().max(behind), None);
-        let mut judged = Vec::with_capacity(things.len());
-        for (number, thing) in (first..).zip(things) {
-            let now = match thing.kind {
+        let mut judged = Vec::with_capacity(canopies.len());
+        for (number, canopy) in (first..).zip(canopies) {
+            let now = match canopy.kind {
                 Kind::Plant => plants.next().map(Fate::Plant),
                 Kind::Weed => weeds.next().map(Fate::Weed),
             };
@@ -277,7 +274,7 @@ impl Trial {
         judged
     }
 
-    /// Forgets the motion from before the tool came near the next thing to judge.
+    /// Forgets the motion from before the tool came near the next canopy to judge.
     fn forget(&mut self) {
         let tool_mm = self.rolling.tool_mm();
         let next_mm = self.rolling.row.get(self.next).map_or(tool_mm, |next| next.span_mm().start.min(tool_mm));

@@ -139,7 +139,7 @@ fn run_over(row: &Row, machine: &machine::Machine, rng: &mut ChaCha8Rng) -> Run 
     let start_mm = row.span_mm().start - HEADLAND_MM;
     let mut run = standing();
     let mut end_mm = 0;
-    for canopy in row.things() {
+    for canopy in row.canopies() {
         let span = canopy.span_mm();
         let [from, to] = [span.start, span.end].map(|mm| (mm - start_mm).round() as u32);
         run.row.push((from - end_mm, to - from));

@@ -3,8 +3,8 @@
 //! - [`run()`] lets the firmware weed the row of a [`Trial`]; [`firmware`] builds it. [`report`], [`picture`] and
 //!   [`animation`] show the [`Outcome`]. [`replay`] plays a recording to the firmware instead of a row.
 //! - [`console`] operates it as an operator would, and makes it a port for the [`link`].
-//! - [`live`] runs it in real time, at a serial port for other programs. A [`receiver`] on the machine has another
-//!   port.
+//! - [`live`] runs it in real time, at a serial port for other programs. A satellite receiver on the machine
+//!   has another port.
 //! - [`by_the_manual`] sets up and measures the simulated machine by the manual.
 //! - [`mod@bench`] counts cycles and bytes.
 //!
@@ -18,7 +18,6 @@ pub mod console;
 pub mod firmware;
 pub mod live;
 pub mod picture;
-pub mod receiver;
 pub mod replay;
 pub mod report;
 mod run;

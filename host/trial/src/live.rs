@@ -17,7 +17,6 @@
 //! - **The receiver.** A satellite receiver on the machine has its own pseudo terminal.
 //! - **EEPROM.** It is read from a file at the start, if there is one, and written to it after each change.
 
-use crate::receiver::{ReceiverSetup, SimulatedReceiver};
 use anyhow::{Context, Result, bail};
 use field::machine::{Machine, cycle_at, time_at_s};
 use field::motion::Motion;
@@ -36,8 +35,12 @@ use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
 
 pub mod rows;
 
+/// The bytes that a device on the machine sends until a time, in seconds since the Uno was powered up. Its second
+/// argument returns the metres travelled at a time.
+pub type Sender = Box<dyn FnMut(f64, &dyn Fn(f64) -> f64) -> Vec<u8> + Send>;
+
 /// The parts of the simulated set-up.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub struct Setup {
     /// The firmware's ELF. Without one, and with a bootloader, the rest of the flash is erased.
     pub elf: Option<PathBuf>,
@@ -48,7 +51,7 @@ pub struct Setup {
     /// Path of a symbolic link to the pseudo terminal.
     pub link: Option<PathBuf>,
     /// The satellite receiver on the machine, and the path of a symbolic link to its pseudo terminal.
-    pub receiver: Option<(ReceiverSetup, PathBuf)>,
+    pub receiver: Option<(Sender, PathBuf)>,
     /// The course of the machine. Without one, the machine stands.
     pub course: Option<Course>,
     /// Whether to run as fast as the host can, not in real time.
@@ -160,14 +163,14 @@ impl Way {
 
 /// The satellite receiver on the machine, and its terminal.
 struct Receiver {
-    simulated: SimulatedReceiver,
+    sends: Sender,
     pty: Pty,
     unread: VecDeque<u8>,
 }
 
 impl Receiver {
-    fn start((setup, link): (ReceiverSetup, PathBuf)) -> Result<Self> {
-        Ok(Self { simulated: SimulatedReceiver::new(setup), pty: terminal(Some(&link))?, unread: VecDeque::new() })
+    fn start((sends, link): (Sender, PathBuf)) -> Result<Self> {
+        Ok(Self { sends, pty: terminal(Some(&link))?, unread: VecDeque::new() })
     }
 
     /// Passes on its output until a cycle.
@@ -177,7 +180,7 @@ impl Receiver {
             self.unread.clear();
         }
         self.pty.read(&mut [0; MOST_BYTES_ON_THEIR_WAY])?;
-        self.unread.extend(self.simulated.bytes_until(time_at_s(0, cycle), |time_s| way.rolled_m(time_s)));
+        self.unread.extend((self.sends)(time_at_s(0, cycle), &|time_s| way.rolled_m(time_s)));
         give(&mut self.pty, &mut self.unread)
     }
 }

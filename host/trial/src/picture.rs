@@ -6,7 +6,7 @@ use drawing::{
     DOUBTFUL, LEFT_ALONE, Legend, MARK_SIZE, NOTE, PALE_INK, PAPER, PLANT, WEED, WEEDED, WRONG, document, line, paper,
     rectangle, swatch, tenth, words,
 };
-use field::row::{Kind, Row, Thing};
+use field::row::{Canopy, Kind, Row};
 use field::verdict::{Judgement, Verdict};
 use std::ops::Range;
 use svg::Document;
@@ -72,13 +72,13 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
             drawn = drawn.add(rectangle(x(from), y, x(to) - x(from), height, colour));
         }
     }
-    for thing in row.things().iter().filter(|thing| is_here(&thing.span_mm())) {
-        for block in thing.blocks_mm() {
+    for canopy in row.canopies().iter().filter(|canopy| is_here(&canopy.span_mm())) {
+        for block in canopy.blocks_mm() {
             let width = (x(block.end) - x(block.start)).max(2.0);
             drawn = drawn.add(rectangle(x(block.start), BEAM_Y, width, STRIP_HEIGHT, BEAM));
         }
-        if thing.kind == Kind::Weed {
-            let x = x(thing.position_mm);
+        if canopy.kind == Kind::Weed {
+            let x = x(canopy.position_mm);
             let weed = line(x, CANOPY_Y - 10.0, x, CANOPY_Y + CANOPY_HALF_HEIGHT, WEED);
             drawn = drawn.add(weed.set("stroke-width", 4));
         }
@@ -140,7 +140,7 @@ fn piece_within(from: (f64, f64), to: (f64, f64), ground: &Range<f64>) -> Option
     (first < 1.0 && last > 0.0).then_some((begin, end))
 }
 
-fn canopy(plant: &Thing, x: f64, verdict: Verdict) -> Group {
+fn canopy(plant: &Canopy, x: f64, verdict: Verdict) -> Group {
     let ellipse = Ellipse::new()
         .set("cx", tenth(x))
         .set("cy", CANOPY_Y)
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn a_long_row_is_broken_into_lanes() {
         let (_, outcome) = ruined_row();
-        let row = Row::new(vec![Thing::plant(0.0, 100.0), Thing::plant(6000.0, 100.0)]).unwrap();
+        let row = Row::new(vec![Canopy::plant(0.0, 100.0), Canopy::plant(6000.0, 100.0)]).unwrap();
         let drawn = draw(&row, &outcome.judgement).to_string();
         // 12 m of row: half a spacing beyond either plant.
         assert_eq!(drawn.matches("out 45°").count(), 5);

@@ -261,14 +261,14 @@ pub fn introduction(row: &row::Row, machine: &Machine, motion: &Motion) -> Strin
 pub(crate) mod tests {
     use super::*;
     use field::motion::mm_s;
-    use field::row::Thing;
+    use field::row::Canopy;
     use field::verdict::{Timing, judge};
     use uno::{CYCLES_PER_SECOND, Pulse};
 
     /// A trial in which the tool stayed in the row from one second on, and its outcome.
     pub fn ruined_row() -> (Trial, Outcome) {
         let row =
-            row::Row::new(vec![Thing::plant(500.0, 150.0), Thing::weed(750.0, 15.0), Thing::plant(1000.0, 150.0)])
+            row::Row::new(vec![Canopy::plant(500.0, 150.0), Canopy::weed(750.0, 15.0), Canopy::plant(1000.0, 150.0)])
                 .unwrap();
         let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(1.0));
         let frame = |rise, width_us: u64| Pulse { rise, fall: rise + width_us * CYCLES_PER_SECOND / 1_000_000 };

@@ -52,7 +52,7 @@ const READERS: [Reader; 11] = [
         |path| {
             let log = log::read(path)?;
             let job = Job::read(&log, &Wanted::default());
-            assert!(map::features(&[("log", &job)]).features.len() >= job.things().count());
+            assert!(map::features(&[("log", &job)]).features.len() >= job.events().count());
             picture::draw(&[&job], &picture::Words::default());
             replay::replay(&log)?;
             Ok(())

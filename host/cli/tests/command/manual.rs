@@ -8,7 +8,7 @@
 
 use field::machine::{Machine, cycle_at};
 use field::motion::Motion;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -305,7 +305,7 @@ fn roll(uno: &mut Uno, distance_mm: f64) {
     const SPEED_MM_S: f64 = 1000.0;
     const ACCELERATION_MM_S2: f64 = 2000.0;
     let machine = Machine { wheel_mm: 396.0, ..Machine::default() };
-    let row = Row::new(vec![Thing::plant(distance_mm / 2.0, 150.0)]).expect("a plant is a row");
+    let row = Row::new(vec![Canopy::plant(distance_mm / 2.0, 150.0)]).expect("a plant is a row");
     let motion =
         Motion::starting_at(0.0).change_speed(SPEED_MM_S, ACCELERATION_MM_S2).stop_at(distance_mm, ACCELERATION_MM_S2);
     let start_cycle = uno.cycle();

@@ -20,7 +20,7 @@ use field::machine::Machine;
 use field::motion::Motion;
 use field::native::{Sensors, TURN_S, beams_before};
 use field::planting::Planting;
-use field::row::{Kind, Row, Thing};
+use field::row::{Canopy, Kind, Row};
 use field::trial::Trial;
 use field::verdict::Timing;
 use rand::{Rng, RngExt, SeedableRng};
@@ -153,22 +153,22 @@ fn grow(crop: &Crop, spacing_mm: f64, headland_mm: f64, ragged: bool, rng: &mut 
         ragged,
     };
     let mut came_up = true;
-    let mut things = planting.grow(rng.random())?.things().to_vec();
-    things.retain(|_| {
+    let mut canopies = planting.grow(rng.random())?.canopies().to_vec();
+    canopies.retain(|_| {
         came_up = !came_up || !rng.random_bool(MISSING);
         came_up
     });
 
     let mut bare_from_mm = -headland_mm;
     let mut weeds = Vec::new();
-    for plant in &things {
+    for plant in &canopies {
         let bare_mm = bare_from_mm..plant.span_mm().start;
         let attempts = ((bare_mm.end - bare_mm.start) / 1000.0 * WEEDS_PER_METRE).round() as usize;
-        let mut taken = Vec::<Thing>::new();
+        let mut taken = Vec::<Canopy>::new();
         for _ in 0..attempts {
-            let weed = Thing::weed(rng.random_range(bare_mm.clone()), rng.random_range(crop.weed_widths_mm.clone()));
+            let weed = Canopy::weed(rng.random_range(bare_mm.clone()), rng.random_range(crop.weed_widths_mm.clone()));
             let ground = weed.span_mm().start - WEED_MARGIN_MM..weed.span_mm().end + WEED_MARGIN_MM;
-            let is_free = |other: &Thing| other.span_mm().end < ground.start || ground.end < other.span_mm().start;
+            let is_free = |other: &Canopy| other.span_mm().end < ground.start || ground.end < other.span_mm().start;
             if bare_mm.start <= ground.start && ground.end <= bare_mm.end && taken.iter().all(is_free) {
                 taken.push(weed);
             }
@@ -176,8 +176,8 @@ fn grow(crop: &Crop, spacing_mm: f64, headland_mm: f64, ragged: bool, rng: &mut 
         weeds.extend(taken);
         bare_from_mm = plant.span_mm().end;
     }
-    things.extend(weeds);
-    Ok(Row::new(things)?)
+    canopies.extend(weeds);
+    Ok(Row::new(canopies)?)
 }
 
 /// Records the features that the controller asks about, and answers with the true class. It can be taught nothing.
@@ -190,7 +190,7 @@ impl Classifier for &Recorder<'_> {
     fn classify(&self, features: &Features, _k: u8) -> Vote {
         let mut seen = self.seen.borrow_mut();
         // Surplus detections are an error at the end.
-        let kind = self.row.things().get(seen.len()).map_or(Kind::Plant, |thing| thing.kind);
+        let kind = self.row.canopies().get(seen.len()).map_or(Kind::Plant, |canopy| canopy.kind);
         seen.push(Labelled { features: *features, kind });
         let class = match kind {
             Kind::Plant => Class::Plant,
@@ -219,7 +219,7 @@ fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<
     drop(rig);
 
     let seen = recorder.seen.into_inner();
-    let planted = row.things().len();
+    let planted = row.canopies().len();
     ensure!(
         seen.len() == planted,
         "the beam saw {} objects on a row of {planted}: it has to see each as one",

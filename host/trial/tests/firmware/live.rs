@@ -1,7 +1,7 @@
 //! The live virtual Uno at its pseudo terminal, as other programs see it.
 
 use field::machine::Machine;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use field::wiring;
 use link::{Link, Status, try_port};
 use rand::{Rng, SeedableRng};
@@ -96,14 +96,14 @@ fn avrdude_writes_the_flash_through_the_old_bootloader_and_leaves_that_alone() {
 #[test]
 fn the_eeprom_is_kept_in_its_file_over_runs() {
     let folder = tempfile::tempdir().unwrap();
-    let setup = Setup { eeprom: Some(folder.path().join("uno.eeprom")), ..product() };
-    let uno = start(setup.clone());
+    let setup = || Setup { eeprom: Some(folder.path().join("uno.eeprom")), ..product() };
+    let uno = start(setup());
     let mut link = open(&uno);
     link.ask("set k 5").unwrap();
     link.ask("save").unwrap();
     drop((link, uno));
 
-    let uno = start(setup);
+    let uno = start(setup());
     let answer = open(&uno).ask("get k").unwrap();
     assert!(answer[0].starts_with("k=5 "), "{answer:?}");
 }
@@ -126,7 +126,7 @@ fn without_firmware_and_bootloader_there_is_nothing_to_run() {
 
 #[test]
 fn the_machine_rolls_along_its_row_and_stands_between() {
-    let row = Row::new(vec![Thing::plant(500.0, 150.0)]).unwrap();
+    let row = Row::new(vec![Canopy::plant(500.0, 150.0)]).unwrap();
     let course = Course::of_rows(vec![row], Machine::default(), 2000.0).pop();
     let uno = start(Setup { course, fast: true, ..product() });
     let mut link = open(&uno);

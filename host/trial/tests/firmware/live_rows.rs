@@ -3,7 +3,7 @@
 
 use field::machine::Machine;
 use field::planting::Planting;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use link::rows::{Heard, Hold, Opener, Rows, What};
 use link::session::Happening;
 use link::{EventLine, Link, Mode};
@@ -34,13 +34,10 @@ fn row(plants: usize, seed: u64) -> Row {
 }
 
 /// Setups of a machine with these rows.
-fn setups(rows: Vec<Row>, setup: &Setup) -> Vec<Setup> {
+fn setups(rows: Vec<Row>, fast: bool) -> Vec<Setup> {
+    let elf = firmware::build().expect("the firmware builds");
     let courses = Course::of_rows(rows, Machine::default(), SPEED_MM_S).into_iter();
-    courses.map(|course| Setup { course: Some(course), ..setup.clone() }).collect()
-}
-
-fn product() -> Setup {
-    Setup { elf: Some(firmware::build().expect("the firmware builds")), ..Setup::default() }
+    courses.map(|course| Setup { elf: Some(elf.clone()), course: Some(course), fast, ..Setup::default() }).collect()
 }
 
 /// The laptop's view of the rows.
@@ -132,9 +129,9 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
     let folder = tempfile::tempdir().expect("there is room for links");
     let mut rows: Vec<Row> = (1..=6).map(|seed| row(40, seed)).collect();
     // The beam of the third is broken over more ground than a plant has.
-    rows[2] = Row::new(vec![Thing::plant(0.0, 150.0), Thing::plant(1000.0, 900.0)]).expect("it is a row");
+    rows[2] = Row::new(vec![Canopy::plant(0.0, 150.0), Canopy::plant(1000.0, 900.0)]).expect("it is a row");
     let link = |number| Some(folder.path().join(format!("row{number}")));
-    let setups = setups(rows, &product()).into_iter().enumerate();
+    let setups = setups(rows, false).into_iter().enumerate();
     let setups = setups.map(|(number, setup)| Setup { link: link(number), ..setup }).collect();
     let machine = LiveRows::start(setups).expect("they start").run_in_background();
     let mut laptop = Laptop::open(&machine);
@@ -175,8 +172,7 @@ fn of_six_rows_in_real_time_one_that_is_lost_reset_or_in_alarm_disturbs_no_other
 
 #[test]
 fn twelve_rows_hold_at_once_however_slow_the_computer_is() {
-    let setup = Setup { fast: true, ..product() };
-    let machine = LiveRows::start(setups((1..=12).map(|seed| row(40, seed)).collect(), &setup)).expect("they start");
+    let machine = LiveRows::start(setups((1..=12).map(|seed| row(40, seed)).collect(), true)).expect("they start");
     let machine = machine.run_in_background();
     let mut laptop = Laptop::open(&machine);
     laptop.set_to_work();
@@ -190,8 +186,7 @@ fn twelve_rows_hold_at_once_however_slow_the_computer_is() {
 
 #[test]
 fn all_rows_count_the_same_ticks_of_the_wheel_that_they_share_and_each_sees_its_own_plants() {
-    let setup = Setup { fast: true, ..product() };
-    let mut machine = LiveRows::start(setups((1..=3).map(|seed| row(12, seed)).collect(), &setup)).expect("they start");
+    let mut machine = LiveRows::start(setups((1..=3).map(|seed| row(12, seed)).collect(), true)).expect("they start");
     let ran = machine.run(&AtomicBool::new(false), Some(Duration::from_secs(8)));
     let ran = ran.map_err(|(row, error)| format!("row {row}: {error}")).expect("they run");
     assert_eq!(ran.simulated, Duration::from_secs(8));

@@ -3,7 +3,7 @@
 use field::machine::Machine;
 use field::motion::Motion;
 use field::planting::Planting;
-use field::row::{Row, Thing};
+use field::row::{Canopy, Row};
 use link::log::{self, Entry, Kind, LogWriter};
 use link::replay::{Replayed, replay};
 use link::session::{Happening, Session};
@@ -22,14 +22,14 @@ use uno::Uno;
 
 /// Plants and a tall weed.
 fn row() -> Row {
-    let things = vec![
-        Thing::plant(600.0, 150.0),
-        Thing::weed(900.0, 15.0),
-        Thing::plant(1200.0, 140.0),
-        Thing::plant(1700.0, 160.0),
-        Thing::plant(2300.0, 150.0),
+    let canopies = vec![
+        Canopy::plant(600.0, 150.0),
+        Canopy::weed(900.0, 15.0),
+        Canopy::plant(1200.0, 140.0),
+        Canopy::plant(1700.0, 160.0),
+        Canopy::plant(2300.0, 150.0),
     ];
-    Row::new(things).expect("plants and a weed are a row")
+    Row::new(canopies).expect("plants and a weed are a row")
 }
 
 /// The log of a session in which the machine rolls along the row and is started by these commands. The link, the
@@ -254,8 +254,8 @@ fn start_now_over_unseen_ground_is_known_from_start() {
 
 #[test]
 fn an_alarm_of_the_beam_is_raised_again_and_the_rest_of_the_detection_is_cut() {
-    let things = vec![Thing::plant(600.0, 150.0), Thing::plant(1500.0, 700.0), Thing::plant(2300.0, 150.0)];
-    let row = Row::new(things).expect("plants are a row");
+    let canopies = vec![Canopy::plant(600.0, 150.0), Canopy::plant(1500.0, 700.0), Canopy::plant(2300.0, 150.0)];
+    let row = Row::new(canopies).expect("plants are a row");
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
     let log = logged(&row, &motion, &["start"]);
     assert!(log.iter().any(|entry| entry.text.starts_with("alarm code=1-1 name=beam_blocked")), "{log:#?}");

@@ -3,8 +3,9 @@
 
 use field::machine::Machine;
 use field::motion::Motion;
-use field::row::{Kind as Grown, Row, Thing};
-use gps::job::{self, Did, Job, What};
+use field::row::{Canopy, Kind as Grown, Row};
+use gps::job::{self, Did, EventKind, Job};
+use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
 use gps::summary::{Stand, Summary};
 use gps::track::{Basis, Missing, Offset};
 use gps::{Antenna, Recorder, Wanted};
@@ -16,7 +17,6 @@ use std::cell::Cell;
 use std::io::{self, Read, Write};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
-use trial::receiver::{ReceiverSetup, SimulatedReceiver, Trouble};
 use trial::{UnoPort, firmware};
 use uno::CYCLES_PER_SECOND;
 
@@ -33,11 +33,11 @@ const SETS_OFF: u64 = CYCLES_PER_SECOND;
 /// A row of 24 m with one plant missing, and a weed after every tenth plant.
 fn row() -> Row {
     let plants = (0..PLANTS).filter(|&plant| plant != MISSING);
-    let plants = plants.map(|plant| Thing::plant(600.0 + SPACING_MM * plant as f64, 148.0 + (plant % 5) as f64));
-    let weeds = (5..PLANTS).step_by(10).map(|plant| Thing::weed(600.0 + SPACING_MM * (plant as f64 + 0.5), 15.0));
-    let mut things: Vec<Thing> = plants.chain(weeds).collect();
-    things.sort_by(|one, other| one.position_mm.total_cmp(&other.position_mm));
-    Row::new(things).expect("plants and weeds are a row")
+    let plants = plants.map(|plant| Canopy::plant(600.0 + SPACING_MM * plant as f64, 148.0 + (plant % 5) as f64));
+    let weeds = (5..PLANTS).step_by(10).map(|plant| Canopy::weed(600.0 + SPACING_MM * (plant as f64 + 0.5), 15.0));
+    let mut canopies: Vec<Canopy> = plants.chain(weeds).collect();
+    canopies.sort_by(|one, other| one.position_mm.total_cmp(&other.position_mm));
+    Row::new(canopies).expect("plants and weeds are a row")
 }
 
 /// A port that also returns the Uno's time.
@@ -137,21 +137,21 @@ fn motion() -> Motion {
     Motion::steady(0.0, 500.0, 700.0, end_mm).change_speed(0.0, 500.0)
 }
 
-/// The position errors of the row's plants and weeds, in metres, and how each position was found. Each thing of the row
+/// The position errors of the row's plants and weeds, in metres, and how each position was found. Each canopy of the row
 /// is in the log.
 fn errors_m(job: &Job, row: &Row, setup: &ReceiverSetup) -> Vec<(f64, Basis)> {
     let truth = SimulatedReceiver::new(setup.clone());
-    let objects: Vec<_> = job.things().filter(|thing| matches!(thing.what, What::Object { .. })).collect();
-    assert_eq!(objects.len(), row.things().len());
-    let error = |(thing, object): (&Thing, &&job::Thing)| {
-        let place = truth.place(thing.position_mm / 1000.0, Offset::default());
+    let objects: Vec<_> = job.events().filter(|event| matches!(event.kind, EventKind::Detection { .. })).collect();
+    assert_eq!(objects.len(), row.canopies().len());
+    let error = |(canopy, object): (&Canopy, &&job::Event)| {
+        let place = truth.place(canopy.position_mm / 1000.0, Offset::default());
         // A plant behind a gap is unlike all examples, and is kept.
-        let is_weed = matches!(object.what, What::Object { class: Class::Weed, .. });
-        assert_eq!(is_weed, thing.kind == Grown::Weed, "{object:?}");
+        let is_weed = matches!(object.kind, EventKind::Detection { class: Class::Weed, .. });
+        assert_eq!(is_weed, canopy.kind == Grown::Weed, "{object:?}");
         let found = object.found.ok()?;
         Some((found.place.distance_m(place), found.basis))
     };
-    row.things().iter().zip(&objects).filter_map(error).collect()
+    row.canopies().iter().zip(&objects).filter_map(error).collect()
 }
 
 /// The most that the machine and its log add to the receiver's error, in metres. A status is logged some 10 ms late,
@@ -170,7 +170,7 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     assert_eq!(job.antenna, antenna);
 
     let errors = errors_m(&job, &row, &setup);
-    assert_eq!(errors.len(), row.things().len(), "all have places");
+    assert_eq!(errors.len(), row.canopies().len(), "all have places");
     let interpolated = errors.iter().filter(|(_, basis)| *basis == Basis::Interpolated).count();
     assert!((10..40).contains(&interpolated), "{interpolated}");
     // An error with normal distributions to the east and to the north exceeds four standard deviations once in 3000
@@ -192,12 +192,12 @@ fn places_come_back_within_the_receivers_error_through_outages_jumps_and_damaged
     let damaged = log.iter().filter(|entry| entry.kind == Kind::GpsDamaged).count() as u64;
     assert!(damaged > 2 && damaged == job.counts.damaged, "{damaged}");
     let replayed = replay(&log).expect("the log can be replayed");
-    assert_eq!((replayed.difference, replayed.objects), (None, row.things().len()));
+    assert_eq!((replayed.difference, replayed.objects), (None, row.canopies().len()));
 
     // The time is the receiver's, and the label has the detection's position.
-    let label = job.things().find(|thing| thing.what == What::Label(Class::Weed)).expect("it was labelled");
+    let label = job.events().find(|event| event.kind == EventKind::Label(Class::Weed)).expect("it was labelled");
     let weed =
-        job.things().find(|thing| (thing.distance_m - label.distance_m).abs() < 1e-9).expect("it is an object's");
+        job.events().find(|event| (event.distance_m - label.distance_m).abs() < 1e-9).expect("it is an object's");
     assert_eq!((weed.found, label.time_ms > weed.time_ms), (label.found, true));
     let utc_ms = job.midnight_ms.expect("RMC has a date") + label.found.expect("it has a place").utc_ms;
     assert!((30_000..60_000).contains(&(utc_ms - setup.began_ms)), "{utc_ms}");
@@ -246,9 +246,9 @@ fn a_receiver_that_is_unplugged_for_long_costs_places_and_no_line_of_the_machine
     assert!(errors_m(&far, &row, &setup).iter().any(|(_, basis)| *basis == Basis::Interpolated));
     assert_eq!((far.unplugged, far.counts.losses), (1, 1));
     let near = read(5.0);
-    let missing: Vec<_> = near.things().filter_map(|thing| thing.found.err()).collect();
+    let missing: Vec<_> = near.events().filter_map(|event| event.found.err()).collect();
     assert!(missing.len() > 15 && missing.iter().all(|why| *why == Missing::OutageTooLong), "{missing:?}");
-    assert_eq!(near.things().count(), far.things().count());
+    assert_eq!(near.events().count(), far.events().count());
     let replayed = replay(&log).expect("the log can be replayed");
-    assert_eq!((replayed.difference, replayed.objects), (None, row.things().len()));
+    assert_eq!((replayed.difference, replayed.objects), (None, row.canopies().len()));
 }

@@ -7,9 +7,10 @@
 //! The error of a real receiver drifts over minutes instead of changing from fix to fix. The model also leaves out that
 //! a machine sways and turns.
 
-use chrono::DateTime;
-use gps::plane::{Metres, Place, Plane};
-use gps::track::Offset;
+use crate::plane::{Metres, Place, Plane};
+use crate::sentence::{Quality, framed};
+use crate::track::Offset;
+use chrono::{DateTime, Utc};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -137,38 +138,63 @@ impl SimulatedReceiver {
             }
         }
         let utc_ms = self.setup.began_ms + (moment_s * 1000.0).round() as i64;
-        let moment = DateTime::from_timestamp_millis(utc_ms).unwrap_or_default();
-        let (clock, date) = (moment.format("%H%M%S%.3f"), moment.format("%d%m%y"));
-        if !has_fix {
-            return [format!("GNRMC,{clock},V,,,,,,,{date},,,N"), format!("GNGGA,{clock},,,,,0,00,99.9,,M,,M,,")];
-        }
-        let place = coordinates(self.plane.place(at));
-        let (mode, quality) = match self.setup.error_mm {
-            ..=50.0 => ('R', 4),
-            ..=400.0 => ('F', 5),
-            ..=1000.0 => ('D', 2),
-            _ => ('A', 1),
+        let quality = match self.setup.error_mm {
+            ..=50.0 => Quality::Rtk,
+            ..=400.0 => Quality::FloatRtk,
+            ..=1000.0 => Quality::Differential,
+            _ => Quality::Satellites,
         };
-        [
-            format!("GNRMC,{clock},A,{place},,,{date},,,{mode}"),
-            format!("GNGGA,{clock},{place},{quality},14,0.7,60.0,M,46.0,M,,"),
-        ]
+        let fix = has_fix.then(|| (self.plane.place(at), quality));
+        [rmc(utc_ms, fix), gga(utc_ms, fix)]
     }
 
     fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.noise)
     }
 
-    /// A sentence with its frame, as sent.
+    /// A sentence's line, as sent.
     fn sent(&mut self, text: String) -> Vec<u8> {
-        let checksum = text.bytes().fold(0, |sum, byte| sum ^ byte);
-        let mut bytes = format!("${text}*{checksum:02X}\r\n").into_bytes();
+        let mut bytes = framed(&text).into_bytes();
         let damaged = self.setup.trouble.as_ref().map_or(0.0, |trouble| trouble.damaged);
         if damaged > 0.0 && self.noise.random_bool(damaged) {
             let at = self.noise.random_range(0..text.len());
             bytes[at] ^= 1 << self.noise.random_range(0..7);
         }
+        bytes.extend(b"\r\n");
         bytes
+    }
+}
+
+/// The text of RMC for a moment, in milliseconds from 1970, UTC. `None` for a receiver without a fix.
+pub fn rmc(utc_ms: i64, fix: Option<(Place, Quality)>) -> String {
+    let moment = moment(utc_ms);
+    let (clock, date) = (moment.format(CLOCK), moment.format("%d%m%y"));
+    let Some((place, quality)) = fix else { return format!("GNRMC,{clock},V,,,,,,,{date},,,N") };
+    format!("GNRMC,{clock},A,{},,,{date},,,{}", coordinates(place), codes(quality).0)
+}
+
+/// The text of GGA, as [`rmc`].
+pub fn gga(utc_ms: i64, fix: Option<(Place, Quality)>) -> String {
+    let moment = moment(utc_ms);
+    let clock = moment.format(CLOCK);
+    let Some((place, quality)) = fix else { return format!("GNGGA,{clock},,,,,0,00,99.9,,M,,M,,") };
+    format!("GNGGA,{clock},{},{},14,0.7,60.0,M,46.0,M,,", coordinates(place), codes(quality).1)
+}
+
+/// The time of day in a sentence.
+const CLOCK: &str = "%H%M%S%.3f";
+
+fn moment(utc_ms: i64) -> DateTime<Utc> {
+    DateTime::from_timestamp_millis(utc_ms).unwrap_or_default()
+}
+
+/// The mode in RMC and the quality in GGA.
+fn codes(quality: Quality) -> (char, u8) {
+    match quality {
+        Quality::Satellites => ('A', 1),
+        Quality::Differential => ('D', 2),
+        Quality::FloatRtk => ('F', 5),
+        Quality::Rtk => ('R', 4),
     }
 }
 
