@@ -89,7 +89,7 @@ impl ScriptedBoard {
         self.typed.lock().expect("no test has panicked").clone()
     }
 
-    /// A port to it, which starts anew each time; `None` while it is unplugged.
+    /// A port to the board, which restarts at each opening; `None` while it is unplugged.
     pub fn open(&self) -> Option<impl Read + Write + use<>> {
         let is_there = |board: &Self| board.is_there.load(Ordering::Relaxed);
         let board = self.clone();
