@@ -292,12 +292,7 @@ impl Wheel {
     /// A wheel before the settings are loaded.
     pub const NONE: Self = Self { tick: 0, too_far: 0 };
 
-    /// A wheel from its encoder's counts a turn, 100 to 10,000, and its diameter, 200 to 800 mm.
-    pub const fn of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> Self {
-        Self::of_tick(Self::tick_of_diameter(ticks_per_rev, diameter_mm))
-    }
-
-    /// That wheel's tick in 2^-20 mm.
+    /// A tick in 2^-20 mm, from the encoder's counts a turn, 100 to 10,000, and the wheel's diameter, 200 to 800 mm.
     pub(crate) const fn tick_of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> u32 {
         let circumference = (((Self::PI_NUMERATOR * diameter_mm as u32) << 12) / Self::PI_DENOMINATOR) << 8;
         circumference / ticks_per_rev as u32
