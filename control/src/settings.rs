@@ -276,6 +276,16 @@ impl Settings {
         settings
     }
 
+    /// The factory settings with these changes, each within its range.
+    #[cfg(test)]
+    pub(crate) fn with(changes: &[(Setting, u16)]) -> Self {
+        let mut settings = Self::new();
+        for &(setting, value) in changes {
+            settings.set(setting, value).expect("within its range");
+        }
+        settings
+    }
+
     /// Restores factory settings.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn take_defaults(&mut self) {

@@ -219,7 +219,19 @@ mod tests {
         Example::new([number, 2, 3, 4, 5], number % 2)
     }
 
-    fn restart(store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
+    /// A store with examples of these numbers, all written.
+    fn holding(numbers: impl Iterator<Item = u8>) -> FieldExamples<Volatile> {
+        let mut store = store();
+        for number in numbers {
+            store.add(example(number)).unwrap();
+        }
+        while !store.carry_on() {}
+        store
+    }
+
+    /// The store after all is written and the power was off.
+    fn restart(mut store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
+        while !store.carry_on() {}
         init(store.into_memory().with_power())
     }
 
@@ -230,12 +242,10 @@ mod tests {
             assert_eq!(store.add(example(number)), Ok(number));
         }
         assert_eq!(store.add(example(99)), Err(example(99)), "a full store returns the example");
-        while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!(store.len(), usize::from(CAPACITY));
         assert!(store.forget(7));
         assert!(!store.forget(7) && !store.forget(CAPACITY));
-        while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!((store.slot(7), store.slot(8)), (None, Some(example(8))));
         assert_eq!(store.add(example(50)), Ok(7), "the free slot is used again");
@@ -245,18 +255,13 @@ mod tests {
     fn power_lost_at_any_byte_costs_at_most_the_example_being_written() {
         for power in 0..=SLOT {
             for forgetting in [false, true] {
-                let mut store = store();
-                for number in 0..4 {
-                    store.add(example(number)).unwrap();
-                }
-                while !store.carry_on() {}
+                let mut store = holding(0..4);
                 store.memory.lose_power_after(power);
                 if forgetting {
                     store.forget(2);
                 } else {
                     store.add(example(4)).unwrap();
                 }
-                while !store.carry_on() {}
                 let store = restart(store);
                 for number in [0, 1, 3] {
                     assert_eq!(store.slot(number), Some(example(number)), "{power} {forgetting}");
@@ -277,10 +282,7 @@ mod tests {
     fn a_flipped_bit_drops_its_example_and_is_counted() {
         for byte in 0..SLOT {
             for bit in 0..8 {
-                let mut store = store();
-                store.add(example(0)).unwrap();
-                store.add(example(1)).unwrap();
-                while !store.carry_on() {}
+                let mut store = holding(0..2);
                 store.memory.bytes[byte] ^= 1 << bit;
                 let store = restart(store);
                 assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (None, Some(example(1)), 1));
@@ -290,9 +292,7 @@ mod tests {
 
     #[test]
     fn an_example_of_another_scale_is_invalid() {
-        let mut store = store();
-        store.add(example(0)).unwrap();
-        while !store.carry_on() {}
+        let mut store = holding(0..1);
         let Example { features: [a, b, c, d, e], label } = example(0);
         let [low, high] = checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
         store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
@@ -318,7 +318,6 @@ mod tests {
         assert!(!store.carry_on(), "the first is being written");
         assert!(store.forget(0) && store.forget(1));
         assert_eq!(store.add(example(3)), Ok(0), "its slot is free, although bytes are still to be written");
-        while !store.carry_on() {}
         let store = restart(store);
         assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (Some(example(3)), None, 0));
     }
