@@ -80,7 +80,6 @@ pub enum Warning {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use std::vec::Vec;
 

@@ -181,6 +181,12 @@ impl Instant {
         Self(steps)
     }
 
+    /// The moment this many milliseconds after power-up.
+    #[cfg(test)]
+    pub(crate) const fn at_ms(milliseconds: u32) -> Self {
+        Self(Interval::from_ms(milliseconds).0)
+    }
+
     /// The clock's count at this moment.
     pub const fn steps(self) -> u32 {
         self.0

@@ -22,14 +22,11 @@ pub const SCALE: Scale<{ features::COUNT }> = Scale::new(table::RANGES);
 
 /// The ranges of [`SCALE`] as bytes, for the CRC of field examples.
 pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
-    let mut bytes = [0; 8 * features::COUNT];
-    let mut feature = 0;
-    while feature < features::COUNT {
-        let (_, behind) = bytes.split_at_mut(8 * feature);
-        let (lowest, behind) = behind.split_at_mut(4);
-        lowest.copy_from_slice(&table::RANGES[feature].lowest.to_le_bytes());
-        behind.split_at_mut(4).0.copy_from_slice(&table::RANGES[feature].highest.to_le_bytes());
-        feature += 1;
+    let (mut bytes, mut place) = ([0; 8 * features::COUNT], 0);
+    while place < bytes.len() {
+        let knn::Range { lowest, highest } = table::RANGES[place / 8];
+        bytes[place] = [lowest.to_le_bytes(), highest.to_le_bytes()][place % 8 / 4][place % 4];
+        place += 1;
     }
     bytes
 };
@@ -110,7 +107,6 @@ const fn greatest_common_divisor(one: usize, other: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::{
         ground::{

@@ -200,7 +200,6 @@ fn encode(example: Taught) -> [u8; SLOT] {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::memory::Volatile;
     use std::vec::Vec;

@@ -171,7 +171,6 @@ const _: () =
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::memory::Volatile;
     use std::vec::Vec;

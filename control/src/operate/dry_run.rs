@@ -54,7 +54,6 @@ impl DryRun {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use std::vec::Vec;
 

@@ -172,7 +172,6 @@ const fn address(copy: u8) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::memory::{ERASED, Volatile};
     use std::{format, vec::Vec};

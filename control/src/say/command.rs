@@ -322,7 +322,6 @@ impl LineBuffer {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use std::vec::Vec;
 
