@@ -202,7 +202,6 @@ fn encode(example: Taught) -> [u8; SLOT] {
 mod tests {
     use super::*;
     use crate::memory::Volatile;
-    use std::vec::Vec;
 
     fn store() -> FieldExamples<Volatile> {
         init(Volatile::new())
@@ -319,18 +318,5 @@ mod tests {
         assert_eq!(store.add(example(3)), Ok(0), "its slot is free, although bytes are still to be written");
         let store = restart(store);
         assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (Some(example(3)), None, 0));
-    }
-
-    #[test]
-    fn field_examples_are_searched_like_any_others() {
-        let mut store = store();
-        for number in 0..10 {
-            store.add(example(number)).unwrap();
-        }
-        store.forget(3);
-        let plain: Vec<_> = (0..10).filter(|&number| number != 3).map(example).collect();
-        let query = [4, 2, 3, 4, 9];
-        let answer = knn::classify::<{ features::COUNT }, 2>(&store, &query, 3, 1000);
-        assert_eq!(answer, knn::classify(&plain[..], &query, 3, 1000));
     }
 }
