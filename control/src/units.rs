@@ -27,7 +27,6 @@ impl Position {
     }
 
     /// Whether this position lies ahead of `other`.
-    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_ahead_of(self, other: Self) -> bool {
         (self - other).0 > 0
     }
@@ -304,12 +303,7 @@ impl Wheel {
         circumference / ticks_per_rev as u32
     }
 
-    /// A wheel from its calibrated counts a metre, 1 to 20,000.
-    pub const fn measured(ticks_per_m: u16) -> Self {
-        Self::of_tick(Self::tick_measured(ticks_per_m))
-    }
-
-    /// That wheel's tick in 2^-20 mm.
+    /// A tick in 2^-20 mm, from the calibrated counts a metre, 1 to 20,000.
     pub(crate) const fn tick_measured(ticks_per_m: u16) -> u32 {
         (1000 << 20) / ticks_per_m as u32
     }

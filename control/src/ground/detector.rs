@@ -164,7 +164,8 @@ mod tests {
         detector
     }
 
-    /// Rolls tick by tick through `positions`, counted from `base`, with the beam broken inside `canopies`. Collects the detections.
+    /// Rolls tick by tick through `positions`, counted from `base`, with the beam broken inside `canopies`. Collects the
+    /// detections.
     fn detections(base: i16, canopies: &[(i16, i16)], positions: &[i16]) -> Vec<(i16, i16)> {
         let broken_at = |position: i16| canopies.iter().any(|&(from, to)| (from..to).contains(&position));
         let mut detector = begun(base.wrapping_add(positions[0]), broken_at(positions[0]));
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_canopy_is_one_detection_however_ragged_it_is_and_however_often_it_is_passed() {
+    fn canopies_are_detections_if_a_gap_parts_them_however_often_the_machine_passes() {
         let ragged = [(100, 200), (215, 300), (339, 400)];
         let there_and_back: Vec<_> = (0..350).chain((50..350).rev()).chain(50..600).collect();
         let past_it: Vec<_> = (0..700).chain((0..700).rev()).chain(0..900).collect();
