@@ -17,26 +17,20 @@ pub const GAP_MARK: u8 = 0x1A;
 
 /// A command of the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the table of commands has the words of the others")]
 pub enum Command {
-    /// `help`.
     Help,
     /// `help name`.
     Explain(Setting),
-    /// `status`.
     Status,
-    /// `get`.
     GetAll,
     /// `get name`.
     Get(Setting),
     /// `set name value`.
     Set(Setting, u16),
-    /// `save`.
     Save,
-    /// `revert`.
     Revert,
-    /// `defaults`.
     Defaults,
-    /// `calibrate start`.
     CalibrateStart,
     /// `calibrate MM`, or `calibrate MM force`.
     Calibrate {
@@ -45,11 +39,8 @@ pub enum Command {
         /// Accepts any difference from the wheel's diameter.
         force: bool,
     },
-    /// `calibrate servo`.
     CalibrateServo,
-    /// `servo in`.
     ServoIn,
-    /// `servo out`.
     ServoOut,
     /// `servo US`, in microseconds.
     Servo(u16),
@@ -58,16 +49,13 @@ pub enum Command {
         /// The simulated speed, in mm/s.
         speed_mm_s: u16,
     },
-    /// `test watchdog`.
     TestWatchdog,
     /// `start`, or `start now`.
     Start {
         /// At once, also over unseen ground.
         now: bool,
     },
-    /// `hold`.
     Hold,
-    /// `clear`.
     Clear,
     /// `events on|off`.
     Events(bool),
@@ -84,15 +72,11 @@ pub enum Command {
     Feature(u8),
     /// `teach plant|weed`: the [`label`].
     Teach(u8),
-    /// `examples`.
     Examples,
     /// `forget N`.
     Forget(u8),
-    /// `forget all`.
     ForgetAll,
-    /// `dump`.
     Dump,
-    /// `version`.
     Version,
 }
 
