@@ -483,9 +483,9 @@ mod tests {
     const SPEED: TicksPerSecond = TicksPerSecond(1000);
 
     /// Classifies a detection as a plant.
-    fn keep(ground: &mut Ground, canopy: Detection) -> Result<(), ScheduleFull> {
+    fn keep(ground: &mut Ground, canopy: Detection) {
         ground.await_class(canopy, false);
-        ground.classified(Class::Plant)
+        ground.classified(Class::Plant).expect("there is room");
     }
 
     /// Rolls past a canopy and the gap behind it.
@@ -505,7 +505,7 @@ mod tests {
         ground.lead(&settings, SPEED, SPEED);
         let canopy = pass(&mut ground, 1000, 1300);
         assert_eq!((ground.spacing(&canopy), canopy.width()), (Ticks(1000), Length(300)));
-        keep(&mut ground, canopy).expect("there is room");
+        keep(&mut ground, canopy);
         (ground, settings)
     }
 
@@ -626,7 +626,7 @@ mod tests {
         let plants = 20;
         for leading in (0..plants).map(|plant| 1000 + 400 * plant) {
             let canopy = pass(&mut ground, leading, leading + 100);
-            keep(&mut ground, canopy).expect("there is room");
+            keep(&mut ground, canopy);
         }
         let end = 1000 + 400 * plants;
         let told = (0..end).rev().filter(|&position| {
@@ -643,7 +643,7 @@ mod tests {
             settings.set(Setting::GuardSpacingMm, 500).expect("within its range");
             ground.follow(&settings, Position::new(1400));
             let canopy = pass(&mut ground, 2000, 2300);
-            keep(&mut ground, canopy).expect("there is room");
+            keep(&mut ground, canopy);
             settings.set(setting, value).expect("within its range");
             ground.follow(&settings, Position::new(2400));
             assert_eq!(ground.roll_to(Position::new(3300)), None);
