@@ -77,17 +77,3 @@ pub enum Warning {
     /// Too many consecutive detections gave no slip: the stand is too dense for two beams, or the beams see differently.
     SlipUnknown,
 }
-
-#[cfg(test)]
-mod tests {
-    extern crate std;
-    use super::*;
-    use std::vec::Vec;
-
-    #[test]
-    fn codes_rise_in_order_with_digits_that_can_be_counted() {
-        let codes: Vec<u8> =
-            (0..).map_while(Alarm::from_index).map(Alarm::code).map(|(first, second)| 10 * first + second).collect();
-        assert_eq!(codes, [11, 12, 13, 14, 15, 21, 22, 23, 31, 32, 33, 34, 41, 51, 52, 61]);
-    }
-}

@@ -483,26 +483,29 @@ mod tests {
     const SPEED: TicksPerSecond = TicksPerSecond(1000);
 
     /// Classifies a detection as a plant.
-    fn keep(ground: &mut Ground, canopy: Detection) -> Result<(), ScheduleFull> {
+    fn keep(ground: &mut Ground, canopy: Detection) {
         ground.await_class(canopy, false);
-        ground.classified(Class::Plant)
+        ground.classified(Class::Plant).expect("there is room");
     }
 
-    /// Ground seen from 0 to 3000, with a canopy from 1000 to 1300, without leads.
+    /// Rolls past a canopy and the gap behind it.
+    fn pass(ground: &mut Ground, leading: i32, trailing: i32) -> Detection {
+        ground.edge(Position::new(leading), true);
+        ground.edge(Position::new(trailing), false);
+        ground.roll_to(Position::new(trailing + 100)).expect("the gap has been seen")
+    }
+
+    /// Ground seen from 0 to 1400, with a canopy from 1000 to 1300, without leads.
     fn ground() -> (Ground, Settings) {
-        let mut settings = Settings::new();
-        for setting in [Setting::LeadOutMs, Setting::LeadInMs, Setting::BeamResponseMs] {
-            settings.set(setting, 0).expect("within its range");
-        }
+        let leads = [Setting::LeadOutMs, Setting::LeadInMs, Setting::BeamResponseMs];
+        let settings = Settings::with(&leads.map(|lead| (lead, 0)));
         let mut ground = Ground::NONE;
         ground.follow(&settings, Position::new(0));
         ground.begin(Position::new(0), false);
         ground.lead(&settings, SPEED, SPEED);
-        ground.edge(Position::new(1000), true);
-        ground.edge(Position::new(1300), false);
-        let canopy = ground.roll_to(Position::new(1400)).expect("the gap has been seen");
+        let canopy = pass(&mut ground, 1000, 1300);
         assert_eq!((ground.spacing(&canopy), canopy.width()), (Ticks(1000), Length(300)));
-        keep(&mut ground, canopy).expect("there is room");
+        keep(&mut ground, canopy);
         (ground, settings)
     }
 
@@ -515,25 +518,6 @@ mod tests {
                 !ground.is_closed_at_tool()
             })
             .expect("somewhere the ground is open")
-    }
-
-    #[test]
-    fn an_unclassified_detection_keeps_its_full_width() {
-        for (class, trim) in [(Class::Plant, 38), (Class::Unknown, 0)] {
-            let (mut ground, mut settings) = ground();
-            settings.set(Setting::StemZoneMm, 100).expect("within its range");
-            ground.follow(&settings, Position::new(1400));
-            ground.await_class(
-                Detection {
-                    leading: WrappedPosition::new(1500),
-                    trailing: WrappedPosition::new(1800),
-                    ..Detection::NONE
-                },
-                false,
-            );
-            ground.classified(class).expect("there is room");
-            assert_eq!(opens(&mut ground, 1500), 1800 - trim + 95 + 1, "{class:?}");
-        }
     }
 
     #[test]
@@ -641,10 +625,8 @@ mod tests {
         ground.begin(Position::new(0), false);
         let plants = 20;
         for leading in (0..plants).map(|plant| 1000 + 400 * plant) {
-            ground.edge(Position::new(leading), true);
-            ground.edge(Position::new(leading + 100), false);
-            let canopy = ground.roll_to(Position::new(leading + 200)).expect("the gap has been seen");
-            keep(&mut ground, canopy).expect("there is room");
+            let canopy = pass(&mut ground, leading, leading + 100);
+            keep(&mut ground, canopy);
         }
         let end = 1000 + 400 * plants;
         let told = (0..end).rev().filter(|&position| {
@@ -660,10 +642,8 @@ mod tests {
             let (mut ground, mut settings) = ground();
             settings.set(Setting::GuardSpacingMm, 500).expect("within its range");
             ground.follow(&settings, Position::new(1400));
-            ground.edge(Position::new(2000), true);
-            ground.edge(Position::new(2300), false);
-            let canopy = ground.roll_to(Position::new(2400)).expect("the gap has been seen");
-            keep(&mut ground, canopy).expect("there is room");
+            let canopy = pass(&mut ground, 2000, 2300);
+            keep(&mut ground, canopy);
             settings.set(setting, value).expect("within its range");
             ground.follow(&settings, Position::new(2400));
             assert_eq!(ground.roll_to(Position::new(3300)), None);
@@ -691,9 +671,7 @@ mod tests {
         for position in (1400..200_000).step_by(50) {
             ground.roll_to(Position::new(position));
         }
-        ground.edge(Position::new(200_000), true);
-        ground.edge(Position::new(200_300), false);
-        let canopy = ground.roll_to(Position::new(200_400)).expect("the gap has been seen");
+        let canopy = pass(&mut ground, 200_000, 200_300);
         assert!((14_800..15_280).contains(&ground.spacing(&canopy).0), "{:?}", ground.spacing(&canopy));
     }
 }

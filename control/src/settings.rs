@@ -27,6 +27,7 @@ macro_rules! settings {
         /// A setting.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
+        #[expect(missing_docs, reason = "the help texts say what each is")]
         pub enum Setting {
             $($(#[$doc])* $Variant,)*
         }
@@ -64,22 +65,17 @@ macro_rules! settings {
 }
 
 settings! {
-    /// Encoder counts a turn of the ground wheel.
     TicksPerRev "ticks_per_rev": 600 to 10000, 2400, true,
         "encoder counts a wheel turn";
-    /// Diameter of the ground wheel.
     WheelMm "wheel_mm" in "mm": 200 to 800, 400, true,
         "wheel diameter";
-    /// Encoder counts a metre, from calibration; 0 before it.
     TicksPerM "ticks_per_m": 0 to 20000, 0, true,
         "encoder counts a metre, calibrated; 0 not yet";
-    /// X: distance from the tool to the beam.
     BeamToToolMm "beam_to_tool_mm" in "mm": 100 to 2000, 400, true,
         "X, from the tool to the beam";
     /// Distance from the first beam to a second one behind it; 0 for none.
     SecondBeamMm "second_beam_mm" in "mm": 0 to 900, 0, true,
         "from the beam to a second beam; 0 none";
-    /// Ground kept clear of the tool on both sides of a canopy.
     MarginMm "margin_mm" in "mm": 0 to 200, 50, true,
         "kept on both sides of a canopy";
     /// Width kept around the middle of a single plant's canopy; 0 for the whole canopy.
@@ -89,49 +85,36 @@ settings! {
     /// stroke. It has 80 ms dead time, 144 ms for 45 degrees against the soil, and 6 ms for the running pulse.
     LeadOutMs "lead_out_ms" in "ms": 0 to 500, 230, false,
         "longest time until the tool is out";
-    /// Shortest time from the command until the tool begins to come back.
     LeadInMs "lead_in_ms" in "ms": 0 to 500, 40, false,
         "shortest time until the tool starts back";
-    /// Pulse for the tool in the row.
     ServoInUs "servo_in_us" in "us": 500 to 2500, 1500, true,
         "servo pulse, tool in the row";
-    /// Pulse for the tool out of the row.
     ServoOutUs "servo_out_us" in "us": 500 to 2500, 2000, true,
         "servo pulse, tool out of the row";
-    /// Shortest gap between two servo pulses.
     ServoGapMs "servo_gap_ms" in "ms": 0 to 15, 3, false,
         "shortest gap between servo pulses; 0 is 50 Hz";
-    /// Examples that vote.
     K "k": 1 to 15, 3, false,
         "nearest examples that vote";
-    /// Narrower detections are dust; 0 for none.
     MinWidthMm "min_width_mm" in "mm": 0 to 100, 0, false,
         "narrower objects are dust; 0 none";
     /// Consecutive narrow detections without a plant that raise an alarm; 0 for never.
     MisfitAfter "misfit_after": 0 to 100, 5, false,
         "alarm at so many narrow objects in a row; 0 never";
-    /// Longest stretch with a broken beam before an alarm.
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
         "alarm where an object is wider";
-    /// Shorter gaps belong to the canopy.
     MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
         "shorter gaps belong to the canopy";
-    /// Planting distance, for guarding missed plants; 0 turns it off.
     GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,
         "planting distance, keeps unseen plants; 0 off";
-    /// How far a missed plant may stand from its expected place.
     GuardScatterMm "guard_scatter_mm" in "mm": 0 to 200, 30, false,
         "how far off it an unseen plant may stand";
-    /// The sensor's response time.
     BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
         "time the beam takes to answer";
     /// Highest speed for work. With the default lead and margin, the default beam allows 1330 mm/s.
     TopSpeedMmS "top_speed_mm_s" in "mm/s": 100 to 3000, 1300, false,
         "alarm where work is faster";
-    /// Distance without a plant before a warning; 0 for never.
     NoPlantM "no_plant_m" in "m": 0 to 100, 10, false,
         "warning after so far without a plant; 0 never";
-    /// Whether an end switch on D5 closes with the tool out.
     EndSwitch "end_switch": 0 to 1, 0, false,
         "switch on D5 closes with the tool out";
 }
@@ -273,6 +256,16 @@ impl Settings {
     pub fn new() -> Self {
         let mut settings = Self::NONE;
         settings.take_defaults();
+        settings
+    }
+
+    /// The factory settings with these changes, each within its range.
+    #[cfg(test)]
+    pub(crate) fn with(changes: &[(Setting, u16)]) -> Self {
+        let mut settings = Self::new();
+        for &(setting, value) in changes {
+            settings.set(setting, value).expect("within its range");
+        }
         settings
     }
 

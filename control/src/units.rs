@@ -27,7 +27,6 @@ impl Position {
     }
 
     /// Whether this position lies ahead of `other`.
-    #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_ahead_of(self, other: Self) -> bool {
         (self - other).0 > 0
     }
@@ -181,6 +180,12 @@ impl Instant {
         Self(steps)
     }
 
+    /// The moment this many milliseconds after power-up.
+    #[cfg(test)]
+    pub(crate) const fn at_ms(milliseconds: u32) -> Self {
+        Self(Interval::from_ms(milliseconds).0)
+    }
+
     /// The clock's count at this moment.
     pub const fn steps(self) -> u32 {
         self.0
@@ -292,23 +297,13 @@ impl Wheel {
     /// A wheel before the settings are loaded.
     pub const NONE: Self = Self { tick: 0, too_far: 0 };
 
-    /// A wheel from its encoder's counts a turn, 100 to 10,000, and its diameter, 200 to 800 mm.
-    pub const fn of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> Self {
-        Self::of_tick(Self::tick_of_diameter(ticks_per_rev, diameter_mm))
-    }
-
-    /// That wheel's tick in 2^-20 mm.
+    /// A tick in 2^-20 mm, from the encoder's counts a turn, 100 to 10,000, and the wheel's diameter, 200 to 800 mm.
     pub(crate) const fn tick_of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> u32 {
         let circumference = (((Self::PI_NUMERATOR * diameter_mm as u32) << 12) / Self::PI_DENOMINATOR) << 8;
         circumference / ticks_per_rev as u32
     }
 
-    /// A wheel from its calibrated counts a metre, 1 to 20,000.
-    pub const fn measured(ticks_per_m: u16) -> Self {
-        Self::of_tick(Self::tick_measured(ticks_per_m))
-    }
-
-    /// That wheel's tick in 2^-20 mm.
+    /// A tick in 2^-20 mm, from the calibrated counts a metre, 1 to 20,000.
     pub(crate) const fn tick_measured(ticks_per_m: u16) -> u32 {
         (1000 << 20) / ticks_per_m as u32
     }

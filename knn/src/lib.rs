@@ -7,6 +7,7 @@
 //! flash, EEPROM or SRAM behind the trait [`Examples`], and several stores are searched as one. A [`Table`] in SRAM takes new
 //! examples at run time. [`classify`] finds the k nearest and counts their votes. The answer says whether it is [`Kind::Known`], a
 //! [`Kind::Tie`] or a [`Kind::Stranger`]. If k does not fit the examples, it is an error, never a class.
+//! [`classify`] has the rules of the vote.
 //!
 //! ```
 //! use knn::{Answer, Example, Kind, Range, Scale, Table, classify};
@@ -25,13 +26,6 @@
 //! assert_eq!((answer.label, answer.kind), (0, Kind::Known));
 //! # Ok::<(), knn::ClassifyError>(())
 //! ```
-//!
-//! # Rules
-//!
-//! - All examples as far as the k-th nearest vote, so that their order never changes the answer.
-//! - Each vote counts one. Equal votes are a tie. The answer then names the class with the nearest example, among these the
-//!   smallest label.
-//! - If the nearest example is beyond the radius, the answer is a stranger, with any votes.
 //!
 //! # Costs
 //!

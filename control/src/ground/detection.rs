@@ -17,6 +17,12 @@ impl Detection {
     /// No detection.
     pub const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), cut: false };
 
+    /// A detection whose beginning was seen.
+    #[cfg(test)]
+    pub(super) const fn whole(leading: i16, trailing: i16) -> Self {
+        Self { leading: WrappedPosition::new(leading), trailing: WrappedPosition::new(trailing), cut: false }
+    }
+
     /// An empty detection at the border of unseen ground: a plant there may reach into seen ground.
     pub(super) const fn cut_at(position: WrappedPosition) -> Self {
         Self { leading: position, trailing: position, cut: true }

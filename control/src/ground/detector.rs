@@ -153,7 +153,6 @@ impl Detector {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use std::vec::Vec;
 
@@ -165,51 +164,46 @@ mod tests {
         detector
     }
 
-    /// Rolls tick by tick through `positions`, with the beam broken inside `canopies`, and collects the detections.
-    fn detections(canopies: &[(i16, i16)], positions: impl IntoIterator<Item = i16>) -> Vec<(i16, i16)> {
+    /// Rolls tick by tick through `positions`, counted from `base`, with the beam broken inside `canopies`. Collects the
+    /// detections.
+    fn detections(base: i16, canopies: &[(i16, i16)], positions: &[i16]) -> Vec<(i16, i16)> {
         let broken_at = |position: i16| canopies.iter().any(|&(from, to)| (from..to).contains(&position));
-        let mut positions = positions.into_iter();
-        let first = positions.next().expect("a position to start from");
-        let mut detector = begun(first, broken_at(first));
+        let mut detector = begun(base.wrapping_add(positions[0]), broken_at(positions[0]));
         let mut found = Vec::new();
-        for position in positions {
-            let ground = WrappedPosition::new(position);
+        for &position in &positions[1..] {
+            let ground = WrappedPosition::new(base.wrapping_add(position));
             found.extend(if broken_at(position) == detector.is_broken() {
                 detector.roll_to(ground, GAP)
             } else {
                 detector.edge(ground, broken_at(position), GAP)
             });
         }
-        found.into_iter().map(|detection| (detection.leading.count(), detection.trailing.count())).collect()
+        let offset = |end: WrappedPosition| end.count().wrapping_sub(base);
+        found.into_iter().map(|detection| (offset(detection.leading), offset(detection.trailing))).collect()
     }
 
     #[test]
-    fn a_canopy_is_one_detection_from_edge_to_edge() {
-        assert_eq!(detections(&[(100, 400)], 0..600), [(100, 400)]);
-    }
-
-    #[test]
-    fn a_ragged_canopy_is_one_detection() {
-        assert_eq!(detections(&[(100, 200), (215, 300), (339, 400)], 0..600), [(100, 400)]);
-    }
-
-    #[test]
-    fn two_canopies_a_gap_apart_are_two_detections() {
-        assert_eq!(detections(&[(100, 200), (240, 300)], 0..600), [(100, 200), (240, 300)]);
-    }
-
-    #[test]
-    fn a_detection_is_complete_only_once_the_gap_behind_it_has_been_seen() {
-        assert_eq!(detections(&[(100, 200)], 0..240), []);
-        assert_eq!(detections(&[(100, 200)], 0..241), [(100, 200)]);
-    }
-
-    #[test]
-    fn a_plant_passed_three_times_is_one_detection() {
-        let there_and_back = (0..350).chain((50..350).rev()).chain(50..600);
-        assert_eq!(detections(&[(100, 400)], there_and_back), [(100, 400)]);
-        let past_it = (0..700).chain((0..700).rev()).chain(0..900);
-        assert_eq!(detections(&[(100, 400)], past_it), [(100, 400)]);
+    fn canopies_are_detections_if_a_gap_parts_them_however_often_the_machine_passes() {
+        let ragged = [(100, 200), (215, 300), (339, 400)];
+        let there_and_back: Vec<_> = (0..350).chain((50..350).rev()).chain(50..600).collect();
+        let past_it: Vec<_> = (0..700).chain((0..700).rev()).chain(0..900).collect();
+        let to = |end: i16| (0..end).collect::<Vec<_>>();
+        for (canopies, positions, expected) in [
+            (&[][..], to(200), &[][..]),
+            (&[(100, 400)], to(600), &[(100, 400)]),
+            (&ragged, to(600), &[(100, 400)]),
+            (&[(100, 200), (240, 300)], to(600), &[(100, 200), (240, 300)]),
+            // It is complete only once the gap behind it has been seen.
+            (&[(100, 200)], to(240), &[]),
+            (&[(100, 200)], to(241), &[(100, 200)]),
+            (&[(100, 400)], there_and_back, &[(100, 400)]),
+            (&[(100, 400)], past_it, &[(100, 400)]),
+        ] {
+            // The counter wraps inside the canopy, or does not.
+            for base in [0, i16::MAX - 250] {
+                assert_eq!(detections(base, canopies, &positions), expected, "{canopies:?} from {base}");
+            }
+        }
     }
 
     #[test]
@@ -242,6 +236,7 @@ mod tests {
     #[test]
     fn a_plant_that_comes_into_the_beam_behind_the_frontier_begins_at_the_frontier() {
         let mut detector = begun(0, false);
+        assert_eq!(detector.open(), None);
         detector.roll_to(WrappedPosition::new(500), GAP);
         detector.edge(WrappedPosition::new(450), true, GAP);
         assert_eq!(detector.open(), None, "edges behind the frontier are ignored");
@@ -259,11 +254,7 @@ mod tests {
     #[test]
     fn a_detection_without_a_whole_gap_before_it_is_cut() {
         for clear in 0..80 {
-            let whole = Detection {
-                leading: WrappedPosition::new(clear),
-                trailing: WrappedPosition::new(clear + 100),
-                ..Detection::NONE
-            };
+            let whole = Detection::whole(clear, clear + 100);
             let rest = Detection { leading: WrappedPosition::new(0), cut: true, ..whole };
             let expected = if clear < GAP.0 { rest } else { whole };
             assert_eq!(first_detection(begun(0, false), clear), expected);
@@ -296,26 +287,5 @@ mod tests {
                 assert_eq!((rest.leading, rest.trailing), (WrappedPosition::new(700), WrappedPosition::new(720)));
             }
         }
-    }
-
-    #[test]
-    fn clear_ground_is_no_detection() {
-        let mut detector = begun(0, false);
-        assert_eq!(detector.open(), None);
-        for position in 1..200 {
-            assert_eq!(detector.roll_to(WrappedPosition::new(position), GAP), None);
-        }
-    }
-
-    #[test]
-    fn detections_are_the_same_where_the_counter_wraps() {
-        let base = i16::MAX - 250;
-        let mut detector = begun(base, false);
-        let at = |offset: i16| WrappedPosition::new(base.wrapping_add(offset));
-        assert_eq!(detector.edge(at(100), true, GAP), None);
-        assert_eq!(detector.edge(at(400), false, GAP), None);
-        let detection = detector.roll_to(at(440), GAP).expect("the gap has been seen");
-        assert_eq!((detection.leading, detection.trailing), (at(100), at(400)));
-        assert_eq!(detection.width(), Length(300));
     }
 }

@@ -22,14 +22,11 @@ pub const SCALE: Scale<{ features::COUNT }> = Scale::new(table::RANGES);
 
 /// The ranges of [`SCALE`] as bytes, for the CRC of field examples.
 pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
-    let mut bytes = [0; 8 * features::COUNT];
-    let mut feature = 0;
-    while feature < features::COUNT {
-        let (_, behind) = bytes.split_at_mut(8 * feature);
-        let (lowest, behind) = behind.split_at_mut(4);
-        lowest.copy_from_slice(&table::RANGES[feature].lowest.to_le_bytes());
-        behind.split_at_mut(4).0.copy_from_slice(&table::RANGES[feature].highest.to_le_bytes());
-        feature += 1;
+    let (mut bytes, mut place) = ([0; 8 * features::COUNT], 0);
+    while place < bytes.len() {
+        let knn::Range { lowest, highest } = table::RANGES[place / 8];
+        bytes[place] = [lowest.to_le_bytes(), highest.to_le_bytes()][place % 8 / 4][place % 4];
+        place += 1;
     }
     bytes
 };
@@ -110,7 +107,6 @@ const fn greatest_common_divisor(one: usize, other: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::{
         ground::{
@@ -124,10 +120,21 @@ mod tests {
     use knn::Neighbour;
     use std::vec::Vec;
 
-    fn class(speed: i16, spacing_mm: i16, width_mm: i16) -> Class {
-        Nearest::new(EXAMPLES, Volatile::new())
-            .classify(&Features::describe(speed, spacing_mm, width_mm), table::K)
-            .class
+    /// Checks the class of each canopy at each speed.
+    fn check_classes(
+        widths_mm: impl Iterator<Item = i16> + Clone,
+        spacings_mm: impl Iterator<Item = i16> + Clone,
+        is_right: impl Fn(Class) -> bool,
+    ) {
+        let nearest = Nearest::new(EXAMPLES, Volatile::new());
+        for speed in SPEED_CLASSES_MM_S {
+            for width_mm in widths_mm.clone() {
+                for spacing_mm in spacings_mm.clone() {
+                    let class = nearest.classify(&Features::describe(speed, spacing_mm, width_mm), table::K).class;
+                    assert!(is_right(class), "{class:?}: {speed} {spacing_mm} {width_mm}");
+                }
+            }
+        }
     }
 
     #[test]
@@ -159,35 +166,18 @@ mod tests {
 
     #[test]
     fn plants_of_every_canopy_at_every_speed_are_plants() {
-        for speed in SPEED_CLASSES_MM_S {
-            for width_mm in 95..=190 {
-                for spacing_mm in (470..=1240).step_by(10) {
-                    assert_ne!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
-                }
-            }
-        }
+        check_classes(95..=190, (470..=1240).step_by(10), |class| class != Class::Weed);
     }
 
     #[test]
     fn tall_weeds_between_the_plants_are_weeds() {
-        for speed in SPEED_CLASSES_MM_S {
-            for width_mm in 12..=20 {
-                for spacing_mm in 60..=700 {
-                    assert_eq!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
-                }
-            }
-        }
+        check_classes(12..=20, 60..=700, |class| class == Class::Weed);
     }
 
     #[test]
     fn a_detection_unlike_both_classes_is_never_a_weed() {
-        for speed in SPEED_CLASSES_MM_S {
-            for width_mm in (35..=90).chain([250, 400, 1000, 30_000]) {
-                for spacing_mm in (0..=2000).step_by(5) {
-                    assert_ne!(class(speed, spacing_mm, width_mm), Class::Weed, "{speed} {spacing_mm} {width_mm}");
-                }
-            }
-        }
+        let widths_mm = (35..=90).chain([250, 400, 1000, 30_000]);
+        check_classes(widths_mm, (0..=2000).step_by(5), |class| class != Class::Weed);
     }
 
     #[test]

@@ -134,11 +134,6 @@ impl<M: Memory> FieldExamples<M> {
         self.examples.get(..self.used.into()).unwrap_or(&self.examples)
     }
 
-    /// The memory, for a test or another machine.
-    pub fn into_memory(self) -> M {
-        self.memory
-    }
-
     /// The byte that holds a slot's pending bit.
     fn pending(&mut self, number: u8) -> &mut u8 {
         &mut self.pending[usize::from(number / 8)]
@@ -200,10 +195,8 @@ fn encode(example: Taught) -> [u8; SLOT] {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::memory::Volatile;
-    use std::vec::Vec;
 
     fn store() -> FieldExamples<Volatile> {
         init(Volatile::new())
@@ -219,8 +212,20 @@ mod tests {
         Example::new([number, 2, 3, 4, 5], number % 2)
     }
 
-    fn restart(store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
-        init(store.into_memory().with_power())
+    /// A store with examples of these numbers, all written.
+    fn holding(numbers: impl Iterator<Item = u8>) -> FieldExamples<Volatile> {
+        let mut store = store();
+        for number in numbers {
+            store.add(example(number)).unwrap();
+        }
+        while !store.carry_on() {}
+        store
+    }
+
+    /// The store after all is written and the power was off.
+    fn restart(mut store: FieldExamples<Volatile>) -> FieldExamples<Volatile> {
+        while !store.carry_on() {}
+        init(store.memory.with_power())
     }
 
     #[test]
@@ -230,12 +235,10 @@ mod tests {
             assert_eq!(store.add(example(number)), Ok(number));
         }
         assert_eq!(store.add(example(99)), Err(example(99)), "a full store returns the example");
-        while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!(store.len(), usize::from(CAPACITY));
         assert!(store.forget(7));
         assert!(!store.forget(7) && !store.forget(CAPACITY));
-        while !store.carry_on() {}
         let mut store = restart(store);
         assert_eq!((store.slot(7), store.slot(8)), (None, Some(example(8))));
         assert_eq!(store.add(example(50)), Ok(7), "the free slot is used again");
@@ -245,18 +248,13 @@ mod tests {
     fn power_lost_at_any_byte_costs_at_most_the_example_being_written() {
         for power in 0..=SLOT {
             for forgetting in [false, true] {
-                let mut store = store();
-                for number in 0..4 {
-                    store.add(example(number)).unwrap();
-                }
-                while !store.carry_on() {}
+                let mut store = holding(0..4);
                 store.memory.lose_power_after(power);
                 if forgetting {
                     store.forget(2);
                 } else {
                     store.add(example(4)).unwrap();
                 }
-                while !store.carry_on() {}
                 let store = restart(store);
                 for number in [0, 1, 3] {
                     assert_eq!(store.slot(number), Some(example(number)), "{power} {forgetting}");
@@ -277,10 +275,7 @@ mod tests {
     fn a_flipped_bit_drops_its_example_and_is_counted() {
         for byte in 0..SLOT {
             for bit in 0..8 {
-                let mut store = store();
-                store.add(example(0)).unwrap();
-                store.add(example(1)).unwrap();
-                while !store.carry_on() {}
+                let mut store = holding(0..2);
                 store.memory.bytes[byte] ^= 1 << bit;
                 let store = restart(store);
                 assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (None, Some(example(1)), 1));
@@ -289,24 +284,16 @@ mod tests {
     }
 
     #[test]
-    fn an_example_of_another_scale_is_invalid() {
-        let mut store = store();
-        store.add(example(0)).unwrap();
-        while !store.carry_on() {}
-        let Example { features: [a, b, c, d, e], label } = example(0);
-        let [low, high] = checksum(&[a, b, c, d, e, label, !SCALE_MARK[0], SCALE_MARK[1]]).to_le_bytes();
-        store.memory.bytes[6..SLOT].copy_from_slice(&[low, high]);
-        let store = restart(store);
-        assert_eq!((store.slot(0), store.spoiled()), (None, 1));
-    }
-
-    #[test]
-    fn an_example_with_an_unknown_label_is_invalid() {
-        for label in [label::COUNT as u8, VACANT] {
+    fn an_example_of_another_scale_or_with_an_unknown_label_is_invalid() {
+        let encoded = |label| encode(Example::new([1, 2, 3, 4, 5], label));
+        let check = checksum(&[1, 2, 3, 4, 5, 0, !SCALE_MARK[0], SCALE_MARK[1]]);
+        let mut of_another_scale = encoded(0);
+        of_another_scale[6..].copy_from_slice(&check.to_le_bytes());
+        for slot in [of_another_scale, encoded(label::COUNT as u8), encoded(VACANT)] {
             let mut memory = Volatile::new();
-            memory.bytes[..SLOT].copy_from_slice(&encode(Example::new([1, 2, 3, 4, 5], label)));
+            memory.bytes[..SLOT].copy_from_slice(&slot);
             let store = init(memory);
-            assert_eq!((store.slot(0), store.len(), store.spoiled()), (None, 0, 1), "{label}");
+            assert_eq!((store.slot(0), store.len(), store.spoiled()), (None, 0, 1), "{slot:?}");
         }
     }
 
@@ -318,21 +305,7 @@ mod tests {
         assert!(!store.carry_on(), "the first is being written");
         assert!(store.forget(0) && store.forget(1));
         assert_eq!(store.add(example(3)), Ok(0), "its slot is free, although bytes are still to be written");
-        while !store.carry_on() {}
         let store = restart(store);
         assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (Some(example(3)), None, 0));
-    }
-
-    #[test]
-    fn field_examples_are_searched_like_any_others() {
-        let mut store = store();
-        for number in 0..10 {
-            store.add(example(number)).unwrap();
-        }
-        store.forget(3);
-        let plain: Vec<_> = (0..10).filter(|&number| number != 3).map(example).collect();
-        let query = [4, 2, 3, 4, 9];
-        let answer = knn::classify::<{ features::COUNT }, 2>(&store, &query, 3, 1000);
-        assert_eq!(answer, knn::classify(&plain[..], &query, 3, 1000));
     }
 }

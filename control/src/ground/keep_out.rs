@@ -243,30 +243,33 @@ mod tests {
     }
 
     #[test]
-    fn a_zone_reaches_from_margin_to_margin() {
-        let mut keep_out = KeepOut::new(WrappedPosition::new(-1000));
-        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
-        assert!(!closed(&keep_out, 904, 904));
-        assert!(closed(&keep_out, 905, 905));
-        assert!(closed(&keep_out, 1395, 1395));
-        assert!(!closed(&keep_out, 1396, 1396));
-        assert!(closed(&keep_out, 800, 905), "a stretch that ends in the zone");
-        assert!(closed(&keep_out, 0, 5000), "a stretch across the zone");
-        assert!(!closed(&keep_out, 0, 904));
+    fn a_zone_reaches_from_margin_to_margin_also_where_the_counter_wraps() {
+        for base in [0, i16::MAX - 1100] {
+            let at = |offset: i16| WrappedPosition::new(base.wrapping_add(offset));
+            let mut keep_out = KeepOut::new(at(-1000));
+            keep_out.push(Canopy { leading: at(1000), trailing: at(1300), trim: 0 }, at(0), MARGIN).unwrap();
+            for (from, to, closed) in [
+                (904, 904, false),
+                (905, 905, true),
+                (1150, 1150, true),
+                (1395, 1395, true),
+                (1396, 1396, false),
+                (800, 905, true),
+                (0, 5000, true),
+                (0, 904, false),
+            ] {
+                assert_eq!(keep_out.is_closed(at(from), at(to), MARGIN), closed, "{from} to {to}");
+            }
+        }
     }
 
     #[test]
     fn a_single_plant_is_closed_in_its_stem_zone_and_margins() {
-        let seen = |leading, trailing| Detection {
-            leading: WrappedPosition::new(leading),
-            trailing: WrappedPosition::new(trailing),
-            ..Detection::NONE
-        };
         let zone = Length(160);
         for (width, trim) in [(100, 0), (160, 0), (170, 5), (222, 31), (224, 32), (225, 32), (300, 32)] {
-            assert_eq!(Canopy::of(&seen(1000, 1000 + width), zone).trim, trim, "{width}");
+            assert_eq!(Canopy::of(&Detection::whole(1000, 1000 + width), zone).trim, trim, "{width}");
         }
-        let plant = seen(1000, 1300);
+        let plant = Detection::whole(1000, 1300);
         assert_eq!(Canopy::of(&plant, Length::ZERO).trim, 0);
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         keep_out.push(Canopy::of(&plant, zone), WrappedPosition::new(0), MARGIN).unwrap();
@@ -275,12 +278,18 @@ mod tests {
     }
 
     #[test]
-    fn ground_never_seen_is_closed_with_a_margin_ahead_of_it() {
-        let keep_out = KeepOut::new(WrappedPosition::new(0));
+    fn unknown_ground_is_closed_with_a_margin_ahead_of_it() {
+        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         assert!(closed(&keep_out, -1, -1));
         assert!(closed(&keep_out, 94, 94));
         assert!(closed(&keep_out, 94, 100));
         assert!(!closed(&keep_out, 95, 100));
+        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.invalidate(WrappedPosition::new(1310));
+        assert!(closed(&keep_out, 0, 0) && closed(&keep_out, 1310, 1310));
+        assert!(closed(&keep_out, 1404, 1404));
+        assert!(!closed(&keep_out, 1405, 1405));
+        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "invalid, not dropped");
     }
 
     #[test]
@@ -322,28 +331,5 @@ mod tests {
             assert!(!keep_out.has_left(tool));
         }
         assert!(keep_out.has_left(WrappedPosition::new(i16::wrapping_mul(4999, 1 << 8)) - Length(8001)));
-    }
-
-    #[test]
-    fn invalid_ground_is_closed_with_a_margin_ahead_of_it() {
-        let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
-        keep_out.invalidate(WrappedPosition::new(1310));
-        assert!(closed(&keep_out, 0, 0) && closed(&keep_out, 1310, 1310));
-        assert!(closed(&keep_out, 1404, 1404));
-        assert!(!closed(&keep_out, 1405, 1405));
-        assert!(!keep_out.has_left(WrappedPosition::new(1000)), "invalid, not dropped");
-    }
-
-    #[test]
-    fn zones_close_the_same_ground_where_the_counter_wraps() {
-        let base = i16::MAX - 1100;
-        let at = |offset: i16| WrappedPosition::new(base.wrapping_add(offset));
-        let mut keep_out = KeepOut::new(at(0));
-        let canopy = Canopy { leading: at(1000), trailing: at(1300), trim: 0 };
-        keep_out.push(canopy, at(0), MARGIN).unwrap();
-        for (offset, closed) in [(904, false), (905, true), (1150, true), (1395, true), (1396, false)] {
-            assert_eq!(keep_out.is_closed(at(offset), at(offset), MARGIN), closed, "{offset}");
-        }
     }
 }

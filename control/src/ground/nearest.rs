@@ -171,10 +171,19 @@ const _: () =
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::memory::Volatile;
     use std::vec::Vec;
+
+    /// The listed examples: whether each is from the field, its number and its label.
+    fn listed(nearest: &Nearest<impl Examples<{ features::COUNT }>, Volatile>) -> Vec<(bool, u8, u8)> {
+        let (mut listed, mut place) = (Vec::new(), 0);
+        while let Some((entry, next)) = nearest.listed(place) {
+            listed.push((entry.from_field, entry.number, entry.example.label));
+            place = next;
+        }
+        listed
+    }
 
     #[test]
     fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {
@@ -187,13 +196,9 @@ mod tests {
             assert_eq!(nearest.teach(&features, label::PLANT), Ok(()));
         }
         assert_eq!(nearest.teach(&features, label::PLANT), Err(ExamplesFull));
-        let mut listed = 0;
-        let mut place = 0;
-        while let Some((example, next)) = nearest.listed(place) {
-            assert_eq!(example.from_field, example.example.label == label::PLANT);
-            (listed, place) = (listed + 1, next);
-        }
-        assert_eq!(listed, examples::CAPACITY + usize::from(field_examples::CAPACITY));
+        let listed = listed(&nearest);
+        assert!(listed.iter().all(|&(from_field, _, label)| from_field == (label == label::PLANT)));
+        assert_eq!(listed.len(), examples::CAPACITY + usize::from(field_examples::CAPACITY));
         // All are as near as the k-th nearest, so all vote, field examples too.
         let all = (&nearest.built_in, &nearest.field);
         let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &bytes, 3, examples::RADIUS).unwrap();
@@ -217,15 +222,6 @@ mod tests {
         for label in [label::PLANT, label::WEED, label::PLANT] {
             assert_eq!(nearest.teach(&features, label), Ok(()));
         }
-        let listed = |nearest: &Nearest<_, _>| {
-            let mut next = Some(0);
-            core::iter::from_fn(|| {
-                let (listed, behind) = nearest.listed(next?)?;
-                next = Some(behind);
-                Some((listed.from_field, listed.number, listed.example.label))
-            })
-            .collect::<Vec<_>>()
-        };
         let [built_in, second] = [(false, 0, label::WEED), (false, 1, label::WEED)];
         let field = [(true, 0, label::PLANT), (true, 1, label::WEED), (true, 2, label::PLANT)];
         assert_eq!(listed(&nearest), [built_in, second, field[0], field[1], field[2]]);

@@ -191,35 +191,27 @@ mod tests {
 
     #[test]
     fn a_lead_is_the_distance_in_its_time_and_a_millisecond_and_zero_stays_zero() {
-        let mut settings = Settings::new();
-        let leads = |settings: &Settings| {
-            let (speed, expected) = (TicksPerSecond(1000), TicksPerSecond(1100));
-            let Leads { out, back, response } = Leads::at(speed, expected, settings, LengthScale::TICK);
-            (out, back, response)
-        };
-        for (setting, milliseconds) in
-            [(Setting::LeadOutMs, 180), (Setting::LeadInMs, 40), (Setting::BeamResponseMs, 7)]
-        {
-            settings.set(setting, milliseconds).expect("within its range");
+        let (speed, expected) = (TicksPerSecond(1000), TicksPerSecond(1100));
+        // Only the swing out is led at the expected speed.
+        for (lead_out_ms, expected_leads) in [(180, [199, 41, 7]), (0, [0, 0, 7])] {
+            let settings = Settings::with(&[
+                (Setting::LeadOutMs, lead_out_ms),
+                (Setting::LeadInMs, 40),
+                (Setting::BeamResponseMs, 7),
+            ]);
+            let Leads { out, back, response } = Leads::at(speed, expected, &settings, LengthScale::TICK);
+            assert_eq!([out.0, back.0, response.0], expected_leads);
         }
-        assert_eq!(
-            leads(&settings),
-            (Length(199), Length(41), Length(7)),
-            "only the way out is led at the expected speed"
-        );
-        settings.set(Setting::LeadOutMs, 0).expect("within its range");
-        assert_eq!(leads(&settings), (Length::ZERO, Length::ZERO, Length(7)));
     }
 
     #[test]
     fn lengths_of_every_wheel_fit_16_bits() {
         for ticks_per_m in 40..=20_000 {
-            let mut settings = Settings::new();
-            for (setting, value) in
-                [(Setting::TicksPerM, ticks_per_m), (Setting::BeamToToolMm, 2000), (Setting::MaxWidthMm, 1500)]
-            {
-                settings.set(setting, value).expect("within its range");
-            }
+            let settings = Settings::with(&[
+                (Setting::TicksPerM, ticks_per_m),
+                (Setting::BeamToToolMm, 2000),
+                (Setting::MaxWidthMm, 1500),
+            ]);
             let Geometry { scale, beam_to_tool, max_width, memory, .. } = Geometry::of(&settings, 0);
             let farthest = i32::from(memory.0) + 2 * i32::from(beam_to_tool.0) + i32::from(max_width.0);
             assert!(farthest < i16::MAX.into(), "{ticks_per_m} a metre: {farthest}");

@@ -216,7 +216,6 @@ impl SecondBeam {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec;
@@ -248,12 +247,7 @@ mod tests {
             // The first beam's detection is complete after the gap behind it.
             let over = stretches.iter().filter_map(|&(first, _)| first).find(|&(_, to)| to + GAP.0 == position);
             if let Some((from, to)) = over {
-                let detection = Detection {
-                    leading: WrappedPosition::new(from),
-                    trailing: WrappedPosition::new(to),
-                    ..Detection::NONE
-                };
-                second.await_detection(detection, LEAST);
+                second.await_detection(Detection::whole(from, to), LEAST);
             }
             let broken =
                 stretches.iter().filter_map(|&(_, second)| second).any(|(from, to)| (from..to).contains(&position));
@@ -326,13 +320,7 @@ mod tests {
     fn a_beam_that_misses_three_plants_in_a_row_is_blind() {
         let only_first = |from: i16| (Some((from, from + 300)), None);
         let only_second = |from: i16| (None, Some((from + 400, from + 700)));
-        let at = |leading: i16| {
-            Report::Alone(Detection {
-                leading: WrappedPosition::new(leading),
-                trailing: WrappedPosition::new(leading + 300),
-                ..Detection::NONE
-            })
-        };
+        let at = |leading: i16| Report::Alone(Detection::whole(leading, leading + 300));
         let unseen = [only_first(0), only_first(1500), only_first(3000)];
         assert_eq!(compare(&mut begun(), &unseen), [Report::Blind(Blind::Second)]);
         let alone = [only_second(0), only_second(1500), only_second(3000)];
@@ -377,10 +365,10 @@ mod tests {
         assert_eq!(take(&mut second, 200, false), Some(WrappedPosition::new(100)));
         assert_eq!(take(&mut second, 241, false), None);
         // The slip is known, and the first beam has seen the detection.
-        second.slip.mark_known();
-        let detection =
-            Detection { leading: WrappedPosition::new(950), trailing: WrappedPosition::new(1050), ..Detection::NONE };
-        second.await_detection(detection, LEAST);
+        for _ in 0..2 {
+            second.slip.measure(APART, APART);
+        }
+        second.await_detection(Detection::whole(950, 1050), LEAST);
         assert_eq!(take(&mut second, 880, true), Some(WrappedPosition::new(880)), "too early for the expected one");
         take(&mut second, 900, false);
         take(&mut second, 945, false);

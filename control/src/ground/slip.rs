@@ -64,12 +64,6 @@ impl Slip {
         self.is_known
     }
 
-    /// Marks the slip as known.
-    #[cfg(test)]
-    pub(super) fn mark_known(&mut self) {
-        (self.is_known, self.without_slip) = (true, 0);
-    }
-
     /// What has changed since the last call.
     pub(super) fn take_change(&mut self) -> SlipChange {
         core::mem::replace(&mut self.change, SlipChange::None)

@@ -147,45 +147,24 @@ mod tests {
     const FORWARD: [Channels; 4] = [0b00, 0b10, 0b11, 0b01];
 
     #[test]
-    fn every_pair_of_levels_is_decoded_by_the_sequence() {
+    fn every_pair_of_levels_is_decoded_by_the_sequence_and_a_jump_by_the_last_direction() {
+        assert_eq!(Quadrature::new(0b00).direction(), 0);
         for from in 0..4 {
             for jump in 0..4 {
-                for direction in [-1, 0, 1] {
-                    let mut decoder = Quadrature { phase: from as u8, direction };
-                    let expected = match (jump, direction) {
-                        (0, _) => Step::Ticks(0),
-                        (1, _) => Step::Ticks(1),
-                        (3, _) => Step::Ticks(-1),
-                        (_, 0) => Step::Lost,
-                        (_, direction) => Step::Ticks(2 * direction),
+                for before in [-1, 0, 1] {
+                    let (step, direction) = match (jump, before) {
+                        (0, _) => (Step::Ticks(0), before),
+                        (1, _) => (Step::Ticks(1), 1),
+                        (3, _) => (Step::Ticks(-1), -1),
+                        (_, 0) => (Step::Lost, 0),
+                        (_, before) => (Step::Ticks(2 * before), before),
                     };
-                    assert_eq!(decoder.step(FORWARD[(from + jump) % 4]), expected, "{from} {jump} {direction}");
-                    assert_eq!(decoder.phase as usize, (from + jump) % 4);
+                    let mut decoder = Quadrature::moving(FORWARD[from], before);
+                    assert_eq!(decoder.step(FORWARD[(from + jump) % 4]), step, "{from} {jump} {before}");
+                    assert_eq!((decoder.phase as usize, decoder.direction()), ((from + jump) % 4, direction));
                 }
             }
         }
-    }
-
-    #[test]
-    fn a_jump_continues_in_the_direction_of_the_step_before_it() {
-        let mut decoder = Quadrature::new(0b00);
-        assert_eq!(decoder.step(0b11), Step::Lost);
-        assert_eq!(decoder.step(0b10), Step::Ticks(-1));
-        assert_eq!(decoder.step(0b01), Step::Ticks(-2));
-        assert_eq!(decoder.step(0b00), Step::Ticks(1));
-        assert_eq!(decoder.step(0b11), Step::Ticks(2));
-    }
-
-    #[test]
-    fn direction_returns_the_last_step() {
-        let mut decoder = Quadrature::new(0b00);
-        let directions = [0b00, 0b10, 0b10, 0b00, 0b11].map(|channels| {
-            decoder.step(channels);
-            decoder.direction()
-        });
-        assert_eq!(directions, [0, 1, 1, -1, -1]);
-        let given = [1, 0, -1];
-        assert_eq!(given.map(|direction| Quadrature::moving(0b11, direction).direction()), given);
     }
 
     /// The odometer's position after these counts and jumps, and the ticks that it removed.

@@ -50,21 +50,16 @@ impl Switch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::Interval;
-
-    fn at_ms(milliseconds: u32) -> Instant {
-        Instant::default() + Interval::from_ms(milliseconds)
-    }
 
     #[test]
     fn a_switch_that_is_on_from_the_start_counts_only_after_it_has_been_off() {
         let mut switch = Switch { on: true, ..Switch::NONE };
-        assert_eq!(switch.read(at_ms(0), true), None);
-        assert_eq!(switch.read(at_ms(1000), true), None);
-        assert_eq!(switch.read(at_ms(1001), false), None);
-        assert_eq!(switch.read(at_ms(1021), false), Some(false));
-        assert_eq!(switch.read(at_ms(1022), true), None);
-        assert_eq!(switch.read(at_ms(1042), true), Some(true));
+        assert_eq!(switch.read(Instant::at_ms(0), true), None);
+        assert_eq!(switch.read(Instant::at_ms(1000), true), None);
+        assert_eq!(switch.read(Instant::at_ms(1001), false), None);
+        assert_eq!(switch.read(Instant::at_ms(1021), false), Some(false));
+        assert_eq!(switch.read(Instant::at_ms(1022), true), None);
+        assert_eq!(switch.read(Instant::at_ms(1042), true), Some(true));
     }
 
     #[test]
@@ -73,7 +68,7 @@ mod tests {
         let mut thrown = 0;
         for millisecond in 0..100 {
             let on = millisecond >= 15 || millisecond % 3 == 0;
-            thrown += u8::from(switch.read(at_ms(millisecond), on).is_some());
+            thrown += u8::from(switch.read(Instant::at_ms(millisecond), on).is_some());
         }
         assert_eq!(thrown, 1);
     }

@@ -165,43 +165,37 @@ impl Swings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Ticks;
 
-    fn end(distance: &mut Distance, ticks: i32, length_mm: u16, forced: bool) -> Result<u16, CommandError> {
-        distance.begin(Position::new(i32::MAX - 100));
-        distance.end(Position::new((i32::MAX - 100).wrapping_add(ticks)), length_mm, 1910, forced)
-    }
-
-    fn counted(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, CommandError> {
+    /// Ends a stretch of these ticks, where the counter wraps. A refusal comes with the count.
+    fn end(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, (CommandError, u16)> {
+        let begin = Position::new(i32::MAX - 100);
         let mut distance = Distance::NONE;
-        end(&mut distance, ticks, length_mm, forced)
-    }
-
-    /// The count of a stretch that is refused.
-    fn refused(ticks: i32, length_mm: u16, forced: bool) -> u16 {
-        let mut distance = Distance::NONE;
-        assert_eq!(end(&mut distance, ticks, length_mm, forced), Err(CommandError::WheelDiffers));
-        distance.counted()
+        distance.begin(begin);
+        distance.end(begin + Ticks(ticks), length_mm, 1910, forced).map_err(|error| (error, distance.counted()))
     }
 
     #[test]
-    fn a_measured_stretch_gives_the_ticks_a_metre_forward_and_back() {
-        assert_eq!(counted(18_900, 10_000, false), Ok(1890));
-        assert_eq!(counted(-18_900, 10_000, false), Ok(1890));
-        assert_eq!(counted(1905, 1000, false), Ok(1905));
-        assert_eq!([18_904, 18_905].map(|ticks| counted(ticks, 10_000, false)), [Ok(1890), Ok(1891)], "rounded");
-    }
-
-    #[test]
-    fn an_implausible_stretch_is_refused_and_can_be_forced() {
-        let mut none = Distance::NONE;
-        assert_eq!(none.end(Position::new(0), 5000, 1910, true), Err(CommandError::NotBegun));
-        assert_eq!(counted(1900, 999, false), Err(CommandError::TooShort));
-        assert_eq!(counted(24_830, 10_000, false), Ok(2483));
-        assert_eq!(refused(24_840, 10_000, false), 2484);
-        assert_eq!(refused(13_360, 10_000, false), 1336);
-        assert_eq!(counted(24_840, 10_000, true), Ok(2484));
-        assert_eq!(refused(0, 10_000, true), 0);
-        assert_eq!(refused(i32::MIN, 1000, false), u16::MAX);
+    fn a_measured_stretch_gives_the_ticks_a_metre_and_an_implausible_one_is_refused_and_can_be_forced() {
+        let differs = |counted| Err((CommandError::WheelDiffers, counted));
+        for (ticks, length_mm, forced, expected) in [
+            (18_900, 10_000, false, Ok(1890)),
+            (-18_900, 10_000, false, Ok(1890)),
+            (1905, 1000, false, Ok(1905)),
+            (1900, 999, false, Err((CommandError::TooShort, 0))),
+            // Rounded.
+            (18_904, 10_000, false, Ok(1890)),
+            (18_905, 10_000, false, Ok(1891)),
+            // Up to 30 % from the nominal value.
+            (24_830, 10_000, false, Ok(2483)),
+            (24_840, 10_000, false, differs(2484)),
+            (13_360, 10_000, false, differs(1336)),
+            (24_840, 10_000, true, Ok(2484)),
+            (0, 10_000, true, differs(0)),
+            (i32::MIN, 1000, false, differs(u16::MAX)),
+        ] {
+            assert_eq!(end(ticks, length_mm, forced), expected, "{ticks} in {length_mm} mm");
+        }
     }
 
     fn at_ms(milliseconds: u32) -> Instant {
@@ -209,8 +203,8 @@ mod tests {
     }
 
     /// Runs the swings with a switch that follows each command after this many milliseconds, in turn.
-    fn run(watched: bool, follows_ms: [u32; 6]) -> (Outcome, u32) {
-        let mut swings = Swings::new(at_ms(0), watched, 3);
+    fn run(follows_ms: [u32; 6]) -> (Outcome, u32) {
+        let mut swings = Swings::new(at_ms(0), true, 3);
         let (mut commanded, mut out, mut count) = (0, true, 0);
         for now in 0_u32.. {
             if swings.tool_out() != out {
@@ -227,20 +221,19 @@ mod tests {
 
     #[test]
     fn the_end_switch_gives_the_longest_swing_out_and_the_shortest_swing_in() {
-        let (outcome, lasted_ms) = run(true, [61, 180, 57, 195, 70, 170]);
+        let (outcome, lasted_ms) = run([61, 180, 57, 195, 70, 170]);
         assert_eq!(outcome, Outcome::Measured(SwingTimes { out_ms: 195 + 11, in_ms: 57 - LATE_MS }));
         assert_eq!(lasted_ms, 18_000);
     }
 
     #[test]
-    fn a_switch_that_does_not_follow_fails_and_without_a_switch_the_swings_are_shown() {
-        assert_eq!(run(true, [60, 180, 60, 9999, 60, 180]).0, Outcome::Failed);
-        assert_eq!(run(true, [9999, 180, 60, 180, 60, 180]).0, Outcome::Failed);
-        assert_eq!(run(true, [4, 180, 60, 180, 60, 180]).0, Outcome::Failed);
+    fn a_switch_that_does_not_follow_or_follows_too_soon_fails() {
+        assert_eq!(run([60, 180, 60, 9999, 60, 180]).0, Outcome::Failed);
+        assert_eq!(run([9999, 180, 60, 180, 60, 180]).0, Outcome::Failed);
+        assert_eq!(run([4, 180, 60, 180, 60, 180]).0, Outcome::Failed);
         assert_eq!(
-            run(true, [5, 180, 60, 180, 60, 180]).0,
+            run([5, 180, 60, 180, 60, 180]).0,
             Outcome::Measured(SwingTimes { out_ms: 180 + 11, in_ms: 5 - LATE_MS })
         );
-        assert_eq!(run(false, [0; 6]), (Outcome::Shown, 18_000));
     }
 }

@@ -6,32 +6,22 @@
 /// A command that the present state does not allow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[expect(missing_docs, reason = "the messages say what each means")]
 pub enum CommandError {
-    /// An alarm is latched.
     AlarmLatched,
     /// The machine works: the setting changes where the tool is, or settings are to be saved.
     NotInHold,
-    /// Both servo pulses would be equal.
     PulsesEqual,
     /// The beam would be too near; [`needed_mm`](crate::operate::configuration::Configuration::needed_mm) has the least distance.
     BeamTooNear,
-    /// The second beam would be too near to the first or to the tool, or X is too long for it.
     SecondBeamAstray,
-    /// The wheel gives too few ticks a metre.
     EncoderTooCoarse,
-    /// The machine rolls, so the tool must not be moved.
     Rolls,
-    /// There is no detection to label, or the last one has a label.
     NothingToLabel,
-    /// An example does not have exactly five features.
     IncompleteExample,
-    /// All places for field examples are taken.
     ExamplesFull,
-    /// No field example has this number.
     NoSuchExample,
-    /// No saved settings to load.
     NothingSaved,
-    /// No stretch has been started.
     NotBegun,
     /// The stretch is shorter than [`SHORTEST_MM`](crate::operate::calibration::SHORTEST_MM).
     TooShort,

@@ -81,7 +81,6 @@ impl Detections {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::ground::class::Class;
     use std::vec::Vec;

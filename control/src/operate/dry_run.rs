@@ -54,7 +54,6 @@ impl DryRun {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use std::vec::Vec;
 
@@ -95,9 +94,8 @@ mod tests {
 
     #[test]
     fn zones_too_near_for_two_strokes_are_one() {
-        let mut settings = Settings::new();
-        settings.set(Setting::LeadOutMs, 180).expect("within its range");
         for speed_mm_s in [1000, 1300] {
+            let settings = Settings::with(&[(Setting::LeadOutMs, 180)]);
             assert_eq!(swings(speed_mm_s, &settings).len(), 3, "in, out for all of them, and in");
         }
     }
@@ -105,10 +103,7 @@ mod tests {
     #[test]
     fn equal_leads_give_one_swing_each_way_a_plant() {
         for lead_ms in [0, 100, 180, 240] {
-            let mut settings = Settings::new();
-            for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
-                settings.set(lead, lead_ms).expect("within its range");
-            }
+            let settings = Settings::with(&[(Setting::LeadOutMs, lead_ms), (Setting::LeadInMs, lead_ms)]);
             assert_eq!(swings(556, &settings).len(), 13, "{lead_ms} ms");
         }
     }

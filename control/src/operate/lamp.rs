@@ -27,7 +27,6 @@ pub fn is_lit(state: State, now: Instant) -> bool {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::{alarm::Alarm, units::Interval};
     use std::{string::String, vec::Vec};

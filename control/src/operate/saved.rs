@@ -172,15 +172,12 @@ const fn address(copy: u8) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use crate::memory::{ERASED, Volatile};
     use std::{format, vec::Vec};
 
     fn with_k(k: u16) -> Settings {
-        let mut settings = Settings::new();
-        settings.set(Setting::K, k).expect("within its range");
-        settings
+        Settings::with(&[(Setting::K, k)])
     }
 
     fn save(memory: Volatile, settings: &Settings) -> Volatile {
@@ -193,12 +190,6 @@ mod tests {
 
     fn load(memory: &Volatile) -> Option<Settings> {
         SavedSettings::new(memory.clone()).load()
-    }
-
-    #[test]
-    fn an_erased_memory_holds_no_settings() {
-        assert_eq!(load(&Volatile::new()), None);
-        assert_eq!(load(&Volatile::holding([0; SIZE])), None);
     }
 
     #[test]
@@ -275,36 +266,30 @@ mod tests {
         }
     }
 
-    #[test]
-    fn two_invalid_copies_are_no_settings() {
-        let mut memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
-        memory.bytes[10] ^= 1;
-        memory.bytes[usize::from(STRIDE) + 20] ^= 0x80;
-        assert_eq!(load(&memory), None);
-    }
-
-    #[test]
-    fn settings_of_another_table_or_length_are_invalid_with_a_right_crc() {
-        for place in 0..HEADER - 1 {
-            let mut bytes = image(&with_k(5), 1);
-            bytes[place] ^= 1;
-            let check = checksum(&bytes[..END]).to_le_bytes();
-            bytes[END..].copy_from_slice(&check);
-            let mut memory = Volatile::new();
-            memory.bytes[..COPY].copy_from_slice(&bytes);
-            assert_eq!(load(&memory), None, "{place}");
-        }
-    }
-
-    #[test]
-    fn values_out_of_range_are_invalid_with_a_right_crc() {
-        let mut bytes = image(&Settings::new(), 1);
-        bytes[HEADER..HEADER + 2].copy_from_slice(&u16::MAX.to_le_bytes());
-        let check = checksum(&bytes[..END]).to_le_bytes();
-        bytes[END..].copy_from_slice(&check);
+    /// A memory whose only copy has this change, and a right CRC.
+    fn changed(change: impl FnOnce(&mut [u8; COPY])) -> Volatile {
+        let mut copy = image(&with_k(5), 1);
+        change(&mut copy);
+        let check = checksum(&copy[..END]).to_le_bytes();
+        copy[END..].copy_from_slice(&check);
         let mut memory = Volatile::new();
-        memory.bytes[..COPY].copy_from_slice(&bytes);
-        assert_eq!(load(&memory), None);
+        memory.bytes[..COPY].copy_from_slice(&copy);
+        memory
+    }
+
+    #[test]
+    fn a_memory_without_a_valid_copy_holds_no_settings() {
+        let erased = [Volatile::new(), Volatile::holding([0; SIZE])];
+        let mut two_invalid = save(save(Volatile::new(), &with_k(5)), &with_k(7));
+        two_invalid.bytes[10] ^= 1;
+        two_invalid.bytes[usize::from(STRIDE) + 20] ^= 0x80;
+        let of_another_table_or_length = (0..HEADER - 1).map(|place| changed(|copy| copy[place] ^= 1));
+        let out_of_range = changed(|copy| copy[HEADER..HEADER + 2].copy_from_slice(&u16::MAX.to_le_bytes()));
+        let invalid = erased.into_iter().chain([two_invalid, out_of_range]).chain(of_another_table_or_length);
+        for (number, memory) in invalid.enumerate() {
+            assert_eq!(load(&memory), None, "{number}");
+        }
+        assert_eq!(load(&changed(|_| {})), Some(with_k(5)));
     }
 
     #[test]

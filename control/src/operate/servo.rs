@@ -52,25 +52,21 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_is_cut_short_only_after_the_gap() {
-        let width = from_us(1500);
-        assert_eq!(action(0, width, 3), Action::Wait);
-        assert_eq!(action(width + from_us(3000) - 1, width, 3), Action::Wait);
-        assert_eq!(action(width + from_us(3000), width, 3), Action::Restart);
-    }
-
-    #[test]
-    fn fixed_frames_are_never_cut_short() {
-        let width = from_us(1500);
-        assert_eq!(action(width - 1, width, 0), Action::Wait);
+    fn a_frame_is_cut_short_only_after_the_gap_and_a_fixed_frame_never() {
+        let (width, wider) = (from_us(1500), from_us(2000));
+        for (since_rise, width, gap_ms, expected) in [
+            (0, width, 3, Action::Wait),
+            (width + from_us(3000) - 1, width, 3, Action::Wait),
+            (width + from_us(3000), width, 3, Action::Restart),
+            (width - 1, width, 0, Action::Wait),
+            // A frame about to end is left to end.
+            (FRAME - 21, wider, 15, Action::Restart),
+            (FRAME - 20, wider, 15, Action::Change),
+        ] {
+            assert_eq!(action(since_rise, width, gap_ms), expected, "{since_rise} of {width}");
+        }
         for since_rise in width..FRAME {
             assert_eq!(action(since_rise, width, 0), Action::Change);
         }
-    }
-
-    #[test]
-    fn a_frame_about_to_end_is_left_to_end() {
-        assert_eq!(action(FRAME - 21, from_us(2000), 15), Action::Restart);
-        assert_eq!(action(FRAME - 20, from_us(2000), 15), Action::Change);
     }
 }

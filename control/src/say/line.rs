@@ -134,7 +134,6 @@ impl Default for Line {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use std::string::{String, ToString};
 

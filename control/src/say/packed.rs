@@ -384,7 +384,6 @@ const fn begins(text: &[u8], at: usize, part: &[u8]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::*;
     use std::string::String;
 

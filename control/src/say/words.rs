@@ -11,82 +11,49 @@ use crate::{
 /// The first word of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[expect(missing_docs, reason = "the help texts say what each does")]
 pub enum Word {
-    /// Lists the commands, or explains a setting.
     Help,
-    /// Two lines of figures.
     Status,
-    /// Shows one setting or all.
     Get,
-    /// Changes a setting.
     Set,
-    /// Saves the settings.
     Save,
-    /// Loads the saved settings.
     Revert,
-    /// Restores factory settings.
     Defaults,
-    /// Measures the wheel or the servo.
     Calibrate,
-    /// Drives the servo directly.
     Servo,
-    /// A dry run, or a watchdog test.
     Test,
-    /// Goes to work.
     Start,
-    /// Takes the tool out.
     Hold,
-    /// Clears an alarm.
     Clear,
-    /// Turns event lines on or off.
     Events,
-    /// Sends curves to a plotter.
     Plot,
-    /// Labels the last detection, and teaches it.
     Label,
-    /// Takes a feature of an example, or teaches the example.
     Teach,
-    /// Lists the examples.
     Examples,
-    /// Forgets field examples.
     Forget,
-    /// Lists the last detections.
     Dump,
-    /// Names the firmware.
     Version,
 }
 
 /// An argument of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[expect(missing_docs, reason = "the table of commands says which command takes each")]
 pub enum Argument {
-    /// Of `start`.
     Now,
-    /// Of `events`, and of settings that are switches.
     On,
-    /// As `on`.
     Off,
-    /// Of `forget`.
     All,
-    /// Of `calibrate`.
     Start,
-    /// Of `calibrate`.
     Servo,
-    /// Of `calibrate` and `label`.
     Force,
-    /// Of `servo`.
     In,
-    /// Of `servo`.
     Out,
-    /// Of `test`.
     Row,
-    /// Of `test`.
     Watchdog,
-    /// Of `plot`.
     Teleplot,
-    /// Of `label`.
     Plant,
-    /// Of `label`.
     Weed,
 }
 

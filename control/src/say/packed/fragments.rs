@@ -23,7 +23,6 @@ pub(super) const FRAGMENTS: &[&str] = &[
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
     use super::FRAGMENTS;
     use crate::say::packed::{CHARACTERS, DIGITS, HALVINGS, WAITING};
     use crate::say::texts::GROUPS;
