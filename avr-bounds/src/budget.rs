@@ -7,8 +7,8 @@ use crate::loops::LoopBounds;
 use crate::proved::{Bounds, Input, Longest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::fmt;
+use std::path::Path;
 
 /// The limits of a program, and facts about it. Every key is optional.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -62,27 +62,6 @@ pub enum RegisterRule {
     Unchecked,
 }
 
-/// Why a file of budgets could not be read.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", path.display())]
-pub struct BudgetsError {
-    /// The file.
-    pub path: PathBuf,
-    /// The problem.
-    pub problem: BudgetsProblem,
-}
-
-/// The problem of a file of budgets.
-#[derive(Debug, thiserror::Error)]
-pub enum BudgetsProblem {
-    /// The system cannot read it.
-    #[error(transparent)]
-    File(#[from] io::Error),
-    /// It is no TOML, or has an unknown key; with line and column.
-    #[error(transparent)]
-    Content(#[from] toml::de::Error),
-}
-
 /// A bound beside its budget.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Held {
@@ -101,9 +80,10 @@ impl Budgets {
     ///
     /// # Errors
     /// If it cannot be read, or says what is not known.
-    pub fn read(path: &Path) -> Result<Budgets, BudgetsError> {
-        let read = || Ok(toml::from_str(&std::fs::read_to_string(path)?)?);
-        read().map_err(|problem| BudgetsError { path: path.into(), problem })
+    pub fn read(path: &Path) -> Result<Budgets, BoundsError> {
+        let error = |reason: &dyn fmt::Display| BoundsError(format!("{}: {reason}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|reason| error(&reason))?;
+        toml::from_str(&text).map_err(|reason| error(&reason))
     }
 
     /// Holds bounds against the budgets that there are.
@@ -146,9 +126,12 @@ impl Budgets {
 impl Longest {
     /// The cycles of a time that must have a bound; `what` names it in the error. `None` if it never ends.
     pub(crate) fn or_refuse(&self, what: &str) -> Result<Option<u64>, BoundsError> {
-        match self.without_bound.first() {
-            None => Ok(self.cycles),
-            Some(place) => Err(BoundsError::Unbounded { what: what.into(), place: place.clone() }),
-        }
+        let Some(place) = self.without_bound.first() else { return Ok(self.cycles) };
+        let function = &place.function;
+        Err(BoundsError(format!(
+            "{what} has a loop without a bound, at {} in {function}: give its bound, by a record in .loop_bounds or for the \
+             function, as in [loops] {function:?} = {{ passes = 9, because = \"..\" }}",
+            place.address_and_line()
+        )))
     }
 }

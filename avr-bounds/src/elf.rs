@@ -1,7 +1,8 @@
 //! Reads an ELF: the bytes in flash and of initialised variables, the functions, the chip, and the program's records of
 //! loop bounds.
 
-use crate::chip::Chip;
+use crate::chip::{CHIPS, Chip};
+use crate::error::BoundsError;
 use crate::loops;
 use addr2line::Loader;
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
@@ -21,64 +22,6 @@ const EEPROM_ORIGIN: u32 = 0x81_0000;
 
 /// The section in which avr-gcc names the chip.
 const DEVICE_INFO: &str = ".note.gnu.avr.deviceinfo";
-
-/// Why an ELF could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum ElfError {
-    /// The file could not be read.
-    #[error("{path} could not be read")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: std::io::Error,
-    },
-    /// The file is no ELF, or damaged.
-    #[error("{path} is not a readable ELF file ({reason})")]
-    NotElf {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        reason: object::Error,
-    },
-    /// The file was made for another processor.
-    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed")]
-    NotAvr {
-        /// The file.
-        path: PathBuf,
-        /// Its target.
-        architecture: Architecture,
-    },
-    /// The file does not name its chip, and neither did the caller.
-    #[error("{path} does not name its chip: name it with --chip or `chip = ..` in the budgets, as one of {}", names())]
-    NoChip {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The chip is not in the table.
-    #[error("the chip {name} is not known: the known ones are {}", names())]
-    UnknownChip {
-        /// Its name.
-        name: String,
-    },
-    /// The file has more bytes than the chip's flash.
-    #[error("{path} has {end} bytes for the flash: the {chip} holds {limit}; --chip names another chip")]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// Address behind the last byte.
-        end: u32,
-        /// The chip.
-        chip: &'static str,
-        /// Its flash.
-        limit: u32,
-    },
-}
-
-/// The chips' names.
-fn names() -> String {
-    crate::chip::CHIPS.map(|chip| chip.name).join(", ")
-}
 
 /// A function's symbol.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -124,16 +67,23 @@ impl Program {
     ///
     /// # Errors
     /// If the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
-    pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, ElfError> {
-        let bytes = std::fs::read(path).map_err(|source| ElfError::Read { path: path.into(), source })?;
-        let not_elf = |reason| ElfError::NotElf { path: path.into(), reason };
+    pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, BoundsError> {
+        let error = |reason: String| BoundsError(format!("{} {reason}", path.display()));
+        let not_elf = |reason| error(format!("is not a readable ELF file ({reason})"));
+        let bytes = std::fs::read(path).map_err(|reason| error(format!("could not be read: {reason}")))?;
         let architecture = object::File::parse(&*bytes).map_err(not_elf)?.architecture();
         if architecture != Architecture::Avr {
-            return Err(ElfError::NotAvr { path: path.into(), architecture });
+            return Err(error(format!("was made for {architecture:?}: an ELF for AVR is needed")));
         }
         let file: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes).map_err(not_elf)?;
-        let name = chip.map(str::to_owned).or_else(|| device(&file)).ok_or(ElfError::NoChip { path: path.into() })?;
-        let chip = Chip::named(&name).ok_or(ElfError::UnknownChip { name })?;
+        let chips = CHIPS.map(|chip| chip.name).join(", ");
+        let name = chip.map(str::to_owned).or_else(|| device(&file)).ok_or_else(|| {
+            error(format!(
+                "does not name its chip: name it with --chip or `chip = ..` in the budgets, as one of {chips}"
+            ))
+        })?;
+        let unknown = || BoundsError(format!("the chip {name} is not known: the known ones are {chips}"));
+        let chip = Chip::named(&name).ok_or_else(unknown)?;
 
         let (mut flash, mut data, mut data_start) = (Vec::new(), Vec::new(), 0);
         let (mut start, mut code_end) = (u32::MAX, 0);
@@ -145,7 +95,10 @@ impl Program {
             }
             let end = address + content.len() as u32;
             if end > chip.flash_bytes {
-                return Err(ElfError::TooLarge { path: path.into(), end, chip: chip.name, limit: chip.flash_bytes });
+                let Chip { name, flash_bytes, .. } = chip;
+                return Err(error(format!(
+                    "has {end} bytes for the flash: the {name} holds {flash_bytes}; --chip names another chip"
+                )));
             }
             start = start.min(address);
             if flash.len() < end as usize {

@@ -135,16 +135,16 @@ pub(crate) struct Code<'a> {
 }
 
 impl<'a> Code<'a> {
-    pub(crate) fn new(elf: &'a elf::Program, budgets: &'a Budgets) -> Result<Code<'a>, BoundsError> {
-        Ok(Code {
+    pub(crate) fn new(elf: &'a elf::Program, budgets: &'a Budgets) -> Code<'a> {
+        Code {
             elf,
             budgets,
-            targets: Targets::new(elf, budgets)?,
+            targets: Targets::new(elf, budgets),
             active: vec![Vec::new()],
             indirect: BTreeMap::new(),
             routines: BTreeMap::new(),
             open: Vec::new(),
-        })
+        }
     }
 
     /// The instruction at an address.
@@ -155,7 +155,7 @@ impl<'a> Code<'a> {
 
     /// The error for an instruction at an address.
     fn refuse(&self, address: u32, problem: Problem) -> BoundsError {
-        BoundsError::At { place: self.place(address), problem }
+        BoundsError::at(&self.place(address), problem)
     }
 
     /// An address with its function and line.
@@ -210,9 +210,15 @@ impl<'a> Code<'a> {
         if let Some(first) =
             self.open.iter().position(|open| open.address == entry.address && open.active == entry.active)
         {
-            let mut circle: Vec<String> = self.open[first..].iter().map(|open| self.name(open.address)).collect();
-            circle.push(self.name(entry.address));
-            return Err(BoundsError::Recursion { circle });
+            let function = self.name(entry.address);
+            let circle: Vec<String> = self.open[first..].iter().map(|open| self.name(open.address)).collect();
+            return Err(BoundsError(format!(
+                "there is recursion, which has no deepest stack: {}, which calls {function} calls itself: set in the budgets how \
+                 many calls are active at once, as in [recursion] {function:?} = {{ depth = 3, because = \"..\" }}; if a call by a \
+                 pointer only seems to be one of these, link with -Wl,--emit-relocs, which lists the functions whose address is \
+                 taken",
+                circle.join(", which calls ")
+            )));
         }
         self.open.push(entry);
         let routine = Rc::new(Follower::new(self, entry).follow()?);

@@ -60,12 +60,12 @@ mod registers;
 mod targets;
 mod values;
 
-pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Depth, Held, RegisterRule};
+pub use self::budget::{Budgets, Depth, Held, RegisterRule};
 pub use self::chip::{CHIPS, Chip};
 use self::cycles::{Passes, Stretch, Time, Timer};
 use self::decode::Operation;
-pub use self::elf::{ElfError, Program, Symbol};
-pub use self::error::{BoundsError, Problem};
+pub use self::elf::{Program, Symbol};
+pub use self::error::BoundsError;
 use self::flow::{Code, Entry, Kind, Node, Routine, bytes};
 pub use self::loops::{LoopBound, LoopBounds};
 pub use self::order::order;
@@ -88,16 +88,23 @@ const SYNCHRONISER_CYCLES: u64 = 3;
 /// # Errors
 /// If the program cannot be followed.
 pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
-    let known: BTreeSet<&str> = elf.functions.values().map(|symbol| symbol.name.as_str()).collect();
-    let tables: [(_, Vec<&String>); 2] =
-        [("loops", budgets.loops.keys().collect()), ("recursion", budgets.recursion.keys().collect())];
-    for (table, names) in tables {
-        let names: Vec<String> = names.into_iter().filter(|name| !known.contains(name.as_str())).cloned().collect();
+    let known: BTreeSet<&String> = elf.functions.values().map(|symbol| &symbol.name).collect();
+    let tables: [(_, Vec<&String>); 3] = [
+        ("loops", budgets.loops.keys().collect()),
+        ("recursion", budgets.recursion.keys().collect()),
+        ("calls", budgets.calls.iter().flat_map(|(caller, called)| called.iter().chain([caller])).collect()),
+    ];
+    for (table, mut names) in tables {
+        names.retain(|name| !known.contains(name));
         if !names.is_empty() {
-            return Err(BoundsError::NoSuchFunction { table, names });
+            let names = names.into_iter().map(String::as_str).collect::<Vec<_>>().join(" or ");
+            return Err(BoundsError(format!(
+                "no function of the program is called {names}, which the budgets name in [{table}]: take the names that \
+                 `avr-objdump -dC` shows"
+            )));
         }
     }
-    let mut code = Code::new(elf, budgets)?;
+    let mut code = Code::new(elf, budgets);
     let entry = |address, kind| Entry { address, interrupts: Interrupts::Off, kind, active: 0 };
     let main = code.follow(entry(elf.start, Kind::Reset))?;
     let mut handlers = BTreeMap::new();
@@ -105,7 +112,12 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         if let Some(address) = handler_of(&code, vector)? {
             let handler = code.follow(entry(address, Kind::Handler))?;
             if let Some(address) = handler.enables {
-                return Err(BoundsError::HandlerEnables { vector, place: code.place(address) });
+                let place = code.place(address);
+                return Err(BoundsError(format!(
+                    "the handler of vector {vector} turns interrupts on at {}, in {}: handlers could nest without an end",
+                    place.address_and_line(),
+                    place.function
+                )));
             }
             handlers.insert(vector, handler);
         }
@@ -217,14 +229,21 @@ fn watch(
     let is_before_last = |other: u8| input.vectors.last().filter(|last| other < **last).copied();
     for &other in handlers.keys().filter(|other| !input.vectors.contains(other)) {
         if let Some(vector) = is_before_last(other) {
-            return Err(BoundsError::NotFirst { vector, other });
+            return Err(BoundsError(format!(
+                "vector {other} has priority over vector {vector} and is no vector of the input, so an edge's longest wait has no bound"
+            )));
         }
     }
     let looks = |node: &Node| code.instruction(node.place.address).is_ok_and(|found| found.reads(input.port));
     let (mut to_look, mut busy) = (0, 0);
     for &vector in &input.vectors {
         let look = handlers.get(&vector).and_then(|handler| timer.around(handler, looks));
-        let (to, behind) = look.ok_or(BoundsError::DoesNotLook { vector, port: input.port })?;
+        let (to, behind) = look.ok_or_else(|| {
+            let port = input.port;
+            BoundsError(format!(
+                "the handler of vector {vector} is missing, or does not read the port at {port:#04x} exactly once on every path"
+            ))
+        })?;
         let to = to.longest(code).or_refuse("the path to a read")?.unwrap_or_default();
         to_look = to_look.max(code.elf.chip.response_cycles() + to);
         busy = busy.max(behind.longest(code).or_refuse("the path from a read")?.unwrap_or_default());

@@ -18,8 +18,17 @@ pub struct Place {
 /// Function, address and line.
 impl fmt::Display for Place {
     fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        write!(to, "{:#06x} {}", self.address, self.function)?;
-        self.source.iter().try_for_each(|source| write!(to, " ({source})"))
+        write!(to, "{:#06x} {}{}", self.address, self.function, self.line())
+    }
+}
+
+impl Place {
+    fn line(&self) -> String {
+        self.source.iter().map(|source| format!(" ({source})")).collect()
+    }
+
+    pub(crate) fn address_and_line(&self) -> String {
+        format!("{:#06x}{}", self.address, self.line())
     }
 }
 

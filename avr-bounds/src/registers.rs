@@ -33,7 +33,10 @@ pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Res
         let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
         if !broken.is_empty() {
             let function = program.name_of(routine.entry);
-            return Err(BoundsError::NotPreserved { function, registers: broken.to_string() });
+            return Err(BoundsError(format!(
+                "{function} does not preserve {broken}, which the calling convention asks of every function: mend it, or write \
+                 `registers = \"unchecked\"` into the budgets"
+            )));
         }
     }
     for (&vector, handler) in handlers {
@@ -41,7 +44,8 @@ pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Res
         // A handler that never returns may change registers.
         if !clobbered.is_empty() && !handler.returns.is_empty() {
             let function = program.name_of(handler.entry);
-            return Err(BoundsError::HandlerSpoils { vector, function, registers: clobbered.to_string() });
+            let reason = format!("the handler of vector {vector}, {function}, does not restore {clobbered}");
+            return Err(BoundsError(reason));
         }
     }
     Ok(())

@@ -5,7 +5,7 @@
 
 use crate::common::{Run, ask, elf, run_for_ms, started};
 use crate::interrupt_budgets::roll;
-use avr_bounds::{Bounds, BoundsError, Budgets, Program, prove};
+use avr_bounds::{Bounds, Budgets, Program, prove};
 use control::ground::detection::Detection;
 use control::ground::{examples, field_examples, keep_out, nearest};
 use control::operate::event::{self, Event};
@@ -262,8 +262,12 @@ fn a_function_that_writes_to_a_register_that_it_should_preserve_is_found() {
         std::fs::remove_file(&broken).expect("it is there");
         match proved {
             Ok(_) => Some(false),
-            Err(BoundsError::NotPreserved { registers, .. }) => Some(registers.contains(&format!("r{register}"))),
-            Err(other) => panic!("{name} with a write to r{register}: {other}"),
+            Err(error) => {
+                let error = error.to_string();
+                let registers = error.split_once(" does not preserve ").map(|(_, registers)| registers);
+                let registers = registers.unwrap_or_else(|| panic!("{name} with a write to r{register}: {error}"));
+                Some(registers.contains(&format!("r{register}")))
+            }
         }
     };
     let functions: Vec<_> = image.functions.iter().collect();
