@@ -43,13 +43,13 @@ impl Time {
     }
 
     /// The longer of both. Unbounded loops in either make the result unknown.
-    pub(crate) fn or(&self, other: &Time) -> Time {
+    fn or(&self, other: &Time) -> Time {
         Time { cycles: self.cycles.max(other.cycles), unbounded: &self.unbounded | &other.unbounded }
     }
 }
 
 /// The longer of the known times.
-fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
+pub(crate) fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
     match (one, other) {
         (Some(one), Some(other)) => Some(one.or(&other)),
         (one, None) => one,
@@ -372,8 +372,8 @@ impl<'a> Timer<'a> {
 
 /// The longest time to the end of a return.
 fn ends(nodes: &[Node], times: &[Option<Time>]) -> Option<Time> {
-    let ends = nodes.iter().zip(times).filter_map(|(node, time)| Some(time.as_ref()?.and_cycles(node.returns?)));
-    ends.fold(None, |longest, end| longer(longest, Some(end)))
+    let ends = nodes.iter().zip(times).map(|(node, time)| Some(time.as_ref()?.and_cycles(node.returns?)));
+    ends.fold(None, longer)
 }
 
 /// Longest paths over places and edges.
@@ -427,7 +427,7 @@ impl Paths<'_> {
             entered = longer(entered, times[head].clone());
             inside[head] = Some(Time::default());
         }
-        let (Some(entered), Some(&first)) = (entered, heads.first()) else { return };
+        let Some(entered) = entered else { return };
         self.fill(circle.clone(), &heads, depth + 1, &mut inside);
         let mut turn = Time::default();
         for &node in circle {
@@ -438,7 +438,7 @@ impl Paths<'_> {
         let cycles = turn.cycles.saturating_mul(passes.unwrap_or(1));
         let mut before_last = Time { cycles, unbounded: turn.unbounded };
         if passes.is_none() {
-            before_last.unbounded.insert(self.address(first));
+            before_last.unbounded.extend(heads.iter().map(|&head| self.address(head)).min());
         }
         let entered = entered.and(&before_last);
         for &node in circle {

@@ -62,7 +62,7 @@ mod values;
 
 pub use self::budget::{Budgets, Depth, Held, RegisterRule};
 pub use self::chip::{CHIPS, Chip};
-use self::cycles::{Passes, Stretch, Time, Timer};
+use self::cycles::{Passes, Stretch, Time, Timer, longer};
 use self::decode::Operation;
 pub use self::elf::{Program, Symbol};
 pub use self::error::BoundsError;
@@ -133,12 +133,9 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         .map(|input| watch(input, &code, &handlers, &of_handlers, &mut timer, &closed))
         .transpose()?;
 
-    let feeds = |node: &Node| {
-        code.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Wdr)
-    };
+    let feeds = |node: &Node| node.instruction.operation == Operation::Wdr;
     let turns = code.routines().filter(|routine| routine.entry.kind != Kind::Handler);
-    let turns: Vec<Time> = turns.filter_map(|routine| timer.turn(routine, feeds)).collect();
-    let turn = turns.into_iter().reduce(|longest, turn| longest.or(&turn)).map(|turn| turn.longest(&code));
+    let turn = turns.map(|routine| timer.turn(routine, feeds)).fold(None, longer).map(|turn| turn.longest(&code));
     let loops: BTreeSet<u32> = code.routines().flat_map(|routine| timer.loops_without_bound(routine)).collect();
 
     if budgets.registers == RegisterRule::Convention {
@@ -179,9 +176,8 @@ fn time_handlers(
     timer: &mut Timer,
     closed: &Longest,
 ) -> Vec<Handler> {
-    let sleeps = code.routines().flat_map(|routine| &routine.nodes).any(|node| {
-        code.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Sleep)
-    });
+    let mut nodes = code.routines().flat_map(|routine| &routine.nodes);
+    let sleeps = nodes.any(|node| node.instruction.operation == Operation::Sleep);
     let response = code.elf.chip.response_cycles() + if sleeps { WAKE_UP_CYCLES } else { 0 };
     let mut timed: Vec<Handler> = (handlers.iter())
         .map(|(&vector, handler)| {
@@ -234,7 +230,7 @@ fn watch(
             )));
         }
     }
-    let looks = |node: &Node| code.instruction(node.place.address).is_ok_and(|found| found.reads(input.port));
+    let looks = |node: &Node| node.instruction.reads(input.port);
     let (mut to_look, mut busy) = (0, 0);
     for &vector in &input.vectors {
         let look = handlers.get(&vector).and_then(|handler| timer.around(handler, looks));
@@ -281,11 +277,7 @@ fn deepest<'a>(
 fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
     let mut found: BTreeMap<u32, (FunctionBounds, Option<Time>)> = BTreeMap::new();
     for routine in code.routines() {
-        let called = |node: &Node| {
-            let through = node.edges.iter().filter_map(|edge| edge.through.clone());
-            through.chain(node.ends_in.iter().map(|(_, called)| Rc::clone(called))).collect::<Vec<_>>()
-        };
-        let calls = routine.nodes.iter().flat_map(called).map(|called| code.name_of(called.entry));
+        let calls = routine.nodes.iter().flat_map(Node::called).map(|called| code.name_of(called.entry));
         let time = timer.longest(routine);
         let (bounds, longest) = found.entry(routine.entry.address).or_insert_with(|| {
             let bounds = FunctionBounds {
@@ -299,10 +291,7 @@ fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
         });
         bounds.stack_bytes = bounds.stack_bytes.max(bytes(&routine.deepest));
         bounds.calls.extend(calls);
-        *longest = match (longest.take(), time) {
-            (Some(one), Some(other)) => Some(one.or(&other)),
-            (one, other) => one.or(other),
-        };
+        *longest = longer(longest.take(), time);
     }
     let functions = found.into_values();
     functions.map(|(bounds, time)| FunctionBounds { longest: time.map(|time| time.longest(code)), ..bounds }).collect()

@@ -29,7 +29,7 @@ pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Res
             })
         };
         // An error names the function itself, not its caller.
-        let called = routine.nodes.iter().flat_map(called).filter(|called| !called.returns.is_empty());
+        let called = routine.nodes.iter().flat_map(Node::called).filter(|called| !called.returns.is_empty());
         let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
         if !broken.is_empty() {
             let function = program.name_of(routine.entry);
@@ -49,9 +49,4 @@ pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Res
         }
     }
     Ok(())
-}
-
-/// The routines that a place calls.
-fn called(node: &Node) -> impl Iterator<Item = &Rc<Routine>> {
-    node.edges.iter().filter_map(|edge| edge.through.as_ref()).chain(node.ends_in.iter().map(|(_, called)| called))
 }
