@@ -360,12 +360,7 @@ impl<'a> Timer<'a> {
             times[node] = longer(times[node].take(), Some(time));
         }
         let all = (0..nodes.len()).filter(|&node| within(node)).collect();
-        Paths { code: self.code, nodes, edges: &edges, passes: &self.passes }.fill(
-            all,
-            &BTreeSet::new(),
-            0,
-            &mut times,
-        );
+        Paths { nodes, edges: &edges, passes: &self.passes }.fill(all, &BTreeSet::new(), 0, &mut times);
         times
     }
 }
@@ -378,7 +373,6 @@ fn ends(nodes: &[Node], times: &[Option<Time>]) -> Option<Time> {
 
 /// Longest paths over places and edges.
 struct Paths<'a> {
-    code: &'a Code<'a>,
     nodes: &'a [Node],
     edges: &'a [Vec<(usize, Time)>],
     passes: &'a Passes,
@@ -421,7 +415,7 @@ impl Paths<'_> {
                 let by_depth = self.passes.of_heads.get(&self.address(head))?;
                 by_depth.get(depth).or(by_depth.last()).copied()
             });
-            let counted = || if heads.len() == 1 { counted::turns(self.code, self.nodes, circle, head) } else { None };
+            let counted = || if heads.len() == 1 { counted::turns(self.nodes, circle, head) } else { None };
             let stated = stated.or_else(counted);
             passes = passes.zip(stated).map(|(passes, stated)| passes + stated);
             entered = longer(entered, times[head].clone());

@@ -148,6 +148,11 @@ static FORM_OF_WORD: LazyLock<Vec<Option<&Form>>> = LazyLock::new(|| {
     forms
 });
 
+/// The 16 bits at an address of some memory.
+pub(crate) fn word_at(memory: &[u8], address: u32) -> Option<u16> {
+    Some(u16::from_le_bytes(*memory.get(address as usize..)?.first_chunk()?))
+}
+
 /// An instruction at its address in flash.
 #[derive(Clone, Copy)]
 pub(crate) struct Instruction {
@@ -169,16 +174,11 @@ pub(crate) struct Instruction {
 impl Instruction {
     /// The instruction at an address, in bytes; `None` without flash or a valid instruction.
     pub(crate) fn at(flash: &[u8], address: u32) -> Option<Instruction> {
-        let word = |address: u32| {
-            let bytes = flash.get(address as usize..)?.first_chunk()?;
-            Some(u16::from_le_bytes(*bytes))
-        };
-        let first = word(address)?;
-        let &(bits, operation, cycles) = FORM_OF_WORD[usize::from(first)]?;
-        let second = if matches!(operation, Call | Jmp | Lds | Sts) { word(address + 2)? } else { 0 };
+        let word = word_at(flash, address)?;
+        let &(bits, operation, cycles) = FORM_OF_WORD[usize::from(word)]?;
+        let second = if matches!(operation, Call | Jmp | Lds | Sts) { word_at(flash, address + 2)? } else { 0 };
         let (destination, source, constant) = (0, 0, 0);
-        let found =
-            Instruction { address, operation, cycles, bits, destination, source, constant, word: first, second };
+        let found = Instruction { address, operation, cycles, bits, destination, source, constant, word, second };
         let (destination, source) = (found.destination_in_bits() as u8, found.source_in_bits() as u8);
         Some(Instruction { destination, source, constant: found.operand('K') as u8, ..found })
     }

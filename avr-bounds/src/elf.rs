@@ -45,6 +45,8 @@ pub struct Program {
     pub has_vectors: bool,
     /// Its functions by address. Of two names for one address the alphabetically first is kept.
     pub functions: BTreeMap<u32, Symbol>,
+    /// The records of loops: an address in the loop, and the most executions of that address.
+    pub records: BTreeMap<u32, u64>,
     /// Every symbol in flash by its raw name.
     pub(crate) labels: BTreeMap<String, u32>,
     /// The first address of code after the vectors, and the end of flash without the initial values of variables.
@@ -57,8 +59,6 @@ pub struct Program {
     /// Functions whose address is taken outside virtual tables and the tables of constructors, if the ELF has
     /// relocations.
     pub(crate) taken: Option<BTreeSet<u32>>,
-    /// The records of loops.
-    pub(crate) records: BTreeMap<u32, u64>,
     lines: Lines,
 }
 
@@ -107,7 +107,7 @@ impl Program {
             }
             flash[address as usize..end as usize].copy_from_slice(content);
             if (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&header.p_vaddr(LittleEndian)) {
-                data_start = header.p_vaddr(LittleEndian);
+                data_start = header.p_vaddr(LittleEndian).into();
                 data = content.to_vec();
             } else {
                 code_end = code_end.max(end);
@@ -117,20 +117,22 @@ impl Program {
             .filter(|symbol| symbol.address() < u64::from(SRAM_ORIGIN))
             .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
             .collect();
-        let virtual_tables = (file.symbols())
+        let tables: Vec<Range<u64>> = (file.symbols())
             .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
-            .filter_map(|symbol| {
-                let first = (symbol.address() as u32).checked_sub(data_start)? as usize;
-                let table = first..first + symbol.size() as usize;
-                data.get(table.clone()).map(|_| table)
-            })
+            .map(|symbol| symbol.address()..symbol.address() + symbol.size())
             .collect();
+        let in_data = |table: &Range<u64>| {
+            let first = table.start.checked_sub(data_start)? as usize;
+            let table = first..first + (table.end - table.start) as usize;
+            data.get(table.clone()).map(|_| table)
+        };
+        let virtual_tables = tables.iter().filter_map(in_data).collect();
         // A program at a higher address than 0 is a bootloader; some have no vectors.
         let start = if start == u32::MAX { 0 } else { start };
         let has_vectors = start == 0 || labels.get("__vectors") == Some(&start);
         let records = loops::records_of(&file).map_err(not_elf)?;
         let functions = functions(&file);
-        let taken = taken(&file, &functions, &labels);
+        let taken = taken(&file, &functions, &labels, &tables);
         let vectors = if has_vectors { u32::from(chip.vectors) * chip.vector_bytes } else { 0 };
         Ok(Program {
             chip,
@@ -145,18 +147,20 @@ impl Program {
             data,
             virtual_tables,
             records,
-            lines: Lines::of(path),
+            lines: Lines { path: path.into(), loader: OnceCell::new() },
         })
     }
 
-    /// The records of loops: an address in the loop, and the most executions of that address.
-    pub fn records(&self) -> &BTreeMap<u32, u64> {
-        &self.records
+    pub(crate) fn label(&self, name: &str) -> Option<u32> {
+        self.labels.get(name).copied()
     }
 
     /// File and line of an address, if the ELF has debug information.
     pub fn line(&self, address: u32) -> Option<String> {
-        self.lines.at(address)
+        let loader = self.lines.loader.get_or_init(|| Loader::new(&self.lines.path).ok()).as_ref()?;
+        let location = loader.find_location(address.into()).ok()??;
+        let file = Path::new(location.file?).file_name()?.to_string_lossy().into_owned();
+        Some(format!("{file}:{}", location.line?))
     }
 
     /// The functions of a name.
@@ -184,20 +188,6 @@ impl Program {
 struct Lines {
     path: PathBuf,
     loader: OnceCell<Option<Loader>>,
-}
-
-impl Lines {
-    fn of(path: &Path) -> Lines {
-        Lines { path: path.into(), loader: OnceCell::new() }
-    }
-
-    /// File and line of an address.
-    fn at(&self, address: u32) -> Option<String> {
-        let loader = self.loader.get_or_init(|| Loader::new(&self.path).ok()).as_ref()?;
-        let location = loader.find_location(address.into()).ok()??;
-        let file = Path::new(location.file?).file_name()?.to_string_lossy().into_owned();
-        Some(format!("{file}:{}", location.line?))
-    }
 }
 
 impl fmt::Debug for Lines {
@@ -254,6 +244,7 @@ fn taken(
     file: &ElfFile32<LittleEndian>,
     functions: &BTreeMap<u32, Symbol>,
     labels: &BTreeMap<String, u32>,
+    tables: &[Range<u64>],
 ) -> Option<BTreeSet<u32>> {
     /// Word addresses: in memory, and in `ldi`, directly and by a trampoline (binutils, elf/avr.h).
     const OF_WORDS: [u32; 6] = [5, 12, 13, 14, 24, 25];
@@ -261,10 +252,6 @@ fn taken(
     let label = |name: &str| labels.get(name).copied().unwrap_or_default();
     let constructors =
         label("__ctors_start").min(label("__dtors_start"))..label("__ctors_end").max(label("__dtors_end"));
-    let tables: Vec<Range<u64>> = (file.symbols())
-        .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
-        .map(|symbol| symbol.address()..symbol.address() + symbol.size())
-        .collect();
     let mut taken = BTreeSet::new();
     let mut is_kept = false;
     for section in file.sections().filter(|section| section.kind() != SectionKind::Other && section.size() > 0) {

@@ -348,7 +348,8 @@ impl Follower<'_, '_> {
             Rjmp | Jmp | Rcall | Call if target.is_some_and(|target| self.program.targets.is_table_jump(target)) => {
                 let targets = self.program.targets.of_table(self.program.elf, at, &after.known);
                 let (targets, table_cycles) = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
-                after.known.after(Registers::range(1..=29));
+                // The routine changes R0 and the pointer.
+                after.known.after(Registers::which(|register| matches!(register, 1..=29)));
                 after.cycles += table_cycles;
                 self.lead(number, targets, after)?;
             }

@@ -13,20 +13,14 @@ use std::rc::Rc;
 /// The register that is zero except between instructions that change it (AVR calling convention).
 const ZERO: usize = 1;
 
-/// The registers that functions preserve (AVR calling convention).
-fn is_preserved(register: usize) -> bool {
-    matches!(register, 2..=17 | 28 | 29)
-}
-
 /// Proves that every function of this program keeps the calling convention, and that handlers restore all registers and
 /// flags.
 pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Result<(), BoundsError> {
     let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function);
     for routine in functions.filter(|routine| !routine.returns.is_empty()) {
         let broken = |routine: &Routine| {
-            Registers::which(|register| {
-                is_preserved(register) && !routine.keeps.contains(register) || register == ZERO && !routine.leaves_zero
-            })
+            let zero = if routine.leaves_zero { Registers::NONE } else { Registers::one(ZERO) };
+            (Registers::PRESERVED - routine.keeps) | zero
         };
         // An error names the function itself, not its caller.
         let called = routine.nodes.iter().flat_map(Node::called).filter(|called| !called.returns.is_empty());

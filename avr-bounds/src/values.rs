@@ -50,9 +50,9 @@ pub(crate) enum Value {
     StackHigh(i32),
     /// The status register, with interrupts on or off, and whether all other flags are as at the entry.
     Status(bool, bool),
-    /// From memory, at this displacement from a pointer; the pointer itself came from memory if it is deep. `None` is a
+    /// From memory, at this displacement from a pointer, and whether the pointer itself came from memory. `None` is a
     /// fixed address.
-    Loaded(Option<u8>, Deep),
+    Loaded(Option<u8>, bool),
     /// An unknown value, less a constant.
     Less(u8),
 }
@@ -68,13 +68,6 @@ impl Value {
             _ => Value::Unknown,
         }
     }
-}
-
-/// Whether a pointer was loaded by a pointer that was loaded too.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Deep {
-    No,
-    Yes,
 }
 
 /// The known facts at a place.
@@ -318,9 +311,7 @@ impl Known {
             Bset if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, true),
             Bclr if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, false),
             Push => self.stack.push(self.registers[r]),
-            Pop => {
-                self.registers[d] = self.stack.pop().ok_or(Problem::TakesTooMuch)?;
-            }
+            Pop => self.registers[d] = self.stack.pop().ok_or(Problem::TakesTooMuch)?,
             Mov => self.registers[d] = self.registers[r],
             Movw => {
                 self.registers[d + 1] = self.registers[r + 1];
@@ -333,7 +324,7 @@ impl Known {
                     Some(SPL) => StackLow(depth as u8),
                     Some(SPH) => StackHigh(depth),
                     Some(SREG) => Status(interrupts_before != Interrupts::Off, self.unchanged == Registers::FLAGS),
-                    _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, Deep::No),
+                    _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, false),
                     _ => gpior.map_or(Unknown, |gpior| self.kept[gpior]),
                 };
             }
@@ -374,18 +365,10 @@ impl Known {
                         let depth = depth.ok_or(Problem::UnknownStack)?;
                         self.stack.resize(depth.min(DEEPEST + 1), Unknown);
                     }
-                    _ => {
-                        if let Some(gpior) = gpior {
-                            self.kept[gpior] = value;
-                        }
-                    }
+                    _ => gpior.into_iter().for_each(|gpior| self.kept[gpior] = value),
                 }
             }
-            Sbi | Cbi => {
-                if let Some(gpior) = gpior {
-                    self.kept[gpior] = Unknown;
-                }
-            }
+            Sbi | Cbi => gpior.into_iter().for_each(|gpior| self.kept[gpior] = Unknown),
             Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.registers[..2].fill(Unknown),
             Ld | Ldd | Lpm | Elpm | St | Std => {
                 let pointer = instruction.pointer().unwrap_or_default();
@@ -398,11 +381,9 @@ impl Known {
                         }
                     }
                     _ => {
-                        let deep = match (self.registers[pointer], self.registers[pointer + 1]) {
-                            (Loaded(..), Loaded(..)) => Deep::Yes,
-                            _ => Deep::No,
-                        };
-                        let loaded = Loaded(Some(instruction.displacement()), deep);
+                        let is_deep =
+                            self.registers[pointer..pointer + 2].iter().all(|value| matches!(value, Loaded(..)));
+                        let loaded = Loaded(Some(instruction.displacement()), is_deep);
                         let value = place.map_or(loaded, |place| lasting(self.stack[place]));
                         // If a pointer loads over itself, the second byte uses the pointer's old value.
                         self.registers[d] = value;
@@ -435,7 +416,8 @@ impl Known {
 /// compilers save count.
 fn lasting(value: Value) -> Value {
     match value {
-        Value::AtEntry(2..=17 | 28 | 29) | Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
+        Value::AtEntry(register) if Registers::PRESERVED.contains(register) => value,
+        Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
         _ => Value::Unknown,
     }
 }

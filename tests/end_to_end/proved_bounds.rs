@@ -218,7 +218,7 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     assert_eq!(search, [examples::COUNT + 2, moving]);
     assert_eq!(by_depth("control::weeder::Controller::catch_up"), [nearest::AT_ONCE + 2, moving]);
     // The ELF must have the loops' own records: of the edges that a turn takes, and of the console's bytes.
-    let records = program(&elf()).records().len();
+    let records = program(&elf()).records.len();
     assert_eq!(records, 2);
     assert_eq!(passes("knn::nearest::Nearest::answer"), usize::from(MAX_K) + 1);
     // Bytes that move when an entry of a list is removed. An entry takes at least as many bytes on the PC.
