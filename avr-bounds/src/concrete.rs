@@ -67,8 +67,8 @@ impl Concrete {
 
     /// Executes an instruction. Returns `false` for one that does more than arithmetic, or accesses memory.
     pub(crate) fn carry_out(&mut self, instruction: &Instruction) -> bool {
-        let (d, r) = (instruction.destination(), instruction.source());
-        let (to, from, constant) = (self.registers[d], self.registers[r], instruction.constant());
+        let (d, r) = (instruction.destination, instruction.source);
+        let (to, from, constant) = (self.registers[d], self.registers[r], instruction.constant);
         let carry = self.status & C;
         let value = match instruction.operation {
             Add => self.add(to, from, 0),

@@ -137,9 +137,9 @@ fn run(steps: &[Instruction], exit: u32, stays_when_next: bool, mut held: Concre
         }
         for step in steps {
             if step.address == exit {
-                let source = held.registers[step.source()];
+                let source = held.registers[step.source];
                 let goes_next = match step.operation {
-                    Cpse => held.registers[step.destination()] != source,
+                    Cpse => held.registers[step.destination] != source,
                     Sbrc | Sbrs => (source >> step.operand('b') & 1 == 1) != (step.operation == Sbrs),
                     _ => (held.status >> step.operand('s') & 1 == 1) != (step.operation == Brbs),
                 };
@@ -156,13 +156,13 @@ fn run(steps: &[Instruction], exit: u32, stays_when_next: bool, mut held: Concre
 
 /// Moves the pointer of a load or store, which changes no other needed register.
 fn moves_pointer(step: &Instruction, held: &mut Concrete, needed: Registers) -> bool {
-    let Some(pointer) = step.moved_pointer() else { return false };
+    let Some((pointer, by)) = step.pointer() else { return false };
     let is_load = matches!(step.operation, Ld | Lpm | Elpm);
-    if is_load && needed.contains(step.destination()) {
+    if by == 0 || is_load && needed.contains(step.destination) {
         return false;
     }
     let address = u16::from_le_bytes([held.registers[pointer], held.registers[pointer + 1]]);
-    let moved = address.wrapping_add_signed(step.moves_by().into()).to_le_bytes();
+    let moved = address.wrapping_add_signed(by.into()).to_le_bytes();
     held.registers[pointer..pointer + 2].copy_from_slice(&moved);
     true
 }

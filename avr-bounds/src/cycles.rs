@@ -10,7 +10,7 @@
 //! routine.
 
 use crate::counted;
-use crate::flow::{Code, Edge, Node, Routine};
+use crate::flow::{Edge, Node, Routine};
 use crate::paths::{circles, loops, reaching, runs_once};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
@@ -104,16 +104,15 @@ struct Stretches {
 }
 
 /// Times routines, each once.
-pub(crate) struct Timer<'a> {
-    code: &'a Code<'a>,
+pub(crate) struct Timer {
     passes: Passes,
     longest: BTreeMap<*const Routine, Option<Time>>,
     stretches: BTreeMap<(*const Routine, Stretch), Stretches>,
 }
 
-impl<'a> Timer<'a> {
-    pub(crate) fn new(code: &'a Code<'a>, passes: Passes) -> Timer<'a> {
-        Timer { code, passes, longest: BTreeMap::new(), stretches: BTreeMap::new() }
+impl Timer {
+    pub(crate) fn new(passes: Passes) -> Timer {
+        Timer { passes, longest: BTreeMap::new(), stretches: BTreeMap::new() }
     }
 
     /// The longest path from a routine's entry to the end of a return; `None` if it never returns.
@@ -223,7 +222,7 @@ impl<'a> Timer<'a> {
     ) -> (Option<Time>, Option<Time>) {
         let nodes = &routine.nodes;
         // How a call's stretch continues in the called function: it ends at once if interrupts are on there.
-        let opens = |timer: &mut Timer<'a>, called: &Routine| {
+        let opens = |timer: &mut Timer, called: &Routine| {
             if is_inside(&called.nodes[0]) { timer.stretches(called, kind).first } else { Some(Time::default()) }
         };
         let mut ending = Vec::new();
@@ -286,7 +285,7 @@ impl<'a> Timer<'a> {
             (None, _) => Time::default(),
             (Some(called), Count::Whole) => match edge.length {
                 Some(length) if self.passes.by_length.contains(&called.entry.address) => {
-                    self.of_length(called, length)?
+                    Self::of_length(called, length)?
                 }
                 _ => self.longest(called)?,
             },
@@ -300,10 +299,10 @@ impl<'a> Timer<'a> {
     }
 
     /// The longest path through a function that processes this number of bytes.
-    fn of_length(&self, routine: &Routine, length: u16) -> Option<Time> {
+    fn of_length(routine: &Routine, length: u16) -> Option<Time> {
         let passes = vec![u64::from(length) + 1];
         let of_heads = routine.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
-        Timer::new(self.code, Passes { of_heads, ..Passes::default() }).longest(routine)
+        Timer::new(Passes { of_heads, ..Passes::default() }).longest(routine)
     }
 
     /// The heads of a routine's own unbounded loops, except loops that it never leaves.

@@ -116,11 +116,11 @@ impl Instruction {
     pub(crate) fn effects(&self) -> Effects {
         use Registers as R;
 
-        let (d, r) = (self.destination(), self.source());
+        let (d, r) = (self.destination, self.source);
         let (to, from) = (R::one(d), R::one(r));
         let flag = flags(1 << self.operand('s')) & R::FLAGS;
-        let pointer = self.pointer().map_or(R::NONE, R::pair);
-        let moved = self.moved_pointer().map_or(R::NONE, R::pair);
+        let pointer = self.pointer().map_or(R::NONE, |(pointer, _)| R::pair(pointer));
+        let moved = if self.pointer().is_some_and(|(_, by)| by != 0) { pointer } else { R::NONE };
         // Subtracting a register from itself, or XOR with itself, gives 0 or a value made from the carry. The old value
         // does not matter.
         let is_same = d == r;

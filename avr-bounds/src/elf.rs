@@ -217,25 +217,17 @@ fn functions(file: &ElfFile32<LittleEndian>) -> BTreeMap<u32, Symbol> {
         SymbolKind::Unknown => is_code(symbol) && symbol.size() > 0,
         _ => false,
     };
-    let mut functions: BTreeMap<u32, Symbol> = BTreeMap::new();
-    for symbol in file.symbols().filter(|symbol| is_function(symbol) && symbol.address() < u64::from(SRAM_ORIGIN)) {
-        let Ok(name) = symbol.name() else { continue };
-        let (name, bytes) = (demangled(name), symbol.size() as u32);
-        if name.is_empty() {
-            continue;
-        }
-        let new = Symbol { name, bytes };
-        let rank = |symbol: &Symbol| (symbol.bytes == 0, symbol.name.clone());
-        functions
-            .entry(symbol.address() as u32)
-            .and_modify(|known| {
-                if rank(&new) < rank(known) {
-                    *known = new.clone();
-                }
-            })
-            .or_insert(new);
-    }
-    functions
+    let mut functions: Vec<(u32, Symbol)> = (file.symbols())
+        .filter(|symbol| is_function(symbol) && symbol.address() < u64::from(SRAM_ORIGIN))
+        .filter_map(|symbol| {
+            let named = Symbol { name: demangled(symbol.name().ok()?), bytes: symbol.size() as u32 };
+            Some((symbol.address() as u32, named))
+        })
+        .filter(|(_, symbol)| !symbol.name.is_empty())
+        .collect();
+    // Of several at one address the map keeps the last.
+    functions.sort_by_cached_key(|(_, symbol)| (symbol.bytes == 0, symbol.name.clone()));
+    functions.into_iter().rev().collect()
 }
 
 /// The functions whose address is taken, by the relocations that `--emit-relocs` keeps; `None` without relocations.

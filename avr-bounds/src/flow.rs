@@ -76,8 +76,8 @@ pub(crate) struct Edge {
     pub(crate) cycles: u32,
     /// The routine called on this edge.
     pub(crate) through: Option<Rc<Routine>>,
-    /// The number in R21 and R20 at the beginning of the edge, if it is known: the length argument of `memcpy` and
-    /// similar functions.
+    /// The number in R21 and R20 at the beginning of the edge, if it is known: the third argument, if each has 16 bits.
+    /// This is the length of `memcpy` and similar functions.
     pub(crate) length: Option<u16>,
     /// Registers with known constants after the instruction.
     pub(crate) constants: Constants,
@@ -378,7 +378,7 @@ impl Follower<'_, '_> {
             }
             Cpse | Sbrc | Sbrs | Sbic | Sbis => {
                 let skipped = self.program.instruction(next)?;
-                let bit = match (instruction.operation, after.known.registers[instruction.source()]) {
+                let bit = match (instruction.operation, after.known.registers[instruction.source]) {
                     (Sbrc | Sbrs, Value::Status(on, _)) if instruction.operand('b') == INTERRUPT_FLAG => Some(on),
                     _ => None,
                 };
@@ -443,7 +443,7 @@ impl Follower<'_, '_> {
             return Ok(());
         }
         let After { known, interrupts, cycles } = after;
-        let (length, constants) = (self.known[from].length(), known.constants());
+        let (length, constants) = (self.known[from].pair(20), known.constants());
         let to = self.reach(Place { address, depth: known.stack.len(), interrupts }, known)?;
         self.routine.nodes[from].edges.push(Edge { to, cycles, through, length, constants });
         Ok(())

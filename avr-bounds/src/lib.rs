@@ -123,7 +123,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         }
     }
     let code = code;
-    let mut timer = Timer::new(&code, passes(&code, budgets));
+    let mut timer = Timer::new(passes(&code, budgets));
     let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
         .map(|kind| timer.longest_stretch(&main, kind).map(|time| time.longest(&code)))
         .map(|longest| longest.unwrap_or(Longest { cycles: Some(0), without_bound: Vec::new() }))

@@ -196,7 +196,7 @@ fn found_taken(elf: &Program) -> BTreeSet<u32> {
                 continue;
             };
             if instruction.operation == Ldi {
-                loaded.entry(instruction.destination()).or_default().insert(instruction.constant());
+                loaded.entry(instruction.destination).or_default().insert(instruction.constant);
             }
             address = instruction.next();
         }

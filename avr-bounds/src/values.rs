@@ -138,11 +138,6 @@ impl Known {
         Some(u16::from_le_bytes([self.constant(lower)?, self.constant(lower + 1)?]))
     }
 
-    /// The number in R21 and R20: a function's third argument, if each has 16 bits.
-    pub(crate) fn length(&self) -> Option<u16> {
-        self.pair(20)
-    }
-
     /// Keeps the facts that both have. Returns whether this has removed any.
     pub(crate) fn meet(&mut self, other: &Known) -> bool {
         let before = self.clone();
@@ -202,22 +197,19 @@ impl Known {
     }
 
     /// The stack position that a load or a store accesses, by a pointer with a known target.
-    fn on_stack(&self, instruction: &Instruction, pointer: usize) -> Option<usize> {
-        let below = self.below(pointer)?;
-        let place = match instruction.moves_by() {
-            -1 => below + 1,
-            _ => below - i32::from(instruction.displacement()),
-        };
-        usize::try_from(place).ok().filter(|place| *place < self.stack.len())
+    fn on_stack(&self, instruction: &Instruction) -> Option<usize> {
+        let (pointer, by) = instruction.pointer()?;
+        let offset = if by < 0 { by.into() } else { i32::from(instruction.displacement()) };
+        usize::try_from(self.below(pointer)? - offset).ok().filter(|place| *place < self.stack.len())
     }
 
     /// Applies arithmetic on the bytes of a stack pointer. Returns whether it was that.
     fn moves_stack_pointer(&mut self, instruction: &Instruction) -> bool {
         use Value::{StackHigh, StackLow, Unknown};
 
-        let (d, r) = (instruction.destination(), instruction.source());
+        let (d, r) = (instruction.destination, instruction.source);
         let constant = match instruction.operation {
-            Adiw | Sbiw | Subi | Sbci => Some(instruction.constant()),
+            Adiw | Sbiw | Subi | Sbci => Some(instruction.constant),
             Add | Adc | Sub | Sbc => self.constant(r),
             _ => return false,
         };
@@ -287,7 +279,7 @@ impl Known {
     ) -> Result<(), Problem> {
         use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
 
-        let (d, r) = (instruction.destination(), instruction.source());
+        let (d, r) = (instruction.destination, instruction.source);
         let gpior =
             instruction.data_address().and_then(|address| chip.gpior.iter().position(|gpior| *gpior == address));
         let changes = instruction.effects().changes;
@@ -317,7 +309,7 @@ impl Known {
                 self.registers[d + 1] = self.registers[r + 1];
                 self.registers[d] = self.registers[r];
             }
-            Subi | Sbci => self.registers[d] = Less(instruction.constant()),
+            Subi | Sbci => self.registers[d] = Less(instruction.constant),
             In | Lds => {
                 let depth = self.stack.len() as i32;
                 self.registers[d] = match instruction.data_address() {
@@ -371,8 +363,8 @@ impl Known {
             Sbi | Cbi => gpior.into_iter().for_each(|gpior| self.kept[gpior] = Unknown),
             Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.registers[..2].fill(Unknown),
             Ld | Ldd | Lpm | Elpm | St | Std => {
-                let pointer = instruction.pointer().unwrap_or_default();
-                let place = self.on_stack(instruction, pointer);
+                let (pointer, by) = instruction.pointer().unwrap_or_default();
+                let place = self.on_stack(instruction);
                 match instruction.operation {
                     Lpm | Elpm => self.registers[d] = Unknown,
                     St | Std => {
@@ -390,11 +382,11 @@ impl Known {
                     }
                 }
                 // The pointer moves, and so does the address that its content came from.
-                if instruction.moves_by() != 0 && !(pointer..pointer + 2).contains(&d) {
+                if by != 0 && !(pointer..pointer + 2).contains(&d) {
                     match (self.below(pointer), self.pair(pointer)) {
-                        (Some(below), _) => self.point_below(pointer, below - i32::from(instruction.moves_by())),
+                        (Some(below), _) => self.point_below(pointer, below - i32::from(by)),
                         (_, Some(address)) => {
-                            let [low, high] = address.wrapping_add_signed(instruction.moves_by().into()).to_le_bytes();
+                            let [low, high] = address.wrapping_add_signed(by.into()).to_le_bytes();
                             (self.registers[pointer], self.registers[pointer + 1]) = (Constant(low), Constant(high));
                         }
                         _ if matches!(self.registers[pointer], Loaded(..)) => {}
@@ -404,7 +396,7 @@ impl Known {
             }
             Cp | Cpc | Cpi | Bst | Nop | Wdr | Bset | Bclr | Sleep | Spm | Break => {}
             // Compilers ask so whether a pair is zero.
-            Adiw | Sbiw if instruction.constant() == 0 => {}
+            Adiw | Sbiw if instruction.constant == 0 => {}
             Adiw | Sbiw => self.registers[d..d + 2].fill(Unknown),
             _ => self.registers[d] = Unknown,
         }
