@@ -92,41 +92,35 @@ impl Budgets {
     /// If there is a budget for a time that has no bound.
     pub fn hold(&self, bounds: &Bounds) -> Result<Vec<Held>, BoundsError> {
         let mut held = Vec::new();
-        let mut at_most = |name, proved, budget: Option<u64>| {
-            held.extend(budget.map(|budget| Held { name, proved, budget, keeps: proved <= budget }));
+        let mut hold = |name, proved, budget: Option<u64>, keeps: fn(&u64, &u64) -> bool| {
+            held.extend(budget.map(|budget| Held { name, proved, budget, keeps: keeps(&proved, &budget) }));
         };
-        at_most("stack_bytes", bounds.stack_bytes as u64, self.stack_bytes);
+        hold("stack_bytes", bounds.stack_bytes as u64, self.stack_bytes, u64::le);
         if self.handler_cycles.is_some() {
             for handler in &bounds.handlers {
-                let what = format!("the handler of vector {}", handler.vector);
-                Longest { cycles: handler.cycles, without_bound: handler.without_bound.clone() }.or_refuse(&what)?;
+                handler.longest.or_refuse(&format!("the handler of vector {}", handler.vector))?;
             }
         }
-        at_most("handler_cycles", bounds.longest_handler_cycles(), self.handler_cycles);
+        hold("handler_cycles", bounds.longest_handler_cycles(), self.handler_cycles, u64::le);
         if self.critical_section_cycles.is_some() {
             let longest = bounds.critical_section.or_refuse("a stretch without interrupts")?;
-            at_most("critical_section_cycles", longest.unwrap_or_default(), self.critical_section_cycles);
+            hold("critical_section_cycles", longest, self.critical_section_cycles, u64::le);
         }
         // A main program without a known turn counts as unbounded.
         let loops = bounds.turn.as_ref().map_or(u64::MAX, |turn| turn.without_bound.len() as u64);
-        at_most("loops_without_bound", loops, self.loops_without_bound);
+        hold("loops_without_bound", loops, self.loops_without_bound, u64::le);
         let turn = bounds.turn.as_ref().and_then(|turn| turn.cycles).unwrap_or(u64::MAX);
-        at_most("turn_cycles", turn, self.turn_cycles);
+        hold("turn_cycles", turn, self.turn_cycles, u64::le);
         let rate = bounds.edges.as_ref().map_or(0, |edges| edges.never_lost_per_s);
-        held.extend(self.never_lost_per_s.map(|budget| Held {
-            name: "never_lost_per_s",
-            proved: rate,
-            budget,
-            keeps: rate >= budget,
-        }));
+        hold("never_lost_per_s", rate, self.never_lost_per_s, u64::ge);
         Ok(held)
     }
 }
 
 impl Longest {
-    /// The cycles of a time that must have a bound; `what` names it in the error. `None` if it never ends.
-    pub(crate) fn or_refuse(&self, what: &str) -> Result<Option<u64>, BoundsError> {
-        let Some(place) = self.without_bound.first() else { return Ok(self.cycles) };
+    /// The cycles of a time that must have a bound; `what` names it in the error. 0 if it never ends.
+    pub(crate) fn or_refuse(&self, what: &str) -> Result<u64, BoundsError> {
+        let Some(place) = self.without_bound.first() else { return Ok(self.cycles.unwrap_or_default()) };
         let function = &place.function;
         Err(BoundsError(format!(
             "{what} has a loop without a bound, at {} in {function}: give its bound, by a record in .loop_bounds or for the \

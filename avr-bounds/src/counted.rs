@@ -10,7 +10,7 @@ use crate::decode::Instruction;
 use crate::decode::Operation::*;
 use crate::effects::Registers;
 use crate::flow::{Edge, Node};
-use crate::paths::{circles, loops, runs_once};
+use crate::paths::{circles, entering, loops, runs_once};
 use std::collections::BTreeSet;
 
 /// Turns after which a loop counts as endless.
@@ -19,10 +19,7 @@ const MOST_TURNS: u64 = 1 << 22;
 /// The most returns to `head` for each entry to its loop. `circle` is a strongly connected part of a routine.
 pub(crate) fn turns(nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Option<u64> {
     let edges = |node: usize| -> Vec<usize> { nodes[node].edges.iter().map(|edge| edge.to).collect() };
-    // Where it is entered.
-    let outside = nodes.iter().enumerate().filter(|(number, _)| !circle.contains(number));
-    let entering = outside.flat_map(|(_, node)| &node.edges).filter(|edge| circle.contains(&edge.to));
-    let entries: Vec<&Edge> = entering.collect();
+    let entries: Vec<&Edge> = entering(nodes, circle).collect();
     let first = entries.first()?.to;
     if circle.contains(&0) || entries.iter().any(|edge| edge.to != first) {
         return None;

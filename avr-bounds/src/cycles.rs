@@ -11,7 +11,7 @@
 
 use crate::counted;
 use crate::flow::{Edge, Node, Routine};
-use crate::paths::{circles, loops, reaching, runs_once};
+use crate::paths::{circles, entering, loops, reaching, runs_once};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +25,7 @@ pub(crate) struct Time {
 }
 
 impl Time {
-    fn of(cycles: u64) -> Time {
+    pub(crate) fn of(cycles: u64) -> Time {
         Time { cycles, unbounded: BTreeSet::new() }
     }
 
@@ -34,7 +34,7 @@ impl Time {
         self.unbounded.is_empty()
     }
 
-    fn and(&self, other: &Time) -> Time {
+    pub(crate) fn and(&self, other: &Time) -> Time {
         Time { cycles: self.cycles.saturating_add(other.cycles), unbounded: &self.unbounded | &other.unbounded }
     }
 
@@ -316,12 +316,8 @@ impl Timer {
                 let is_left = circle.iter().any(|&node| {
                     nodes[node].returns.is_some() || nodes[node].edges.iter().any(|edge| !circle.contains(&edge.to))
                 });
-                let heads: BTreeSet<usize> = (nodes.iter().enumerate())
-                    .filter(|(number, _)| !circle.contains(number))
-                    .flat_map(|(_, node)| node.edges.iter().map(|edge| edge.to))
-                    .chain([0])
-                    .filter(|to| circle.contains(to))
-                    .collect();
+                let entry = circle.contains(&0).then_some(0);
+                let heads: BTreeSet<usize> = entering(nodes, &circle).map(|edge| edge.to).chain(entry).collect();
                 let heads = if heads.is_empty() { circle.iter().copied().take(1).collect() } else { heads };
                 if is_left {
                     let begins = heads.iter().map(|&head| (head, Time::default())).collect();

@@ -181,21 +181,18 @@ fn time_handlers(
     let response = code.elf.chip.response_cycles() + if sleeps { WAKE_UP_CYCLES } else { 0 };
     let mut timed: Vec<Handler> = (handlers.iter())
         .map(|(&vector, handler)| {
-            let longest = timer.longest(handler).map(|time| time.longest(code)).unwrap_or_default();
+            let longest = timer.longest(handler).map(|time| time.and(&Time::of(response)).longest(code));
             Handler {
                 vector,
                 function: code.name_of(handler.entry),
-                cycles: longest.cycles.map(|cycles| response + cycles),
-                without_bound: longest.without_bound,
+                longest: longest.unwrap_or_default(),
                 response_cycles: None,
                 stack_bytes: code.elf.chip.return_address_bytes() + bytes(&handler.deepest),
             }
         })
         .collect();
     // A handler that never returns delays no other: the program ends in it.
-    let time = |handler: &Handler| {
-        if handler.without_bound.is_empty() { Some(handler.cycles.unwrap_or_default()) } else { None }
-    };
+    let time = |handler: &Handler| handler.longest.or_refuse("").ok();
     let responses: Vec<Option<u64>> = (timed.iter())
         .map(|own| {
             let (before, behind): (Vec<&Handler>, Vec<&Handler>) =
@@ -222,13 +219,11 @@ fn watch(
     timer: &mut Timer,
     closed: &Longest,
 ) -> Result<EdgeBounds, BoundsError> {
-    let is_before_last = |other: u8| input.vectors.last().filter(|last| other < **last).copied();
-    for &other in handlers.keys().filter(|other| !input.vectors.contains(other)) {
-        if let Some(vector) = is_before_last(other) {
-            return Err(BoundsError(format!(
-                "vector {other} has priority over vector {vector} and is no vector of the input, so an edge's longest wait has no bound"
-            )));
-        }
+    let last = input.vectors.last().copied().unwrap_or_default();
+    if let Some(other) = handlers.keys().find(|other| **other < last && !input.vectors.contains(other)) {
+        return Err(BoundsError(format!(
+            "vector {other} has priority over vector {last} and is no vector of the input, so an edge's longest wait has no bound"
+        )));
     }
     let looks = |node: &Node| node.instruction.reads(input.port);
     let (mut to_look, mut busy) = (0, 0);
@@ -240,16 +235,14 @@ fn watch(
                 "the handler of vector {vector} is missing, or does not read the port at {port:#04x} exactly once on every path"
             ))
         })?;
-        let to = to.longest(code).or_refuse("the path to a read")?.unwrap_or_default();
+        let to = to.longest(code).or_refuse("the path to a read")?;
         to_look = to_look.max(code.elf.chip.response_cycles() + to);
-        busy = busy.max(behind.longest(code).or_refuse("the path from a read")?.unwrap_or_default());
+        busy = busy.max(behind.longest(code).or_refuse("the path from a read")?);
     }
     for other in of_handlers.iter().filter(|handler| !input.vectors.contains(&handler.vector)) {
-        let longest = Longest { cycles: other.cycles, without_bound: other.without_bound.clone() };
-        let cycles = longest.or_refuse(&format!("the handler of vector {}", other.vector))?;
-        busy = busy.max(cycles.unwrap_or_default());
+        busy = busy.max(other.longest.or_refuse(&format!("the handler of vector {}", other.vector))?);
     }
-    let closed = closed.or_refuse("a stretch without interrupts")?.unwrap_or_default();
+    let closed = closed.or_refuse("a stretch without interrupts")?;
     let wait_cycles = SYNCHRONISER_CYCLES + busy + closed + to_look;
     Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * input.clock_hz / wait_cycles })
 }

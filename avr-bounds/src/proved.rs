@@ -58,11 +58,10 @@ pub struct Handler {
     pub vector: u8,
     /// Its name.
     pub function: String,
-    /// The longest time from the interrupt's response to the end of its return; `None` if it never returns, or if a
-    /// loop has no bound.
-    pub cycles: Option<u64>,
-    /// Its unbounded parts.
-    pub without_bound: Vec<Place>,
+    /// The longest time from the interrupt's response to the end of its return; without cycles and unbounded parts if it
+    /// never returns.
+    #[serde(flatten)]
+    pub longest: Longest,
     /// The longest time from the request to the first instruction of the handler, if every handler of higher rank runs
     /// once. `None` if a part of it has no bound.
     pub response_cycles: Option<u64>,
@@ -175,6 +174,6 @@ pub struct Bounds {
 impl Bounds {
     /// The longest of the handlers that return, in cycles; 0 without one.
     pub fn longest_handler_cycles(&self) -> u64 {
-        self.handlers.iter().filter_map(|handler| handler.cycles).max().unwrap_or_default()
+        self.handlers.iter().filter_map(|handler| handler.longest.cycles).max().unwrap_or_default()
     }
 }

@@ -141,20 +141,14 @@ impl Known {
     /// Keeps the facts that both have. Returns whether this has removed any.
     pub(crate) fn meet(&mut self, other: &Known) -> bool {
         let before = self.clone();
-        // The caller's value in R1 is zero.
-        if self.registers[1] != other.registers[1]
-            && self.constant(1).is_some()
-            && self.constant(1) == other.constant(1)
-        {
-            self.registers[1] = Value::Constant(0);
-        }
-        let zero = self.registers[1];
+        let is_zero = self.constant(1) == Some(0) && other.constant(1) == Some(0);
         let pairs = (self.registers.iter_mut().zip(&other.registers))
             .chain(self.kept.iter_mut().zip(&other.kept))
             .chain(self.stack.iter_mut().zip(&other.stack));
         pairs.for_each(|(mine, theirs)| *mine = mine.meet(*theirs));
-        if zero == Value::Constant(0) && other.constant(1) == Some(0) {
-            self.registers[1] = zero;
+        // The caller's value in R1 and a constant can both be zero.
+        if is_zero && self.registers[1] == Value::Unknown {
+            self.registers[1] = Value::Constant(0);
         }
         let (mask, bits) = self.flags;
         let mask = mask & other.flags.0 & !(bits ^ other.flags.1);

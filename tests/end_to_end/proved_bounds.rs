@@ -77,7 +77,7 @@ fn assert_within(bounds: &Bounds, uno: &Uno) {
     let measured = uno.interrupt_statistics().expect("they were measured");
     for (vector, handler) in &measured.handlers {
         let proved = bounds.handlers.iter().find(|proved| proved.vector == *vector).expect("every handler is known");
-        let longest = proved.cycles.expect("it returned");
+        let longest = proved.longest.cycles.expect("it returned");
         println!("vector {vector}: {} of {longest} cycles", handler.most);
         assert!(handler.most <= longest, "the handler of vector {vector} took {} cycles", handler.most);
     }
