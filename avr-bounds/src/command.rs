@@ -73,10 +73,7 @@ struct Arguments {
 
 /// Runs the command with its arguments. Returns its exit status.
 pub fn main() -> ExitCode {
-    // Cargo hands its own name for the command on.
-    let is_cargo = |(place, argument): &(usize, String)| *place == 1 && argument == "avr-bounds";
-    let arguments = std::env::args().enumerate().filter(|argument| !is_cargo(argument)).map(|(_, argument)| argument);
-    match run(&Arguments::parse_from(arguments)) {
+    match run(&Arguments::parse()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
