@@ -80,7 +80,7 @@ impl Loop<'_> {
                     if !(effects.changes & flags).is_empty() {
                         flags = flags - effects.changes;
                         slice.insert(node);
-                        needed = needed | effects.reads - Registers::FLAGS;
+                        needed = needed | (effects.reads - Registers::FLAGS);
                         flags_of.push((node, effects.reads & Registers::FLAGS));
                     }
                 }
@@ -94,7 +94,7 @@ impl Loop<'_> {
                     return None;
                 }
                 if !(effects.changes & needed).is_empty() && slice.insert(node) {
-                    needed = needed | effects.reads - Registers::FLAGS;
+                    needed = needed | (effects.reads - Registers::FLAGS);
                     flags_of.push((node, effects.reads & Registers::FLAGS));
                 }
             }

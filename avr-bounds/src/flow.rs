@@ -101,9 +101,15 @@ impl Node {
         Node { place, instruction, edges: Vec::new(), returns: None, ends_in: Vec::new(), waits: false }
     }
 
+    /// The routines that it calls, with the cycles of the call.
+    pub(crate) fn calls(&self) -> impl Iterator<Item = (u32, &Rc<Routine>)> {
+        let returning = self.edges.iter().filter_map(|edge| Some((edge.cycles, edge.through.as_ref()?)));
+        returning.chain(self.ends_in.iter().map(|(cycles, called)| (*cycles, called)))
+    }
+
     /// The routines that it calls.
     pub(crate) fn called(&self) -> impl Iterator<Item = &Rc<Routine>> {
-        self.edges.iter().filter_map(|edge| edge.through.as_ref()).chain(self.ends_in.iter().map(|(_, called)| called))
+        self.calls().map(|(_, called)| called)
     }
 }
 
