@@ -33,7 +33,6 @@ pub struct Symbol {
 }
 
 /// An ELF, taken apart.
-#[derive(Debug)]
 pub struct Program {
     /// Its chip.
     pub chip: Chip,
@@ -59,7 +58,9 @@ pub struct Program {
     /// Functions whose address is taken outside virtual tables and the tables of constructors, if the ELF has
     /// relocations.
     pub(crate) taken: Option<BTreeSet<u32>>,
-    lines: Lines,
+    path: PathBuf,
+    /// Its debug information, which is read when the first line is asked for.
+    debug_information: OnceCell<Option<Loader>>,
 }
 
 impl Program {
@@ -147,7 +148,8 @@ impl Program {
             data,
             virtual_tables,
             records,
-            lines: Lines { path: path.into(), loader: OnceCell::new() },
+            path: path.into(),
+            debug_information: OnceCell::new(),
         })
     }
 
@@ -157,7 +159,7 @@ impl Program {
 
     /// File and line of an address, if the ELF has debug information.
     pub fn line(&self, address: u32) -> Option<String> {
-        let loader = self.lines.loader.get_or_init(|| Loader::new(&self.lines.path).ok()).as_ref()?;
+        let loader = self.debug_information.get_or_init(|| Loader::new(&self.path).ok()).as_ref()?;
         let location = loader.find_location(address.into()).ok()??;
         let file = Path::new(location.file?).file_name()?.to_string_lossy().into_owned();
         Some(format!("{file}:{}", location.line?))
@@ -184,15 +186,9 @@ impl Program {
     }
 }
 
-/// The lines of an ELF, which are read when the first is asked for.
-struct Lines {
-    path: PathBuf,
-    loader: OnceCell<Option<Loader>>,
-}
-
-impl fmt::Debug for Lines {
+impl fmt::Debug for Program {
     fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        write!(to, "lines of {}", self.path.display())
+        write!(to, "program of {}", self.path.display())
     }
 }
 

@@ -210,7 +210,7 @@ impl<'a> Code<'a> {
 
     /// A routine's name. A handler has the name of the function that its vector leads to.
     pub(crate) fn name_of(&self, entry: Entry) -> String {
-        let leads_to = || self.instruction(entry.address).ok()?.target(self.flash_bytes());
+        let leads_to = || self.instruction(entry.address).ok()?.target(self.elf.chip.flash_bytes);
         match entry.kind {
             Kind::Reset => "reset".to_owned(),
             Kind::Handler => self.name(leads_to().unwrap_or(entry.address)),
@@ -253,10 +253,6 @@ impl<'a> Code<'a> {
         self.open.pop();
         self.routines.insert(entry, Rc::clone(&routine));
         Ok(routine)
-    }
-
-    pub(crate) fn flash_bytes(&self) -> u32 {
-        self.elf.chip.flash_bytes
     }
 }
 
