@@ -7,8 +7,8 @@ use crate::loops::LoopBounds;
 use crate::proved::{Bounds, Input, Longest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::fmt;
+use std::path::Path;
 
 /// The limits of a program, and facts about it. Every key is optional.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -62,27 +62,6 @@ pub enum RegisterRule {
     Unchecked,
 }
 
-/// Why a file of budgets could not be read.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", path.display())]
-pub struct BudgetsError {
-    /// The file.
-    pub path: PathBuf,
-    /// The problem.
-    pub problem: BudgetsProblem,
-}
-
-/// The problem of a file of budgets.
-#[derive(Debug, thiserror::Error)]
-pub enum BudgetsProblem {
-    /// The system cannot read it.
-    #[error(transparent)]
-    File(#[from] io::Error),
-    /// It is no TOML, or has an unknown key; with line and column.
-    #[error(transparent)]
-    Content(#[from] toml::de::Error),
-}
-
 /// A bound beside its budget.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Held {
@@ -101,9 +80,10 @@ impl Budgets {
     ///
     /// # Errors
     /// If it cannot be read, or says what is not known.
-    pub fn read(path: &Path) -> Result<Budgets, BudgetsError> {
-        let read = || Ok(toml::from_str(&std::fs::read_to_string(path)?)?);
-        read().map_err(|problem| BudgetsError { path: path.into(), problem })
+    pub fn read(path: &Path) -> Result<Budgets, BoundsError> {
+        let error = |reason: &dyn fmt::Display| BoundsError(format!("{}: {reason}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|reason| error(&reason))?;
+        toml::from_str(&text).map_err(|reason| error(&reason))
     }
 
     /// Holds bounds against the budgets that there are.
@@ -112,43 +92,40 @@ impl Budgets {
     /// If there is a budget for a time that has no bound.
     pub fn hold(&self, bounds: &Bounds) -> Result<Vec<Held>, BoundsError> {
         let mut held = Vec::new();
-        let mut at_most = |name, proved, budget: Option<u64>| {
-            held.extend(budget.map(|budget| Held { name, proved, budget, keeps: proved <= budget }));
+        let mut hold = |name, proved, budget: Option<u64>, keeps: fn(&u64, &u64) -> bool| {
+            held.extend(budget.map(|budget| Held { name, proved, budget, keeps: keeps(&proved, &budget) }));
         };
-        at_most("stack_bytes", bounds.stack_bytes as u64, self.stack_bytes);
+        hold("stack_bytes", bounds.stack_bytes as u64, self.stack_bytes, u64::le);
         if self.handler_cycles.is_some() {
             for handler in &bounds.handlers {
-                let what = format!("the handler of vector {}", handler.vector);
-                Longest { cycles: handler.cycles, without_bound: handler.without_bound.clone() }.or_refuse(&what)?;
+                handler.longest.or_refuse(&format!("the handler of vector {}", handler.vector))?;
             }
         }
-        at_most("handler_cycles", bounds.longest_handler_cycles(), self.handler_cycles);
+        hold("handler_cycles", bounds.longest_handler_cycles(), self.handler_cycles, u64::le);
         if self.critical_section_cycles.is_some() {
             let longest = bounds.critical_section.or_refuse("a stretch without interrupts")?;
-            at_most("critical_section_cycles", longest.unwrap_or_default(), self.critical_section_cycles);
+            hold("critical_section_cycles", longest, self.critical_section_cycles, u64::le);
         }
         // A main program without a known turn counts as unbounded.
         let loops = bounds.turn.as_ref().map_or(u64::MAX, |turn| turn.without_bound.len() as u64);
-        at_most("loops_without_bound", loops, self.loops_without_bound);
+        hold("loops_without_bound", loops, self.loops_without_bound, u64::le);
         let turn = bounds.turn.as_ref().and_then(|turn| turn.cycles).unwrap_or(u64::MAX);
-        at_most("turn_cycles", turn, self.turn_cycles);
+        hold("turn_cycles", turn, self.turn_cycles, u64::le);
         let rate = bounds.edges.as_ref().map_or(0, |edges| edges.never_lost_per_s);
-        held.extend(self.never_lost_per_s.map(|budget| Held {
-            name: "never_lost_per_s",
-            proved: rate,
-            budget,
-            keeps: rate >= budget,
-        }));
+        hold("never_lost_per_s", rate, self.never_lost_per_s, u64::ge);
         Ok(held)
     }
 }
 
 impl Longest {
-    /// The cycles of a time that must have a bound; `what` names it in the error. `None` if it never ends.
-    pub(crate) fn or_refuse(&self, what: &str) -> Result<Option<u64>, BoundsError> {
-        match self.without_bound.first() {
-            None => Ok(self.cycles),
-            Some(place) => Err(BoundsError::Unbounded { what: what.into(), place: place.clone() }),
-        }
+    /// The cycles of a time that must have a bound; `what` names it in the error. 0 if it never ends.
+    pub(crate) fn or_refuse(&self, what: &str) -> Result<u64, BoundsError> {
+        let Some(place) = self.without_bound.first() else { return Ok(self.cycles.unwrap_or_default()) };
+        let function = &place.function;
+        Err(BoundsError(format!(
+            "{what} has a loop without a bound, at {} in {function}: give its bound, by a record in .loop_bounds or for the \
+             function, as in [loops] {function:?} = {{ passes = 9, because = \"..\" }}",
+            place.address_and_line()
+        )))
     }
 }

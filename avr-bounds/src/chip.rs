@@ -5,7 +5,7 @@
 //! and of the interrupt response come from the data sheets: the instruction set summary, and section "Interrupt
 //! Response Time".
 
-use crate::decode::Operation;
+use crate::decode::Operation::{self, *};
 
 /// A chip of the AVR family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,16 +71,12 @@ impl Chip {
 
     /// Additional cycles of calls and returns, compared with a return address of two bytes.
     pub(crate) fn more_cycles(&self, operation: Operation) -> u32 {
-        use Operation::*;
-
         let is_of_stack = matches!(operation, Call | Rcall | Icall | Ret | Reti);
         if is_of_stack { self.return_address_bytes() as u32 - 2 } else { 0 }
     }
 
     /// Whether the chip carries this instruction out.
     pub(crate) fn has(&self, operation: Operation) -> bool {
-        use Operation::*;
-
         match operation {
             Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.has_mul,
             Jmp | Call => self.flash_bytes > 0x2000,

@@ -73,10 +73,7 @@ struct Arguments {
 
 /// Runs the command with its arguments. Returns its exit status.
 pub fn main() -> ExitCode {
-    // Cargo hands its own name for the command on.
-    let is_cargo = |(place, argument): &(usize, String)| *place == 1 && argument == "avr-bounds";
-    let arguments = std::env::args().enumerate().filter(|argument| !is_cargo(argument)).map(|(_, argument)| argument);
-    match run(&Arguments::parse_from(arguments)) {
+    match run(&Arguments::parse()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
@@ -158,12 +155,11 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
             "Interrupt handlers, response and return included, and how long a request waits for its handler:\n"
                 .to_owned(),
         );
-        let or_not = |cycles: Option<u64>| cycles.map_or("no bound".to_owned(), |cycles| cycles.to_string());
         let rows = bounds.handlers.iter().map(|handler| {
-            let returns = handler.cycles.is_some() || !handler.without_bound.is_empty();
-            let cycles = if returns { or_not(handler.cycles) } else { "never returns".to_owned() };
+            let returns = handler.longest != Longest::default();
+            let cycles = if returns { or_no_bound(handler.longest.cycles) } else { "never returns".to_owned() };
             let (vector, stack) = (handler.vector.to_string(), handler.stack_bytes.to_string());
-            vec![vector, handler.function.clone(), cycles, or_not(handler.response_cycles), stack]
+            vec![vector, handler.function.clone(), cycles, or_no_bound(handler.response_cycles), stack]
         });
         line(table(&["vector", "function", "cycles", "response", "stack bytes"], rows));
     }
@@ -204,6 +200,11 @@ fn in_words(bounds: &Bounds, held: &[Held], all: bool) -> String {
         }
     }
     text
+}
+
+/// Cycles in a table.
+fn or_no_bound(cycles: Option<u64>) -> String {
+    cycles.map_or("no bound".to_owned(), |cycles| cycles.to_string())
 }
 
 /// A time in words.
@@ -264,23 +265,22 @@ fn differences(old: &Bounds, new: &Bounds) -> String {
 
 /// Every figure by its name.
 fn figures(bounds: &Bounds) -> BTreeMap<String, String> {
-    let cycles = |cycles: Option<u64>| cycles.map_or("no bound".to_owned(), |cycles| cycles.to_string());
     let mut all = BTreeMap::from([
         ("stack, bytes".to_owned(), bounds.stack_bytes.to_string()),
-        ("critical section, cycles".to_owned(), cycles(bounds.critical_section.cycles)),
-        ("without interrupts, cycles".to_owned(), cycles(bounds.closed.cycles)),
+        ("critical section, cycles".to_owned(), or_no_bound(bounds.critical_section.cycles)),
+        ("without interrupts, cycles".to_owned(), or_no_bound(bounds.closed.cycles)),
     ]);
-    all.extend(bounds.turn.iter().map(|turn| ("turn of the loop, cycles".to_owned(), cycles(turn.cycles))));
+    all.extend(bounds.turn.iter().map(|turn| ("turn of the loop, cycles".to_owned(), or_no_bound(turn.cycles))));
     for handler in &bounds.handlers {
         let name = format!("vector {}", handler.vector);
-        all.insert(format!("{name}, cycles"), cycles(handler.cycles));
-        all.insert(format!("{name}, response"), cycles(handler.response_cycles));
+        all.insert(format!("{name}, cycles"), or_no_bound(handler.longest.cycles));
+        all.insert(format!("{name}, response"), or_no_bound(handler.response_cycles));
         all.insert(format!("{name}, stack bytes"), handler.stack_bytes.to_string());
     }
     for FunctionBounds { function, stack_bytes, longest, .. } in &bounds.functions {
         all.insert(format!("{function}, stack bytes"), stack_bytes.to_string());
         if let Some(longest) = longest {
-            all.insert(format!("{function}, cycles"), cycles(longest.cycles));
+            all.insert(format!("{function}, cycles"), or_no_bound(longest.cycles));
         }
     }
     all

@@ -67,34 +67,25 @@ impl Concrete {
 
     /// Executes an instruction. Returns `false` for one that does more than arithmetic, or accesses memory.
     pub(crate) fn carry_out(&mut self, instruction: &Instruction) -> bool {
-        let (d, r) = (instruction.destination(), instruction.source());
-        let (to, from, constant) = (self.registers[d], self.registers[r], instruction.constant());
+        let (d, r) = (instruction.destination, instruction.source);
+        let (to, from, constant) = (self.registers[d], self.registers[r], instruction.constant);
         let carry = self.status & C;
         let value = match instruction.operation {
             Add => self.add(to, from, 0),
             Adc => self.add(to, from, carry),
-            Sub => self.subtract(to, from, None),
-            Sbc => self.subtract(to, from, Some(carry)),
-            Subi => self.subtract(to, constant, None),
+            Sub | Cp => self.subtract(to, from, None),
+            Sbc | Cpc => self.subtract(to, from, Some(carry)),
+            Subi | Cpi => self.subtract(to, constant, None),
             Sbci => self.subtract(to, constant, Some(carry)),
-            Cp | Cpc | Cpi => {
-                match instruction.operation {
-                    Cp => self.subtract(to, from, None),
-                    Cpc => self.subtract(to, from, Some(carry)),
-                    _ => self.subtract(to, constant, None),
-                };
-                return true;
-            }
             Adiw | Sbiw => {
                 let before = u16::from_le_bytes([to, self.registers[d + 1]]);
                 let constant = u16::from(constant);
                 let is_sum = instruction.operation == Adiw;
                 let after = if is_sum { before.wrapping_add(constant) } else { before.wrapping_sub(constant) };
                 let (was_high, is_high) = (before >> 15 == 1, after >> 15 == 1);
-                let grown = if is_sum { !was_high && is_high } else { was_high && !is_high };
-                let wrapped = if is_sum { was_high && !is_high } else { !was_high && is_high };
-                self.flag(C, wrapped);
-                self.result(after == 0, is_high, grown);
+                let (rises, falls) = (!was_high && is_high, was_high && !is_high);
+                self.flag(C, if is_sum { falls } else { rises });
+                self.result(after == 0, is_high, if is_sum { rises } else { falls });
                 self.registers[d + 1] = (after >> 8) as u8;
                 after as u8
             }
@@ -141,7 +132,9 @@ impl Concrete {
             Nop => return true,
             _ => return false,
         };
-        self.registers[d] = value;
+        if !matches!(instruction.operation, Cp | Cpc | Cpi) {
+            self.registers[d] = value;
+        }
         true
     }
 }

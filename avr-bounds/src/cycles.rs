@@ -10,8 +10,8 @@
 //! routine.
 
 use crate::counted;
-use crate::flow::{Code, Edge, Node, Routine};
-use crate::paths::{circles, loops, reaching, runs_once};
+use crate::flow::{Edge, Node, Routine};
+use crate::paths::{circles, entering, loops, reaching, runs_once};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +25,7 @@ pub(crate) struct Time {
 }
 
 impl Time {
-    fn of(cycles: u64) -> Time {
+    pub(crate) fn of(cycles: u64) -> Time {
         Time { cycles, unbounded: BTreeSet::new() }
     }
 
@@ -34,26 +34,22 @@ impl Time {
         self.unbounded.is_empty()
     }
 
-    fn and(&self, other: &Time) -> Time {
+    pub(crate) fn and(&self, other: &Time) -> Time {
         Time { cycles: self.cycles.saturating_add(other.cycles), unbounded: &self.unbounded | &other.unbounded }
     }
 
     fn and_cycles(&self, cycles: u32) -> Time {
         self.and(&Time::of(cycles.into()))
     }
-
-    /// The longer of both. Unbounded loops in either make the result unknown.
-    pub(crate) fn or(&self, other: &Time) -> Time {
-        Time { cycles: self.cycles.max(other.cycles), unbounded: &self.unbounded | &other.unbounded }
-    }
 }
 
-/// The longer of the known times.
-fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
+/// The longer of the known times. Unbounded loops in either make the result unknown.
+pub(crate) fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
     match (one, other) {
-        (Some(one), Some(other)) => Some(one.or(&other)),
-        (one, None) => one,
-        (None, other) => other,
+        (Some(one), Some(other)) => {
+            Some(Time { cycles: one.cycles.max(other.cycles), unbounded: &one.unbounded | &other.unbounded })
+        }
+        (one, other) => one.or(other),
     }
 }
 
@@ -77,6 +73,16 @@ pub(crate) enum Stretch {
     /// From one moment at which an interrupt can be served to the next. It includes one instruction before and one
     /// after.
     Closed,
+}
+
+impl Stretch {
+    /// Whether a place lies in such a stretch.
+    fn has(self, node: &Node) -> bool {
+        match self {
+            Stretch::FlagClear => node.place.interrupts == Interrupts::Off,
+            Stretch::Closed => node.place.interrupts != Interrupts::On,
+        }
+    }
 }
 
 /// What counts of the time of a path.
@@ -104,16 +110,15 @@ struct Stretches {
 }
 
 /// Times routines, each once.
-pub(crate) struct Timer<'a> {
-    code: &'a Code<'a>,
+pub(crate) struct Timer {
     passes: Passes,
     longest: BTreeMap<*const Routine, Option<Time>>,
     stretches: BTreeMap<(*const Routine, Stretch), Stretches>,
 }
 
-impl<'a> Timer<'a> {
-    pub(crate) fn new(code: &'a Code<'a>, passes: Passes) -> Timer<'a> {
-        Timer { code, passes, longest: BTreeMap::new(), stretches: BTreeMap::new() }
+impl Timer {
+    pub(crate) fn new(passes: Passes) -> Timer {
+        Timer { passes, longest: BTreeMap::new(), stretches: BTreeMap::new() }
     }
 
     /// The longest path from a routine's entry to the end of a return; `None` if it never returns.
@@ -168,45 +173,32 @@ impl<'a> Timer<'a> {
             return known.clone();
         }
         let nodes = &routine.nodes;
-        let is_inside = |node: &Node| match kind {
-            Stretch::FlagClear => node.place.interrupts == Interrupts::Off,
-            Stretch::Closed => node.place.interrupts != Interrupts::On,
-        };
         let mut found = Stretches::default();
         // The beginnings of stretches: after an instruction outside of stretches, or in a called function.
         let mut begins = Vec::new();
         for node in nodes {
-            for (_, called) in &node.ends_in {
+            for called in node.called() {
                 found.inner = longer(found.inner, self.stretches(called, kind).inner);
             }
+            // An instruction outside lets interrupts in before and after it.
+            let alone = |cycles: u32| (kind == Stretch::Closed && !kind.has(node)).then(|| Time::of(cycles.into()));
             for edge in &node.edges {
-                let called = edge.through.as_ref().map(|called| self.stretches(called, kind));
-                if let Some(called) = called {
-                    found.inner = longer(found.inner, called.inner);
-                    if is_inside(&nodes[edge.to])
-                        && let Some(last) = called.last
-                    {
-                        begins.push((edge.to, last));
-                    }
+                let is_inside = kind.has(&nodes[edge.to]);
+                if let (Some(called), true) = (&edge.through, is_inside) {
+                    begins.extend(self.stretches(called, kind).last.map(|last| (edge.to, last)));
                 }
-                if !is_inside(node) {
-                    let own = if kind == Stretch::Closed { edge.cycles } else { 0 };
-                    let alone = (kind == Stretch::Closed).then(|| Time::of(own.into()));
-                    if edge.through.is_none() && is_inside(&nodes[edge.to]) {
-                        begins.push((edge.to, Time::of(own.into())));
-                    } else {
-                        found.inner = longer(found.inner, alone);
-                    }
+                if edge.through.is_none() && is_inside && !kind.has(node) {
+                    begins.push((edge.to, alone(edge.cycles).unwrap_or_default()));
+                } else {
+                    found.inner = longer(found.inner, alone(edge.cycles));
                 }
             }
-            if let (Stretch::Closed, false, Some(cycles)) = (kind, is_inside(node), node.returns) {
-                found.inner = longer(found.inner, Some(Time::of(cycles.into())));
-            }
+            found.inner = longer(found.inner, node.returns.and_then(alone));
         }
         // The stretches that begin here, and the one at the routine's entry.
-        (found.last, found.inner) = self.run(routine, kind, &is_inside, begins, found.inner);
-        if is_inside(&nodes[0]) {
-            (found.through, found.first) = self.run(routine, kind, &is_inside, vec![(0, Time::default())], None);
+        (found.last, found.inner) = self.run(routine, kind, begins, found.inner);
+        if kind.has(&nodes[0]) {
+            (found.through, found.first) = self.run(routine, kind, vec![(0, Time::default())], None);
         }
         self.stretches.insert(key, found.clone());
         found
@@ -217,34 +209,25 @@ impl<'a> Timer<'a> {
         &mut self,
         routine: &Routine,
         kind: Stretch,
-        is_inside: &dyn Fn(&Node) -> bool,
         begins: Vec<(usize, Time)>,
         longest: Option<Time>,
     ) -> (Option<Time>, Option<Time>) {
         let nodes = &routine.nodes;
-        // How a call's stretch continues in the called function: it ends at once if interrupts are on there.
-        let opens = |timer: &mut Timer<'a>, called: &Routine| {
-            if is_inside(&called.nodes[0]) { timer.stretches(called, kind).first } else { Some(Time::default()) }
-        };
         let mut ending = Vec::new();
         for node in nodes {
-            let mut ends = Vec::new();
-            for edge in &node.edges {
-                match &edge.through {
-                    Some(called) => ends.extend(opens(self, called).map(|first| first.and_cycles(edge.cycles))),
-                    None if !is_inside(&nodes[edge.to]) => ends.push(Time::of(edge.cycles.into())),
-                    None => {}
-                }
+            let opening = node.edges.iter().filter(|edge| edge.through.is_none() && !kind.has(&nodes[edge.to]));
+            let mut end = opening.map(|edge| Some(Time::of(edge.cycles.into()))).fold(None, longer);
+            for (cycles, called) in node.calls() {
+                // The stretch continues in the called function. It ends at once if interrupts are on there.
+                let is_inside = kind.has(&called.nodes[0]);
+                let first = if is_inside { self.stretches(called, kind).first } else { Some(Time::default()) };
+                end = longer(end, first.map(|first| first.and_cycles(cycles)));
             }
-            for (cycles, called) in &node.ends_in {
-                ends.extend(opens(self, called).map(|first| first.and_cycles(*cycles)));
-            }
-            ending.push(ends.into_iter().reduce(|longest, end| longest.or(&end)));
+            ending.push(end);
         }
-        let leading = reaching(nodes, |node| {
-            is_inside(&nodes[node]) && (nodes[node].returns.is_some() || ending[node].is_some())
-        });
-        let times = self.times(nodes, &|node| is_inside(&nodes[node]) && leading[node], begins, Count::Stretch(kind));
+        let leading =
+            reaching(nodes, |node| kind.has(&nodes[node]) && (nodes[node].returns.is_some() || ending[node].is_some()));
+        let times = self.times(nodes, &|node| kind.has(&nodes[node]) && leading[node], begins, Count::Stretch(kind));
         let (mut to_return, mut to_open) = (None, longest);
         for ((node, time), end) in nodes.iter().zip(&times).zip(&ending) {
             let Some(time) = time else { continue };
@@ -286,7 +269,7 @@ impl<'a> Timer<'a> {
             (None, _) => Time::default(),
             (Some(called), Count::Whole) => match edge.length {
                 Some(length) if self.passes.by_length.contains(&called.entry.address) => {
-                    self.of_length(called, length)?
+                    Self::of_length(called, length)?
                 }
                 _ => self.longest(called)?,
             },
@@ -300,10 +283,10 @@ impl<'a> Timer<'a> {
     }
 
     /// The longest path through a function that processes this number of bytes.
-    fn of_length(&self, routine: &Routine, length: u16) -> Option<Time> {
+    fn of_length(routine: &Routine, length: u16) -> Option<Time> {
         let passes = vec![u64::from(length) + 1];
         let of_heads = routine.nodes.iter().map(|node| (node.place.address, passes.clone())).collect();
-        Timer::new(self.code, Passes { of_heads, ..Passes::default() }).longest(routine)
+        Timer::new(Passes { of_heads, ..Passes::default() }).longest(routine)
     }
 
     /// The heads of a routine's own unbounded loops, except loops that it never leaves.
@@ -317,12 +300,8 @@ impl<'a> Timer<'a> {
                 let is_left = circle.iter().any(|&node| {
                     nodes[node].returns.is_some() || nodes[node].edges.iter().any(|edge| !circle.contains(&edge.to))
                 });
-                let heads: BTreeSet<usize> = (nodes.iter().enumerate())
-                    .filter(|(number, _)| !circle.contains(number))
-                    .flat_map(|(_, node)| node.edges.iter().map(|edge| edge.to))
-                    .chain([0])
-                    .filter(|to| circle.contains(to))
-                    .collect();
+                let entry = circle.contains(&0).then_some(0);
+                let heads: BTreeSet<usize> = entering(nodes, &circle).map(|edge| edge.to).chain(entry).collect();
                 let heads = if heads.is_empty() { circle.iter().copied().take(1).collect() } else { heads };
                 if is_left {
                     let begins = heads.iter().map(|&head| (head, Time::default())).collect();
@@ -360,25 +339,19 @@ impl<'a> Timer<'a> {
             times[node] = longer(times[node].take(), Some(time));
         }
         let all = (0..nodes.len()).filter(|&node| within(node)).collect();
-        Paths { code: self.code, nodes, edges: &edges, passes: &self.passes }.fill(
-            all,
-            &BTreeSet::new(),
-            0,
-            &mut times,
-        );
+        Paths { nodes, edges: &edges, passes: &self.passes }.fill(all, &BTreeSet::new(), 0, &mut times);
         times
     }
 }
 
 /// The longest time to the end of a return.
 fn ends(nodes: &[Node], times: &[Option<Time>]) -> Option<Time> {
-    let ends = nodes.iter().zip(times).filter_map(|(node, time)| Some(time.as_ref()?.and_cycles(node.returns?)));
-    ends.fold(None, |longest, end| longer(longest, Some(end)))
+    let ends = nodes.iter().zip(times).map(|(node, time)| Some(time.as_ref()?.and_cycles(node.returns?)));
+    ends.fold(None, longer)
 }
 
 /// Longest paths over places and edges.
 struct Paths<'a> {
-    code: &'a Code<'a>,
     nodes: &'a [Node],
     edges: &'a [Vec<(usize, Time)>],
     passes: &'a Passes,
@@ -421,24 +394,25 @@ impl Paths<'_> {
                 let by_depth = self.passes.of_heads.get(&self.address(head))?;
                 by_depth.get(depth).or(by_depth.last()).copied()
             });
-            let counted = || if heads.len() == 1 { counted::turns(self.code, self.nodes, circle, head) } else { None };
+            let counted = || if heads.len() == 1 { counted::turns(self.nodes, circle, head) } else { None };
             let stated = stated.or_else(counted);
             passes = passes.zip(stated).map(|(passes, stated)| passes + stated);
             entered = longer(entered, times[head].clone());
             inside[head] = Some(Time::default());
         }
-        let (Some(entered), Some(&first)) = (entered, heads.first()) else { return };
+        let Some(entered) = entered else { return };
         self.fill(circle.clone(), &heads, depth + 1, &mut inside);
-        let mut turn = Time::default();
+        let mut turn = None;
         for &node in circle {
             for (_, own) in self.edges[node].iter().filter(|(to, _)| heads.contains(to)) {
-                turn = inside[node].as_ref().map_or(turn.clone(), |time| turn.or(&time.and(own)));
+                turn = longer(turn, inside[node].as_ref().map(|time| time.and(own)));
             }
         }
+        let turn = turn.unwrap_or_default();
         let cycles = turn.cycles.saturating_mul(passes.unwrap_or(1));
         let mut before_last = Time { cycles, unbounded: turn.unbounded };
         if passes.is_none() {
-            before_last.unbounded.insert(self.address(first));
+            before_last.unbounded.extend(heads.iter().map(|&head| self.address(head)).min());
         }
         let entered = entered.and(&before_last);
         for &node in circle {

@@ -148,6 +148,11 @@ static FORM_OF_WORD: LazyLock<Vec<Option<&Form>>> = LazyLock::new(|| {
     forms
 });
 
+/// The 16 bits at an address of some memory.
+pub(crate) fn word_at(memory: &[u8], address: u32) -> Option<u16> {
+    Some(u16::from_le_bytes(*memory.get(address as usize..)?.first_chunk()?))
+}
+
 /// An instruction at its address in flash.
 #[derive(Clone, Copy)]
 pub(crate) struct Instruction {
@@ -157,10 +162,13 @@ pub(crate) struct Instruction {
     pub(crate) operation: Operation,
     /// Its cycles, without those of a taken branch, of a skipped instruction, and of the EEPROM.
     pub(crate) cycles: u32,
+    /// The register that is written, or read and written: R0 to R31; of a pair the lower one.
+    pub(crate) destination: usize,
+    /// The register that is only read.
+    pub(crate) source: usize,
+    /// The constant of an arithmetic instruction, or of `ldi`.
+    pub(crate) constant: u8,
     bits: &'static str,
-    destination: u8,
-    source: u8,
-    constant: u8,
     word: u16,
     /// The second word, if it has one.
     second: u16,
@@ -169,17 +177,23 @@ pub(crate) struct Instruction {
 impl Instruction {
     /// The instruction at an address, in bytes; `None` without flash or a valid instruction.
     pub(crate) fn at(flash: &[u8], address: u32) -> Option<Instruction> {
-        let word = |address: u32| {
-            let bytes = flash.get(address as usize..)?.first_chunk()?;
-            Some(u16::from_le_bytes(*bytes))
-        };
-        let first = word(address)?;
-        let &(bits, operation, cycles) = FORM_OF_WORD[usize::from(first)]?;
-        let second = if matches!(operation, Call | Jmp | Lds | Sts) { word(address + 2)? } else { 0 };
+        let word = word_at(flash, address)?;
+        let &(bits, operation, cycles) = FORM_OF_WORD[usize::from(word)]?;
+        let second = if matches!(operation, Call | Jmp | Lds | Sts) { word_at(flash, address + 2)? } else { 0 };
         let (destination, source, constant) = (0, 0, 0);
-        let found =
-            Instruction { address, operation, cycles, bits, destination, source, constant, word: first, second };
-        let (destination, source) = (found.destination_in_bits() as u8, found.source_in_bits() as u8);
+        let found = Instruction { address, operation, cycles, bits, destination, source, constant, word, second };
+        let (d, r) = (usize::from(found.operand('d')), usize::from(found.operand('r')));
+        let destination = match (operation, bits.matches('d').count()) {
+            (Movw, _) => d * 2,
+            (_, 2) => 24 + d * 2,
+            (_, 3 | 4) => 16 + d,
+            _ => d,
+        };
+        let source = match operation {
+            Movw => r * 2,
+            Muls | Mulsu | Fmul | Fmuls | Fmulsu => 16 + r,
+            _ => r,
+        };
         Some(Instruction { destination, source, constant: found.operand('K') as u8, ..found })
     }
 
@@ -187,40 +201,6 @@ impl Instruction {
     pub(crate) fn operand(&self, letter: char) -> u16 {
         let bits = self.bits.chars().zip((0..16).rev()).filter(|(bit, _)| *bit == letter);
         bits.fold(0, |operand, (_, bit)| operand << 1 | self.word >> bit & 1)
-    }
-
-    /// The register that is written, or read and written: R0 to R31; of a pair the lower one.
-    pub(crate) fn destination(&self) -> usize {
-        self.destination.into()
-    }
-
-    fn destination_in_bits(&self) -> usize {
-        let d = usize::from(self.operand('d'));
-        match (self.operation, self.bits.matches('d').count()) {
-            (Movw, _) => d * 2,
-            (_, 2) => 24 + d * 2,
-            (_, 3 | 4) => 16 + d,
-            _ => d,
-        }
-    }
-
-    /// The register that is only read.
-    pub(crate) fn source(&self) -> usize {
-        self.source.into()
-    }
-
-    fn source_in_bits(&self) -> usize {
-        let r = usize::from(self.operand('r'));
-        match (self.operation, self.bits.matches('r').count()) {
-            (Movw, _) => r * 2,
-            (Muls | Mulsu | Fmul | Fmuls | Fmulsu, _) => 16 + r,
-            _ => r,
-        }
-    }
-
-    /// The constant of an arithmetic instruction, or of `ldi`.
-    pub(crate) fn constant(&self) -> u8 {
-        self.constant
     }
 
     /// The data address in the instruction itself: of `in`, `out` and the instructions for a bit of a register, and of
@@ -241,34 +221,21 @@ impl Instruction {
         matches!(self.operation, In | Lds | Sbic | Sbis) && self.data_address() == Some(address)
     }
 
-    /// The lower register of the pointer of a load or a store.
-    pub(crate) fn pointer(&self) -> Option<usize> {
-        match (self.operation, self.word & 0xF) {
-            (Ld | St, 0xC..=0xE) => Some(X),
-            (Ld | St, 0x9 | 0xA) => Some(Y),
-            (Ldd | Std, 0x8..) => Some(Y),
-            (Ld | St, 0x1 | 0x2) | (Ldd | Std | Lpm | Elpm, _) => Some(Z),
-            _ => None,
-        }
-    }
-
-    /// The lower register of the pointer that a load or a store moves on or back.
-    pub(crate) fn moved_pointer(&self) -> Option<usize> {
-        match (self.operation, self.word & 0xF) {
-            (Ld | St, 0xD | 0xE) => Some(X),
-            (Ld | St, 0x9 | 0xA) => Some(Y),
-            (Ld | St, 0x1 | 0x2) | (Lpm, 0x5) | (Elpm, 0x7) => Some(Z),
-            _ => None,
-        }
-    }
-
-    /// The change of the pointer by a load or a store: after it, or before it if negative.
-    pub(crate) fn moves_by(&self) -> i8 {
-        match (self.moved_pointer(), self.operation, self.word & 0xF) {
-            (None, ..) => 0,
-            (_, Ld | St, 0xE | 0xA | 0x2) => -1,
-            _ => 1,
-        }
+    /// The lower register of the pointer of a load or a store, and how it moves: after the access, or before it if
+    /// negative.
+    pub(crate) fn pointer(&self) -> Option<(usize, i8)> {
+        Some(match (self.operation, self.word & 0xF) {
+            (Ld | St, 0xC) => (X, 0),
+            (Ld | St, 0xD) => (X, 1),
+            (Ld | St, 0xE) => (X, -1),
+            (Ld | St, 0x9) => (Y, 1),
+            (Ld | St, 0xA) => (Y, -1),
+            (Ld | St, 0x2) => (Z, -1),
+            (Ld | St, 0x1) | (Lpm, 0x5) | (Elpm, 0x7) => (Z, 1),
+            (Ldd | Std, 0x8..) => (Y, 0),
+            (Ldd | Std | Lpm | Elpm, _) => (Z, 0),
+            _ => return None,
+        })
     }
 
     /// The displacement of a load or a store from its pointer.

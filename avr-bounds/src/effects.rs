@@ -6,7 +6,7 @@
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
 use std::fmt;
-use std::ops::{self, RangeInclusive};
+use std::ops;
 
 /// A set of registers and flags: registers by their number, then flags by their bit in SREG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +17,8 @@ const REGISTERS: usize = 32;
 
 impl Registers {
     pub(crate) const NONE: Registers = Registers(0);
+    /// The registers that functions preserve (AVR calling convention): R2 to R17, R28 and R29.
+    pub(crate) const PRESERVED: Registers = Registers(0x3003_FFFC);
     /// The pair that a multiplication's product is in.
     const PRODUCT: Registers = Registers(0b11);
     /// All flags but the interrupts'.
@@ -47,11 +49,6 @@ impl Registers {
         (0..REGISTERS + 7).filter(move |&register| self.contains(register))
     }
 
-    /// Registers that are neighbours.
-    pub(crate) const fn range(registers: RangeInclusive<usize>) -> Registers {
-        Registers((2 << *registers.end()) - (1 << *registers.start()))
-    }
-
     /// Every register for which that holds.
     pub(crate) fn which(holds: impl Fn(usize) -> bool) -> Registers {
         let registers = (0..REGISTERS).filter(|&register| holds(register));
@@ -64,12 +61,6 @@ impl ops::BitOr for Registers {
 
     fn bitor(self, other: Registers) -> Registers {
         Registers(self.0 | other.0)
-    }
-}
-
-impl ops::BitOrAssign for Registers {
-    fn bitor_assign(&mut self, other: Registers) {
-        self.0 |= other.0;
     }
 }
 
@@ -125,11 +116,11 @@ impl Instruction {
     pub(crate) fn effects(&self) -> Effects {
         use Registers as R;
 
-        let (d, r) = (self.destination(), self.source());
+        let (d, r) = (self.destination, self.source);
         let (to, from) = (R::one(d), R::one(r));
         let flag = flags(1 << self.operand('s')) & R::FLAGS;
-        let pointer = self.pointer().map_or(R::NONE, R::pair);
-        let moved = self.moved_pointer().map_or(R::NONE, R::pair);
+        let pointer = self.pointer().map_or(R::NONE, |(pointer, _)| R::pair(pointer));
+        let moved = if self.pointer().is_some_and(|(_, by)| by != 0) { pointer } else { R::NONE };
         // Subtracting a register from itself, or XOR with itself, gives 0 or a value made from the carry. The old value
         // does not matter.
         let is_same = d == r;

@@ -1,7 +1,8 @@
 //! Reads an ELF: the bytes in flash and of initialised variables, the functions, the chip, and the program's records of
 //! loop bounds.
 
-use crate::chip::Chip;
+use crate::chip::{CHIPS, Chip};
+use crate::error::BoundsError;
 use crate::loops;
 use addr2line::Loader;
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
@@ -22,64 +23,6 @@ const EEPROM_ORIGIN: u32 = 0x81_0000;
 /// The section in which avr-gcc names the chip.
 const DEVICE_INFO: &str = ".note.gnu.avr.deviceinfo";
 
-/// Why an ELF could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum ElfError {
-    /// The file could not be read.
-    #[error("{path} could not be read")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's answer.
-        source: std::io::Error,
-    },
-    /// The file is no ELF, or damaged.
-    #[error("{path} is not a readable ELF file ({reason})")]
-    NotElf {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        reason: object::Error,
-    },
-    /// The file was made for another processor.
-    #[error("{path} was made for {architecture:?}: an ELF for AVR is needed")]
-    NotAvr {
-        /// The file.
-        path: PathBuf,
-        /// Its target.
-        architecture: Architecture,
-    },
-    /// The file does not name its chip, and neither did the caller.
-    #[error("{path} does not name its chip: name it with --chip or `chip = ..` in the budgets, as one of {}", names())]
-    NoChip {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The chip is not in the table.
-    #[error("the chip {name} is not known: the known ones are {}", names())]
-    UnknownChip {
-        /// Its name.
-        name: String,
-    },
-    /// The file has more bytes than the chip's flash.
-    #[error("{path} has {end} bytes for the flash: the {chip} holds {limit}; --chip names another chip")]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// Address behind the last byte.
-        end: u32,
-        /// The chip.
-        chip: &'static str,
-        /// Its flash.
-        limit: u32,
-    },
-}
-
-/// The chips' names.
-fn names() -> String {
-    crate::chip::CHIPS.map(|chip| chip.name).join(", ")
-}
-
 /// A function's symbol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Symbol {
@@ -90,7 +33,6 @@ pub struct Symbol {
 }
 
 /// An ELF, taken apart.
-#[derive(Debug)]
 pub struct Program {
     /// Its chip.
     pub chip: Chip,
@@ -102,6 +44,8 @@ pub struct Program {
     pub has_vectors: bool,
     /// Its functions by address. Of two names for one address the alphabetically first is kept.
     pub functions: BTreeMap<u32, Symbol>,
+    /// The records of loops: an address in the loop, and the most executions of that address.
+    pub records: BTreeMap<u32, u64>,
     /// Every symbol in flash by its raw name.
     pub(crate) labels: BTreeMap<String, u32>,
     /// The first address of code after the vectors, and the end of flash without the initial values of variables.
@@ -114,9 +58,9 @@ pub struct Program {
     /// Functions whose address is taken outside virtual tables and the tables of constructors, if the ELF has
     /// relocations.
     pub(crate) taken: Option<BTreeSet<u32>>,
-    /// The records of loops.
-    pub(crate) records: BTreeMap<u32, u64>,
-    lines: Lines,
+    path: PathBuf,
+    /// Its debug information, which is read when the first line is asked for.
+    debug_information: OnceCell<Option<Loader>>,
 }
 
 impl Program {
@@ -124,16 +68,23 @@ impl Program {
     ///
     /// # Errors
     /// If the file cannot be read, is no ELF for AVR, is for no known chip, or holds more than it.
-    pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, ElfError> {
-        let bytes = std::fs::read(path).map_err(|source| ElfError::Read { path: path.into(), source })?;
-        let not_elf = |reason| ElfError::NotElf { path: path.into(), reason };
+    pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, BoundsError> {
+        let error = |reason: String| BoundsError(format!("{} {reason}", path.display()));
+        let not_elf = |reason| error(format!("is not a readable ELF file ({reason})"));
+        let bytes = std::fs::read(path).map_err(|reason| error(format!("could not be read: {reason}")))?;
         let architecture = object::File::parse(&*bytes).map_err(not_elf)?.architecture();
         if architecture != Architecture::Avr {
-            return Err(ElfError::NotAvr { path: path.into(), architecture });
+            return Err(error(format!("was made for {architecture:?}: an ELF for AVR is needed")));
         }
         let file: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes).map_err(not_elf)?;
-        let name = chip.map(str::to_owned).or_else(|| device(&file)).ok_or(ElfError::NoChip { path: path.into() })?;
-        let chip = Chip::named(&name).ok_or(ElfError::UnknownChip { name })?;
+        let chips = CHIPS.map(|chip| chip.name).join(", ");
+        let name = chip.map(str::to_owned).or_else(|| device(&file)).ok_or_else(|| {
+            error(format!(
+                "does not name its chip: name it with --chip or `chip = ..` in the budgets, as one of {chips}"
+            ))
+        })?;
+        let unknown = || BoundsError(format!("the chip {name} is not known: the known ones are {chips}"));
+        let chip = Chip::named(&name).ok_or_else(unknown)?;
 
         let (mut flash, mut data, mut data_start) = (Vec::new(), Vec::new(), 0);
         let (mut start, mut code_end) = (u32::MAX, 0);
@@ -145,7 +96,10 @@ impl Program {
             }
             let end = address + content.len() as u32;
             if end > chip.flash_bytes {
-                return Err(ElfError::TooLarge { path: path.into(), end, chip: chip.name, limit: chip.flash_bytes });
+                let Chip { name, flash_bytes, .. } = chip;
+                return Err(error(format!(
+                    "has {end} bytes for the flash: the {name} holds {flash_bytes}; --chip names another chip"
+                )));
             }
             start = start.min(address);
             if flash.len() < end as usize {
@@ -154,7 +108,7 @@ impl Program {
             }
             flash[address as usize..end as usize].copy_from_slice(content);
             if (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&header.p_vaddr(LittleEndian)) {
-                data_start = header.p_vaddr(LittleEndian);
+                data_start = header.p_vaddr(LittleEndian).into();
                 data = content.to_vec();
             } else {
                 code_end = code_end.max(end);
@@ -164,20 +118,22 @@ impl Program {
             .filter(|symbol| symbol.address() < u64::from(SRAM_ORIGIN))
             .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
             .collect();
-        let virtual_tables = (file.symbols())
+        let tables: Vec<Range<u64>> = (file.symbols())
             .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
-            .filter_map(|symbol| {
-                let first = (symbol.address() as u32).checked_sub(data_start)? as usize;
-                let table = first..first + symbol.size() as usize;
-                data.get(table.clone()).map(|_| table)
-            })
+            .map(|symbol| symbol.address()..symbol.address() + symbol.size())
             .collect();
+        let in_data = |table: &Range<u64>| {
+            let first = table.start.checked_sub(data_start)? as usize;
+            let table = first..first + (table.end - table.start) as usize;
+            data.get(table.clone()).map(|_| table)
+        };
+        let virtual_tables = tables.iter().filter_map(in_data).collect();
         // A program at a higher address than 0 is a bootloader; some have no vectors.
         let start = if start == u32::MAX { 0 } else { start };
         let has_vectors = start == 0 || labels.get("__vectors") == Some(&start);
         let records = loops::records_of(&file).map_err(not_elf)?;
         let functions = functions(&file);
-        let taken = taken(&file, &functions, &labels);
+        let taken = taken(&file, &functions, &labels, &tables);
         let vectors = if has_vectors { u32::from(chip.vectors) * chip.vector_bytes } else { 0 };
         Ok(Program {
             chip,
@@ -192,18 +148,21 @@ impl Program {
             data,
             virtual_tables,
             records,
-            lines: Lines::of(path),
+            path: path.into(),
+            debug_information: OnceCell::new(),
         })
     }
 
-    /// The records of loops: an address in the loop, and the most executions of that address.
-    pub fn records(&self) -> &BTreeMap<u32, u64> {
-        &self.records
+    pub(crate) fn label(&self, name: &str) -> Option<u32> {
+        self.labels.get(name).copied()
     }
 
     /// File and line of an address, if the ELF has debug information.
     pub fn line(&self, address: u32) -> Option<String> {
-        self.lines.at(address)
+        let loader = self.debug_information.get_or_init(|| Loader::new(&self.path).ok()).as_ref()?;
+        let location = loader.find_location(address.into()).ok()??;
+        let file = Path::new(location.file?).file_name()?.to_string_lossy().into_owned();
+        Some(format!("{file}:{}", location.line?))
     }
 
     /// The functions of a name.
@@ -227,29 +186,9 @@ impl Program {
     }
 }
 
-/// The lines of an ELF, which are read when the first is asked for.
-struct Lines {
-    path: PathBuf,
-    loader: OnceCell<Option<Loader>>,
-}
-
-impl Lines {
-    fn of(path: &Path) -> Lines {
-        Lines { path: path.into(), loader: OnceCell::new() }
-    }
-
-    /// File and line of an address.
-    fn at(&self, address: u32) -> Option<String> {
-        let loader = self.loader.get_or_init(|| Loader::new(&self.path).ok()).as_ref()?;
-        let location = loader.find_location(address.into()).ok()??;
-        let file = Path::new(location.file?).file_name()?.to_string_lossy().into_owned();
-        Some(format!("{file}:{}", location.line?))
-    }
-}
-
-impl fmt::Debug for Lines {
+impl fmt::Debug for Program {
     fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        write!(to, "lines of {}", self.path.display())
+        write!(to, "program of {}", self.path.display())
     }
 }
 
@@ -274,25 +213,17 @@ fn functions(file: &ElfFile32<LittleEndian>) -> BTreeMap<u32, Symbol> {
         SymbolKind::Unknown => is_code(symbol) && symbol.size() > 0,
         _ => false,
     };
-    let mut functions: BTreeMap<u32, Symbol> = BTreeMap::new();
-    for symbol in file.symbols().filter(|symbol| is_function(symbol) && symbol.address() < u64::from(SRAM_ORIGIN)) {
-        let Ok(name) = symbol.name() else { continue };
-        let (name, bytes) = (demangled(name), symbol.size() as u32);
-        if name.is_empty() {
-            continue;
-        }
-        let new = Symbol { name, bytes };
-        let rank = |symbol: &Symbol| (symbol.bytes == 0, symbol.name.clone());
-        functions
-            .entry(symbol.address() as u32)
-            .and_modify(|known| {
-                if rank(&new) < rank(known) {
-                    *known = new.clone();
-                }
-            })
-            .or_insert(new);
-    }
-    functions
+    let mut functions: Vec<(u32, Symbol)> = (file.symbols())
+        .filter(|symbol| is_function(symbol) && symbol.address() < u64::from(SRAM_ORIGIN))
+        .filter_map(|symbol| {
+            let named = Symbol { name: demangled(symbol.name().ok()?), bytes: symbol.size() as u32 };
+            Some((symbol.address() as u32, named))
+        })
+        .filter(|(_, symbol)| !symbol.name.is_empty())
+        .collect();
+    // Of several at one address the map keeps the last.
+    functions.sort_by_cached_key(|(_, symbol)| (symbol.bytes == 0, symbol.name.clone()));
+    functions.into_iter().rev().collect()
 }
 
 /// The functions whose address is taken, by the relocations that `--emit-relocs` keeps; `None` without relocations.
@@ -301,6 +232,7 @@ fn taken(
     file: &ElfFile32<LittleEndian>,
     functions: &BTreeMap<u32, Symbol>,
     labels: &BTreeMap<String, u32>,
+    tables: &[Range<u64>],
 ) -> Option<BTreeSet<u32>> {
     /// Word addresses: in memory, and in `ldi`, directly and by a trampoline (binutils, elf/avr.h).
     const OF_WORDS: [u32; 6] = [5, 12, 13, 14, 24, 25];
@@ -308,10 +240,6 @@ fn taken(
     let label = |name: &str| labels.get(name).copied().unwrap_or_default();
     let constructors =
         label("__ctors_start").min(label("__dtors_start"))..label("__ctors_end").max(label("__dtors_end"));
-    let tables: Vec<Range<u64>> = (file.symbols())
-        .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
-        .map(|symbol| symbol.address()..symbol.address() + symbol.size())
-        .collect();
     let mut taken = BTreeSet::new();
     let mut is_kept = false;
     for section in file.sections().filter(|section| section.kind() != SectionKind::Other && section.size() > 0) {

@@ -69,7 +69,6 @@ pub(crate) struct Place {
 }
 
 /// An edge from a place to the next.
-#[derive(Clone)]
 pub(crate) struct Edge {
     /// The place's number in its routine.
     pub(crate) to: usize,
@@ -77,17 +76,17 @@ pub(crate) struct Edge {
     pub(crate) cycles: u32,
     /// The routine called on this edge.
     pub(crate) through: Option<Rc<Routine>>,
-    /// The number in R21 and R20 at the beginning of the edge, if it is known: the length argument of `memcpy` and
-    /// similar functions.
+    /// The number in R21 and R20 at the beginning of the edge, if it is known: the third argument, if each has 16 bits.
+    /// This is the length of `memcpy` and similar functions.
     pub(crate) length: Option<u16>,
     /// Registers with known constants after the instruction.
     pub(crate) constants: Constants,
 }
 
 /// An instruction at a place, and its edges.
-#[derive(Clone)]
 pub(crate) struct Node {
     pub(crate) place: Place,
+    pub(crate) instruction: Instruction,
     pub(crate) edges: Vec<Edge>,
     /// If the routine returns here, the cycles of the return.
     pub(crate) returns: Option<u32>,
@@ -95,6 +94,23 @@ pub(crate) struct Node {
     pub(crate) ends_in: Vec<(u32, Rc<Routine>)>,
     /// Whether the instruction waits for an unknown time.
     pub(crate) waits: bool,
+}
+
+impl Node {
+    fn new(place: Place, instruction: Instruction) -> Node {
+        Node { place, instruction, edges: Vec::new(), returns: None, ends_in: Vec::new(), waits: false }
+    }
+
+    /// The routines that it calls, with the cycles of the call.
+    pub(crate) fn calls(&self) -> impl Iterator<Item = (u32, &Rc<Routine>)> {
+        let returning = self.edges.iter().filter_map(|edge| Some((edge.cycles, edge.through.as_ref()?)));
+        returning.chain(self.ends_in.iter().map(|(cycles, called)| (*cycles, called)))
+    }
+
+    /// The routines that it calls.
+    pub(crate) fn called(&self) -> impl Iterator<Item = &Rc<Routine>> {
+        self.calls().map(|(_, called)| called)
+    }
 }
 
 /// A routine with all its paths.
@@ -135,16 +151,16 @@ pub(crate) struct Code<'a> {
 }
 
 impl<'a> Code<'a> {
-    pub(crate) fn new(elf: &'a elf::Program, budgets: &'a Budgets) -> Result<Code<'a>, BoundsError> {
-        Ok(Code {
+    pub(crate) fn new(elf: &'a elf::Program, budgets: &'a Budgets) -> Code<'a> {
+        Code {
             elf,
             budgets,
-            targets: Targets::new(elf, budgets)?,
+            targets: Targets::new(elf, budgets),
             active: vec![Vec::new()],
             indirect: BTreeMap::new(),
             routines: BTreeMap::new(),
             open: Vec::new(),
-        })
+        }
     }
 
     /// The instruction at an address.
@@ -155,7 +171,7 @@ impl<'a> Code<'a> {
 
     /// The error for an instruction at an address.
     fn refuse(&self, address: u32, problem: Problem) -> BoundsError {
-        BoundsError::At { place: self.place(address), problem }
+        BoundsError::at(&self.place(address), problem)
     }
 
     /// An address with its function and line.
@@ -194,7 +210,7 @@ impl<'a> Code<'a> {
 
     /// A routine's name. A handler has the name of the function that its vector leads to.
     pub(crate) fn name_of(&self, entry: Entry) -> String {
-        let leads_to = || self.instruction(entry.address).ok()?.target(self.flash_bytes());
+        let leads_to = || self.instruction(entry.address).ok()?.target(self.elf.chip.flash_bytes);
         match entry.kind {
             Kind::Reset => "reset".to_owned(),
             Kind::Handler => self.name(leads_to().unwrap_or(entry.address)),
@@ -210,157 +226,105 @@ impl<'a> Code<'a> {
         if let Some(first) =
             self.open.iter().position(|open| open.address == entry.address && open.active == entry.active)
         {
-            let mut circle: Vec<String> = self.open[first..].iter().map(|open| self.name(open.address)).collect();
-            circle.push(self.name(entry.address));
-            return Err(BoundsError::Recursion { circle });
+            let function = self.name(entry.address);
+            let circle: Vec<String> = self.open[first..].iter().map(|open| self.name(open.address)).collect();
+            return Err(BoundsError(format!(
+                "there is recursion, which has no deepest stack: {}, which calls {function} calls itself: set in the budgets how \
+                 many calls are active at once, as in [recursion] {function:?} = {{ depth = 3, because = \"..\" }}; if a call by a \
+                 pointer only seems to be one of these, link with -Wl,--emit-relocs, which lists the functions whose address is \
+                 taken",
+                circle.join(", which calls ")
+            )));
         }
         self.open.push(entry);
-        let routine = Rc::new(Follower::new(self, entry).follow()?);
+        let routine = Routine {
+            entry,
+            nodes: Vec::new(),
+            returns: BTreeSet::new(),
+            keeps: Registers::ALL,
+            leaves_zero: true,
+            deepest: Vec::new(),
+            deepest_interrupted: None,
+            enables: None,
+        };
+        let follower =
+            Follower { program: self, routine, known: Vec::new(), numbers: HashMap::new(), to_do: Vec::new() };
+        let routine = Rc::new(follower.follow()?);
         self.open.pop();
         self.routines.insert(entry, Rc::clone(&routine));
         Ok(routine)
     }
-
-    pub(crate) fn flash_bytes(&self) -> u32 {
-        self.elf.chip.flash_bytes
-    }
 }
 
-/// The next address of an instruction at a place.
-struct Next {
-    place: Place,
+/// The state after an instruction, and its cycles.
+#[derive(Clone)]
+struct After {
     known: Known,
+    interrupts: Interrupts,
     cycles: u32,
-    through: Option<Rc<Routine>>,
-}
-
-/// The effects of an instruction at a place.
-#[derive(Default)]
-struct Step {
-    next: Vec<Next>,
-    returns: Option<u32>,
-    ends_in: Vec<(u32, Rc<Routine>)>,
-    waits: bool,
 }
 
 /// Follows one routine.
 struct Follower<'p, 'a> {
     program: &'p mut Code<'a>,
-    entry: Entry,
-    known: HashMap<Place, Known>,
-    returns: BTreeSet<Interrupts>,
-    keeps: Registers,
-    leaves_zero: bool,
-    enables: Option<u32>,
+    routine: Routine,
+    /// The known facts at each of its places.
+    known: Vec<Known>,
+    numbers: HashMap<Place, usize>,
+    to_do: Vec<usize>,
 }
 
-impl<'p, 'a> Follower<'p, 'a> {
-    fn new(program: &'p mut Code<'a>, entry: Entry) -> Self {
-        Follower {
-            program,
-            entry,
-            known: HashMap::new(),
-            returns: BTreeSet::new(),
-            keeps: Registers::ALL,
-            leaves_zero: true,
-            enables: None,
+impl Follower<'_, '_> {
+    fn follow(mut self) -> Result<Routine, BoundsError> {
+        let Entry { address, interrupts, kind, .. } = self.routine.entry;
+        self.reach(Place { address, depth: 0, interrupts }, Known::at_entry(kind == Kind::Function))?;
+        while let Some(number) = self.to_do.pop() {
+            self.step(number)?;
         }
+        let deepest = self.deepest(|_| true, |routine| Some(&routine.deepest)).unwrap_or_default();
+        let is_on = |place: &Place| place.interrupts == Interrupts::On;
+        let deepest_interrupted = self.deepest(is_on, |routine| routine.deepest_interrupted.as_ref());
+        Ok(Routine { deepest, deepest_interrupted, ..self.routine })
     }
 
-    fn follow(mut self) -> Result<Routine, BoundsError> {
-        let start = Place { address: self.entry.address, depth: 0, interrupts: self.entry.interrupts };
-        self.known.insert(start, Known::at_entry(self.entry.kind == Kind::Function));
-        let mut to_do = vec![start];
-        let mut steps: BTreeMap<Place, Step> = BTreeMap::new();
-        while let Some(place) = to_do.pop() {
-            let step = self.step(place)?;
-            for Next { place: next, known, .. } in &step.next {
-                let is_new = match self.known.get_mut(next) {
-                    Some(before) => before.meet(known),
-                    None => self.known.insert(*next, known.clone()).is_none(),
-                };
-                if is_new {
-                    to_do.push(*next);
-                }
-            }
-            steps.insert(place, step);
-        }
-
-        // The entry comes first.
-        let mut places: Vec<Place> = steps.keys().copied().collect();
-        let first = places.iter().position(|place| *place == start).unwrap_or_default();
-        places.swap(0, first);
-        let numbers: HashMap<Place, usize> = places.iter().copied().zip(0..).collect();
-        let node = |place: &Place| {
-            let Step { next, returns, ends_in, waits } = &steps[place];
-            let length = self.known[place].length();
-            let edge = |next: &Next| Edge {
-                to: numbers[&next.place],
-                cycles: next.cycles,
-                through: next.through.clone(),
-                length,
-                constants: next.known.constants(),
-            };
-            Node {
-                place: *place,
-                edges: next.iter().map(edge).collect(),
-                returns: *returns,
-                ends_in: ends_in.clone(),
-                waits: *waits,
+    /// The number of a place that a path reaches with these facts. If they are new, the place is to be followed.
+    fn reach(&mut self, place: Place, known: Known) -> Result<usize, BoundsError> {
+        let number = match self.numbers.get(&place) {
+            Some(&number) if !self.known[number].meet(&known) => return Ok(number),
+            Some(&number) => number,
+            None => {
+                self.routine.nodes.push(Node::new(place, self.program.instruction(place.address)?));
+                self.known.push(known);
+                self.numbers.insert(place, self.known.len() - 1);
+                self.known.len() - 1
             }
         };
-        let nodes: Vec<Node> = places.iter().map(node).collect();
-        let deepest = self.deepest(&nodes, |_| true, |routine| Some(&routine.deepest)).unwrap_or_default();
-        let deepest_interrupted = self.deepest(
-            &nodes,
-            |place| place.interrupts == Interrupts::On,
-            |routine| routine.deepest_interrupted.as_ref(),
-        );
-        Ok(Routine {
-            entry: self.entry,
-            nodes,
-            returns: self.returns,
-            keeps: self.keeps,
-            leaves_zero: self.leaves_zero,
-            deepest,
-            deepest_interrupted,
-            enables: self.enables,
-        })
+        self.to_do.push(number);
+        Ok(number)
     }
 
     /// The deepest stack over the selected places, and over the called routines.
     fn deepest(
         &self,
-        nodes: &[Node],
         counts: impl Fn(&Place) -> bool,
         of: impl Fn(&Routine) -> Option<&Vec<Frame>>,
     ) -> Option<Vec<Frame>> {
-        let function = self.program.name_of(self.entry);
-        let own = nodes.iter().filter(|node| counts(&node.place)).map(|node| (node.place.depth, None));
-        let calls = nodes.iter().flat_map(|node| {
-            let ends_in = node.ends_in.iter().map(|(_, called)| called);
-            let called = node.edges.iter().filter_map(|edge| edge.through.as_ref()).chain(ends_in);
-            called.map(|routine| {
-                (node.place.depth + self.program.elf.chip.return_address_bytes(), Some(Rc::clone(routine)))
-            })
-        });
-        let frames = own.chain(calls).filter_map(|(depth, called)| {
-            let below = called.as_deref().map(&of);
-            let below = match below {
-                Some(None) => return None,
-                Some(Some(frames)) => frames.as_slice(),
-                None => &[],
-            };
-            Some((depth + bytes(below), depth, below.to_vec()))
-        });
-        let (_, depth, below) = frames.max_by_key(|(total, ..)| *total)?;
-        Some([vec![Frame { function, bytes: depth }], below].concat())
+        let nodes = &self.routine.nodes;
+        let none: &[Frame] = &[];
+        let own = nodes.iter().filter(|node| counts(&node.place)).map(|node| (node.place.depth, none));
+        let return_address = self.program.elf.chip.return_address_bytes();
+        let calls =
+            nodes.iter().flat_map(|node| node.called().map(|called| (node.place.depth + return_address, called)));
+        let calls = calls.filter_map(|(depth, called)| Some((depth, of(called)?.as_slice())));
+        let (depth, below) = own.chain(calls).max_by_key(|(depth, below)| depth + bytes(below))?;
+        let frame = Frame { function: self.program.name_of(self.routine.entry), bytes: depth };
+        Some([&[frame], below].concat())
     }
 
     /// Executes the instruction at a place.
-    fn step(&mut self, place: Place) -> Result<Step, BoundsError> {
-        let mut known = self.known[&place].clone();
-        let instruction = self.program.instruction(place.address)?;
+    fn step(&mut self, number: usize) -> Result<(), BoundsError> {
+        let Node { place, instruction, .. } = self.routine.nodes[number];
+        let mut known = self.known[number].clone();
         let at = place.address;
         let chip = self.program.elf.chip;
         if place.depth > DEEPEST.min(usize::from(chip.ram_last)) {
@@ -375,146 +339,132 @@ impl<'p, 'a> Follower<'p, 'a> {
         }
         let cycles =
             instruction.cycles + chip.more_cycles(instruction.operation) + halt_cycles(&instruction, chip.eecr);
-        let mut interrupts = match place.interrupts {
+        let interrupts = match place.interrupts {
             Interrupts::Off => Interrupts::Off,
             Interrupts::Soon | Interrupts::On => Interrupts::On,
         };
-        let mut step = Step::default();
-        let target = instruction.target(chip.flash_bytes);
+        let mut after = After { known, interrupts, cycles };
+        self.routine.nodes[number] = Node::new(place, instruction);
+        let (next, target) = (instruction.next(), instruction.target(chip.flash_bytes));
         match instruction.operation {
             Rjmp | Jmp | Rcall | Call if target.is_some_and(|target| self.program.targets.is_table_jump(target)) => {
-                let targets = self.program.targets.of_table(self.program.elf, at, &known);
+                let targets = self.program.targets.of_table(self.program.elf, at, &after.known);
                 let (targets, table_cycles) = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
-                known.after(Registers::range(1..=29));
-                self.lead(&mut step, targets, place, known, interrupts, cycles + table_cycles)?;
+                // The routine changes R0 and the pointer.
+                after.known.after(Registers::which(|register| matches!(register, 1..=29)));
+                after.cycles += table_cycles;
+                self.lead(number, targets, after)?;
             }
             Icall | Eicall | Ijmp | Eijmp => {
-                let targets =
-                    self.program.targets.of_pointer(self.program.elf, &self.program.name(at), &instruction, &known);
+                let caller = self.program.name(at);
+                let targets = self.program.targets.of_pointer(self.program.elf, &caller, &instruction, &after.known);
                 let targets = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
-                self.lead(&mut step, targets, place, known, interrupts, cycles)?;
+                self.lead(number, targets, after)?;
             }
-            Rjmp | Jmp => self.go(&mut step, target.unwrap_or_default(), known, interrupts, cycles, None),
+            Rjmp | Jmp => self.go(number, target.unwrap_or_default(), after, None)?,
             Brbs | Brbc => {
                 let flag = (instruction.operand('s') == INTERRUPT_FLAG).then_some(place.interrupts != Interrupts::Off);
                 let taken_if_set = instruction.operation == Brbs;
-                let mut if_set = known.clone();
+                let mut if_set = after.clone();
                 if instruction.operand('s') == ZERO_FLAG {
-                    if_set.is_zero();
+                    if_set.known.is_zero();
                 }
-                let (taken, passed) = if taken_if_set { (if_set, known) } else { (known, if_set) };
+                let (mut taken, passed) = if taken_if_set { (if_set, after) } else { (after, if_set) };
+                taken.cycles += 1;
                 if flag != Some(!taken_if_set) {
-                    let target = target.unwrap_or_default();
-                    self.go(&mut step, target, taken, interrupts, cycles + 1, None);
+                    self.go(number, target.unwrap_or_default(), taken, None)?;
                 }
                 if flag != Some(taken_if_set) {
-                    self.go(&mut step, instruction.next(), passed, interrupts, cycles, None);
+                    self.go(number, next, passed, None)?;
                 }
             }
             Cpse | Sbrc | Sbrs | Sbic | Sbis => {
-                let skipped = self.program.instruction(instruction.next())?;
-                let bit = match (instruction.operation, known.registers[instruction.source()]) {
+                let skipped = self.program.instruction(next)?;
+                let bit = match (instruction.operation, after.known.registers[instruction.source]) {
                     (Sbrc | Sbrs, Value::Status(on, _)) if instruction.operand('b') == INTERRUPT_FLAG => Some(on),
                     _ => None,
                 };
                 let skips_if_set = instruction.operation == Sbrs;
                 if bit != Some(!skips_if_set) {
-                    let cycles = cycles + skipped.bytes() / 2;
-                    self.go(&mut step, skipped.next(), known.clone(), interrupts, cycles, None);
+                    let skips = After { cycles: cycles + skipped.bytes() / 2, ..after.clone() };
+                    self.go(number, skipped.next(), skips, None)?;
                 }
                 if bit != Some(skips_if_set) {
-                    self.go(&mut step, instruction.next(), known, interrupts, cycles, None);
+                    self.go(number, next, after, None)?;
                 }
             }
-            Rcall | Call => {
-                let target = target.unwrap_or_default();
-                if target == instruction.next() {
-                    // A compiler's shortest code for pushing bytes.
-                    known.stack.extend(vec![Value::Unknown; chip.return_address_bytes()]);
-                    self.go(&mut step, target, known, interrupts, cycles, None);
-                } else {
-                    self.call(&mut step, target, place, known, interrupts, cycles)?;
-                }
+            Rcall | Call if target == Some(next) => {
+                // A compiler's shortest code for pushing bytes.
+                after.known.stack.extend(vec![Value::Unknown; chip.return_address_bytes()]);
+                self.go(number, next, after, None)?;
             }
+            Rcall | Call => self.call(number, target.unwrap_or_default(), after)?,
             Ret | Reti => {
-                if !known.stack.is_empty() {
+                let Routine { entry, keeps, leaves_zero, .. } = &mut self.routine;
+                if !after.known.stack.is_empty() {
                     return Err(self.program.refuse(at, Problem::ReturnsElsewhere));
                 }
-                if self.entry.kind == Kind::Reset
-                    || (instruction.operation == Reti) != (self.entry.kind == Kind::Handler)
-                {
+                if entry.kind == Kind::Reset || (instruction.operation == Reti) != (entry.kind == Kind::Handler) {
                     return Err(self.program.refuse(at, Problem::WrongReturn));
                 }
-                self.returns.insert(interrupts);
-                let holds = |register: usize| known.registers[register] == Value::AtEntry(register);
-                self.keeps = self.keeps & (Registers::which(holds) | known.unchanged);
-                self.leaves_zero &= known.constant(1) == Some(0);
-                step.returns = Some(cycles);
+                let holds = |register: usize| after.known.registers[register] == Value::AtEntry(register);
+                *keeps = *keeps & (Registers::which(holds) | after.known.unchanged);
+                *leaves_zero &= after.known.constant(1) == Some(0);
+                self.routine.returns.insert(interrupts);
+                self.routine.nodes[number].returns = Some(cycles);
             }
             _ => {
-                let before = interrupts;
-                let is_start_up = self.entry.kind == Kind::Reset;
-                let done = known.carry_out(&instruction, &chip, place.interrupts, &mut interrupts, is_start_up);
-                match done {
+                let Entry { kind, interrupts: at_entry, .. } = self.routine.entry;
+                let After { known, interrupts: now, .. } = &mut after;
+                match known.carry_out(&instruction, &chip, place.interrupts, now, kind == Kind::Reset) {
                     // The value is unknown, so interrupts can be on or off.
-                    Err(Problem::UnknownStatus) if self.entry.kind != Kind::Handler => {
-                        self.go(&mut step, instruction.next(), known.clone(), Interrupts::Off, cycles, None);
-                        turn(&mut interrupts, true);
+                    Err(Problem::UnknownStatus) if kind != Kind::Handler => {
+                        turn(now, true);
+                        self.go(number, next, After { interrupts: Interrupts::Off, ..after.clone() }, None)?;
                     }
                     Ok(()) => {}
                     Err(problem) => return Err(self.program.refuse(at, problem)),
                 }
-                if before == Interrupts::Off
-                    && interrupts != Interrupts::Off
-                    && self.entry.interrupts == Interrupts::Off
-                {
-                    self.enables.get_or_insert(at);
+                if interrupts == Interrupts::Off && after.interrupts != Interrupts::Off && at_entry == Interrupts::Off {
+                    self.routine.enables.get_or_insert(at);
                 }
                 // A sleep with interrupts off does not end, and the time of a write to flash is unknown.
-                step.waits = match instruction.operation {
+                self.routine.nodes[number].waits = match instruction.operation {
                     Sleep => place.interrupts == Interrupts::Off,
                     operation => operation == Spm,
                 };
-                self.go(&mut step, instruction.next(), known, interrupts, cycles, None);
+                self.go(number, next, after, None)?;
             }
         }
-        Ok(step)
+        Ok(())
     }
 
     /// Continues at an address.
-    fn go(
-        &self,
-        step: &mut Step,
-        address: u32,
-        known: Known,
-        interrupts: Interrupts,
-        cycles: u32,
-        through: Option<Rc<Routine>>,
-    ) {
-        // The reset vector starts the program again, and from a bootloader address 0 another.
-        if address != 0 && address != self.program.elf.start {
-            let place = Place { address, depth: known.stack.len(), interrupts };
-            step.next.push(Next { place, known, cycles, through });
+    fn go(&mut self, from: usize, address: u32, after: After, through: Option<Rc<Routine>>) -> Result<(), BoundsError> {
+        if self.is_start(address) {
+            return Ok(());
         }
+        let After { known, interrupts, cycles } = after;
+        let (length, constants) = (self.known[from].pair(20), known.constants());
+        let to = self.reach(Place { address, depth: known.stack.len(), interrupts }, known)?;
+        self.routine.nodes[from].edges.push(Edge { to, cycles, through, length, constants });
+        Ok(())
+    }
+
+    /// Whether a path ends at this address: the reset vector starts the program again, and from a bootloader address 0
+    /// starts another.
+    fn is_start(&self, address: u32) -> bool {
+        address == 0 || address == self.program.elf.start
     }
 
     /// Continues at every target of an indirect call or jump.
-    fn lead(
-        &mut self,
-        step: &mut Step,
-        targets: Where,
-        place: Place,
-        known: Known,
-        interrupts: Interrupts,
-        cycles: u32,
-    ) -> Result<(), BoundsError> {
-        let instruction = self.program.instruction(place.address)?;
-        let is_call = matches!(instruction.operation, Rcall | Call | Icall | Eicall);
+    fn lead(&mut self, from: usize, targets: Where, after: After) -> Result<(), BoundsError> {
+        let Node { place, instruction, .. } = self.routine.nodes[from];
         for &target in &targets.addresses {
-            if is_call {
-                self.call(step, target, place, known.clone(), interrupts, cycles)?;
+            if matches!(instruction.operation, Rcall | Call | Icall | Eicall) {
+                self.call(from, target, after.clone())?;
             } else {
-                self.go(step, target, known.clone(), interrupts, cycles, None);
+                self.go(from, target, after.clone(), None)?;
             }
         }
         self.program.indirect.insert(place.address, targets);
@@ -522,35 +472,29 @@ impl<'p, 'a> Follower<'p, 'a> {
     }
 
     /// Calls a function and continues after it.
-    fn call(
-        &mut self,
-        step: &mut Step,
-        target: u32,
-        place: Place,
-        mut known: Known,
-        interrupts: Interrupts,
-        cycles: u32,
-    ) -> Result<(), BoundsError> {
-        if target == 0 || target == self.program.elf.start {
+    fn call(&mut self, from: usize, address: u32, mut after: After) -> Result<(), BoundsError> {
+        let Entry { interrupts: at_entry, active, .. } = self.routine.entry;
+        let interrupts = after.interrupts;
+        if self.is_start(address) {
             return Ok(());
         }
-        let Some(active) = self.program.enter(target, self.entry.active) else { return Ok(()) };
-        let called = self.program.follow(Entry { address: target, interrupts, kind: Kind::Function, active })?;
-        if self.enables.is_none() && self.entry.interrupts == Interrupts::Off {
-            self.enables = called.enables.filter(|_| interrupts == Interrupts::Off);
+        let Some(active) = self.program.enter(address, active) else { return Ok(()) };
+        let called = self.program.follow(Entry { address, interrupts, kind: Kind::Function, active })?;
+        if self.routine.enables.is_none() && at_entry == Interrupts::Off && interrupts == Interrupts::Off {
+            self.routine.enables = called.enables;
         }
-        known.after(called.keeps);
-        known.kept = [Value::Unknown; 3];
+        after.known.after(called.keeps);
+        after.known.kept = [Value::Unknown; 3];
         // The calling convention, which is checked at the function's return.
         if called.leaves_zero && !called.keeps.contains(1) {
-            known.registers[1] = Value::Constant(0);
+            after.known.registers[1] = Value::Constant(0);
         }
-        let next = self.program.instruction(place.address)?.next();
+        let next = self.routine.nodes[from].instruction.next();
         for &interrupts in &called.returns {
-            self.go(step, next, known.clone(), interrupts, cycles, Some(Rc::clone(&called)));
+            self.go(from, next, After { interrupts, ..after.clone() }, Some(Rc::clone(&called)))?;
         }
         if called.returns.is_empty() {
-            step.ends_in.push((cycles, called));
+            self.routine.nodes[from].ends_in.push((after.cycles, called));
         }
         Ok(())
     }

@@ -60,12 +60,12 @@ mod registers;
 mod targets;
 mod values;
 
-pub use self::budget::{Budgets, BudgetsError, BudgetsProblem, Depth, Held, RegisterRule};
+pub use self::budget::{Budgets, Depth, Held, RegisterRule};
 pub use self::chip::{CHIPS, Chip};
-use self::cycles::{Passes, Stretch, Time, Timer};
+use self::cycles::{Passes, Stretch, Time, Timer, longer};
 use self::decode::Operation;
-pub use self::elf::{ElfError, Program, Symbol};
-pub use self::error::{BoundsError, Problem};
+pub use self::elf::{Program, Symbol};
+pub use self::error::BoundsError;
 use self::flow::{Code, Entry, Kind, Node, Routine, bytes};
 pub use self::loops::{LoopBound, LoopBounds};
 pub use self::order::order;
@@ -88,16 +88,23 @@ const SYNCHRONISER_CYCLES: u64 = 3;
 /// # Errors
 /// If the program cannot be followed.
 pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
-    let known: BTreeSet<&str> = elf.functions.values().map(|symbol| symbol.name.as_str()).collect();
-    let tables: [(_, Vec<&String>); 2] =
-        [("loops", budgets.loops.keys().collect()), ("recursion", budgets.recursion.keys().collect())];
-    for (table, names) in tables {
-        let names: Vec<String> = names.into_iter().filter(|name| !known.contains(name.as_str())).cloned().collect();
+    let known: BTreeSet<&String> = elf.functions.values().map(|symbol| &symbol.name).collect();
+    let tables: [(_, Vec<&String>); 3] = [
+        ("loops", budgets.loops.keys().collect()),
+        ("recursion", budgets.recursion.keys().collect()),
+        ("calls", budgets.calls.iter().flat_map(|(caller, called)| called.iter().chain([caller])).collect()),
+    ];
+    for (table, mut names) in tables {
+        names.retain(|name| !known.contains(name));
         if !names.is_empty() {
-            return Err(BoundsError::NoSuchFunction { table, names });
+            let names = names.into_iter().map(String::as_str).collect::<Vec<_>>().join(" or ");
+            return Err(BoundsError(format!(
+                "no function of the program is called {names}, which the budgets name in [{table}]: take the names that \
+                 `avr-objdump -dC` shows"
+            )));
         }
     }
-    let mut code = Code::new(elf, budgets)?;
+    let mut code = Code::new(elf, budgets);
     let entry = |address, kind| Entry { address, interrupts: Interrupts::Off, kind, active: 0 };
     let main = code.follow(entry(elf.start, Kind::Reset))?;
     let mut handlers = BTreeMap::new();
@@ -105,13 +112,18 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         if let Some(address) = handler_of(&code, vector)? {
             let handler = code.follow(entry(address, Kind::Handler))?;
             if let Some(address) = handler.enables {
-                return Err(BoundsError::HandlerEnables { vector, place: code.place(address) });
+                let place = code.place(address);
+                return Err(BoundsError(format!(
+                    "the handler of vector {vector} turns interrupts on at {}, in {}: handlers could nest without an end",
+                    place.address_and_line(),
+                    place.function
+                )));
             }
             handlers.insert(vector, handler);
         }
     }
     let code = code;
-    let mut timer = Timer::new(&code, passes(&code, budgets));
+    let mut timer = Timer::new(passes(&code, budgets));
     let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
         .map(|kind| timer.longest_stretch(&main, kind).map(|time| time.longest(&code)))
         .map(|longest| longest.unwrap_or(Longest { cycles: Some(0), without_bound: Vec::new() }))
@@ -121,12 +133,9 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
         .map(|input| watch(input, &code, &handlers, &of_handlers, &mut timer, &closed))
         .transpose()?;
 
-    let feeds = |node: &Node| {
-        code.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Wdr)
-    };
+    let feeds = |node: &Node| node.instruction.operation == Operation::Wdr;
     let turns = code.routines().filter(|routine| routine.entry.kind != Kind::Handler);
-    let turns: Vec<Time> = turns.filter_map(|routine| timer.turn(routine, feeds)).collect();
-    let turn = turns.into_iter().reduce(|longest, turn| longest.or(&turn)).map(|turn| turn.longest(&code));
+    let turn = turns.map(|routine| timer.turn(routine, feeds)).fold(None, longer).map(|turn| turn.longest(&code));
     let loops: BTreeSet<u32> = code.routines().flat_map(|routine| timer.loops_without_bound(routine)).collect();
 
     if budgets.registers == RegisterRule::Convention {
@@ -167,27 +176,23 @@ fn time_handlers(
     timer: &mut Timer,
     closed: &Longest,
 ) -> Vec<Handler> {
-    let sleeps = code.routines().flat_map(|routine| &routine.nodes).any(|node| {
-        code.instruction(node.place.address).is_ok_and(|instruction| instruction.operation == Operation::Sleep)
-    });
+    let mut nodes = code.routines().flat_map(|routine| &routine.nodes);
+    let sleeps = nodes.any(|node| node.instruction.operation == Operation::Sleep);
     let response = code.elf.chip.response_cycles() + if sleeps { WAKE_UP_CYCLES } else { 0 };
     let mut timed: Vec<Handler> = (handlers.iter())
         .map(|(&vector, handler)| {
-            let longest = timer.longest(handler).map(|time| time.longest(code)).unwrap_or_default();
+            let longest = timer.longest(handler).map(|time| time.and(&Time::of(response)).longest(code));
             Handler {
                 vector,
                 function: code.name_of(handler.entry),
-                cycles: longest.cycles.map(|cycles| response + cycles),
-                without_bound: longest.without_bound,
+                longest: longest.unwrap_or_default(),
                 response_cycles: None,
                 stack_bytes: code.elf.chip.return_address_bytes() + bytes(&handler.deepest),
             }
         })
         .collect();
     // A handler that never returns delays no other: the program ends in it.
-    let time = |handler: &Handler| {
-        if handler.without_bound.is_empty() { Some(handler.cycles.unwrap_or_default()) } else { None }
-    };
+    let time = |handler: &Handler| handler.longest.or_refuse("").ok();
     let responses: Vec<Option<u64>> = (timed.iter())
         .map(|own| {
             let (before, behind): (Vec<&Handler>, Vec<&Handler>) =
@@ -214,27 +219,30 @@ fn watch(
     timer: &mut Timer,
     closed: &Longest,
 ) -> Result<EdgeBounds, BoundsError> {
-    let is_before_last = |other: u8| input.vectors.last().filter(|last| other < **last).copied();
-    for &other in handlers.keys().filter(|other| !input.vectors.contains(other)) {
-        if let Some(vector) = is_before_last(other) {
-            return Err(BoundsError::NotFirst { vector, other });
-        }
+    let last = input.vectors.last().copied().unwrap_or_default();
+    if let Some(other) = handlers.keys().find(|other| **other < last && !input.vectors.contains(other)) {
+        return Err(BoundsError(format!(
+            "vector {other} has priority over vector {last} and is no vector of the input, so an edge's longest wait has no bound"
+        )));
     }
-    let looks = |node: &Node| code.instruction(node.place.address).is_ok_and(|found| found.reads(input.port));
+    let looks = |node: &Node| node.instruction.reads(input.port);
     let (mut to_look, mut busy) = (0, 0);
     for &vector in &input.vectors {
         let look = handlers.get(&vector).and_then(|handler| timer.around(handler, looks));
-        let (to, behind) = look.ok_or(BoundsError::DoesNotLook { vector, port: input.port })?;
-        let to = to.longest(code).or_refuse("the path to a read")?.unwrap_or_default();
+        let (to, behind) = look.ok_or_else(|| {
+            let port = input.port;
+            BoundsError(format!(
+                "the handler of vector {vector} is missing, or does not read the port at {port:#04x} exactly once on every path"
+            ))
+        })?;
+        let to = to.longest(code).or_refuse("the path to a read")?;
         to_look = to_look.max(code.elf.chip.response_cycles() + to);
-        busy = busy.max(behind.longest(code).or_refuse("the path from a read")?.unwrap_or_default());
+        busy = busy.max(behind.longest(code).or_refuse("the path from a read")?);
     }
     for other in of_handlers.iter().filter(|handler| !input.vectors.contains(&handler.vector)) {
-        let longest = Longest { cycles: other.cycles, without_bound: other.without_bound.clone() };
-        let cycles = longest.or_refuse(&format!("the handler of vector {}", other.vector))?;
-        busy = busy.max(cycles.unwrap_or_default());
+        busy = busy.max(other.longest.or_refuse(&format!("the handler of vector {}", other.vector))?);
     }
-    let closed = closed.or_refuse("a stretch without interrupts")?.unwrap_or_default();
+    let closed = closed.or_refuse("a stretch without interrupts")?;
     let wait_cycles = SYNCHRONISER_CYCLES + busy + closed + to_look;
     Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * input.clock_hz / wait_cycles })
 }
@@ -262,11 +270,7 @@ fn deepest<'a>(
 fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
     let mut found: BTreeMap<u32, (FunctionBounds, Option<Time>)> = BTreeMap::new();
     for routine in code.routines() {
-        let called = |node: &Node| {
-            let through = node.edges.iter().filter_map(|edge| edge.through.clone());
-            through.chain(node.ends_in.iter().map(|(_, called)| Rc::clone(called))).collect::<Vec<_>>()
-        };
-        let calls = routine.nodes.iter().flat_map(called).map(|called| code.name_of(called.entry));
+        let calls = routine.nodes.iter().flat_map(Node::called).map(|called| code.name_of(called.entry));
         let time = timer.longest(routine);
         let (bounds, longest) = found.entry(routine.entry.address).or_insert_with(|| {
             let bounds = FunctionBounds {
@@ -280,10 +284,7 @@ fn functions(code: &Code, timer: &mut Timer) -> Vec<FunctionBounds> {
         });
         bounds.stack_bytes = bounds.stack_bytes.max(bytes(&routine.deepest));
         bounds.calls.extend(calls);
-        *longest = match (longest.take(), time) {
-            (Some(one), Some(other)) => Some(one.or(&other)),
-            (one, other) => one.or(other),
-        };
+        *longest = longer(longest.take(), time);
     }
     let functions = found.into_values();
     functions.map(|(bounds, time)| FunctionBounds { longest: time.map(|time| time.longest(code)), ..bounds }).collect()

@@ -154,9 +154,8 @@ fn without_numbers(name: &str) -> String {
         let to_underscore = rest.find('_').map_or(rest.len(), |at| at + 1);
         let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
         let length = match first {
-            'B' | 's' => to_underscore,
-            // A constant: its type, and its value.
-            'K' => to_underscore,
+            // Of a constant: its type, and its value.
+            'B' | 's' | 'K' => to_underscore,
             // An identifier behind its length.
             _ if digits > 0 => {
                 let separator = usize::from(rest[digits..].starts_with('_'));

@@ -1,6 +1,6 @@
 //! The graph of a routine's places: its loops, and which places can be reached from which.
 
-use crate::flow::Node;
+use crate::flow::{Edge, Node};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The nodes from which a node with `is_end` can be reached, itself included.
@@ -18,6 +18,12 @@ pub(crate) fn reaching(nodes: &[Node], is_end: impl Fn(usize) -> bool) -> Vec<bo
         }
     }
     reaches
+}
+
+/// The edges that lead into a set.
+pub(crate) fn entering<'a>(nodes: &'a [Node], set: &'a BTreeSet<usize>) -> impl Iterator<Item = &'a Edge> {
+    let outside = nodes.iter().enumerate().filter(|(number, _)| !set.contains(number));
+    outside.flat_map(|(_, node)| &node.edges).filter(|edge| set.contains(&edge.to))
 }
 
 /// The edges of a graph: the successors of a node.

@@ -18,8 +18,17 @@ pub struct Place {
 /// Function, address and line.
 impl fmt::Display for Place {
     fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        write!(to, "{:#06x} {}", self.address, self.function)?;
-        self.source.iter().try_for_each(|source| write!(to, " ({source})"))
+        write!(to, "{:#06x} {}{}", self.address, self.function, self.line())
+    }
+}
+
+impl Place {
+    fn line(&self) -> String {
+        self.source.iter().map(|source| format!(" ({source})")).collect()
+    }
+
+    pub(crate) fn address_and_line(&self) -> String {
+        format!("{:#06x}{}", self.address, self.line())
     }
 }
 
@@ -49,11 +58,10 @@ pub struct Handler {
     pub vector: u8,
     /// Its name.
     pub function: String,
-    /// The longest time from the interrupt's response to the end of its return; `None` if it never returns, or if a
-    /// loop has no bound.
-    pub cycles: Option<u64>,
-    /// Its unbounded parts.
-    pub without_bound: Vec<Place>,
+    /// The longest time from the interrupt's response to the end of its return; without cycles and unbounded parts if it
+    /// never returns.
+    #[serde(flatten)]
+    pub longest: Longest,
     /// The longest time from the request to the first instruction of the handler, if every handler of higher rank runs
     /// once. `None` if a part of it has no bound.
     pub response_cycles: Option<u64>,
@@ -166,6 +174,6 @@ pub struct Bounds {
 impl Bounds {
     /// The longest of the handlers that return, in cycles; 0 without one.
     pub fn longest_handler_cycles(&self) -> u64 {
-        self.handlers.iter().filter_map(|handler| handler.cycles).max().unwrap_or_default()
+        self.handlers.iter().filter_map(|handler| handler.longest.cycles).max().unwrap_or_default()
     }
 }

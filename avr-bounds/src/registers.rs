@@ -13,27 +13,24 @@ use std::rc::Rc;
 /// The register that is zero except between instructions that change it (AVR calling convention).
 const ZERO: usize = 1;
 
-/// The registers that functions preserve (AVR calling convention).
-fn is_preserved(register: usize) -> bool {
-    matches!(register, 2..=17 | 28 | 29)
-}
-
 /// Proves that every function of this program keeps the calling convention, and that handlers restore all registers and
 /// flags.
 pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Result<(), BoundsError> {
     let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function);
     for routine in functions.filter(|routine| !routine.returns.is_empty()) {
         let broken = |routine: &Routine| {
-            Registers::which(|register| {
-                is_preserved(register) && !routine.keeps.contains(register) || register == ZERO && !routine.leaves_zero
-            })
+            let zero = if routine.leaves_zero { Registers::NONE } else { Registers::one(ZERO) };
+            (Registers::PRESERVED - routine.keeps) | zero
         };
         // An error names the function itself, not its caller.
-        let called = routine.nodes.iter().flat_map(called).filter(|called| !called.returns.is_empty());
+        let called = routine.nodes.iter().flat_map(Node::called).filter(|called| !called.returns.is_empty());
         let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
         if !broken.is_empty() {
             let function = program.name_of(routine.entry);
-            return Err(BoundsError::NotPreserved { function, registers: broken.to_string() });
+            return Err(BoundsError(format!(
+                "{function} does not preserve {broken}, which the calling convention asks of every function: mend it, or write \
+                 `registers = \"unchecked\"` into the budgets"
+            )));
         }
     }
     for (&vector, handler) in handlers {
@@ -41,13 +38,9 @@ pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Res
         // A handler that never returns may change registers.
         if !clobbered.is_empty() && !handler.returns.is_empty() {
             let function = program.name_of(handler.entry);
-            return Err(BoundsError::HandlerSpoils { vector, function, registers: clobbered.to_string() });
+            let reason = format!("the handler of vector {vector}, {function}, does not restore {clobbered}");
+            return Err(BoundsError(reason));
         }
     }
     Ok(())
-}
-
-/// The routines that a place calls.
-fn called(node: &Node) -> impl Iterator<Item = &Rc<Routine>> {
-    node.edges.iter().filter_map(|edge| edge.through.as_ref()).chain(node.ends_in.iter().map(|(_, called)| called))
 }

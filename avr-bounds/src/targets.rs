@@ -19,12 +19,11 @@
 //! must list its calls.
 
 use crate::budget::Budgets;
-use crate::decode::Instruction;
 use crate::decode::Operation::*;
+use crate::decode::{Instruction, word_at};
 use crate::elf::Program;
-use crate::error::BoundsError;
 use crate::proved::Found;
-use crate::values::{Deep, Known, Value};
+use crate::values::{Known, Value};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The targets of an indirect call or jump.
@@ -51,32 +50,24 @@ pub(crate) struct Targets {
 const Z: usize = 30;
 
 impl Targets {
-    pub(crate) fn new(elf: &Program, budgets: &Budgets) -> Result<Targets, BoundsError> {
+    pub(crate) fn new(elf: &Program, budgets: &Budgets) -> Targets {
         let table_jumps = elf.labels.iter().filter(|(name, _)| name.starts_with("__tablejump"));
         let table_jumps = table_jumps.map(|(_, address)| *address).collect();
         let virtual_tables = elf.virtual_tables.iter().map(|table| {
             let words = elf.data[table.clone()].chunks_exact(2);
             words.map(|word| function_at(elf, u16::from_le_bytes([word[0], word[1]]))).collect()
         });
-        let gone: Vec<String> = (budgets.calls.iter())
-            .flat_map(|(caller, called)| called.iter().chain([caller]))
-            .filter(|name| elf.functions_called(name).is_empty())
-            .cloned()
-            .collect();
-        if !gone.is_empty() {
-            return Err(BoundsError::NoSuchFunction { table: "calls", names: gone });
-        }
         let listed = budgets.calls.iter().map(|(caller, called)| {
             (caller.clone(), called.iter().flat_map(|name| elf.functions_called(name)).collect())
         });
         let taken = elf.taken.clone();
-        Ok(Targets {
+        Targets {
             table_jumps,
             is_exact: taken.is_some(),
             taken: taken.unwrap_or_else(|| found_taken(elf)),
             virtual_tables: virtual_tables.collect(),
             listed: listed.collect(),
-        })
+        }
     }
 
     /// Whether a routine at this address jumps through a table.
@@ -86,7 +77,6 @@ impl Targets {
 
     /// The targets of a call or jump at `at` to such a routine, and the cycles of the routine itself.
     pub(crate) fn of_table(&self, elf: &Program, at: u32, known: &Known) -> Option<(Where, u32)> {
-        let label = |name: &str| elf.labels.get(name).copied();
         let call = Instruction::at(&elf.flash, at)?;
         let entry = call.target(elf.chip.flash_bytes)?;
         let mut cycles = 0;
@@ -99,16 +89,13 @@ impl Targets {
             }
         }
         cycles += instruction.cycles;
-        let word = |address: u32| {
-            let bytes = elf.flash.get(address as usize..address as usize + 2)?;
-            Some(u32::from(u16::from_le_bytes([bytes[0], bytes[1]])) * 2)
-        };
+        let word = |address: u32| Some(u32::from(word_at(&elf.flash, address)?) * 2);
         for of in ["ctors", "dtors"] {
             // The start-up code calls it in a loop. Its label stands directly in front of that loop.
-            let caller = label(&format!("__do_global_{of}"));
+            let caller = elf.label(&format!("__do_global_{of}"));
             let in_loop = caller.is_some_and(|caller| (caller..caller + 32).contains(&at));
             if in_loop && matches!(call.operation, Call | Rcall) {
-                let table = label(&format!("__{of}_start"))?..label(&format!("__{of}_end"))?;
+                let table = elf.label(&format!("__{of}_start"))?..elf.label(&format!("__{of}_end"))?;
                 let addresses = table.step_by(2).map(word).collect::<Option<_>>()?;
                 return Some((Where { found: Found::Table, addresses }, cycles));
             }
@@ -142,7 +129,7 @@ impl Targets {
         }
         let (low, high) = (known.registers[Z], known.registers[Z + 1]);
         let slot = match (low, high) {
-            (Value::Loaded(Some(low), Deep::Yes), Value::Loaded(Some(high), Deep::Yes)) => {
+            (Value::Loaded(Some(low), true), Value::Loaded(Some(high), true)) => {
                 (high == low + 1 || (low, high) == (0, 0)).then_some(usize::from(low))
             }
             _ => None,
@@ -179,10 +166,8 @@ fn function_at(elf: &Program, word: u16) -> Option<u32> {
 
 /// The target of a jump in the trampolines, which stand for functions that a word address cannot reach.
 fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
-    let label = |name: &str| elf.labels.get(name).copied();
-    let is_trampoline = label("__trampolines_start")
-        .zip(label("__trampolines_end"))
-        .is_some_and(|(start, end)| (start..end).contains(&address));
+    let trampolines = elf.label("__trampolines_start").zip(elf.label("__trampolines_end"));
+    let is_trampoline = trampolines.is_some_and(|(start, end)| (start..end).contains(&address));
     let target = || Instruction::at(&elf.flash, address)?.target(elf.chip.flash_bytes);
     if is_trampoline { target().unwrap_or(address) } else { address }
 }
@@ -191,23 +176,15 @@ fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
 /// others whose address equals a number in the program.
 fn found_taken(elf: &Program) -> BTreeSet<u32> {
     let mut taken = BTreeSet::new();
-    let word = |bytes: &[u8]| function_at(elf, u16::from_le_bytes([bytes[0], bytes[1]]));
+    let word = |bytes: &[u8], address| word_at(bytes, address).and_then(|word| function_at(elf, word));
     // Variables lie at any address.
-    for (place, bytes) in elf.data.windows(2).enumerate() {
-        if !elf.virtual_tables.iter().any(|table| table.contains(&place)) {
-            taken.extend(word(bytes));
-        }
-    }
+    let variables = (0..elf.data.len()).filter(|place| !elf.virtual_tables.iter().any(|table| table.contains(place)));
+    taken.extend(variables.filter_map(|place| word(&elf.data, place as u32)));
     // Constants in flash, before the code and between functions. Only start-up code calls the tables of constructors.
-    let label = |name: &str| elf.labels.get(name).copied().unwrap_or_default();
+    let label = |name: &str| elf.label(name).unwrap_or_default();
     let constructors = label("__ctors_start")..label("__dtors_end").max(label("__ctors_end"));
-    for address in elf.gaps().flatten() {
-        if let Some(bytes) = elf.flash.get(address as usize..address as usize + 2)
-            && !constructors.contains(&address)
-        {
-            taken.extend(word(bytes));
-        }
-    }
+    let constants = elf.gaps().flatten().filter(|address| !constructors.contains(address));
+    taken.extend(constants.filter_map(|address| word(&elf.flash, address)));
     // Pairs of registers that a function loads with constants, in either order.
     for &first in elf.functions.keys() {
         let Some((_, end)) = elf.extent(first) else { continue };
@@ -219,7 +196,7 @@ fn found_taken(elf: &Program) -> BTreeSet<u32> {
                 continue;
             };
             if instruction.operation == Ldi {
-                loaded.entry(instruction.destination()).or_default().insert(instruction.constant());
+                loaded.entry(instruction.destination).or_default().insert(instruction.constant);
             }
             address = instruction.next();
         }

@@ -50,9 +50,9 @@ pub(crate) enum Value {
     StackHigh(i32),
     /// The status register, with interrupts on or off, and whether all other flags are as at the entry.
     Status(bool, bool),
-    /// From memory, at this displacement from a pointer; the pointer itself came from memory if it is deep. `None` is a
+    /// From memory, at this displacement from a pointer, and whether the pointer itself came from memory. `None` is a
     /// fixed address.
-    Loaded(Option<u8>, Deep),
+    Loaded(Option<u8>, bool),
     /// An unknown value, less a constant.
     Less(u8),
 }
@@ -68,13 +68,6 @@ impl Value {
             _ => Value::Unknown,
         }
     }
-}
-
-/// Whether a pointer was loaded by a pointer that was loaded too.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Deep {
-    No,
-    Yes,
 }
 
 /// The known facts at a place.
@@ -145,28 +138,17 @@ impl Known {
         Some(u16::from_le_bytes([self.constant(lower)?, self.constant(lower + 1)?]))
     }
 
-    /// The number in R21 and R20: a function's third argument, if each has 16 bits.
-    pub(crate) fn length(&self) -> Option<u16> {
-        self.pair(20)
-    }
-
     /// Keeps the facts that both have. Returns whether this has removed any.
     pub(crate) fn meet(&mut self, other: &Known) -> bool {
         let before = self.clone();
-        // The caller's value in R1 is zero.
-        if self.registers[1] != other.registers[1]
-            && self.constant(1).is_some()
-            && self.constant(1) == other.constant(1)
-        {
-            self.registers[1] = Value::Constant(0);
-        }
-        let zero = self.registers[1];
+        let is_zero = self.constant(1) == Some(0) && other.constant(1) == Some(0);
         let pairs = (self.registers.iter_mut().zip(&other.registers))
             .chain(self.kept.iter_mut().zip(&other.kept))
             .chain(self.stack.iter_mut().zip(&other.stack));
         pairs.for_each(|(mine, theirs)| *mine = mine.meet(*theirs));
-        if zero == Value::Constant(0) && other.constant(1) == Some(0) {
-            self.registers[1] = zero;
+        // The caller's value in R1 and a constant can both be zero.
+        if is_zero && self.registers[1] == Value::Unknown {
+            self.registers[1] = Value::Constant(0);
         }
         let (mask, bits) = self.flags;
         let mask = mask & other.flags.0 & !(bits ^ other.flags.1);
@@ -209,22 +191,19 @@ impl Known {
     }
 
     /// The stack position that a load or a store accesses, by a pointer with a known target.
-    fn on_stack(&self, instruction: &Instruction, pointer: usize) -> Option<usize> {
-        let below = self.below(pointer)?;
-        let place = match instruction.moves_by() {
-            -1 => below + 1,
-            _ => below - i32::from(instruction.displacement()),
-        };
-        usize::try_from(place).ok().filter(|place| *place < self.stack.len())
+    fn on_stack(&self, instruction: &Instruction) -> Option<usize> {
+        let (pointer, by) = instruction.pointer()?;
+        let offset = if by < 0 { by.into() } else { i32::from(instruction.displacement()) };
+        usize::try_from(self.below(pointer)? - offset).ok().filter(|place| *place < self.stack.len())
     }
 
     /// Applies arithmetic on the bytes of a stack pointer. Returns whether it was that.
     fn moves_stack_pointer(&mut self, instruction: &Instruction) -> bool {
         use Value::{StackHigh, StackLow, Unknown};
 
-        let (d, r) = (instruction.destination(), instruction.source());
+        let (d, r) = (instruction.destination, instruction.source);
         let constant = match instruction.operation {
-            Adiw | Sbiw | Subi | Sbci => Some(instruction.constant()),
+            Adiw | Sbiw | Subi | Sbci => Some(instruction.constant),
             Add | Adc | Sub | Sbc => self.constant(r),
             _ => return false,
         };
@@ -294,7 +273,7 @@ impl Known {
     ) -> Result<(), Problem> {
         use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
 
-        let (d, r) = (instruction.destination(), instruction.source());
+        let (d, r) = (instruction.destination, instruction.source);
         let gpior =
             instruction.data_address().and_then(|address| chip.gpior.iter().position(|gpior| *gpior == address));
         let changes = instruction.effects().changes;
@@ -318,22 +297,20 @@ impl Known {
             Bset if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, true),
             Bclr if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, false),
             Push => self.stack.push(self.registers[r]),
-            Pop => {
-                self.registers[d] = self.stack.pop().ok_or(Problem::TakesTooMuch)?;
-            }
+            Pop => self.registers[d] = self.stack.pop().ok_or(Problem::TakesTooMuch)?,
             Mov => self.registers[d] = self.registers[r],
             Movw => {
                 self.registers[d + 1] = self.registers[r + 1];
                 self.registers[d] = self.registers[r];
             }
-            Subi | Sbci => self.registers[d] = Less(instruction.constant()),
+            Subi | Sbci => self.registers[d] = Less(instruction.constant),
             In | Lds => {
                 let depth = self.stack.len() as i32;
                 self.registers[d] = match instruction.data_address() {
                     Some(SPL) => StackLow(depth as u8),
                     Some(SPH) => StackHigh(depth),
                     Some(SREG) => Status(interrupts_before != Interrupts::Off, self.unchanged == Registers::FLAGS),
-                    _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, Deep::No),
+                    _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, false),
                     _ => gpior.map_or(Unknown, |gpior| self.kept[gpior]),
                 };
             }
@@ -374,22 +351,14 @@ impl Known {
                         let depth = depth.ok_or(Problem::UnknownStack)?;
                         self.stack.resize(depth.min(DEEPEST + 1), Unknown);
                     }
-                    _ => {
-                        if let Some(gpior) = gpior {
-                            self.kept[gpior] = value;
-                        }
-                    }
+                    _ => gpior.into_iter().for_each(|gpior| self.kept[gpior] = value),
                 }
             }
-            Sbi | Cbi => {
-                if let Some(gpior) = gpior {
-                    self.kept[gpior] = Unknown;
-                }
-            }
+            Sbi | Cbi => gpior.into_iter().for_each(|gpior| self.kept[gpior] = Unknown),
             Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.registers[..2].fill(Unknown),
             Ld | Ldd | Lpm | Elpm | St | Std => {
-                let pointer = instruction.pointer().unwrap_or_default();
-                let place = self.on_stack(instruction, pointer);
+                let (pointer, by) = instruction.pointer().unwrap_or_default();
+                let place = self.on_stack(instruction);
                 match instruction.operation {
                     Lpm | Elpm => self.registers[d] = Unknown,
                     St | Std => {
@@ -398,22 +367,20 @@ impl Known {
                         }
                     }
                     _ => {
-                        let deep = match (self.registers[pointer], self.registers[pointer + 1]) {
-                            (Loaded(..), Loaded(..)) => Deep::Yes,
-                            _ => Deep::No,
-                        };
-                        let loaded = Loaded(Some(instruction.displacement()), deep);
+                        let is_deep =
+                            self.registers[pointer..pointer + 2].iter().all(|value| matches!(value, Loaded(..)));
+                        let loaded = Loaded(Some(instruction.displacement()), is_deep);
                         let value = place.map_or(loaded, |place| lasting(self.stack[place]));
                         // If a pointer loads over itself, the second byte uses the pointer's old value.
                         self.registers[d] = value;
                     }
                 }
                 // The pointer moves, and so does the address that its content came from.
-                if instruction.moves_by() != 0 && !(pointer..pointer + 2).contains(&d) {
+                if by != 0 && !(pointer..pointer + 2).contains(&d) {
                     match (self.below(pointer), self.pair(pointer)) {
-                        (Some(below), _) => self.point_below(pointer, below - i32::from(instruction.moves_by())),
+                        (Some(below), _) => self.point_below(pointer, below - i32::from(by)),
                         (_, Some(address)) => {
-                            let [low, high] = address.wrapping_add_signed(instruction.moves_by().into()).to_le_bytes();
+                            let [low, high] = address.wrapping_add_signed(by.into()).to_le_bytes();
                             (self.registers[pointer], self.registers[pointer + 1]) = (Constant(low), Constant(high));
                         }
                         _ if matches!(self.registers[pointer], Loaded(..)) => {}
@@ -423,7 +390,7 @@ impl Known {
             }
             Cp | Cpc | Cpi | Bst | Nop | Wdr | Bset | Bclr | Sleep | Spm | Break => {}
             // Compilers ask so whether a pair is zero.
-            Adiw | Sbiw if instruction.constant() == 0 => {}
+            Adiw | Sbiw if instruction.constant == 0 => {}
             Adiw | Sbiw => self.registers[d..d + 2].fill(Unknown),
             _ => self.registers[d] = Unknown,
         }
@@ -435,7 +402,8 @@ impl Known {
 /// compilers save count.
 fn lasting(value: Value) -> Value {
     match value {
-        Value::AtEntry(2..=17 | 28 | 29) | Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
+        Value::AtEntry(register) if Registers::PRESERVED.contains(register) => value,
+        Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
         _ => Value::Unknown,
     }
 }

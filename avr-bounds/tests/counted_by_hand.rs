@@ -189,7 +189,7 @@ fn a_handler_s_time_is_its_longest_path_with_response_and_return() {
     );
     // Response 4, jmp 3; push 2, in, out; sbic skips the jump 2; lds 2, inc 1, sts 2; in, out, pop 2, reti 4.
     assert_eq!(bounds.handlers.len(), 1, "the vectors that lead to the reset are not used");
-    assert_eq!(bounds.handlers[0].cycles, Some(4 + 3 + 4 + 2 + 5 + 8));
+    assert_eq!(bounds.handlers[0].longest.cycles, Some(4 + 3 + 4 + 2 + 5 + 8));
     assert_eq!(bounds.handlers[0].function, "handler");
     assert_eq!(bounds.handlers[0].stack_bytes, 3);
 }
@@ -200,7 +200,7 @@ fn a_handler_that_jumps_away_for_ever_counts_for_the_stack_and_not_for_the_time(
         "start:\n sei\n1: rjmp 1b\nhandler:\n sbrc r2, 0\n jmp stalled\n reti\nstalled:\n push r2\n push r3\n rcall waits\nwaits:\n rjmp waits",
     );
     // Response 4, jmp 3, sbrc over two words 3, reti 4.
-    assert_eq!(bounds.handlers[0].cycles, Some(14));
+    assert_eq!(bounds.handlers[0].longest.cycles, Some(14));
     assert_eq!(bounds.handlers[0].stack_bytes, 2 + 2 + 2);
 }
 
@@ -363,7 +363,7 @@ fn a_loop_with_a_stated_bound_takes_its_turns_and_the_exit() {
     let restored = "pop r24\n out 0x3f, r24\n pop r25\n pop r24\n";
     let handler =
         |body: &str| format!("start:\n sei\n2: rjmp 2b\nhandler:\n {saved} ldi r24, 8\n{body} {restored} reti");
-    let cycles = |body: &str| proved(&handler(body)).handlers[0].cycles.expect("it returns");
+    let cycles = |body: &str| proved(&handler(body)).handlers[0].longest.cycles.expect("it returns");
     // Response 4, jmp 3, ldi 1, reti 4, and 7 each to save and to restore; eight turns of dec 1 and brne 2, and one more up to the
     // way out, 2.
     assert_eq!(cycles(&format!("1:\n {} dec r24\n brne 1b\n", at_most(8))), 26 + 8 * 3 + 2);
@@ -510,7 +510,7 @@ fn a_program_sleeps_with_interrupts_on_and_its_handlers_take_longer_to_answer() 
     let handler = "handler:\n reti";
     let bounds = proved(&format!("start:\n sei\n1: sleep\n rjmp 1b\n{handler}"));
     // Response 4, out of sleep 4 more, jmp 3, reti 4.
-    assert_eq!(bounds.handlers[0].cycles, Some(15));
+    assert_eq!(bounds.handlers[0].longest.cycles, Some(15));
     // A sleep with interrupts off has no bound.
     assert_refused(&format!("start:\n sei\n1: cli\n sleep\n sei\n rjmp 1b\n{handler}"), "a stretch without interrupts");
 }
@@ -642,7 +642,10 @@ fn a_chip_with_more_flash_puts_longer_addresses_onto_the_stack() {
     };
     let (small, large) = (bounds("atmega328p"), bounds("atmega2560"));
     assert_eq!((small.stack_bytes, large.stack_bytes), (2 * 2 + 2, 3 * 3));
-    assert_eq!((small.handlers[0].cycles, large.handlers[0].cycles), (Some(4 + 3 + 4), Some(5 + 3 + 5)));
+    assert_eq!(
+        (small.handlers[0].longest.cycles, large.handlers[0].longest.cycles),
+        (Some(4 + 3 + 4), Some(5 + 3 + 5))
+    );
     let error = Program::read(assembled(program).path(), Some("atmega4")).expect_err("there is none").to_string();
     assert!(error.contains("atmega328p"), "{error}");
 }

@@ -163,7 +163,8 @@ fn assert_within(name: &str, measured: &Measured, bounds: &Bounds) {
         let proved = bounds.handlers.iter().find(|handler| handler.vector == vector);
         let proved = proved.unwrap_or_else(|| panic!("{name}: the handler of vector {vector} is not known"));
         // A handler without a bound has no limit, and one that never returns was not measured.
-        assert!(proved.cycles.is_none_or(|proved| cycles <= proved), "{name}, vector {vector}: {cycles} of {proved:?}");
+        let proved = proved.longest.cycles;
+        assert!(proved.is_none_or(|proved| cycles <= proved), "{name}, vector {vector}: {cycles} of {proved:?}");
     }
     if let Some(proved) = bounds.critical_section.cycles {
         assert!(measured.critical_section_cycles <= proved, "{name}: {measured:?}, {proved} proved");
@@ -196,7 +197,7 @@ fn row(sample: &Sample) -> (String, Option<f64>) {
     let ratio = bounds.stack_bytes as f64 / most.stack_bytes as f64;
     let handler = |cycles: Option<u64>| cycles.map_or("-".to_owned(), |cycles| cycles.to_string());
     // Of handlers whose loops have a bound.
-    let timed = bounds.handlers.iter().filter_map(|handler| Some((handler.vector, handler.cycles?)));
+    let timed = bounds.handlers.iter().filter_map(|handler| Some((handler.vector, handler.longest.cycles?)));
     let ran = timed.clone().filter_map(|(vector, _)| most.handlers.get(&vector).copied());
     let text = format!(
         "| {name} | {} | {} | {} | {ratio:.2} | {} / {} |\n",
