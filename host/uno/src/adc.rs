@@ -10,6 +10,8 @@
 
 use simavr_ffi as simavr;
 
+use super::io_register::peripheral;
+
 /// Inputs that are pins of the board.
 pub(super) const ADC_CHANNELS: usize = 6;
 
@@ -31,10 +33,11 @@ const ADMUX: u16 = 0x7C;
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip and `adc` its ADC.
-pub(super) unsafe fn set_right(avr: *mut simavr::avr_t, adc: *mut simavr::avr_adc_t, millivolts: &[u16; ADC_CHANNELS]) {
-    // SAFETY: the caller vouches for both; the registers are addresses inside `data`.
+/// `avr` must be an initialised chip.
+pub(super) unsafe fn set_right(avr: *mut simavr::avr_t, millivolts: &[u16; ADC_CHANNELS]) {
+    // SAFETY: the caller vouches for `avr`; the registers are addresses inside `data`, and ADCSRA is the ADC's.
     unsafe {
+        let adc: *mut simavr::avr_adc_t = peripheral(avr, ADCSRA);
         // From here on simavr waits 11 times this number of cycles.
         let prescaler = 1_u8 << (*(*avr).data.add(ADCSRA.into()) & 0b111).max(1);
         (*adc).current_prescale = prescaler;

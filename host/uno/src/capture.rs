@@ -11,7 +11,7 @@ use std::path::Path;
 
 use vcd::{Command, IdCode, Parser, Scope, ScopeItem, TimescaleUnit, Value, Var};
 
-use crate::file_error::FileError;
+use crate::error::FileError;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange};
 
 /// Longest recording, in hours. The firmware would take days to play a longer one.

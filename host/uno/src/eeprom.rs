@@ -2,7 +2,7 @@
 //!
 //! simavr stores a byte at once. Its writer of EECR is replaced by one that lets simavr store the byte, and then keeps
 //! EEPE set for as long as the chip does (data sheet, 8.4.2). Until then EECR accepts no other command. A reset lets
-//! the pending write finish (8.4.3). [`TornByte`] is the result of a power failure.
+//! the pending write finish (8.4.3). [`Eeprom::tear`] has the result of a power failure.
 //!
 //! Only writes that erase first are timed (EEPM 00). The core is not halted for the few cycles after a command.
 
@@ -42,15 +42,6 @@ struct Write {
     begun: u64,
 }
 
-/// A byte whose write was interrupted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TornByte {
-    /// Its address.
-    pub(super) address: usize,
-    /// Bits that the cell sets for any written value: all of them while it is being erased.
-    pub(super) ones: u8,
-}
-
 impl Eeprom {
     /// Finds a chip's EEPROM.
     ///
@@ -62,11 +53,11 @@ impl Eeprom {
         Eeprom { writer: unsafe { Writer::of(avr, EECR) }, write: None }
     }
 
-    /// The result for the byte that is being written, after a power failure at `cycle`.
-    pub(super) fn torn_byte(&self, cycle: u64) -> Option<TornByte> {
-        let Write { address, begun } = self.write?;
-        let ones = if cycle - begun < WRITE_CYCLES / 2 { 0xFF } else { STILL_ERASED };
-        Some(TornByte { address, ones })
+    /// Leaves the byte of `content` that is being written as a power failure at `cycle` does.
+    pub(super) fn tear(&self, content: &mut [u8], cycle: u64) {
+        if let Some(Write { address, begun }) = self.write {
+            content[address] |= if cycle - begun < WRITE_CYCLES / 2 { 0xFF } else { STILL_ERASED };
+        }
     }
 
     /// Applies a reset: the pending write finishes, and EECR is as at power-up.

@@ -5,8 +5,7 @@
 //! run a bootloader; [`Uno`](crate::Uno) does.
 
 use crate::elf::{FLASH_BYTES, Image};
-use crate::error::UnoError;
-use crate::file_error::FileError;
+use crate::error::{FileError, UnoError};
 use ihex::{Reader, ReaderError, Record};
 use std::fmt::Display;
 use std::path::Path;

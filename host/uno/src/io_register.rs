@@ -11,6 +11,16 @@ use simavr_ffi as simavr;
 /// Address of the first I/O register in the data space. simavr counts registers from here.
 const FIRST_IO: u16 = 0x20;
 
+/// The peripheral that a register belongs to: the parameter of simavr's writer.
+///
+/// # Safety
+///
+/// As [`Writer::of`]. The writer must not have been replaced, and `T` must be simavr's type of the peripheral.
+pub(super) unsafe fn peripheral<T>(avr: *mut simavr::avr_t, register: u16) -> *mut T {
+    // SAFETY: the caller vouches for all.
+    unsafe { Writer::of(avr, register) }.parameter.cast()
+}
+
 /// simavr's function for writes of a register, and its parameter.
 #[derive(Clone, Copy)]
 pub(super) struct Writer {
@@ -45,11 +55,6 @@ impl Writer {
         let write = unsafe { &mut (*avr).io[usize::from(register - FIRST_IO)].w };
         write.c = Some(function);
         write.param = parameter;
-    }
-
-    /// The function's parameter: the register's peripheral.
-    pub(super) fn parameter(self) -> *mut c_void {
-        self.parameter
     }
 
     /// Has the register written.

@@ -3,7 +3,7 @@
 //!
 //! # Who knows whom
 //!
-//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`, `turns` beside them -> `recorder`,
+//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `measuring` beside them -> `recorder`,
 //! which owns what simavr calls back with -> `core`, which runs it -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `capture`, `pty` -> `hex`, `core` -> `board`.
 //! `pins` knows none of these and is known to all; `capture`, `waveform` and `pty` know only `pins`.
 
@@ -22,13 +22,11 @@ pub mod elf;
 #[cfg(feature = "simavr")]
 mod error;
 #[cfg(feature = "simavr")]
-mod file_error;
-#[cfg(feature = "simavr")]
 pub mod hex;
 #[cfg(feature = "simavr")]
-mod interrupts;
-#[cfg(feature = "simavr")]
 mod io_register;
+#[cfg(feature = "simavr")]
+mod measuring;
 #[cfg(feature = "simavr")]
 mod output;
 mod pins;
@@ -39,8 +37,6 @@ mod recorder;
 #[cfg(feature = "simavr")]
 mod timer;
 #[cfg(feature = "simavr")]
-mod turns;
-#[cfg(feature = "simavr")]
 mod uart;
 #[cfg(feature = "simavr")]
 pub mod waveform;
@@ -49,9 +45,7 @@ pub use self::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 #[cfg(feature = "simavr")]
 pub use self::{
     board::{BAUD, SENT_BYTE_CYCLES, Uno},
-    error::UnoError,
-    file_error::FileError,
-    interrupts::{HandlerCycles, InterruptStatistics, Place},
+    error::{FileError, UnoError},
+    measuring::{Cycles, InterruptStatistics, Place},
     recorder::{ReceivedByte, Reset, ResetCause},
-    turns::Turns,
 };

@@ -10,7 +10,7 @@
 //! The system calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one,
 //! and do not report who opens it.
 
-use crate::file_error::FileError;
+use crate::error::FileError;
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};
 use rustix::io::Errno;

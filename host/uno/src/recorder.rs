@@ -11,10 +11,9 @@ use simavr_ffi as simavr;
 
 use super::adc::{self, ADC_CHANNELS};
 use super::eeprom::Eeprom;
-use super::interrupts::InterruptRecorder;
+use super::measuring::{InterruptRecorder, TurnRecorder};
 use super::output::{self, Port, TIMER_OUTPUTS};
 use super::timer::Timer1;
-use super::turns::TurnRecorder;
 use super::uart;
 use crate::pins::{Pin, PinChange};
 
@@ -24,17 +23,17 @@ const INTERRUPT_ENTRY_CYCLES: u64 = 4;
 /// Cycles of `reti`; its end is the end of the handler.
 const RETURN_CYCLES: u64 = 4;
 
-/// Why the chip restarted.
+/// Why the chip restarted, by its flag in MCUSR (data sheet, 11.9.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// Power came back ([`Uno::power_cycle`](crate::Uno::power_cycle)).
-    PowerOn,
+    PowerOn = 1 << 0,
     /// The reset pin was pulled ([`Uno::reset`](crate::Uno::reset)).
-    External,
+    External = 1 << 1,
     /// The supply sagged ([`Uno::brown_out`](crate::Uno::brown_out)).
-    BrownOut,
+    BrownOut = 1 << 2,
     /// The watchdog ran out.
-    Watchdog,
+    Watchdog = 1 << 3,
 }
 
 /// A reset after the first power-up.
@@ -55,19 +54,9 @@ pub struct ReceivedByte {
     pub byte: u8,
 }
 
-/// The events from simavr's callbacks.
-pub(super) struct Recorder {
-    pub(super) chip: *mut simavr::avr_t,
-    pub(super) uart: *mut simavr::avr_uart_t,
-    pub(super) adc: *mut simavr::avr_adc_t,
-    pub(super) timer: Timer1,
-    pub(super) eeprom: Eeprom,
-    /// Voltage at each channel of the ADC.
-    pub(super) millivolts: [u16; ADC_CHANNELS],
-    /// Levels of the timers' outputs, in the order of [`TIMER_OUTPUTS`].
-    pub(super) timer_levels: [bool; TIMER_OUTPUTS.len()],
-    /// The pins that the firmware drives high.
-    pub(super) driven_high: [bool; Pin::ALL.len()],
+/// The recorded events, which outlive the chip.
+#[derive(Default)]
+pub(super) struct Log {
     /// Edges of the output pins, oldest first.
     pub(super) changes: Vec<PinChange>,
     /// Bytes that the firmware has handed to its transmitter, oldest first.
@@ -76,17 +65,31 @@ pub(super) struct Recorder {
     pub(super) resets: Vec<Reset>,
     pub(super) interrupts: InterruptRecorder,
     pub(super) turns: TurnRecorder,
+}
+
+/// The state that simavr's callbacks change.
+pub(super) struct Recorder {
+    pub(super) chip: *mut simavr::avr_t,
+    pub(super) timer: Timer1,
+    pub(super) eeprom: Eeprom,
+    /// Voltage at each channel of the ADC.
+    pub(super) millivolts: [u16; ADC_CHANNELS],
+    /// Levels of the timers' outputs, in the order of [`TIMER_OUTPUTS`].
+    pub(super) timer_levels: [bool; TIMER_OUTPUTS.len()],
+    /// The pins that the firmware drives high.
+    pub(super) driven_high: [bool; Pin::ALL.len()],
+    pub(super) log: Log,
     /// Cycle of a reset that simavr is in the middle of.
     pub(super) reset_at: Option<u64>,
 }
 
 impl Recorder {
     /// Records a level of an output pin, if it differs from the last one.
-    pub(super) fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
+    fn record_level(&mut self, pin: Pin, high: bool, cycle: u64) {
         let level = &mut self.driven_high[usize::from(pin.number())];
         if *level != high {
             *level = high;
-            self.changes.push(PinChange { cycle, pin, high });
+            self.log.changes.push(PinChange { cycle, pin, high });
         }
     }
 
@@ -114,12 +117,16 @@ impl Recorder {
         self.driven_high[usize::from(pin.number())]
     }
 
-    /// The chip drives no pin any more: it restarts, or has no power.
-    pub(super) fn release_pins(&mut self, cycle: u64) {
+    /// The chip restarts at `cycle`, and drives no pin.
+    pub(super) fn restart(&mut self, cycle: u64, cause: ResetCause) {
         self.timer_levels = Default::default();
         for pin in Pin::ALL {
             self.record_level(pin, false, cycle);
         }
+        self.eeprom.reset();
+        self.log.interrupts.reset();
+        self.log.turns.reset();
+        self.log.resets.push(Reset { cycle, cause });
     }
 }
 
@@ -151,27 +158,21 @@ unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
     }
 }
 
-/// simavr's callback for a write of a port's register, after the write.
-pub(super) unsafe extern "C" fn on_port<const NAME: char>(_: *mut simavr::avr_irq_t, port: u32, recorder: *mut c_void) {
-    // SAFETY: `recorder` is the one that `Core::new` registered, alive and not borrowed (see the module's text).
-    unsafe {
-        let recorder = &mut *recorder.cast::<Recorder>();
-        let Port { direction, .. } = Port::of(recorder.chip, NAME);
-        recorder.record_port(NAME, direction, port as u8);
-    }
-}
-
-/// simavr's callback for a write of a port's direction register, before the write.
-pub(super) unsafe extern "C" fn on_direction<const NAME: char>(
-    _: *mut simavr::avr_irq_t,
-    direction: u32,
+/// simavr's callback for a write of PORTx, after it, and of DDRx, before it.
+pub(super) unsafe extern "C" fn on_port<const NAME: char>(
+    line: *mut simavr::avr_irq_t,
+    value: u32,
     recorder: *mut c_void,
 ) {
-    // SAFETY: as in `on_port`.
+    // SAFETY: `recorder` is the one that `Core::new` registered, alive and not borrowed (see the module's text). simavr
+    // passes a valid line.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        let Port { levels, .. } = Port::of(recorder.chip, NAME);
-        recorder.record_port(NAME, direction as u8, levels);
+        let Port { direction, levels, .. } = Port::of(recorder.chip, NAME);
+        match (*line).irq {
+            simavr::IOPORT_IRQ_DIRECTION_ALL => recorder.record_port(NAME, value as u8, levels),
+            _ => recorder.record_port(NAME, direction, value as u8),
+        }
     }
 }
 
@@ -198,37 +199,37 @@ pub(super) unsafe extern "C" fn on_timer_output<const INDEX: usize>(
 
 /// simavr's callback for a conversion of the ADC that takes its sample.
 pub(super) unsafe extern "C" fn on_sample(_: *mut simavr::avr_irq_t, _: u32, recorder: *mut c_void) {
-    // SAFETY: as in `on_port`; the ADC is part of the chip.
+    // SAFETY: as in `on_port`.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        adc::set_right(recorder.chip, recorder.adc, &recorder.millivolts);
+        adc::set_right(recorder.chip, &recorder.millivolts);
     }
 }
 
 /// simavr's callback for the start (1) or return (0) of an interrupt handler.
 pub(super) unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins: u32, recorder: *mut c_void) {
-    // SAFETY: as in `on_output`. The chip's clock is simavr's to read only after this callback.
+    // SAFETY: as in `on_port`. The chip's clock is simavr's to read only after this callback.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
         let clock = &raw mut (*recorder.chip).cycle;
         // simavr numbers a vector's lines from 256 times the vector.
         let vector = ((*irq).irq >> 8) as u8;
         if begins != 0 {
-            recorder.interrupts.begins(vector, *clock);
+            recorder.log.interrupts.begins(vector, *clock);
             *clock += INTERRUPT_ENTRY_CYCLES;
         } else {
-            recorder.interrupts.ends(vector, *clock + RETURN_CYCLES);
+            recorder.log.interrupts.ends(vector, *clock + RETURN_CYCLES);
         }
     }
 }
 
 /// simavr's callback for a byte that the firmware passes to the transmitter, before simavr decides how long it takes.
 pub(super) unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32, recorder: *mut c_void) {
-    // SAFETY: as in `on_output`; the UART is part of the chip.
+    // SAFETY: as in `on_port`; the UART is part of the chip.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        (*recorder.uart).cycles_per_byte = uart::cycles_per_byte(recorder.chip);
-        recorder.received.push(ReceivedByte { cycle: (*recorder.chip).cycle, byte: byte as u8 });
+        (*uart::of(recorder.chip)).cycles_per_byte = uart::cycles_per_byte(recorder.chip);
+        recorder.log.received.push(ReceivedByte { cycle: (*recorder.chip).cycle, byte: byte as u8 });
     }
 }
 

@@ -9,11 +9,10 @@
 //! simavr.
 
 use std::ffi::c_void;
-use std::ptr::NonNull;
 
 use simavr_ffi as simavr;
 
-use super::io_register::Writer;
+use super::io_register::{Writer, peripheral};
 
 // Registers by their address in the data space (data sheet, register summary).
 const TCNT0: u16 = 0x46;
@@ -33,7 +32,7 @@ const LAST_PRESCALER: u8 = 5;
 
 /// Timer1 of a chip.
 pub(super) struct Timer1 {
-    timer: NonNull<simavr::avr_timer_t>,
+    timer: *mut simavr::avr_timer_t,
     compare_writer: Writer,
     counter_writer: Writer,
     /// Cycles from the running period's bottom to the match of output A; 0 without a match.
@@ -47,14 +46,14 @@ impl Timer1 {
     ///
     /// `avr` must be an initialised chip that outlives the result, and whose writers have not been replaced.
     pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Timer1 {
-        // SAFETY: the caller vouches for `avr`.
-        let (compare_writer, counter_writer) = unsafe { (Writer::of(avr, OCR1AL), Writer::of(avr, TCNT1L)) };
-        Timer1 {
-            // The parameter of simavr's writer of TCNT1 is the timer.
-            timer: NonNull::new(counter_writer.parameter().cast()).expect("the ATmega328P has a Timer1"),
-            compare_writer,
-            counter_writer,
-            running_compare_cycles: 0,
+        // SAFETY: the caller vouches for `avr`, and the registers are Timer1's.
+        unsafe {
+            Timer1 {
+                timer: peripheral(avr, TCNT1L),
+                compare_writer: Writer::of(avr, OCR1AL),
+                counter_writer: Writer::of(avr, TCNT1L),
+                running_compare_cycles: 0,
+            }
         }
     }
 
@@ -63,7 +62,7 @@ impl Timer1 {
         if high {
             // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it
             // meanwhile.
-            self.running_compare_cycles = unsafe { (*self.timer.as_ptr()).comp[0].comp_cycles };
+            self.running_compare_cycles = unsafe { (*self.timer).comp[0].comp_cycles };
         }
     }
 
@@ -74,7 +73,7 @@ impl Timer1 {
     /// `avr` must be this timer's chip.
     unsafe fn is_buffered(&self, avr: *mut simavr::avr_t) -> bool {
         // SAFETY: the caller guarantees `avr`, and with it the timer; TCCR1B is an address inside `data`.
-        let (timer, control) = unsafe { (self.timer.as_ref(), *(*avr).data.add(TCCR1B.into())) };
+        let (timer, control) = unsafe { (&*self.timer, *(*avr).data.add(TCCR1B.into())) };
         (1..=LAST_PRESCALER).contains(&(control & CS1))
             && timer.wgm_op_mode_kind == simavr::avr_timer_wgm_fast_pwm as i32
             && timer.mode.top() != simavr::avr_timer_wgm_reg_ocra
@@ -87,10 +86,9 @@ impl Timer1 {
 ///
 /// `avr` must be an initialised chip that is not running.
 pub(super) unsafe fn stop_all(avr: *mut simavr::avr_t, timer1: &Timer1) {
-    // SAFETY: the caller vouches for `avr`. The parameter of simavr's writer of TCNTn is the timer; Timer1's has been replaced.
+    // SAFETY: the caller vouches for `avr`. TCNT0 and TCNT2 belong to the other timers, and keep their writers.
     unsafe {
-        let others = [TCNT0, TCNT2].map(|counter| Writer::of(avr, counter).parameter().cast::<simavr::avr_timer_t>());
-        for timer in [timer1.timer.as_ptr()].into_iter().chain(others) {
+        for timer in [peripheral(avr, TCNT0), timer1.timer, peripheral(avr, TCNT2)] {
             let timer = &mut *timer;
             timer.mode = timer.wgm_op[0];
             timer.wgm_op_mode_kind = timer.mode.kind() as i32;
@@ -127,7 +125,7 @@ unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, lo
         }
         *(*avr).data.add(register.into()) = low;
         let compare = u16::from_le_bytes([low, *(*avr).data.add(OCR1AH.into())]);
-        let timer = (*timer1).timer.as_mut();
+        let timer = &mut *(*timer1).timer;
         // The match of the running period is already planned. The next period uses this value.
         timer.comp[0].comp_cycles = match compare <= timer.tov_top {
             true => u64::from(timer.cs_div_value) * (u64::from(compare) + 1),
@@ -145,7 +143,7 @@ unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, lo
         if !(*timer1).is_buffered(avr) {
             return writer.write(avr, register, low);
         }
-        let timer = (*timer1).timer.as_ptr();
+        let timer = (*timer1).timer;
         let control = (*avr).data.add(TCCR1A.into());
         let counter = u16::from_le_bytes([low, *(*avr).data.add(TCNT1H.into())]);
         let prescaler = u64::from((*timer).cs_div_value);

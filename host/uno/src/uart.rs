@@ -7,6 +7,8 @@
 
 use simavr_ffi as simavr;
 
+use super::io_register::peripheral;
+
 /// Complete bytes that the receiver holds: two in its buffer and one in the shift register (data sheet, USART0,
 /// receiver error flags).
 const RECEIVER_BYTES: u16 = 3;
@@ -17,6 +19,7 @@ const UCSR0B: u16 = 0xC1;
 const UCSR0C: u16 = 0xC2;
 const UBRR0L: u16 = 0xC4;
 const UBRR0H: u16 = 0xC5;
+const UDR0: u16 = 0xC6;
 
 /// UCSR0A: a byte waits.
 const RXC0: u8 = 1 << 7;
@@ -30,6 +33,16 @@ const RXEN0: u8 = 1 << 4;
 const USBS0: u8 = 1 << 3;
 /// UCSR0C: parity is on.
 const UPM01: u8 = 1 << 5;
+
+/// The UART of a chip.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> *mut simavr::avr_uart_t {
+    // SAFETY: the caller vouches for `avr`, and UDR0 is the UART's.
+    unsafe { peripheral(avr, UDR0) }
+}
 
 /// Cycles of a byte on the serial line, from the UART's registers (data sheet, USART0, clock generation and frame
 /// formats).
@@ -60,10 +73,11 @@ pub(super) unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip, and `uart` its UART.
-pub(super) unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut simavr::avr_uart_t) {
-    // SAFETY: the caller vouches for both; UCSR0A is an address inside `data`.
+/// `avr` must be an initialised chip.
+pub(super) unsafe fn hand_over_received(avr: *mut simavr::avr_t) {
+    // SAFETY: the caller vouches for `avr`; UCSR0A is an address inside `data`.
     unsafe {
+        let uart = of(avr);
         if (*uart).input.read != (*uart).input.write {
             (*uart).rx_cnt = 0;
             if *(*avr).data.add(UCSR0A.into()) & RXC0 != 0 && (*uart).rxc.pending() == 0 {
@@ -73,19 +87,15 @@ pub(super) unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut sima
     }
 }
 
-/// Gives the receiver a byte whose stop bit has just ended, on its line `input`. Returns whether it had room.
+/// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip, `uart` its UART, and `input` the UART's line for received bytes.
-pub(super) unsafe fn receive(
-    avr: *mut simavr::avr_t,
-    uart: *mut simavr::avr_uart_t,
-    input: *mut simavr::avr_irq_t,
-    byte: u8,
-) -> bool {
-    // SAFETY: the caller guarantees all three; the registers are addresses inside `data`.
+/// `avr` must be an initialised chip.
+pub(super) unsafe fn receive(avr: *mut simavr::avr_t, byte: u8) -> bool {
+    // SAFETY: the caller vouches for `avr`; the registers are addresses inside `data`.
     unsafe {
+        let uart = of(avr);
         let fifo = &(*uart).input;
         let waiting = fifo.write.wrapping_sub(fifo.read) % fifo.buffer.len() as u16;
         let on = *(*avr).data.add(UCSR0B.into()) & RXEN0 != 0;
@@ -95,8 +105,18 @@ pub(super) unsafe fn receive(
         }
         // simavr would set the flag a whole byte later; it is due now.
         (*uart).cycles_per_byte = 1;
-        simavr::avr_raise_irq(input, byte.into());
+        flood(avr, byte);
         (*uart).cycles_per_byte = cycles_per_byte(avr);
     }
     true
+}
+
+/// Gives the receiver a byte, independent of the line's pace and the receiver's room.
+///
+/// # Safety
+///
+/// `avr` must be an initialised chip.
+pub(super) unsafe fn flood(avr: *mut simavr::avr_t, byte: u8) {
+    // SAFETY: the caller vouches for `avr`; its UART has this line.
+    unsafe { simavr::avr_raise_irq((*of(avr)).io.irq.add(simavr::UART_IRQ_INPUT as usize), byte.into()) };
 }
