@@ -22,7 +22,7 @@ pub const BAUD: u64 = 115_200;
 /// Cycles of a byte that a terminal sends: a start bit, eight data bits and a stop bit.
 pub const SENT_BYTE_CYCLES: u64 = (10 * CYCLES_PER_SECOND + BAUD / 2) / BAUD;
 
-/// An Arduino Uno with its firmware.
+/// An Arduino Uno with its firmware. Every method that runs it fails if the firmware crashes or halts for good.
 pub struct Uno {
     core: Core,
     image: Image,
@@ -110,10 +110,6 @@ impl Uno {
     /// Stops the main program in an endless loop at its present instruction, until the next reset. The interrupt flag
     /// is not changed: inside a critical section no interrupt is served. The clock first runs on until no handler is
     /// running.
-    ///
-    /// # Errors
-    ///
-    /// As [`Uno::run_until`].
     pub fn stall(&mut self) -> Result<(), UnoError> {
         while self.core.is_in_handler() {
             self.run_instruction()?;
@@ -203,10 +199,6 @@ impl Uno {
     }
 
     /// Runs until the clock has reached `cycle`, or passed it by the last instruction's length.
-    ///
-    /// # Errors
-    ///
-    /// If the firmware crashed or halted for good.
     pub fn run_until(&mut self, cycle: u64) -> Result<(), UnoError> {
         while self.cycle() < cycle {
             self.step(cycle)?;
@@ -215,10 +207,6 @@ impl Uno {
     }
 
     /// Runs for a time in milliseconds.
-    ///
-    /// # Errors
-    ///
-    /// As [`Uno::run_until`].
     pub fn run_for_ms(&mut self, time_ms: u64) -> Result<(), UnoError> {
         self.run_until(self.cycle() + time_ms * (CYCLES_PER_SECOND / 1000))
     }
@@ -270,10 +258,6 @@ impl Uno {
     }
 
     /// Runs one instruction. If an interrupt is due, that is the first one of its handler, after the response.
-    ///
-    /// # Errors
-    ///
-    /// As [`Uno::run_until`].
     pub fn run_instruction(&mut self) -> Result<(), UnoError> {
         // A cycle is less than any instruction has.
         self.step(self.cycle() + 1)

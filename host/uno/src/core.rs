@@ -75,18 +75,10 @@ const fn request(name: &[u8; 4]) -> u32 {
 pub(super) struct Core {
     chip: NonNull<simavr::avr_t>,
     recorder: NonNull<Recorder>,
-    /// External levels of the inputs, by port and bit.
-    held: [HeldLevels; PORTS.len()],
     /// The last step left the chip asleep.
     asleep: bool,
     /// Address in flash at which the main program loops for ever.
     stalled_at: Option<u32>,
-}
-
-#[derive(Clone, Copy, Default)]
-struct HeldLevels {
-    mask: u8,
-    levels: u8,
 }
 
 // SAFETY: a chip uses only its own two allocations (see the module's text) and is tied to no thread. `Core` has no
@@ -141,13 +133,15 @@ impl Core {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
             (*uart::of(avr)).flags = 0;
+            let listen = |peripheral: u32, line: u32, callback: simavr::avr_irq_notify_t| {
+                let line = simavr::avr_io_getirq(avr, peripheral, line as i32);
+                simavr::avr_irq_register_notify(line, callback, parameter);
+            };
             let port_callbacks: [simavr::avr_irq_notify_t; PORTS.len()] =
                 [Some(on_port::<'B'>), Some(on_port::<'C'>), Some(on_port::<'D'>)];
             for (name, callback) in PORTS.into_iter().zip(port_callbacks) {
-                for kind in [simavr::IOPORT_IRQ_REG_PORT, simavr::IOPORT_IRQ_DIRECTION_ALL] {
-                    let line = simavr::avr_io_getirq(avr, port_request(name), kind as i32);
-                    simavr::avr_irq_register_notify(line, callback, parameter);
-                }
+                listen(port_request(name), simavr::IOPORT_IRQ_REG_PORT, callback);
+                listen(port_request(name), simavr::IOPORT_IRQ_DIRECTION_ALL, callback);
             }
             let timer_callbacks: [simavr::avr_irq_notify_t; TIMER_OUTPUTS.len()] = [
                 Some(on_timer_output::<0>),
@@ -158,12 +152,10 @@ impl Core {
                 Some(on_timer_output::<5>),
             ];
             for (output, callback) in TIMER_OUTPUTS.iter().zip(timer_callbacks) {
-                let line = (simavr::TIMER_IRQ_OUT_COMP + output.output) as i32;
-                let irq = simavr::avr_io_getirq(avr, request(&output.timer), line);
-                simavr::avr_irq_register_notify(irq, callback, parameter);
+                listen(request(&output.timer), simavr::TIMER_IRQ_OUT_COMP + output.output, callback);
             }
-            let sample = simavr::avr_io_getirq(avr, request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER as i32);
-            simavr::avr_irq_register_notify(sample, Some(on_sample), parameter);
+            listen(request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER, Some(on_sample));
+            listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, Some(on_transmit));
             timer::take_over_writes(avr, &raw mut (*recorder.as_ptr()).timer);
             eeprom::take_over_writes(avr, &raw mut (*recorder.as_ptr()).eeprom);
             for vector in 1..=LAST_VECTOR {
@@ -173,11 +165,9 @@ impl Core {
                     simavr::avr_irq_register_notify(running, Some(on_interrupt), parameter);
                 }
             }
-            let output = simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_OUTPUT as i32);
-            simavr::avr_irq_register_notify(output, Some(on_transmit), parameter);
         }
 
-        let mut core = Core { chip, recorder, held: Default::default(), asleep: false, stalled_at: None };
+        let mut core = Core { chip, recorder, asleep: false, stalled_at: None };
         core.sram_mut().fill(SRAM_AT_POWER_UP);
         core.copy_eeprom(b"eesp", &mut eeprom.to_vec());
         core
@@ -341,8 +331,9 @@ impl Core {
         let (log, millivolts) = (mem::take(&mut recorder.log), recorder.millivolts);
         let mut fresh = Core::new(self.flash(), &eeprom, reset_address, cycle, log);
         fresh.recorder_mut().millivolts = millivolts;
-        fresh.held = self.held;
-        fresh.hold_inputs();
+        for (pin, high) in self.held_inputs() {
+            fresh.set_input(pin, high);
+        }
         *self = fresh;
     }
 
@@ -359,41 +350,32 @@ impl Core {
             timer::stop_all(self.chip.as_ptr(), &self.recorder().timer);
         }
         self.recorder_mut().restart(cycle, cause);
-        self.hold_inputs();
+        for (pin, high) in self.held_inputs() {
+            self.set_input(pin, high);
+        }
     }
 
-    /// Applies the external levels to a chip that has just started.
-    fn hold_inputs(&mut self) {
-        for pin in Pin::ALL {
+    /// The pins with an external level, and that level.
+    fn held_inputs(&self) -> Vec<(Pin, bool)> {
+        let held = |pin: Pin| {
             let (port, bit) = pin.port_and_bit();
-            let held = self.held[port_index(port)];
-            if held.mask & (1 << bit) != 0 {
-                self.set_input(pin, held.levels & (1 << bit) != 0);
-            }
-        }
+            // SAFETY: as in `cycle`.
+            let external = unsafe { (*Port::peripheral(self.chip.as_ptr(), port)).external };
+            (external.pull_mask & 1 << bit != 0).then_some((pin, external.pull_value & 1 << bit != 0))
+        };
+        Pin::ALL.into_iter().filter_map(held).collect()
     }
 
     /// Sets the external level of an input pin from now on.
     pub(super) fn set_input(&mut self, pin: Pin, high: bool) {
         let (port, bit) = pin.port_and_bit();
-        let held = &mut self.held[port_index(port)];
-        held.mask |= 1 << bit;
-        held.levels = held.levels & !(1 << bit) | u8::from(high) << bit;
-        let mut external = simavr::avr_ioport_external_t {
-            _bitfield_align_1: [],
-            _bitfield_1: simavr::avr_ioport_external_t::new_bitfield_1(
-                port.into(),
-                held.mask.into(),
-                held.levels.into(),
-            ),
-            __bindgen_padding_0: [0; 5],
-        };
         let avr = self.chip.as_ptr();
-        // SAFETY: as in `step`; `external` has the type of this request, and simavr copies it.
+        // SAFETY: as in `step`.
         unsafe {
             // Only so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
-            let set_external = request(&[b'i', b'o', b'p', port as u8]);
-            simavr::avr_ioctl(avr, set_external, (&raw mut external).cast());
+            let external = &raw mut (*Port::peripheral(avr, port)).external;
+            (*external).pull_mask |= 1 << bit;
+            (*external).pull_value = (*external).pull_value & !(1 << bit) | u8::from(high) << bit;
             if Port::of(avr, port).direction & 1 << bit == 0 {
                 let line = simavr::avr_io_getirq(avr, port_request(port), bit.into());
                 simavr::avr_raise_irq(line, high.into());
@@ -490,8 +472,4 @@ impl Drop for Core {
 /// simavr's request code for the lines of a port.
 const fn port_request(name: char) -> u32 {
     request(&[b'i', b'o', b'g', name as u8])
-}
-
-fn port_index(port: char) -> usize {
-    (port as usize) - ('B' as usize)
 }

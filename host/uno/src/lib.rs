@@ -1,18 +1,14 @@
 #![doc = include_str!("../README.md")]
 //! # Imports
 //!
-//! # Who knows whom
-//!
-//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `measuring` beside them -> `recorder`,
-//! which owns what simavr calls back with -> `core`, which runs it -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `capture`, `pty` -> `hex`, `core` -> `board`.
-//! `pins` knows none of these and is known to all; `capture`, `waveform` and `pty` know only `pins`.
+//! They run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `measuring` beside them -> `recorder`,
+//! which owns what simavr calls back with -> `core`, which runs it -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `recording`, `pty` -> `hex`, `core` -> `board`.
+//! `pins` knows none of these and is known to all; `recording` and `pty` know only `pins` and `error`.
 
 #[cfg(feature = "simavr")]
 mod adc;
 #[cfg(feature = "simavr")]
 mod board;
-#[cfg(feature = "simavr")]
-pub mod capture;
 #[cfg(feature = "simavr")]
 mod core;
 #[cfg(feature = "simavr")]
@@ -35,11 +31,11 @@ pub mod pty;
 #[cfg(feature = "simavr")]
 mod recorder;
 #[cfg(feature = "simavr")]
+pub mod recording;
+#[cfg(feature = "simavr")]
 mod timer;
 #[cfg(feature = "simavr")]
 mod uart;
-#[cfg(feature = "simavr")]
-pub mod waveform;
 
 pub use self::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 #[cfg(feature = "simavr")]

@@ -7,6 +7,7 @@
 
 use simavr_ffi as simavr;
 
+use super::io_register::peripheral;
 use crate::pins::Pin;
 
 /// An output of a timer.
@@ -71,14 +72,27 @@ impl Port {
     ///
     /// `avr` must be an initialised chip.
     pub(super) unsafe fn of(avr: *mut simavr::avr_t, name: char) -> Port {
-        // The address of PINx in the data space; the others follow (data sheet, register summary).
-        let first = match name {
-            'B' => 0x23,
-            'C' => 0x26,
-            _ => 0x29,
-        };
         // SAFETY: the caller vouches for `avr`; the registers are addresses inside `data`.
-        let [pins, direction, levels] = unsafe { *(*avr).data.add(first).cast::<[u8; 3]>() };
+        let [pins, direction, levels] = unsafe { *(*avr).data.add(first_register(name).into()).cast::<[u8; 3]>() };
         Port { pins, direction, levels }
+    }
+
+    /// simavr's state of the port with this letter.
+    ///
+    /// # Safety
+    ///
+    /// `avr` must be an initialised chip.
+    pub(super) unsafe fn peripheral(avr: *mut simavr::avr_t, name: char) -> *mut simavr::avr_ioport_t {
+        // SAFETY: the caller vouches for `avr`, and PINx is the port's.
+        unsafe { peripheral(avr, first_register(name)) }
+    }
+}
+
+/// The address of PINx in the data space. DDRx and PORTx follow (data sheet, register summary).
+fn first_register(port: char) -> u16 {
+    match port {
+        'B' => 0x23,
+        'C' => 0x26,
+        _ => 0x29,
     }
 }

@@ -257,18 +257,6 @@ mod tests {
     }
 
     #[test]
-    fn a_link_leads_to_it_while_it_is_there() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("uno");
-        let mut pty = Pty::open().unwrap();
-        pty.link(&path).unwrap();
-        assert_eq!(pty.path(), path);
-        assert!(std::fs::canonicalize(&path).unwrap().starts_with("/dev/pts"));
-        drop(pty);
-        assert!(!path.is_symlink());
-    }
-
-    #[test]
     fn a_link_to_a_living_one_is_left_to_it() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("uno");
