@@ -20,6 +20,7 @@ use std::{mem, slice};
 use simavr_ffi as simavr;
 
 use super::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
+use super::chip::Chip;
 use super::eeprom::{self, Eeprom};
 use super::measuring::Place;
 use super::output::{PORTS, Port, TIMER_OUTPUTS};
@@ -73,7 +74,7 @@ const fn request(name: &[u8; 4]) -> u32 {
 
 /// An ATmega328P.
 pub(super) struct Core {
-    chip: NonNull<simavr::avr_t>,
+    chip: Chip,
     recorder: NonNull<Recorder>,
     /// The last step left the chip asleep.
     asleep: bool,
@@ -92,14 +93,13 @@ impl Core {
     pub(super) fn new(flash: &[u8], eeprom: &[u8], reset_address: u32, cycle: u64, log: Log) -> Core {
         // SAFETY: the name is a C string that lives for ever. Every simavr knows this chip, so a null pointer means
         // that memory ran out.
-        let chip =
-            NonNull::new(unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) }).expect("simavr knows the ATmega328P");
-        let avr = chip.as_ptr();
+        let avr = unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) };
+        assert!(!avr.is_null(), "simavr knows the ATmega328P");
 
         // SAFETY: `avr` was just made and no other code has its address. `avr_init` is called once, after the clock was
         // set as it requires. `data` and `flash` are then simavr's, of `ramend + 1` and `flashend + 1` bytes, and
         // `flash` fits.
-        unsafe {
+        let chip = unsafe {
             (*avr).frequency = CYCLES_PER_SECOND as u32;
             simavr::avr_init(avr);
             ptr::copy_nonoverlapping(flash.as_ptr(), (*avr).flash, flash.len());
@@ -110,14 +110,13 @@ impl Core {
             for voltage in [&raw mut (*avr).vcc, &raw mut (*avr).avcc, &raw mut (*avr).aref] {
                 *voltage = SUPPLY_MILLIVOLTS.into();
             }
-        }
+            Chip::of(avr)
+        };
 
         let recorder = NonNull::from(Box::leak(Box::new(Recorder {
-            chip: avr,
-            // SAFETY: `avr` was initialised above.
-            timer: unsafe { Timer1::of(avr) },
-            // SAFETY: as above.
-            eeprom: unsafe { Eeprom::of(avr) },
+            chip,
+            timer: Timer1::of(chip),
+            eeprom: Eeprom::of(chip),
             millivolts: [0; ADC_CHANNELS],
             timer_levels: Default::default(),
             driven_high: Default::default(),
@@ -132,7 +131,7 @@ impl Core {
         unsafe {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
-            (*uart::of(avr)).flags = 0;
+            (*uart::of(chip)).flags = 0;
             let listen = |peripheral: u32, line: u32, callback: simavr::avr_irq_notify_t| {
                 let line = simavr::avr_io_getirq(avr, peripheral, line as i32);
                 simavr::avr_irq_register_notify(line, callback, parameter);
@@ -156,8 +155,8 @@ impl Core {
             }
             listen(request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER, Some(on_sample));
             listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, Some(on_transmit));
-            timer::take_over_writes(avr, &raw mut (*recorder.as_ptr()).timer);
-            eeprom::take_over_writes(avr, &raw mut (*recorder.as_ptr()).eeprom);
+            timer::take_over_writes(chip, &raw mut (*recorder.as_ptr()).timer);
+            eeprom::take_over_writes(chip, &raw mut (*recorder.as_ptr()).eeprom);
             for vector in 1..=LAST_VECTOR {
                 let irq = simavr::avr_get_interrupt_irq(avr, vector);
                 if !irq.is_null() {
@@ -175,14 +174,13 @@ impl Core {
 
     /// Cycles since the first power-up.
     pub(super) fn cycle(&self) -> u64 {
-        // SAFETY: the chip is valid for as long as `self` is, and simavr is not running.
-        unsafe { (*self.chip.as_ptr()).cycle }
+        self.chip.cycle()
     }
 
     /// Address of the next instruction, in bytes.
     pub(super) fn program_counter(&self) -> u32 {
-        // SAFETY: as in `cycle`.
-        unsafe { (*self.chip.as_ptr()).pc }
+        // SAFETY: the chip is valid for as long as `self` is, and simavr is not running.
+        unsafe { (*self.chip.avr()).pc }
     }
 
     /// The recorded events.
@@ -200,8 +198,8 @@ impl Core {
 
     /// Whether an interrupt's handler runs.
     pub(super) fn is_in_handler(&self) -> bool {
-        // SAFETY: as in `cycle`.
-        unsafe { (*self.chip.as_ptr()).interrupts.running_ptr > 0 }
+        // SAFETY: as in `program_counter`.
+        unsafe { (*self.chip.avr()).interrupts.running_ptr > 0 }
     }
 
     /// Where the program stands.
@@ -225,7 +223,7 @@ impl Core {
     ///
     /// If the firmware crashed or halted for good.
     pub(super) fn step(&mut self, until: u64) -> Result<(), UnoError> {
-        let avr = self.chip.as_ptr();
+        let avr = self.chip.avr();
         let Log { interrupts, turns, .. } = &self.recorder().log;
         let (measuring, counting_turns) = (interrupts.statistics.is_some(), turns.turns.is_some());
         let one_by_one = measuring || counting_turns || self.stalled_at.is_some();
@@ -233,7 +231,7 @@ impl Core {
         // is alive while it runs. This is `avr_callback_run_raw` without its two waits on the PC's clock.
         unsafe {
             self.add_wake_up();
-            uart::hand_over_received(avr);
+            uart::hand_over_received(self.chip);
             if (*avr).interrupt_state != 0 {
                 simavr::avr_service_interrupts(avr);
             }
@@ -274,7 +272,7 @@ impl Core {
         self.finish_reset(ResetCause::Watchdog);
         if measuring {
             let cycle = self.cycle();
-            // SAFETY: as in `cycle`.
+            // SAFETY: as in `program_counter`.
             let enabled = unsafe { (*avr).sreg[simavr::S_I as usize] != 0 };
             self.recorder_mut().log.interrupts.interrupts_enabled(enabled, cycle);
         }
@@ -284,8 +282,8 @@ impl Core {
     /// Halts the core for a moment after a wake-up: by a level at a pin between two steps, or by a peripheral in the
     /// last step.
     fn add_wake_up(&mut self) {
-        // SAFETY: as in `cycle`.
-        let chip = unsafe { self.chip.as_mut() };
+        // SAFETY: as in `program_counter`.
+        let chip = unsafe { &mut *self.chip.avr() };
         if self.asleep && chip.state as u32 == simavr::cpu_Running {
             chip.cycle += WAKE_UP_CYCLES;
             self.asleep = false;
@@ -294,12 +292,10 @@ impl Core {
 
     /// Resets the chip, for another cause than power-on.
     pub(super) fn reset(&mut self, cause: ResetCause) {
-        let avr = self.chip.as_ptr();
-        // SAFETY: as in `step`; MCUSR is an address inside `data`, and simavr keeps its bits over a reset.
-        unsafe {
-            *(*avr).data.add(MCUSR.into()) |= cause as u8;
-            simavr::avr_reset(avr);
-        }
+        // simavr keeps the bits of MCUSR over a reset.
+        self.chip.set(MCUSR, self.chip.read(MCUSR) | cause as u8);
+        // SAFETY: as in `step`.
+        unsafe { simavr::avr_reset(self.chip.avr()) };
         self.finish_reset(cause);
     }
 
@@ -311,10 +307,10 @@ impl Core {
 
     /// The first word of the next instruction.
     fn next_instruction(&self) -> u16 {
-        // SAFETY: as in `cycle`; simavr's flash has room behind its last word. The program counter lies inside it,
+        // SAFETY: as in `program_counter`; simavr's flash has room behind its last word. The program counter lies inside it,
         // because otherwise the chip has crashed before.
         unsafe {
-            let avr = self.chip.as_ptr();
+            let avr = self.chip.avr();
             let word = (*avr).flash.add((*avr).pc as usize);
             u16::from_le_bytes([*word, *word.add(1)])
         }
@@ -324,8 +320,8 @@ impl Core {
     /// inputs.
     pub(super) fn power_cycle(&mut self) {
         let (eeprom, cycle) = (self.eeprom(), self.cycle());
-        // SAFETY: as in `cycle`.
-        let reset_address = unsafe { (*self.chip.as_ptr()).reset_pc };
+        // SAFETY: as in `program_counter`.
+        let reset_address = unsafe { (*self.chip.avr()).reset_pc };
         let recorder = self.recorder_mut();
         recorder.restart(cycle, ResetCause::PowerOn);
         let (log, millivolts) = (mem::take(&mut recorder.log), recorder.millivolts);
@@ -344,11 +340,11 @@ impl Core {
         };
         self.asleep = false;
         self.stalled_at = None;
-        // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
+        // SAFETY: as in `program_counter`. The watchdog's timer, the only one that can run now, was set from this cycle.
         unsafe {
-            (*self.chip.as_ptr()).cycle = cycle;
-            timer::stop_all(self.chip.as_ptr(), &self.recorder().timer);
+            (*self.chip.avr()).cycle = cycle;
         }
+        timer::stop_all(self.chip, &self.recorder().timer);
         self.recorder_mut().restart(cycle, cause);
         for (pin, high) in self.held_inputs() {
             self.set_input(pin, high);
@@ -359,8 +355,8 @@ impl Core {
     fn held_inputs(&self) -> Vec<(Pin, bool)> {
         let held = |pin: Pin| {
             let (port, bit) = pin.port_and_bit();
-            // SAFETY: as in `cycle`.
-            let external = unsafe { (*Port::peripheral(self.chip.as_ptr(), port)).external };
+            // SAFETY: as in `program_counter`.
+            let external = unsafe { (*Port::peripheral(self.chip, port)).external };
             (external.pull_mask & 1 << bit != 0).then_some((pin, external.pull_value & 1 << bit != 0))
         };
         Pin::ALL.into_iter().filter_map(held).collect()
@@ -369,14 +365,14 @@ impl Core {
     /// Sets the external level of an input pin from now on.
     pub(super) fn set_input(&mut self, pin: Pin, high: bool) {
         let (port, bit) = pin.port_and_bit();
-        let avr = self.chip.as_ptr();
+        let avr = self.chip.avr();
         // SAFETY: as in `step`.
         unsafe {
             // Only so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
-            let external = &raw mut (*Port::peripheral(avr, port)).external;
+            let external = &raw mut (*Port::peripheral(self.chip, port)).external;
             (*external).pull_mask |= 1 << bit;
             (*external).pull_value = (*external).pull_value & !(1 << bit) | u8::from(high) << bit;
-            if Port::of(avr, port).direction & 1 << bit == 0 {
+            if Port::of(self.chip, port).direction & 1 << bit == 0 {
                 let line = simavr::avr_io_getirq(avr, port_request(port), bit.into());
                 simavr::avr_raise_irq(line, high.into());
             }
@@ -391,28 +387,23 @@ impl Core {
     /// The level that the firmware drives the pin to; `None` if it is an input.
     pub(super) fn output(&self, pin: Pin) -> Option<bool> {
         let (port, bit) = pin.port_and_bit();
-        // SAFETY: as in `cycle`.
-        let Port { direction, .. } = unsafe { Port::of(self.chip.as_ptr(), port) };
-        (direction & 1 << bit != 0).then(|| self.recorder().is_driven_high(pin))
+        (Port::of(self.chip, port).direction & 1 << bit != 0).then(|| self.recorder().is_driven_high(pin))
     }
 
     /// The level that the firmware reads at an input.
     pub(super) fn input(&self, pin: Pin) -> bool {
         let (port, bit) = pin.port_and_bit();
-        // SAFETY: as in `cycle`.
-        unsafe { Port::of(self.chip.as_ptr(), port).pins & 1 << bit != 0 }
+        Port::of(self.chip, port).pins & 1 << bit != 0
     }
 
     /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
     pub(super) fn receive(&mut self, byte: u8) -> bool {
-        // SAFETY: as in `step`.
-        unsafe { uart::receive(self.chip.as_ptr(), byte) }
+        uart::receive(self.chip, byte)
     }
 
     /// Gives the receiver a byte, independent of the line's pace and the receiver's room.
     pub(super) fn flood(&mut self, byte: u8) {
-        // SAFETY: as in `step`.
-        unsafe { uart::flood(self.chip.as_ptr(), byte) };
+        uart::flood(self.chip, byte);
     }
 
     /// The EEPROM's content after a power failure now.
@@ -429,31 +420,30 @@ impl Core {
             simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: content.len() as u32 };
         // SAFETY: `description` names a buffer and its size; simavr copies, and refuses an empty or too long buffer. No
         // reference into the EEPROM exists.
-        unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(name), (&raw mut description).cast()) };
+        unsafe { simavr::avr_ioctl(self.chip.avr(), request(name), (&raw mut description).cast()) };
     }
 
     /// The whole flash, with the changes by the firmware or its bootloader.
     pub(super) fn flash(&self) -> &[u8] {
         // SAFETY: simavr owns `flash`, of `flashend + 1` bytes, and changes it only in methods that borrow `self` mutably.
-        unsafe { slice::from_raw_parts((*self.chip.as_ptr()).flash, FLASH_BYTES) }
+        unsafe { slice::from_raw_parts((*self.chip.avr()).flash, FLASH_BYTES) }
     }
 
     /// Cycles of a byte on the serial line, as the chip's UART is set up.
     pub(super) fn byte_cycles(&self) -> u64 {
-        // SAFETY: as in `cycle`.
-        unsafe { uart::cycles_per_byte(self.chip.as_ptr()) }
+        uart::cycles_per_byte(self.chip)
     }
 
     /// All of SRAM.
     pub(super) fn sram(&self) -> &[u8] {
         // SAFETY: SRAM lies inside `data`, which simavr owns and changes only in methods that borrow `self` mutably.
-        unsafe { slice::from_raw_parts((*self.chip.as_ptr()).data.add(SRAM_START.into()), SRAM_BYTES) }
+        unsafe { slice::from_raw_parts((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }
     }
 
     /// All of SRAM, to write to.
     pub(super) fn sram_mut(&mut self) -> &mut [u8] {
         // SAFETY: as in `sram`, and `self` is borrowed mutably.
-        unsafe { slice::from_raw_parts_mut((*self.chip.as_ptr()).data.add(SRAM_START.into()), SRAM_BYTES) }
+        unsafe { slice::from_raw_parts_mut((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }
     }
 }
 
@@ -462,8 +452,8 @@ impl Drop for Core {
         // SAFETY: both were allocated in `new`, the chip by simavr's malloc, which leaves freeing `avr_t` itself to its
         // maker. Neither is used after this.
         unsafe {
-            simavr::avr_terminate(self.chip.as_ptr());
-            libc::free(self.chip.as_ptr().cast());
+            simavr::avr_terminate(self.chip.avr());
+            libc::free(self.chip.avr().cast());
             drop(Box::from_raw(self.recorder.as_ptr()));
         }
     }

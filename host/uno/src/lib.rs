@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 //! # Imports
 //!
-//! They run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `measuring` beside them -> `recorder`,
+//! They run one way. The chip: `chip` -> `timer`, `eeprom`, `adc`, `output`, `uart`, with `measuring` beside them -> `recorder`,
 //! which owns what simavr calls back with -> `core`, which runs it -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `recording`, `pty` -> `hex`, `core` -> `board`.
 //! `pins` knows none of these and is known to all; `recording` and `pty` know only `pins` and `error`.
 
@@ -9,6 +9,8 @@
 mod adc;
 #[cfg(feature = "simavr")]
 mod board;
+#[cfg(feature = "simavr")]
+mod chip;
 #[cfg(feature = "simavr")]
 mod core;
 #[cfg(feature = "simavr")]
@@ -19,8 +21,6 @@ pub mod elf;
 mod error;
 #[cfg(feature = "simavr")]
 pub mod hex;
-#[cfg(feature = "simavr")]
-mod io_register;
 #[cfg(feature = "simavr")]
 mod measuring;
 #[cfg(feature = "simavr")]

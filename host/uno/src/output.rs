@@ -7,7 +7,7 @@
 
 use simavr_ffi as simavr;
 
-use super::io_register::peripheral;
+use super::chip::Chip;
 use crate::pins::Pin;
 
 /// An output of a timer.
@@ -35,20 +35,10 @@ pub(super) const TIMER_OUTPUTS: [TimerOutput; 6] = [
 ];
 
 /// The level of the timer output that is connected to a pin; `None` without one.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-pub(super) unsafe fn timer_level(
-    avr: *mut simavr::avr_t,
-    pin: Pin,
-    levels: &[bool; TIMER_OUTPUTS.len()],
-) -> Option<bool> {
+pub(super) fn timer_level(chip: Chip, pin: Pin, levels: &[bool; TIMER_OUTPUTS.len()]) -> Option<bool> {
     let index = TIMER_OUTPUTS.iter().position(|output| output.pin == pin)?;
     let TimerOutput { control, connected, .. } = TIMER_OUTPUTS[index];
-    // SAFETY: the caller vouches for `avr`; the register is an address inside `data`.
-    let is_connected = unsafe { *(*avr).data.add(control.into()) } & connected != 0;
-    is_connected.then_some(levels[index])
+    (chip.read(control) & connected != 0).then_some(levels[index])
 }
 
 /// The ports' letters.
@@ -67,24 +57,14 @@ pub(super) struct Port {
 
 impl Port {
     /// The port with this letter.
-    ///
-    /// # Safety
-    ///
-    /// `avr` must be an initialised chip.
-    pub(super) unsafe fn of(avr: *mut simavr::avr_t, name: char) -> Port {
-        // SAFETY: the caller vouches for `avr`; the registers are addresses inside `data`.
-        let [pins, direction, levels] = unsafe { *(*avr).data.add(first_register(name).into()).cast::<[u8; 3]>() };
-        Port { pins, direction, levels }
+    pub(super) fn of(chip: Chip, name: char) -> Port {
+        let first = first_register(name);
+        Port { pins: chip.read(first), direction: chip.read(first + 1), levels: chip.read(first + 2) }
     }
 
     /// simavr's state of the port with this letter.
-    ///
-    /// # Safety
-    ///
-    /// `avr` must be an initialised chip.
-    pub(super) unsafe fn peripheral(avr: *mut simavr::avr_t, name: char) -> *mut simavr::avr_ioport_t {
-        // SAFETY: the caller vouches for `avr`, and PINx is the port's.
-        unsafe { peripheral(avr, first_register(name)) }
+    pub(super) fn peripheral(chip: Chip, name: char) -> *mut simavr::avr_ioport_t {
+        chip.peripheral(first_register(name))
     }
 }
 

@@ -10,6 +10,7 @@
 //! The system calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one,
 //! and do not report who opens it.
 
+use crate::board::BAUD;
 use crate::error::FileError;
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};
@@ -21,9 +22,6 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::mem::MaybeUninit;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-
-/// The terminal's default baud rate, for programs that read it and do not set it.
-const BAUD: u32 = 115_200;
 
 /// The system's folder for the programs' sides.
 const TERMINALS: &str = "/dev/pts";
@@ -58,7 +56,8 @@ impl Pty {
                 ioctl_tiocgptpeer(&device, OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
             let mut attributes = tcgetattr(&other_side)?;
             attributes.make_raw();
-            attributes.set_speed(BAUD)?;
+            // For programs that read the rate and do not set it.
+            attributes.set_speed(BAUD as u32)?;
             tcsetattr(&other_side, OptionalActions::Now, &attributes)?;
             fcntl_setfl(&device, OFlags::NONBLOCK)?;
             let watch = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;

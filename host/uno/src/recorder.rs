@@ -10,6 +10,7 @@ use std::ffi::c_void;
 use simavr_ffi as simavr;
 
 use super::adc::{self, ADC_CHANNELS};
+use super::chip::Chip;
 use super::eeprom::Eeprom;
 use super::measuring::{InterruptRecorder, TurnRecorder};
 use super::output::{self, Port, TIMER_OUTPUTS};
@@ -69,7 +70,7 @@ pub(super) struct Log {
 
 /// The state that simavr's callbacks change.
 pub(super) struct Recorder {
-    pub(super) chip: *mut simavr::avr_t,
+    pub(super) chip: Chip,
     pub(super) timer: Timer1,
     pub(super) eeprom: Eeprom,
     /// Voltage at each channel of the ADC.
@@ -94,20 +95,13 @@ impl Recorder {
     }
 
     /// Records the levels of a port, from the present values of its registers.
-    ///
-    /// # Safety
-    ///
-    /// The recorder's chip must be initialised.
-    unsafe fn record_port(&mut self, name: char, direction: u8, port: u8) {
+    fn record_port(&mut self, name: char, direction: u8, port: u8) {
         for bit in 0..8 {
             let Some(pin) = Pin::at(name, bit) else { continue };
-            // SAFETY: the caller vouches for the chip.
-            let timer = unsafe { output::timer_level(self.chip, pin, &self.timer_levels) };
+            let timer = output::timer_level(self.chip, pin, &self.timer_levels);
             let high = direction & 1 << bit != 0 && timer.unwrap_or(port & 1 << bit != 0);
             if self.is_driven_high(pin) != high {
-                // SAFETY: as above.
-                let cycle = unsafe { due_cycle(self.chip) };
-                self.record_level(pin, high, cycle);
+                self.record_level(pin, high, due_cycle(self.chip));
             }
         }
     }
@@ -133,15 +127,11 @@ impl Recorder {
 /// The due time of the peripheral that simavr is serving. simavr serves it at the end of the instruction in which it
 /// falls due, up to four cycles late; its slot still has the due time. If simavr serves none, an instruction is
 /// running, and it began at `cycle`.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
-    // SAFETY: the caller guarantees `avr`. Both lists run through the pool's own slots and end in null. The slot being
+fn due_cycle(chip: Chip) -> u64 {
+    // SAFETY: both lists run through the pool's own slots and end in null. The slot being
     // served is in neither.
     unsafe {
-        let pool = &raw const (*avr).cycle_timers;
+        let pool = &raw const (*chip.avr()).cycle_timers;
         let first = (&raw const (*pool).timer_slots).cast::<simavr::avr_cycle_timer_slot_t>();
         let mut listed = 0_u64;
         for head in [(*pool).timer, (*pool).timer_free] {
@@ -152,7 +142,7 @@ unsafe fn due_cycle(avr: *mut simavr::avr_t) -> u64 {
             }
         }
         match listed.trailing_ones() {
-            64.. => (*avr).cycle,
+            64.. => chip.cycle(),
             served => (*first.add(served as usize)).when,
         }
     }
@@ -211,7 +201,7 @@ pub(super) unsafe extern "C" fn on_interrupt(irq: *mut simavr::avr_irq_t, begins
     // SAFETY: as in `on_port`. The chip's clock is simavr's to read only after this callback.
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
-        let clock = &raw mut (*recorder.chip).cycle;
+        let clock = &raw mut (*recorder.chip.avr()).cycle;
         // simavr numbers a vector's lines from 256 times the vector.
         let vector = ((*irq).irq >> 8) as u8;
         if begins != 0 {
@@ -229,7 +219,7 @@ pub(super) unsafe extern "C" fn on_transmit(_: *mut simavr::avr_irq_t, byte: u32
     unsafe {
         let recorder = &mut *recorder.cast::<Recorder>();
         (*uart::of(recorder.chip)).cycles_per_byte = uart::cycles_per_byte(recorder.chip);
-        recorder.log.received.push(ReceivedByte { cycle: (*recorder.chip).cycle, byte: byte as u8 });
+        recorder.log.received.push(ReceivedByte { cycle: recorder.chip.cycle(), byte: byte as u8 });
     }
 }
 
