@@ -7,14 +7,14 @@ use std::path::Path;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::adc::SUPPLY_MILLIVOLTS;
+use crate::core::adc::SUPPLY_MILLIVOLTS;
+use crate::core::measuring::{Cycles, InterruptStatistics, Place};
+use crate::core::recorder::{Log, ReceivedByte, Reset, ResetCause};
 use crate::core::{self, Core};
 use crate::elf::{EEPROM_BYTES, Image, Size, Variable};
 use crate::error::UnoError;
 use crate::hex::Bootloader;
-use crate::measuring::{Cycles, InterruptStatistics, Place};
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
-use crate::recorder::{Log, ReceivedByte, Reset, ResetCause};
 
 /// The terminal's bit rate, until it follows the chip.
 pub const BAUD: u64 = 115_200;
@@ -158,10 +158,10 @@ impl Uno {
 
     /// Sets the level of a pin now. While the firmware drives the pin, the level waits until it is an input again.
     pub fn set(&mut self, pin: Pin, high: bool) {
-        if let Some(channel) = pin.adc_channel() {
-            self.core.set_millivolts(channel, if high { SUPPLY_MILLIVOLTS } else { 0 });
+        match pin.adc_channel() {
+            Some(_) => self.set_millivolts(pin, if high { SUPPLY_MILLIVOLTS } else { 0 }),
+            None => self.core.set_input(pin, high),
         }
-        self.core.set_input(pin, high);
     }
 
     /// Puts a voltage on an analogue pin, now. It is 0 at first, and stays over resets. The pin reads high from 3 V on and low up
@@ -177,7 +177,7 @@ impl Uno {
         } else if millivolts <= SUPPLY_MILLIVOLTS / 10 * 3 {
             self.core.set_input(pin, false);
         }
-        self.core.set_millivolts(channel, millivolts);
+        self.core.recorder_mut().millivolts[usize::from(channel)] = millivolts;
     }
 
     /// The level that the firmware drives a pin to; `None` while the pin is an input.

@@ -1,5 +1,5 @@
 //! The ATmega328P on simavr: the only module that makes a chip and runs it. The callbacks from C are in
-//! [`super::recorder`], and those for writes of registers in [`super::timer`] and [`super::eeprom`].
+//! [`recorder`], and those for writes of registers in [`timer`] and [`eeprom`].
 //!
 //! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to. It gives the rest of
 //! [`super`] safe calls: one step, levels in, edges and bytes out. It works with port bits, cycles and bytes. Queues
@@ -13,22 +13,28 @@
 //! made while a reference into the recorder or into `avr_t` is alive. simavr keeps no state outside `avr_t` except its
 //! logger, which is never replaced here. So chips in several threads do not interfere.
 
+pub(crate) mod adc;
+mod chip;
+mod eeprom;
+pub(crate) mod measuring;
+pub(crate) mod recorder;
+mod timer;
+mod uart;
+
 use std::ffi::{CStr, c_void};
 use std::ptr::{self, NonNull};
 use std::{mem, slice};
 
 use simavr_ffi as simavr;
 
-use super::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
-use super::chip::Chip;
-use super::eeprom::{self, Eeprom};
-use super::measuring::Place;
-use super::output::{PORTS, Port, TIMER_OUTPUTS};
-use super::recorder::{
-    Log, Recorder, ResetCause, on_interrupt, on_port, on_reset, on_sample, on_timer_output, on_transmit,
+use self::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
+use self::chip::Chip;
+use self::eeprom::Eeprom;
+use self::measuring::Place;
+use self::recorder::{
+    Callback, Log, PORTS, Port, Recorder, ResetCause, TIMER_OUTPUTS, on_interrupt, on_reset, on_sample, on_transmit,
 };
-use super::timer::{self, Timer1};
-use super::uart;
+use self::timer::Timer1;
 use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
 use crate::error::UnoError;
 use crate::pins::{CYCLES_PER_SECOND, Pin};
@@ -132,29 +138,19 @@ impl Core {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
             (*uart::of(chip)).flags = 0;
-            let listen = |peripheral: u32, line: u32, callback: simavr::avr_irq_notify_t| {
+            let listen = |peripheral: u32, line: u32, callback: Callback| {
                 let line = simavr::avr_io_getirq(avr, peripheral, line as i32);
-                simavr::avr_irq_register_notify(line, callback, parameter);
+                simavr::avr_irq_register_notify(line, Some(callback), parameter);
             };
-            let port_callbacks: [simavr::avr_irq_notify_t; PORTS.len()] =
-                [Some(on_port::<'B'>), Some(on_port::<'C'>), Some(on_port::<'D'>)];
-            for (name, callback) in PORTS.into_iter().zip(port_callbacks) {
+            for (name, callback) in PORTS {
                 listen(port_request(name), simavr::IOPORT_IRQ_REG_PORT, callback);
                 listen(port_request(name), simavr::IOPORT_IRQ_DIRECTION_ALL, callback);
             }
-            let timer_callbacks: [simavr::avr_irq_notify_t; TIMER_OUTPUTS.len()] = [
-                Some(on_timer_output::<0>),
-                Some(on_timer_output::<1>),
-                Some(on_timer_output::<2>),
-                Some(on_timer_output::<3>),
-                Some(on_timer_output::<4>),
-                Some(on_timer_output::<5>),
-            ];
-            for (output, callback) in TIMER_OUTPUTS.iter().zip(timer_callbacks) {
-                listen(request(&output.timer), simavr::TIMER_IRQ_OUT_COMP + output.output, callback);
+            for output in TIMER_OUTPUTS {
+                listen(request(&output.timer), simavr::TIMER_IRQ_OUT_COMP + output.output, output.callback);
             }
-            listen(request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER, Some(on_sample));
-            listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, Some(on_transmit));
+            listen(request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER, on_sample);
+            listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, on_transmit);
             timer::take_over_writes(chip, &raw mut (*recorder.as_ptr()).timer);
             eeprom::take_over_writes(chip, &raw mut (*recorder.as_ptr()).eeprom);
             for vector in 1..=LAST_VECTOR {
@@ -377,11 +373,6 @@ impl Core {
                 simavr::avr_raise_irq(line, high.into());
             }
         }
-    }
-
-    /// Sets the voltage on a channel of the ADC from now on.
-    pub(super) fn set_millivolts(&mut self, channel: u8, millivolts: u16) {
-        self.recorder_mut().millivolts[usize::from(channel)] = millivolts;
     }
 
     /// The level that the firmware drives the pin to; `None` if it is an input.

@@ -118,20 +118,3 @@ impl Pulse {
         (self.fall - self.rise) as f64 * 1e6 / CYCLES_PER_SECOND as f64
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_pin_is_at_its_port_and_bit() {
-        for (number, pin) in (0..).zip(Pin::ALL) {
-            assert_eq!(pin.number(), number);
-            let (port, bit) = pin.port_and_bit();
-            assert_eq!(Pin::at(port, bit), Some(pin));
-        }
-        assert_eq!([Pin::at('B', 6), Pin::at('C', 6), Pin::at('D', 8), Pin::at('E', 0)], [None; 4]);
-        assert_eq!(Pin::A3.to_string(), "A3");
-        assert_eq!(Pin::ALL.map(Pin::adc_channel)[13..16], [None, Some(0), Some(1)]);
-    }
-}

@@ -1,4 +1,4 @@
-//! Recordings of the pins, as VCD files: [`read`] takes a logic analyser's, [`write`] makes one for PulseView or GTKWave.
+//! Recordings of the pins, as VCD files: [`read`] takes a logic analyser's, [`write()`] makes one for PulseView or GTKWave.
 //!
 //! Levels are at cycles of the Uno. The reader converts from any time unit of the file. The caller chooses channels by
 //! the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an error. The firmware,
@@ -308,15 +308,13 @@ mod tests {
             Wire { pin: Pin::D3, name: "data", high_at_rest: false },
             Wire { pin: Pin::D8, name: "button", high_at_rest: true },
         ];
-        let mut written = Vec::new();
-        for count in 1..500_u64 {
-            written.push(PinChange {
-                cycle: count * count * 7919,
-                pin: [Pin::D2, Pin::D3, Pin::D8][count as usize % 3],
-                // The button begins high, the others low.
-                high: (count.div_ceil(3) % 2 == 1) != (count % 3 == 2),
-            });
-        }
+        let written = (1..500_u64).map(|count| PinChange {
+            cycle: count * count * 7919,
+            pin: wires[count as usize % 3].pin,
+            // The button begins high, the others low.
+            high: (count.div_ceil(3) % 2 == 1) != (count % 3 == 2),
+        });
+        let written: Vec<PinChange> = written.collect();
         let mut file = Vec::new();
         write(&mut file, &wires, written.iter().rev().copied()).unwrap();
         let read = parse(Path::new("pins.vcd"), &*file, &wires.map(|wire| (wire.pin, wire.name)));

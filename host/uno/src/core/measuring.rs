@@ -63,9 +63,9 @@ pub struct InterruptStatistics {
 
 /// Turns the edges that simavr shows into statistics.
 #[derive(Default)]
-pub(super) struct InterruptRecorder {
+pub(crate) struct InterruptRecorder {
     /// `None` while it does not measure.
-    pub(super) statistics: Option<InterruptStatistics>,
+    pub(crate) statistics: Option<InterruptStatistics>,
     /// Handlers that have begun and not returned: vector and first cycle.
     running: Vec<(u8, u64)>,
     off_since: Option<u64>,
@@ -76,7 +76,7 @@ pub(super) struct InterruptRecorder {
 }
 
 impl InterruptRecorder {
-    pub(super) fn turn_on(&mut self) {
+    pub(crate) fn turn_on(&mut self) {
         *self = Self {
             statistics: Some(InterruptStatistics::default()),
             running: take(&mut self.running),
@@ -84,14 +84,14 @@ impl InterruptRecorder {
         };
     }
 
-    pub(super) fn begins(&mut self, vector: u8, cycle: u64) {
+    pub(crate) fn begins(&mut self, vector: u8, cycle: u64) {
         if self.statistics.is_some() {
             self.running.push((vector, cycle));
             self.off_since.get_or_insert(cycle);
         }
     }
 
-    pub(super) fn ends(&mut self, vector: u8, cycle: u64) {
+    pub(crate) fn ends(&mut self, vector: u8, cycle: u64) {
         // Measuring may have begun inside a handler.
         let Some((_, begun)) = self.running.pop_if(|(running, _)| *running == vector) else {
             return;
@@ -102,7 +102,7 @@ impl InterruptRecorder {
     }
 
     /// The interrupt flag of SREG after an instruction.
-    pub(super) fn interrupts_enabled(&mut self, enabled: bool, cycle: u64) {
+    pub(crate) fn interrupts_enabled(&mut self, enabled: bool, cycle: u64) {
         if !enabled {
             self.off_since.get_or_insert(cycle);
             if self.running.is_empty() && self.knows_who {
@@ -121,26 +121,26 @@ impl InterruptRecorder {
     }
 
     /// A reset ends every handler without a return.
-    pub(super) fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = Self { statistics: self.statistics.take(), ..Self::default() };
     }
 }
 
 /// Times the main loop's turns.
 #[derive(Default)]
-pub(super) struct TurnRecorder {
+pub(crate) struct TurnRecorder {
     /// The complete turns; `None` while it does not measure.
-    pub(super) turns: Option<Cycles>,
+    pub(crate) turns: Option<Cycles>,
     begun: Option<u64>,
 }
 
 impl TurnRecorder {
-    pub(super) fn turn_on(&mut self) {
+    pub(crate) fn turn_on(&mut self) {
         *self = Self { turns: Some(Cycles::default()), begun: None };
     }
 
     /// A `wdr` begins.
-    pub(super) fn watchdog_is_fed(&mut self, cycle: u64) {
+    pub(crate) fn watchdog_is_fed(&mut self, cycle: u64) {
         let begun = self.begun.replace(cycle);
         if let (Some(turns), Some(begun)) = (&mut self.turns, begun) {
             turns.add(cycle - begun);
@@ -148,12 +148,12 @@ impl TurnRecorder {
     }
 
     /// The processor has slept, which is not a part of the turn.
-    pub(super) fn slept(&mut self, cycles: u64) {
+    pub(crate) fn slept(&mut self, cycles: u64) {
         self.begun = self.begun.map(|begun| begun + cycles);
     }
 
     /// A reset ends a turn, which is not counted.
-    pub(super) fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.begun = None;
     }
 }

@@ -16,7 +16,7 @@ use super::chip::Chip;
 pub(super) const ADC_CHANNELS: usize = 6;
 
 /// Voltage of AVCC, of AREF, and of a digital output that is high.
-pub(super) const SUPPLY_MILLIVOLTS: u16 = 5000;
+pub(crate) const SUPPLY_MILLIVOLTS: u16 = 5000;
 
 /// The internal reference in millivolts, and the bits of ADMUX that choose it (data sheet, table 24-3).
 const BANDGAP_MILLIVOLTS: u16 = 1100;

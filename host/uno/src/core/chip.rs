@@ -11,7 +11,7 @@ use simavr_ffi as simavr;
 /// Addresses of the I/O registers in the data space (data sheet, figure 8-3). simavr counts registers from the first.
 const IO: std::ops::Range<u16> = 0x20..0x100;
 
-/// An initialised chip. [`super::core::Core`] owns it, and passes it only to code that ends before the chip does.
+/// An initialised chip. [`super::Core`] owns it, and passes it only to code that ends before the chip does.
 #[derive(Clone, Copy)]
 pub(super) struct Chip(*mut simavr::avr_t);
 
