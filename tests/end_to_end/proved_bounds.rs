@@ -86,7 +86,7 @@ fn assert_within(bounds: &Bounds, uno: &Uno) {
     println!("critical section: {section} of {proved} cycles");
     assert!(section <= proved, "{section} cycles without interrupts");
     let turn = bounds.turn.as_ref().and_then(|turn| turn.cycles).expect("every loop in it has a bound");
-    let longest = uno.turns().expect("they were measured").longest;
+    let longest = uno.turns().expect("they were measured").most;
     println!("turn: {longest} of {turn} cycles");
     assert!(longest <= turn, "a turn of {longest} cycles");
 }

@@ -8,17 +8,17 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use trial::replay::{Counted, replay};
-use uno::capture::Capture;
-use uno::waveform;
+use uno::recording;
 
 /// Writes the steps as a waveform file, lets the firmware count it, and compares with the sum of the steps.
 #[track_caller]
 fn assert_counts(name: &str, steps: &[(u64, i32)]) {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name).with_extension("vcd");
     let file = File::create(&path).expect("the recording is written");
-    waveform::write(BufWriter::new(file), &wiring::WIRES, encoder_steps(steps.iter().copied())).expect("it is written");
+    recording::write(BufWriter::new(file), &wiring::WIRES, encoder_steps(steps.iter().copied()))
+        .expect("it is written");
     let channels = [(wiring::ENCODER_A, "encoder_a"), (wiring::ENCODER_B, "encoder_b")];
-    let capture = Capture::read(&path, &channels).expect("the recording is read");
+    let capture = recording::read(&path, &channels).expect("the recording is read");
     let replay = replay(&capture, &elf(), |_| {}).expect("the firmware runs");
 
     let (mut count, mut lowest, mut highest) = (0_i64, 0, 0);

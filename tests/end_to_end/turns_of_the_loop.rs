@@ -183,7 +183,7 @@ fn no_turn_takes_more_than_a_millisecond_where_fifteen_examples_vote_of_as_many_
         let mut run = under_way_after(&commands.iter().map(String::as_str).collect::<Vec<_>>(), 24);
         run.uno.measure_turns();
         run.roll_to_the_end();
-        let longest = run.uno.turns().expect("they are measured").longest;
+        let longest = run.uno.turns().expect("they are measured").most;
         println!("{longest} of {TURN} cycles with {taught} from the field");
         assert!(longest <= TURN, "a turn took {longest} cycles with {taught} from the field");
     }
@@ -225,7 +225,7 @@ fn typed_takes(uno: &mut Uno, line: &str) -> u64 {
         let verdicts = answer.lines().filter(|line| *line == "ok" || line.starts_with("error: ")).count();
         assert!(verdicts <= 1, "{line}: {answer}");
         if verdicts == 1 && answer.ends_with('\n') {
-            return uno.turns().expect("they are measured").longest;
+            return uno.turns().expect("they are measured").most;
         }
     }
     panic!("{line:?} is not answered: {answer}");

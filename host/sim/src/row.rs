@@ -18,9 +18,7 @@ use std::path::PathBuf;
 use trial::Outcome;
 use trial::replay::{Counted, replay};
 use trial::{animation, firmware, picture, report};
-use uno::PinChange;
-use uno::capture::Capture;
-use uno::waveform;
+use uno::{PinChange, recording};
 
 /// The arguments.
 #[derive(Args)]
@@ -85,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         (Some(path), Some(a), Some(b)) => {
             let mut channels = vec![(wiring::ENCODER_A, a.as_str()), (wiring::ENCODER_B, b.as_str())];
             channels.extend(arguments.channel_beam.iter().map(|beam| (wiring::BEAM, beam.as_str())));
-            let capture = Capture::read(path, &channels)?;
+            let capture = recording::read(path, &channels)?;
             play(arguments, &capture, vcd.as_ref())
         }
         _ => weed(arguments, arguments.course.nth_row(0)?, folder.as_ref(), vcd.as_ref()),
@@ -138,7 +136,7 @@ fn write_folder(folder: &OutFolder, trial: &Trial, outcome: &Outcome, speed_mm_s
 }
 
 fn write_waveform(arguments: &Arguments, vcd: Option<&OutFile>, changes: &[PinChange]) -> Result<()> {
-    write_if_asked(vcd, "Waveform", arguments.json, |to| waveform::write(to, &wiring::WIRES, changes.iter().copied()))
+    write_if_asked(vcd, "Waveform", arguments.json, |to| recording::write(to, &wiring::WIRES, changes.iter().copied()))
 }
 
 /// The result for the row, with the names of the CSV tables.
@@ -163,7 +161,7 @@ fn in_json(arguments: &Arguments, trial: &Trial, outcome: &Outcome) -> Value {
     })
 }
 
-fn play(arguments: &Arguments, capture: &Capture, vcd: Option<&OutFile>) -> Result<Finding> {
+fn play(arguments: &Arguments, capture: &[PinChange], vcd: Option<&OutFile>) -> Result<Finding> {
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     let played = with_bar("playing", |show| replay(capture, &elf, show))?;
     let Counted { net_ticks, lowest_ticks, highest_ticks, lost_ticks } = played.counted;

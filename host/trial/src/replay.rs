@@ -10,7 +10,6 @@ use control::measure::quadrature::{Channels, Quadrature, Step};
 use field::wiring;
 use std::path::Path;
 use uno::PinChange;
-use uno::capture::Capture;
 
 /// The firmware's count, relative to its position at the start of the recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,8 +42,8 @@ const PAUSE_MS: u64 = 1;
 ///
 /// # Errors
 /// If the firmware cannot be run or does not answer.
-pub fn replay(capture: &Capture, elf: &Path, mut progress: impl FnMut(f64)) -> Result<Replay, TrialError> {
-    let (first_levels, edges) = split_first_levels(&capture.changes);
+pub fn replay(capture: &[PinChange], elf: &Path, mut progress: impl FnMut(f64)) -> Result<Replay, TrialError> {
+    let (first_levels, edges) = split_first_levels(capture);
     let mut uno = boot(elf, &first_levels)?;
     let mut played: Vec<PinChange> = first_levels.iter().map(|change| PinChange { cycle: 0, ..*change }).collect();
     let begin = Status::ask(&mut uno)?;

@@ -1,20 +1,20 @@
 //! The board: an Uno with its firmware, the wires on its pins, and a terminal at its serial line.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::path::Path;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::adc::SUPPLY_MILLIVOLTS;
-use crate::core::{self, Core, Stop};
+use crate::core::adc::SUPPLY_MILLIVOLTS;
+use crate::core::measuring::{Cycles, InterruptStatistics, Place};
+use crate::core::recorder::{Log, ReceivedByte, Reset, ResetCause};
+use crate::core::{self, Core};
 use crate::elf::{EEPROM_BYTES, Image, Size, Variable};
 use crate::error::UnoError;
 use crate::hex::Bootloader;
-use crate::interrupts::{InterruptStatistics, Place};
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
-use crate::recorder::{ReceivedByte, Reset};
-use crate::turns::Turns;
 
 /// The terminal's bit rate, until it follows the chip.
 pub const BAUD: u64 = 115_200;
@@ -22,12 +22,10 @@ pub const BAUD: u64 = 115_200;
 /// Cycles of a byte that a terminal sends: a start bit, eight data bits and a stop bit.
 pub const SENT_BYTE_CYCLES: u64 = (10 * CYCLES_PER_SECOND + BAUD / 2) / BAUD;
 
-/// An Arduino Uno with its firmware.
+/// An Arduino Uno with its firmware. Every method that runs it fails if the firmware crashes or halts for good.
 pub struct Uno {
     core: Core,
     image: Image,
-    /// The address in flash where a reset starts the chip, in bytes.
-    reset_address: u16,
     /// Levels to come, by cycle.
     to_drive: VecDeque<PinChange>,
     /// Bytes that the terminal at the serial line has not sent, and the time at which the first one's stop bit ends.
@@ -54,14 +52,10 @@ impl Uno {
     ///
     /// As [`Uno::boot`], and if `eeprom` is longer than 1024 bytes.
     pub fn boot_with_eeprom(elf: &Path, eeprom: &[u8]) -> Result<Uno, UnoError> {
-        if eeprom.len() > EEPROM_BYTES {
-            return Err(UnoError::EepromTooLarge(eeprom.len()));
-        }
         let image = Image::read(elf)?;
-        let mut content = image.eeprom.clone();
-        content.resize(content.len().max(eeprom.len()), 0xFF);
-        content[..eeprom.len()].copy_from_slice(eeprom);
-        Ok(Uno::power_up(image, &content, 0))
+        let rest = image.eeprom.get(eeprom.len()..).unwrap_or_default();
+        let content = [eeprom, rest].concat();
+        Uno::power_up(image, &content, 0)
     }
 
     /// As [`Uno::boot_with_eeprom`], with a bootloader behind the firmware. If `elf` is `None`, the other flash is
@@ -71,25 +65,24 @@ impl Uno {
     ///
     /// As [`Uno::boot_with_eeprom`], and if the firmware overlaps the bootloader.
     pub fn boot_with_bootloader(bootloader: &Bootloader, elf: Option<&Path>, eeprom: &[u8]) -> Result<Uno, UnoError> {
+        let mut image = elf.map(Image::read).transpose()?.unwrap_or_default();
+        image.flash = bootloader.behind(&image.flash)?;
+        Uno::power_up(image, eeprom, bootloader.start())
+    }
+
+    fn power_up(image: Image, eeprom: &[u8], reset_address: u16) -> Result<Uno, UnoError> {
         if eeprom.len() > EEPROM_BYTES {
             return Err(UnoError::EepromTooLarge(eeprom.len()));
         }
-        let mut image = elf.map(Image::read).transpose()?.unwrap_or_default();
-        image.flash = bootloader.behind(&image.flash)?;
-        Ok(Uno::power_up(image, eeprom, bootloader.start()))
-    }
-
-    fn power_up(image: Image, eeprom: &[u8], reset_address: u16) -> Uno {
-        Uno {
-            core: Core::new(&image.flash, eeprom, reset_address, 0),
+        Ok(Uno {
+            core: Core::new(&image.flash, eeprom, reset_address.into(), 0, Log::default()),
             image,
-            reset_address,
             to_drive: VecDeque::new(),
             to_send: VecDeque::new(),
             next_byte_ends: 0,
             follows_baud: false,
             lost_bytes: 0,
-        }
+        })
     }
 
     /// The Uno with these wires on its pins, each at its level at rest. Before the first instruction this is the same
@@ -104,25 +97,22 @@ impl Uno {
 
     /// Pulls the reset pin. EEPROM, SRAM, inputs and the clock stay; the cause is in MCUSR.
     pub fn reset(&mut self) {
-        self.core.reset();
+        self.core.reset(ResetCause::External);
     }
 
     /// Lets the supply voltage drop for a moment: too low to run, high enough for SRAM, which keeps its content.
     /// EEPROM, inputs and the clock are kept too. A byte that was being written to the EEPROM is torn.
     pub fn brown_out(&mut self) {
-        self.core.brown_out();
+        self.core.tear_eeprom();
+        self.core.reset(ResetCause::BrownOut);
     }
 
     /// Stops the main program in an endless loop at its present instruction, until the next reset. The interrupt flag
     /// is not changed: inside a critical section no interrupt is served. The clock first runs on until no handler is
     /// running.
-    ///
-    /// # Errors
-    ///
-    /// As [`Uno::run_until`].
     pub fn stall(&mut self) -> Result<(), UnoError> {
         while self.core.is_in_handler() {
-            self.step(self.cycle() + 1)?;
+            self.run_instruction()?;
         }
         self.core.stall();
         Ok(())
@@ -132,23 +122,18 @@ impl Uno {
     /// [`Uno::deepest_stack`] is valid only for firmware that paints its stack.
     pub fn power_cycle_to_noise(&mut self, seed: u64) {
         self.power_cycle();
-        let mut noise = [0; Core::SRAM_BYTES];
-        ChaCha8Rng::seed_from_u64(seed).fill_bytes(&mut noise);
-        self.core.set_sram(core::SRAM_START, &noise);
+        ChaCha8Rng::seed_from_u64(seed).fill_bytes(self.core.sram_mut());
     }
 
     /// Switches the power off and on. EEPROM, inputs and the clock are kept. SRAM is lost, and a byte that was being
     /// written to the EEPROM is torn.
     pub fn power_cycle(&mut self) {
-        self.core.lose_power();
-        let mut fresh = Core::new(self.core.flash(), &self.core.eeprom(), self.reset_address, self.core.cycle());
-        fresh.take_over(&mut self.core);
-        self.core = fresh;
+        self.core.power_cycle();
     }
 
     /// Resets since the first power-up, oldest first.
     pub fn resets(&self) -> &[Reset] {
-        &self.core.recorder().resets
+        &self.core.recorder().log.resets
     }
 
     /// The flash's 32 KiB, with the changes by the bootloader, if there is one.
@@ -173,10 +158,10 @@ impl Uno {
 
     /// Sets the level of a pin now. While the firmware drives the pin, the level waits until it is an input again.
     pub fn set(&mut self, pin: Pin, high: bool) {
-        if let Some(channel) = pin.adc_channel() {
-            self.core.set_millivolts(channel, if high { SUPPLY_MILLIVOLTS } else { 0 });
+        match pin.adc_channel() {
+            Some(_) => self.set_millivolts(pin, if high { SUPPLY_MILLIVOLTS } else { 0 }),
+            None => self.core.set_input(pin, high),
         }
-        self.core.set_input(pin, high);
     }
 
     /// Puts a voltage on an analogue pin, now. It is 0 at first, and stays over resets. The pin reads high from 3 V on and low up
@@ -192,7 +177,7 @@ impl Uno {
         } else if millivolts <= SUPPLY_MILLIVOLTS / 10 * 3 {
             self.core.set_input(pin, false);
         }
-        self.core.set_millivolts(channel, millivolts);
+        self.core.recorder_mut().millivolts[usize::from(channel)] = millivolts;
     }
 
     /// The level that the firmware drives a pin to; `None` while the pin is an input.
@@ -214,10 +199,6 @@ impl Uno {
     }
 
     /// Runs until the clock has reached `cycle`, or passed it by the last instruction's length.
-    ///
-    /// # Errors
-    ///
-    /// If the firmware crashed or halted for good.
     pub fn run_until(&mut self, cycle: u64) -> Result<(), UnoError> {
         while self.cycle() < cycle {
             self.step(cycle)?;
@@ -226,10 +207,6 @@ impl Uno {
     }
 
     /// Runs for a time in milliseconds.
-    ///
-    /// # Errors
-    ///
-    /// As [`Uno::run_until`].
     pub fn run_for_ms(&mut self, time_ms: u64) -> Result<(), UnoError> {
         self.run_until(self.cycle() + time_ms * (CYCLES_PER_SECOND / 1000))
     }
@@ -242,10 +219,10 @@ impl Uno {
     pub fn run_until_serial(&mut self, text: &str, timeout_cycles: u64) -> Result<String, UnoError> {
         let deadline = self.cycle() + timeout_cycles;
         loop {
-            let bytes = to_bytes(&self.core.recorder().received);
+            let bytes = to_bytes(&self.core.recorder().log.received);
             if let Some(start) = find(&bytes, text.as_bytes()) {
                 let end = start + text.len();
-                self.core.recorder_mut().received.drain(..end);
+                self.core.recorder_mut().log.received.drain(..end);
                 return Ok(String::from_utf8_lossy(&bytes[..end]).into_owned());
             }
             if self.cycle() >= deadline {
@@ -255,7 +232,7 @@ impl Uno {
                     received: String::from_utf8_lossy(&bytes).into_owned(),
                 });
             }
-            while self.core.recorder().received.len() == bytes.len() && self.cycle() < deadline {
+            while self.core.recorder().log.received.len() == bytes.len() && self.cycle() < deadline {
                 self.step(deadline)?;
             }
         }
@@ -281,10 +258,6 @@ impl Uno {
     }
 
     /// Runs one instruction. If an interrupt is due, that is the first one of its handler, after the response.
-    ///
-    /// # Errors
-    ///
-    /// As [`Uno::run_until`].
     pub fn run_instruction(&mut self) -> Result<(), UnoError> {
         // A cycle is less than any instruction has.
         self.step(self.cycle() + 1)
@@ -314,13 +287,7 @@ impl Uno {
         let next_level = self.to_drive.front().map(|change| change.cycle);
         let until =
             [next_level, self.to_send.front().map(|_| self.next_byte_ends)].into_iter().flatten().fold(until, u64::min);
-        self.core.step(until).map_err(|stop| {
-            let (cycle, program_counter) = (self.core.cycle(), self.core.program_counter());
-            match stop {
-                Stop::Crashed => UnoError::Crashed { cycle, program_counter },
-                Stop::Halted => UnoError::Halted { cycle, program_counter },
-            }
-        })
+        self.core.step(until)
     }
 
     /// Sends bytes to the serial line at its pace, after those that are still queued.
@@ -361,7 +328,7 @@ impl Uno {
 
     /// Takes the bytes that have come from the firmware, with their cycles.
     pub fn received_bytes(&mut self) -> Vec<ReceivedByte> {
-        std::mem::take(&mut self.core.recorder_mut().received)
+        std::mem::take(&mut self.core.recorder_mut().log.received)
     }
 
     /// Takes the firmware's output as text. Invalid UTF-8 is replaced.
@@ -373,12 +340,12 @@ impl Uno {
     /// Takes the edges of the output pins: from now on [`Uno::changes`] begins with the next one. This limits the
     /// memory of an Uno that runs for days.
     pub fn take_changes(&mut self) -> Vec<PinChange> {
-        std::mem::take(&mut self.core.recorder_mut().changes)
+        std::mem::take(&mut self.core.recorder_mut().log.changes)
     }
 
     /// Every edge of the output pins since the first power-up, oldest first.
     pub fn changes(&self) -> &[PinChange] {
-        &self.core.recorder().changes
+        &self.core.recorder().log.changes
     }
 
     /// The complete pulses on an output pin since the first power-up, oldest first.
@@ -393,29 +360,29 @@ impl Uno {
 
     /// Counts and times interrupts from now on; a second call restarts. This slows the simulation.
     pub fn measure_interrupts(&mut self) {
-        self.core.recorder_mut().interrupts.turn_on();
+        self.core.recorder_mut().log.interrupts.turn_on();
     }
 
     /// The interrupts' statistics since [`Uno::measure_interrupts`]; `None` before it.
     pub fn interrupt_statistics(&self) -> Option<&InterruptStatistics> {
-        self.core.recorder().interrupts.statistics.as_ref()
+        self.core.recorder().log.interrupts.statistics.as_ref()
     }
 
     /// Times the main loop's turns from now on; a second call restarts. This slows the simulation.
     pub fn measure_turns(&mut self) {
-        self.core.recorder_mut().turns.turn_on();
+        self.core.recorder_mut().log.turns.turn_on();
     }
 
     /// The main loop's turns since [`Uno::measure_turns`]; `None` before it.
-    pub fn turns(&self) -> Option<&Turns> {
-        self.core.recorder().turns.turns.as_ref()
+    pub fn turns(&self) -> Option<&Cycles> {
+        self.core.recorder().log.turns.turns.as_ref()
     }
 
     /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` if there is no such
     /// symbol.
     pub fn read(&self, symbol: &str) -> Option<&[u8]> {
-        let variable = self.image.variables.get(symbol)?;
-        Some(self.core.sram(variable.address, variable.size))
+        let &Variable { address, size } = self.image.variables.get(symbol)?;
+        self.core.sram().get(in_sram(address, size.into())?)
     }
 
     /// Puts bytes into a variable from its first byte on, as bits that fall over would. It is named as in [`Uno::read`].
@@ -437,12 +404,9 @@ impl Uno {
     ///
     /// If they do not fit into SRAM, which is from 0x0100 to 0x08FF.
     pub fn write_sram(&mut self, address: u16, bytes: &[u8]) -> Result<(), UnoError> {
-        let length = bytes.len();
-        let fits = u16::try_from(length).is_ok_and(|count| self.core.sram(address, count).len() == length);
-        if !fits {
-            return Err(UnoError::NotInSram { address, length });
-        }
-        self.core.set_sram(address, bytes);
+        let sram = self.core.sram_mut();
+        let stretch = in_sram(address, bytes.len()).and_then(|stretch| sram.get_mut(stretch));
+        stretch.ok_or(UnoError::NotInSram { address, length: bytes.len() })?.copy_from_slice(bytes);
         Ok(())
     }
 
@@ -451,11 +415,19 @@ impl Uno {
         core::SRAM_START + self.image.size.sram as u16
     }
 
-    /// The most bytes that the stack has used since power-up, or since the firmware painted it. Bytes that were never
-    /// written are not counted.
+    /// The most bytes that the stack has used since power-up, or since the firmware painted it. Below the deepest byte
+    /// SRAM still holds one fill byte. Bytes that were never written are not counted.
     pub fn deepest_stack(&self) -> usize {
-        self.core.deepest_stack(self.image.size.sram as u16)
+        let above = self.core.sram().get(self.image.size.sram as usize..).unwrap_or_default();
+        let untouched = above.iter().take_while(|&&byte| byte == above[0]).count();
+        above.len() - untouched
     }
+}
+
+/// A stretch of the data space, as indices into SRAM; `None` if it begins before SRAM.
+fn in_sram(address: u16, length: usize) -> Option<Range<usize>> {
+    let start = address.checked_sub(core::SRAM_START)?.into();
+    Some(start..start + length)
 }
 
 fn to_bytes(received: &[ReceivedByte]) -> Vec<u8> {

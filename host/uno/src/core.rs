@@ -1,5 +1,5 @@
 //! The ATmega328P on simavr: the only module that makes a chip and runs it. The callbacks from C are in
-//! [`super::recorder`], and those for writes of registers in [`super::timer`] and [`super::eeprom`].
+//! [`recorder`], and those for writes of registers in [`timer`] and [`eeprom`].
 //!
 //! [`Core`] owns a simavr instance and the [`Recorder`] that simavr's callbacks write to. It gives the rest of
 //! [`super`] safe calls: one step, levels in, edges and bytes out. It works with port bits, cycles and bytes. Queues
@@ -13,22 +13,30 @@
 //! made while a reference into the recorder or into `avr_t` is alive. simavr keeps no state outside `avr_t` except its
 //! logger, which is never replaced here. So chips in several threads do not interfere.
 
+pub(crate) mod adc;
+mod chip;
+mod eeprom;
+pub(crate) mod measuring;
+pub(crate) mod recorder;
+mod timer;
+mod uart;
+
 use std::ffi::{CStr, c_void};
 use std::ptr::{self, NonNull};
+use std::{mem, slice};
 
 use simavr_ffi as simavr;
 
-use super::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
-use super::eeprom::{self, Eeprom};
-use super::interrupts::{InterruptRecorder, Place};
-use super::output::{PORTS, Port, TIMER_OUTPUTS};
-use super::recorder::{
-    Recorder, Reset, ResetCause, on_direction, on_interrupt, on_port, on_reset, on_sample, on_timer_output, on_transmit,
+use self::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
+use self::chip::Chip;
+use self::eeprom::Eeprom;
+use self::measuring::Place;
+use self::recorder::{
+    Callback, Log, PORTS, Port, Recorder, ResetCause, TIMER_OUTPUTS, on_interrupt, on_reset, on_sample, on_transmit,
 };
-use super::timer::{self, Timer1};
-use super::turns::TurnRecorder;
-use super::uart;
+use self::timer::Timer1;
 use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
+use crate::error::UnoError;
 use crate::pins::{CYCLES_PER_SECOND, Pin};
 
 unsafe extern "C" {
@@ -45,9 +53,9 @@ const LAST_VECTOR: u8 = 25;
 /// Cycles that the core stays halted when an interrupt wakes it (data sheet, section 7.7.1).
 const WAKE_UP_CYCLES: u64 = 4;
 
-/// First and last address of SRAM in the data space (data sheet, figure 8-3).
+/// First address of SRAM in the data space, and its size (data sheet, figure 8-3).
 pub(super) const SRAM_START: u16 = 0x0100;
-const SRAM_END: u16 = 0x08FF;
+const SRAM_BYTES: usize = 2048;
 
 /// Default content of SRAM at power-up. A real chip's content is random. A byte other than zero reveals code that
 /// expects zeros, and shows how deep the stack has been.
@@ -55,9 +63,6 @@ const SRAM_AT_POWER_UP: u8 = 0xC5;
 
 /// The register of a reset's cause, by its address in the data space (data sheet, register summary).
 const MCUSR: u16 = 0x54;
-/// MCUSR: the cause was the reset pin, or too low a supply voltage (data sheet, 11.9.1).
-const EXTRF: u8 = 1 << 1;
-const BORF: u8 = 1 << 2;
 
 /// The instruction `wdr`, which feeds the watchdog.
 const WDR: u16 = 0x95A8;
@@ -73,32 +78,14 @@ const fn request(name: &[u8; 4]) -> u32 {
     u32::from_be_bytes(*name)
 }
 
-/// Why a chip stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stop {
-    /// It met an invalid instruction, or ran past the end of its flash.
-    Crashed,
-    /// It sleeps with interrupts off: nothing can wake it.
-    Halted,
-}
-
 /// An ATmega328P.
 pub(super) struct Core {
-    chip: NonNull<simavr::avr_t>,
+    chip: Chip,
     recorder: NonNull<Recorder>,
-    input: NonNull<simavr::avr_irq_t>,
-    /// External levels of the inputs, by port and bit.
-    held: [HeldLevels; PORTS.len()],
     /// The last step left the chip asleep.
     asleep: bool,
     /// Address in flash at which the main program loops for ever.
     stalled_at: Option<u32>,
-}
-
-#[derive(Clone, Copy, Default)]
-struct HeldLevels {
-    mask: u8,
-    levels: u8,
 }
 
 // SAFETY: a chip uses only its own two allocations (see the module's text) and is tied to no thread. `Core` has no
@@ -108,89 +95,64 @@ unsafe impl Send for Core {}
 impl Core {
     /// A chip after power-up, at `cycle`, with `flash` and `eeprom` written from address 0. Both must fit;
     /// [`crate::elf::Image`] and [`super::Uno`] ensure this. It starts at `reset_address` in flash, now and after every
-    /// reset.
-    pub(super) fn new(flash: &[u8], eeprom: &[u8], reset_address: u16, cycle: u64) -> Core {
+    /// reset. Its events are appended to `log`.
+    pub(super) fn new(flash: &[u8], eeprom: &[u8], reset_address: u32, cycle: u64, log: Log) -> Core {
         // SAFETY: the name is a C string that lives for ever. Every simavr knows this chip, so a null pointer means
         // that memory ran out.
-        let chip =
-            NonNull::new(unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) }).expect("simavr knows the ATmega328P");
-        let avr = chip.as_ptr();
+        let avr = unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) };
+        assert!(!avr.is_null(), "simavr knows the ATmega328P");
 
         // SAFETY: `avr` was just made and no other code has its address. `avr_init` is called once, after the clock was
         // set as it requires. `data` and `flash` are then simavr's, of `ramend + 1` and `flashend + 1` bytes, and
         // `flash` fits.
-        unsafe {
+        let chip = unsafe {
             (*avr).frequency = CYCLES_PER_SECOND as u32;
             simavr::avr_init(avr);
             ptr::copy_nonoverlapping(flash.as_ptr(), (*avr).flash, flash.len());
             (*avr).codeend = flash.len() as u32;
-            (*avr).reset_pc = reset_address.into();
-            (*avr).pc = reset_address.into();
-            let sram = (*avr).data.add(SRAM_START.into());
-            ptr::write_bytes(sram, SRAM_AT_POWER_UP, (SRAM_END - SRAM_START + 1).into());
+            (*avr).reset_pc = reset_address;
+            (*avr).pc = reset_address;
             (*avr).cycle = cycle;
             for voltage in [&raw mut (*avr).vcc, &raw mut (*avr).avcc, &raw mut (*avr).aref] {
                 *voltage = SUPPLY_MILLIVOLTS.into();
             }
-        }
+            Chip::of(avr)
+        };
 
-        // SAFETY: `avr` was initialised above.
-        let uart: NonNull<simavr::avr_uart_t> = unsafe { find(avr, c"uart") };
         let recorder = NonNull::from(Box::leak(Box::new(Recorder {
-            chip: avr,
-            uart: uart.as_ptr(),
-            // SAFETY: `avr` was initialised above.
-            adc: unsafe { find(avr, c"adc") }.as_ptr(),
-            // SAFETY: as above.
-            timer: unsafe { Timer1::of(avr) },
-            // SAFETY: as above.
-            eeprom: unsafe { Eeprom::of(avr) },
+            chip,
+            timer: Timer1::of(chip),
+            eeprom: Eeprom::of(chip),
             millivolts: [0; ADC_CHANNELS],
             timer_levels: Default::default(),
             driven_high: Default::default(),
-            changes: Vec::new(),
-            received: Vec::new(),
-            resets: Vec::new(),
-            interrupts: InterruptRecorder::default(),
-            turns: TurnRecorder::default(),
+            log,
             reset_at: None,
         })));
         let parameter = recorder.as_ptr().cast::<c_void>();
 
-        // SAFETY: `avr` and `uart` are valid and initialised. Each `avr_io_getirq` names a peripheral that the chip
+        // SAFETY: `avr` is valid and initialised. Each `avr_io_getirq` names a peripheral that the chip
         // has, and simavr ignores a null for a vector that it lacks. The callbacks get the recorder's address, which
         // stays valid until `Drop` has ended the chip.
-        let input = unsafe {
+        unsafe {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
-            (*uart.as_ptr()).flags = 0;
-            let port_callbacks: [(simavr::avr_irq_notify_t, simavr::avr_irq_notify_t); 3] = [
-                (Some(on_port::<'B'>), Some(on_direction::<'B'>)),
-                (Some(on_port::<'C'>), Some(on_direction::<'C'>)),
-                (Some(on_port::<'D'>), Some(on_direction::<'D'>)),
-            ];
-            for (name, (on_port, on_direction)) in PORTS.into_iter().zip(port_callbacks) {
-                let line = |kind: u32| simavr::avr_io_getirq(avr, port_request(name), kind as i32);
-                simavr::avr_irq_register_notify(line(simavr::IOPORT_IRQ_REG_PORT), on_port, parameter);
-                simavr::avr_irq_register_notify(line(simavr::IOPORT_IRQ_DIRECTION_ALL), on_direction, parameter);
+            (*uart::of(chip)).flags = 0;
+            let listen = |peripheral: u32, line: u32, callback: Callback| {
+                let line = simavr::avr_io_getirq(avr, peripheral, line as i32);
+                simavr::avr_irq_register_notify(line, Some(callback), parameter);
+            };
+            for (name, callback) in PORTS {
+                listen(port_request(name), simavr::IOPORT_IRQ_REG_PORT, callback);
+                listen(port_request(name), simavr::IOPORT_IRQ_DIRECTION_ALL, callback);
             }
-            let timer_callbacks: [simavr::avr_irq_notify_t; TIMER_OUTPUTS.len()] = [
-                Some(on_timer_output::<0>),
-                Some(on_timer_output::<1>),
-                Some(on_timer_output::<2>),
-                Some(on_timer_output::<3>),
-                Some(on_timer_output::<4>),
-                Some(on_timer_output::<5>),
-            ];
-            for (output, callback) in TIMER_OUTPUTS.iter().zip(timer_callbacks) {
-                let line = (simavr::TIMER_IRQ_OUT_COMP + output.output) as i32;
-                let irq = simavr::avr_io_getirq(avr, request(&output.timer), line);
-                simavr::avr_irq_register_notify(irq, callback, parameter);
+            for output in TIMER_OUTPUTS {
+                listen(request(&output.timer), simavr::TIMER_IRQ_OUT_COMP + output.output, output.callback);
             }
-            let sample = simavr::avr_io_getirq(avr, request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER as i32);
-            simavr::avr_irq_register_notify(sample, Some(on_sample), parameter);
-            timer::take_over_writes(avr, &raw mut (*recorder.as_ptr()).timer);
-            eeprom::take_over_writes(avr, &raw mut (*recorder.as_ptr()).eeprom);
+            listen(request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER, on_sample);
+            listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, on_transmit);
+            timer::take_over_writes(chip, &raw mut (*recorder.as_ptr()).timer);
+            eeprom::take_over_writes(chip, &raw mut (*recorder.as_ptr()).eeprom);
             for vector in 1..=LAST_VECTOR {
                 let irq = simavr::avr_get_interrupt_irq(avr, vector);
                 if !irq.is_null() {
@@ -198,33 +160,23 @@ impl Core {
                     simavr::avr_irq_register_notify(running, Some(on_interrupt), parameter);
                 }
             }
-            let output = simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_OUTPUT as i32);
-            simavr::avr_irq_register_notify(output, Some(on_transmit), parameter);
-            simavr::avr_io_getirq(avr, request(b"uar0"), simavr::UART_IRQ_INPUT as i32)
-        };
+        }
 
-        let mut core = Core {
-            chip,
-            recorder,
-            input: NonNull::new(input).expect("the ATmega328P has a UART"),
-            held: Default::default(),
-            asleep: false,
-            stalled_at: None,
-        };
-        core.set_eeprom(eeprom);
+        let mut core = Core { chip, recorder, asleep: false, stalled_at: None };
+        core.sram_mut().fill(SRAM_AT_POWER_UP);
+        core.copy_eeprom(b"eesp", &mut eeprom.to_vec());
         core
     }
 
     /// Cycles since the first power-up.
     pub(super) fn cycle(&self) -> u64 {
-        // SAFETY: the chip is valid for as long as `self` is, and simavr is not running.
-        unsafe { (*self.chip.as_ptr()).cycle }
+        self.chip.cycle()
     }
 
     /// Address of the next instruction, in bytes.
     pub(super) fn program_counter(&self) -> u32 {
-        // SAFETY: as in `cycle`.
-        unsafe { (*self.chip.as_ptr()).pc }
+        // SAFETY: the chip is valid for as long as `self` is, and simavr is not running.
+        unsafe { (*self.chip.avr()).pc }
     }
 
     /// The recorded events.
@@ -242,11 +194,11 @@ impl Core {
 
     /// Whether an interrupt's handler runs.
     pub(super) fn is_in_handler(&self) -> bool {
-        // SAFETY: as in `cycle`.
-        unsafe { (*self.chip.as_ptr()).interrupts.running_ptr > 0 }
+        // SAFETY: as in `program_counter`.
+        unsafe { (*self.chip.avr()).interrupts.running_ptr > 0 }
     }
 
-    /// The program's address and stack pointer.
+    /// Where the program stands.
     pub(super) fn place(&self) -> Place {
         match self.next_instruction() {
             _ if self.is_in_handler() => Place::InHandler,
@@ -262,17 +214,20 @@ impl Core {
 
     /// Serves a pending interrupt, runs an instruction or sleeps, and updates the peripherals. Several instructions may
     /// run in one step. A step passes `until` at most by the length of its last instruction.
-    pub(super) fn step(&mut self, until: u64) -> Result<(), Stop> {
-        let avr = self.chip.as_ptr();
-        let uart = self.recorder().uart;
-        let measuring = self.recorder().interrupts.statistics.is_some();
-        let counting_turns = self.recorder().turns.turns.is_some();
+    ///
+    /// # Errors
+    ///
+    /// If the firmware crashed or halted for good.
+    pub(super) fn step(&mut self, until: u64) -> Result<(), UnoError> {
+        let avr = self.chip.avr();
+        let Log { interrupts, turns, .. } = &self.recorder().log;
+        let (measuring, counting_turns) = (interrupts.statistics.is_some(), turns.turns.is_some());
         let one_by_one = measuring || counting_turns || self.stalled_at.is_some();
         // SAFETY: the chip is valid, this is the only place that runs it, and no reference into it or into the recorder
         // is alive while it runs. This is `avr_callback_run_raw` without its two waits on the PC's clock.
         unsafe {
-            self.init();
-            uart::hand_over_received(avr, uart);
+            self.add_wake_up();
+            uart::hand_over_received(self.chip);
             if (*avr).interrupt_state != 0 {
                 simavr::avr_service_interrupts(avr);
             }
@@ -286,7 +241,7 @@ impl Core {
 
             if (*avr).state as u32 == simavr::cpu_Running {
                 if counting_turns && self.next_instruction() == WDR {
-                    self.recorder_mut().turns.watchdog_is_fed((*avr).cycle);
+                    self.recorder_mut().log.turns.watchdog_is_fed((*avr).cycle);
                 }
                 if self.stalled_at == Some((*avr).pc) && !self.is_in_handler() {
                     (*avr).cycle += LOOP_CYCLES;
@@ -296,97 +251,82 @@ impl Core {
             }
             let until_next_timer = simavr::avr_cycle_timer_process(avr);
             match (*avr).state as u32 {
-                simavr::cpu_Running => self.init(),
+                simavr::cpu_Running => self.add_wake_up(),
                 simavr::cpu_Sleeping if (*avr).sreg[simavr::S_I as usize] == 0 => {
-                    return Err(Stop::Halted);
+                    return Err(UnoError::Halted { cycle: (*avr).cycle, program_counter: (*avr).pc });
                 }
                 simavr::cpu_Sleeping => {
                     self.asleep = true;
                     let rest = until.saturating_sub((*avr).cycle);
                     let slept = until_next_timer.min(rest).max(1);
                     (*avr).cycle += slept;
-                    self.recorder_mut().turns.slept(slept);
+                    self.recorder_mut().log.turns.slept(slept);
                 }
-                _ => return Err(Stop::Crashed),
+                _ => return Err(UnoError::Crashed { cycle: (*avr).cycle, program_counter: (*avr).pc }),
             }
         }
         self.finish_reset(ResetCause::Watchdog);
         if measuring {
             let cycle = self.cycle();
-            // SAFETY: as in `cycle`.
+            // SAFETY: as in `program_counter`.
             let enabled = unsafe { (*avr).sreg[simavr::S_I as usize] != 0 };
-            self.recorder_mut().interrupts.interrupts_enabled(enabled, cycle);
+            self.recorder_mut().log.interrupts.interrupts_enabled(enabled, cycle);
         }
         Ok(())
     }
 
     /// Halts the core for a moment after a wake-up: by a level at a pin between two steps, or by a peripheral in the
     /// last step.
-    fn init(&mut self) {
-        // SAFETY: as in `cycle`.
-        let chip = unsafe { self.chip.as_mut() };
+    fn add_wake_up(&mut self) {
+        // SAFETY: as in `program_counter`.
+        let chip = unsafe { &mut *self.chip.avr() };
         if self.asleep && chip.state as u32 == simavr::cpu_Running {
             chip.cycle += WAKE_UP_CYCLES;
             self.asleep = false;
         }
     }
 
-    /// Pulls the reset pin low for a moment.
-    pub(super) fn reset(&mut self) {
-        self.reset_by(EXTRF, ResetCause::External);
-    }
-
-    /// Lets the supply voltage drop for a moment, too low to run and high enough for SRAM. A byte that was being
-    /// written to the EEPROM is torn.
-    pub(super) fn brown_out(&mut self) {
-        let eeprom = self.eeprom();
-        self.set_eeprom(&eeprom);
-        self.reset_by(BORF, ResetCause::BrownOut);
-    }
-
-    fn reset_by(&mut self, flag: u8, cause: ResetCause) {
-        let avr = self.chip.as_ptr();
-        // SAFETY: as in `step`; MCUSR is an address inside `data`, and simavr keeps its bits over a reset.
-        unsafe {
-            *(*avr).data.add(MCUSR.into()) |= flag;
-            simavr::avr_reset(avr);
-        }
+    /// Resets the chip, for another cause than power-on.
+    pub(super) fn reset(&mut self, cause: ResetCause) {
+        // simavr keeps the bits of MCUSR over a reset.
+        self.chip.set(MCUSR, self.chip.read(MCUSR) | cause as u8);
+        // SAFETY: as in `step`.
+        unsafe { simavr::avr_reset(self.chip.avr()) };
         self.finish_reset(cause);
+    }
+
+    /// Leaves the byte that is being written to the EEPROM as a power failure now does.
+    pub(super) fn tear_eeprom(&mut self) {
+        let mut content = self.eeprom();
+        self.copy_eeprom(b"eesp", &mut content);
     }
 
     /// The first word of the next instruction.
     fn next_instruction(&self) -> u16 {
-        // SAFETY: as in `cycle`; simavr's flash has room behind its last word. The program counter lies inside it,
+        // SAFETY: as in `program_counter`; simavr's flash has room behind its last word. The program counter lies inside it,
         // because otherwise the chip has crashed before.
         unsafe {
-            let avr = self.chip.as_ptr();
+            let avr = self.chip.avr();
             let word = (*avr).flash.add((*avr).pc as usize);
             u16::from_le_bytes([*word, *word.add(1)])
         }
     }
 
-    /// Takes over the state of the chip before the power failure: the recording, and the levels at its pins.
-    pub(super) fn take_over(&mut self, before: &mut Core) {
-        let old = before.recorder_mut();
-        let new = self.recorder_mut();
-        new.changes = std::mem::take(&mut old.changes);
-        new.received = std::mem::take(&mut old.received);
-        new.resets = std::mem::take(&mut old.resets);
-        new.interrupts = std::mem::take(&mut old.interrupts);
-        new.interrupts.reset();
-        new.turns = std::mem::take(&mut old.turns);
-        new.turns.reset();
-        new.millivolts = old.millivolts;
-        self.held = before.held;
-        self.hold_inputs();
-    }
-
-    /// Records that power has gone: the outputs fall.
-    pub(super) fn lose_power(&mut self) {
-        let cycle = self.cycle();
+    /// Replaces the chip by one that powers up now. It has the same flash, EEPROM, recorded events, and levels at its
+    /// inputs.
+    pub(super) fn power_cycle(&mut self) {
+        let (eeprom, cycle) = (self.eeprom(), self.cycle());
+        // SAFETY: as in `program_counter`.
+        let reset_address = unsafe { (*self.chip.avr()).reset_pc };
         let recorder = self.recorder_mut();
-        recorder.release_pins(cycle);
-        recorder.resets.push(Reset { cycle, cause: ResetCause::PowerOn });
+        recorder.restart(cycle, ResetCause::PowerOn);
+        let (log, millivolts) = (mem::take(&mut recorder.log), recorder.millivolts);
+        let mut fresh = Core::new(self.flash(), &eeprom, reset_address, cycle, log);
+        fresh.recorder_mut().millivolts = millivolts;
+        for (pin, high) in self.held_inputs() {
+            fresh.set_input(pin, high);
+        }
+        *self = fresh;
     }
 
     /// Corrects simavr after a reset: it sets its clock to 0 and forgets the inputs' levels.
@@ -396,157 +336,105 @@ impl Core {
         };
         self.asleep = false;
         self.stalled_at = None;
-        // SAFETY: as in `cycle`. The watchdog's timer, the only one that can run now, was set from this cycle.
+        // SAFETY: as in `program_counter`. The watchdog's timer, the only one that can run now, was set from this cycle.
         unsafe {
-            (*self.chip.as_ptr()).cycle = cycle;
-            timer::stop_all(self.chip.as_ptr(), &self.recorder().timer);
+            (*self.chip.avr()).cycle = cycle;
         }
-        let recorder = self.recorder_mut();
-        recorder.release_pins(cycle);
-        recorder.interrupts.reset();
-        recorder.turns.reset();
-        recorder.eeprom.reset();
-        recorder.resets.push(Reset { cycle, cause });
-        self.hold_inputs();
+        timer::stop_all(self.chip, &self.recorder().timer);
+        self.recorder_mut().restart(cycle, cause);
+        for (pin, high) in self.held_inputs() {
+            self.set_input(pin, high);
+        }
     }
 
-    /// Applies the external levels to a chip that has just started.
-    fn hold_inputs(&mut self) {
-        for pin in Pin::ALL {
+    /// The pins with an external level, and that level.
+    fn held_inputs(&self) -> Vec<(Pin, bool)> {
+        let held = |pin: Pin| {
             let (port, bit) = pin.port_and_bit();
-            let held = self.held[port_index(port)];
-            if held.mask & (1 << bit) != 0 {
-                self.set_input(pin, held.levels & (1 << bit) != 0);
-            }
-        }
+            // SAFETY: as in `program_counter`.
+            let external = unsafe { (*Port::peripheral(self.chip, port)).external };
+            (external.pull_mask & 1 << bit != 0).then_some((pin, external.pull_value & 1 << bit != 0))
+        };
+        Pin::ALL.into_iter().filter_map(held).collect()
     }
 
     /// Sets the external level of an input pin from now on.
     pub(super) fn set_input(&mut self, pin: Pin, high: bool) {
         let (port, bit) = pin.port_and_bit();
-        let held = &mut self.held[port_index(port)];
-        held.mask |= 1 << bit;
-        held.levels = held.levels & !(1 << bit) | u8::from(high) << bit;
-        let mut external = simavr::avr_ioport_external_t {
-            _bitfield_align_1: [],
-            _bitfield_1: simavr::avr_ioport_external_t::new_bitfield_1(
-                port.into(),
-                held.mask.into(),
-                held.levels.into(),
-            ),
-            __bindgen_padding_0: [0; 5],
-        };
-        let avr = self.chip.as_ptr();
-        // SAFETY: as in `step`; `external` has the type of this request, and simavr copies it.
+        let avr = self.chip.avr();
+        // SAFETY: as in `step`.
         unsafe {
             // Only so, simavr raises the pin to this level, not to its pull-up's, when the firmware writes the port.
-            let set_external = request(&[b'i', b'o', b'p', port as u8]);
-            simavr::avr_ioctl(avr, set_external, (&raw mut external).cast());
-            if Port::of(avr, port).direction & 1 << bit == 0 {
+            let external = &raw mut (*Port::peripheral(self.chip, port)).external;
+            (*external).pull_mask |= 1 << bit;
+            (*external).pull_value = (*external).pull_value & !(1 << bit) | u8::from(high) << bit;
+            if Port::of(self.chip, port).direction & 1 << bit == 0 {
                 let line = simavr::avr_io_getirq(avr, port_request(port), bit.into());
                 simavr::avr_raise_irq(line, high.into());
             }
         }
     }
 
-    /// Sets the voltage on a channel of the ADC from now on.
-    pub(super) fn set_millivolts(&mut self, channel: u8, millivolts: u16) {
-        self.recorder_mut().millivolts[usize::from(channel)] = millivolts;
-    }
-
     /// The level that the firmware drives the pin to; `None` if it is an input.
     pub(super) fn output(&self, pin: Pin) -> Option<bool> {
         let (port, bit) = pin.port_and_bit();
-        // SAFETY: as in `cycle`.
-        let Port { direction, .. } = unsafe { Port::of(self.chip.as_ptr(), port) };
-        (direction & 1 << bit != 0).then(|| self.recorder().is_driven_high(pin))
+        (Port::of(self.chip, port).direction & 1 << bit != 0).then(|| self.recorder().is_driven_high(pin))
     }
 
     /// The level that the firmware reads at an input.
     pub(super) fn input(&self, pin: Pin) -> bool {
         let (port, bit) = pin.port_and_bit();
-        // SAFETY: as in `cycle`.
-        unsafe { Port::of(self.chip.as_ptr(), port).pins & 1 << bit != 0 }
+        Port::of(self.chip, port).pins & 1 << bit != 0
     }
 
     /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
     pub(super) fn receive(&mut self, byte: u8) -> bool {
-        let uart = self.recorder().uart;
-        // SAFETY: as in `step`; `uart` and `input` are parts of the chip.
-        unsafe { uart::receive(self.chip.as_ptr(), uart, self.input.as_ptr(), byte) }
+        uart::receive(self.chip, byte)
     }
 
     /// Gives the receiver a byte, independent of the line's pace and the receiver's room.
     pub(super) fn flood(&mut self, byte: u8) {
-        // SAFETY: as in `step`.
-        unsafe { simavr::avr_raise_irq(self.input.as_ptr(), byte.into()) };
+        uart::flood(self.chip, byte);
     }
 
     /// The EEPROM's content after a power failure now.
     pub(super) fn eeprom(&self) -> Vec<u8> {
         let mut content = vec![0; EEPROM_BYTES];
-        let mut description =
-            simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: EEPROM_BYTES as u32 };
-        // SAFETY: `description` names a buffer and its size, and simavr copies into it.
-        unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eegp"), (&raw mut description).cast()) };
-        if let Some(torn) = self.recorder().eeprom.torn_byte(self.cycle()) {
-            content[torn.address] |= torn.ones;
-        }
+        self.copy_eeprom(b"eegp", &mut content);
+        self.recorder().eeprom.tear(&mut content, self.cycle());
         content
+    }
+
+    /// Copies from the EEPROM's address 0 to `content` (request `eegp`), or the other way (`eesp`).
+    fn copy_eeprom(&self, name: &[u8; 4], content: &mut [u8]) {
+        let mut description =
+            simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: content.len() as u32 };
+        // SAFETY: `description` names a buffer and its size; simavr copies, and refuses an empty or too long buffer. No
+        // reference into the EEPROM exists.
+        unsafe { simavr::avr_ioctl(self.chip.avr(), request(name), (&raw mut description).cast()) };
     }
 
     /// The whole flash, with the changes by the firmware or its bootloader.
     pub(super) fn flash(&self) -> &[u8] {
         // SAFETY: simavr owns `flash`, of `flashend + 1` bytes, and changes it only in methods that borrow `self` mutably.
-        unsafe { std::slice::from_raw_parts((*self.chip.as_ptr()).flash, FLASH_BYTES) }
+        unsafe { slice::from_raw_parts((*self.chip.avr()).flash, FLASH_BYTES) }
     }
 
     /// Cycles of a byte on the serial line, as the chip's UART is set up.
     pub(super) fn byte_cycles(&self) -> u64 {
-        // SAFETY: as in `cycle`.
-        unsafe { uart::cycles_per_byte(self.chip.as_ptr()) }
-    }
-
-    fn set_eeprom(&mut self, content: &[u8]) {
-        let mut content = content.to_vec();
-        let mut description =
-            simavr::avr_eeprom_desc_t { ee: content.as_mut_ptr(), offset: 0, size: content.len() as u32 };
-        // SAFETY: as in `eeprom`; simavr copies out of it, and refuses an empty or too long buffer.
-        unsafe { simavr::avr_ioctl(self.chip.as_ptr(), request(b"eesp"), (&raw mut description).cast()) };
-    }
-
-    /// `length` bytes of SRAM from `address`, cut at the end of SRAM.
-    pub(super) fn sram(&self, address: u16, length: u16) -> &[u8] {
-        let start = address.clamp(SRAM_START, SRAM_END + 1);
-        let end = address.saturating_add(length).clamp(start, SRAM_END + 1);
-        // SAFETY: start and end lie inside `data`, which simavr owns and changes only in methods that borrow `self` mutably.
-        unsafe {
-            let data = (*self.chip.as_ptr()).data;
-            std::slice::from_raw_parts(data.add(start.into()), (end - start).into())
-        }
-    }
-
-    /// Writes bytes to SRAM from `address`; they must fit.
-    pub(super) fn set_sram(&mut self, address: u16, bytes: &[u8]) {
-        assert!(self.sram(address, bytes.len() as u16).len() == bytes.len(), "SRAM is from 0x0100 to 0x08ff");
-        // SAFETY: as in `step`; the bytes fit into SRAM, which lies inside `data`.
-        unsafe {
-            let sram = (*self.chip.as_ptr()).data.add(address.into());
-            ptr::copy_nonoverlapping(bytes.as_ptr(), sram, bytes.len());
-        }
+        uart::cycles_per_byte(self.chip)
     }
 
     /// All of SRAM.
-    pub(super) const SRAM_BYTES: usize = (SRAM_END - SRAM_START + 1) as usize;
+    pub(super) fn sram(&self) -> &[u8] {
+        // SAFETY: SRAM lies inside `data`, which simavr owns and changes only in methods that borrow `self` mutably.
+        unsafe { slice::from_raw_parts((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }
+    }
 
-    /// The most bytes that the stack has used. `static_bytes` of SRAM below it are static. Below the deepest byte SRAM
-    /// still holds one fill byte, from power-up or from firmware that painted it at its start. Bytes that were reserved
-    /// but never written are not counted.
-    pub(super) fn deepest_stack(&self, static_bytes: u16) -> usize {
-        let start = SRAM_START.saturating_add(static_bytes);
-        let above = self.sram(start, (SRAM_END + 1).saturating_sub(start));
-        let untouched = above.iter().take_while(|&&byte| byte == above[0]).count();
-        above.len() - untouched
+    /// All of SRAM, to write to.
+    pub(super) fn sram_mut(&mut self) -> &mut [u8] {
+        // SAFETY: as in `sram`, and `self` is borrowed mutably.
+        unsafe { slice::from_raw_parts_mut((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }
     }
 }
 
@@ -555,35 +443,14 @@ impl Drop for Core {
         // SAFETY: both were allocated in `new`, the chip by simavr's malloc, which leaves freeing `avr_t` itself to its
         // maker. Neither is used after this.
         unsafe {
-            simavr::avr_terminate(self.chip.as_ptr());
-            libc::free(self.chip.as_ptr().cast());
+            simavr::avr_terminate(self.chip.avr());
+            libc::free(self.chip.avr().cast());
             drop(Box::from_raw(self.recorder.as_ptr()));
         }
-    }
-}
-
-/// A peripheral of the chip, by its kind.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip, and `T` simavr's type for a peripheral of this kind.
-unsafe fn find<T>(avr: *mut simavr::avr_t, kind: &CStr) -> NonNull<T> {
-    // SAFETY: the caller guarantees `avr`: its peripherals form a list that ends in null, each with a C string for its
-    // kind. Every peripheral begins with its `avr_io_t`.
-    unsafe {
-        let mut peripheral = (*avr).io_port;
-        while !peripheral.is_null() && CStr::from_ptr((*peripheral).kind) != kind {
-            peripheral = (*peripheral).next;
-        }
-        NonNull::new(peripheral.cast()).expect("the ATmega328P has this peripheral")
     }
 }
 
 /// simavr's request code for the lines of a port.
 const fn port_request(name: char) -> u32 {
     request(&[b'i', b'o', b'g', name as u8])
-}
-
-fn port_index(port: char) -> usize {
-    (port as usize) - ('B' as usize)
 }

@@ -5,8 +5,7 @@
 //! run a bootloader; [`Uno`](crate::Uno) does.
 
 use crate::elf::{FLASH_BYTES, Image};
-use crate::error::UnoError;
-use crate::file_error::FileError;
+use crate::error::{FileError, UnoError};
 use ihex::{Reader, ReaderError, Record};
 use std::fmt::Display;
 use std::path::Path;
@@ -144,17 +143,23 @@ fn pieces(text: &str) -> Result<Vec<(usize, Vec<u8>)>, ReaderError> {
 mod tests {
     use super::*;
 
-    /// A file with these bytes from an address on.
-    fn file(address: u16, bytes: &[u8]) -> tempfile::NamedTempFile {
-        let records = [Record::Data { offset: address, value: bytes.to_vec() }, Record::EndOfFile];
+    /// The text of a file with these bytes from an address on.
+    fn hex(address: u16, bytes: &[u8]) -> String {
+        let lines = bytes.chunks(255).zip((address..).step_by(255));
+        let data = lines.map(|(line, offset)| Record::Data { offset, value: line.to_vec() });
+        let records: Vec<Record> = data.chain([Record::EndOfFile]).collect();
+        ihex::create_object_file_representation(&records).unwrap()
+    }
+
+    fn read(text: &str) -> Result<Bootloader, String> {
         let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), ihex::create_object_file_representation(&records).unwrap()).unwrap();
-        file
+        std::fs::write(file.path(), text).unwrap();
+        Bootloader::read(file.path()).map_err(|error| error.to_string())
     }
 
     #[test]
     fn a_bootloader_stands_at_its_address_behind_the_firmware() {
-        let bootloader = Bootloader::read(file(0x7800, &[1, 2, 3]).path()).unwrap();
+        let bootloader = read(&hex(0x7800, &[1, 2, 3])).unwrap();
         assert_eq!(bootloader.start(), 0x7800);
         let flash = bootloader.behind(&[9, 8]).unwrap();
         assert_eq!(flash.len(), 0x7803);
@@ -170,38 +175,24 @@ mod tests {
 
     #[test]
     fn a_firmware_may_reach_up_to_the_bootloader_and_no_further() {
-        let bootloader = Bootloader::read(file(0x7E00, &[1]).path()).unwrap();
+        let bootloader = read(&hex(0x7E00, &[1; 255])).unwrap();
         assert!(bootloader.behind(&[0; 32_256]).is_ok());
         let error = bootloader.behind(&[0; 32_257]).unwrap_err().to_string();
         assert_eq!(error, "the firmware takes 32257 bytes of flash: the bootloader leaves 32256");
     }
 
     #[test]
-    fn a_file_that_lies_elsewhere_is_no_bootloader() {
-        for address in [0, 0x7900] {
-            let error = Bootloader::read(file(address, &[1]).path()).unwrap_err().to_string();
-            assert!(error.contains("is no bootloader for the ATmega328P"), "{error}");
-        }
-        let error = Bootloader::read(file(0x7E00, &[1; 255]).path()).map(|bootloader| bootloader.start());
-        assert_eq!(error.unwrap(), 0x7E00);
-        let path = tempfile::NamedTempFile::new().unwrap();
-        let records: Vec<Record> = (0..33)
-            .map(|line| Record::Data { offset: 0x7E00 + line * 16, value: vec![0; 16] })
-            .chain([Record::EndOfFile])
-            .collect();
-        std::fs::write(path.path(), ihex::create_object_file_representation(&records).unwrap()).unwrap();
-        let error = Bootloader::read(path.path()).unwrap_err().to_string();
-        assert!(error.contains("from 0x7e00 to 0x8010"), "{error}");
-    }
-
-    #[test]
     fn other_files_are_refused_with_the_reason() {
-        let path = tempfile::NamedTempFile::new().unwrap();
-        let error = Bootloader::read(path.path()).unwrap_err().to_string();
-        assert!(error.contains("is empty"), "{error}");
-        std::fs::write(path.path(), "no hex\n").unwrap();
-        let error = Bootloader::read(path.path()).unwrap_err().to_string();
-        assert!(error.contains("is no Intel HEX file"), "{error}");
+        for (text, reason) in [
+            (hex(0, &[1]), "is no bootloader for the ATmega328P"),
+            (hex(0x7900, &[1]), "is no bootloader for the ATmega328P"),
+            (hex(0x7E00, &[0; 0x210]), "from 0x7e00 to 0x8010"),
+            (String::new(), "is empty"),
+            ("no hex\n".to_owned(), "is no Intel HEX file"),
+        ] {
+            let error = read(&text).unwrap_err();
+            assert!(error.contains(reason), "{error}");
+        }
         let error = Bootloader::read(Path::new("no-such.hex")).unwrap_err().to_string();
         assert!(error.starts_with("no-such.hex cannot be read"), "{error}");
     }

@@ -1,57 +1,31 @@
 #![doc = include_str!("../README.md")]
 //! # Imports
 //!
-//! # Who knows whom
-//!
-//! Imports run one way. The chip: `io_register` -> `timer`, `eeprom`, and `adc`, `output`, `uart`, `interrupts`, `turns` beside them -> `recorder`,
-//! which owns what simavr calls back with -> `core`, which runs it -> `board`, which has the [`Uno`]. The files: `error` -> `elf`, `capture`, `pty` -> `hex`, `core` -> `board`.
-//! `pins` knows none of these and is known to all; `capture`, `waveform` and `pty` know only `pins`.
+//! They run one way: `error` -> `elf` -> `hex`, `core` -> `board` -> `pty`. Inside `core`: `chip` -> `timer`, `eeprom`,
+//! `adc`, `uart`, with `measuring` beside them -> `recorder`, which owns what simavr calls back with -> `core`
+//! itself, which runs it. `pins` knows none of these and is known to all; `recording` knows only `pins` and `error`.
 
-#[cfg(feature = "simavr")]
-mod adc;
 #[cfg(feature = "simavr")]
 mod board;
 #[cfg(feature = "simavr")]
-pub mod capture;
-#[cfg(feature = "simavr")]
 mod core;
-#[cfg(feature = "simavr")]
-mod eeprom;
 #[cfg(feature = "simavr")]
 pub mod elf;
 #[cfg(feature = "simavr")]
 mod error;
 #[cfg(feature = "simavr")]
-mod file_error;
-#[cfg(feature = "simavr")]
 pub mod hex;
-#[cfg(feature = "simavr")]
-mod interrupts;
-#[cfg(feature = "simavr")]
-mod io_register;
-#[cfg(feature = "simavr")]
-mod output;
 mod pins;
 #[cfg(all(feature = "simavr", target_os = "linux"))]
 pub mod pty;
 #[cfg(feature = "simavr")]
-mod recorder;
-#[cfg(feature = "simavr")]
-mod timer;
-#[cfg(feature = "simavr")]
-mod turns;
-#[cfg(feature = "simavr")]
-mod uart;
-#[cfg(feature = "simavr")]
-pub mod waveform;
+pub mod recording;
 
 pub use self::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 #[cfg(feature = "simavr")]
 pub use self::{
     board::{BAUD, SENT_BYTE_CYCLES, Uno},
-    error::UnoError,
-    file_error::FileError,
-    interrupts::{HandlerCycles, InterruptStatistics, Place},
-    recorder::{ReceivedByte, Reset, ResetCause},
-    turns::Turns,
+    core::measuring::{Cycles, InterruptStatistics, Place},
+    core::recorder::{ReceivedByte, Reset, ResetCause},
+    error::{FileError, UnoError},
 };

@@ -10,7 +10,8 @@
 //! The system calls are rustix's. Crates for pseudo terminals (portable-pty, pty-process) start a program behind one,
 //! and do not report who opens it.
 
-use crate::file_error::FileError;
+use crate::board::BAUD;
+use crate::error::FileError;
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};
 use rustix::io::Errno;
@@ -21,9 +22,6 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::mem::MaybeUninit;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-
-/// The terminal's default baud rate, for programs that read it and do not set it.
-const BAUD: u32 = 115_200;
 
 /// The system's folder for the programs' sides.
 const TERMINALS: &str = "/dev/pts";
@@ -50,15 +48,16 @@ impl Pty {
     /// If the system has none to give.
     pub fn open() -> Result<Pty, FileError> {
         let open = || -> io::Result<Pty> {
-            let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+            let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+            let device = openpt(flags)?;
             grantpt(&device)?;
             unlockpt(&device)?;
             let path: PathBuf = ptsname(&device, Vec::new())?.into_string().map_err(io::Error::other)?.into();
-            let other_side =
-                ioctl_tiocgptpeer(&device, OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+            let other_side = ioctl_tiocgptpeer(&device, flags)?;
             let mut attributes = tcgetattr(&other_side)?;
             attributes.make_raw();
-            attributes.set_speed(BAUD)?;
+            // For programs that read the rate and do not set it.
+            attributes.set_speed(BAUD as u32)?;
             tcsetattr(&other_side, OptionalActions::Now, &attributes)?;
             fcntl_setfl(&device, OFlags::NONBLOCK)?;
             let watch = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
@@ -88,22 +87,16 @@ impl Pty {
             let right = "end it, or name another link; if it is none of your virtual Unos, remove the link";
             return Err(FileError::new(path, format_args!("leads to {target}, which {holder} has: {right}")));
         }
-        let is_left_over = target.is_some();
-        let linked = match is_left_over {
-            true => std::fs::remove_file(path).and_then(|()| symlink(&self.path, path)),
-            false => symlink(&self.path, path),
-        };
-        match linked {
-            Ok(()) => {
-                self.link = Some(path.into());
-                Ok(())
-            }
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(FileError::new(
+        let removed = if target.is_some() { std::fs::remove_file(path) } else { Ok(()) };
+        removed.and_then(|()| symlink(&self.path, path)).map_err(|source| match source.kind() {
+            ErrorKind::AlreadyExists => FileError::new(
                 path,
                 "exists already and is no link to a pseudo terminal: name another link, or remove it",
-            )),
-            Err(source) => Err(FileError::failed(path, "cannot be made a link to the pseudo terminal", source)),
-        }
+            ),
+            _ => FileError::failed(path, "cannot be made a link to the pseudo terminal", source),
+        })?;
+        self.link = Some(path.into());
+        Ok(())
     }
 
     /// Whether a program has opened it since the last call, at a time when no other had it open. What was not read before
@@ -171,20 +164,15 @@ fn holder(terminal: &Path) -> String {
     let number = terminal.file_name().unwrap_or_default().to_string_lossy();
     // The system lists each open file this way. Processes of other users hide theirs.
     let index = format!("tty-index:\t{number}\n");
-    let has_it = |process: &PathBuf| {
-        let files = std::fs::read_dir(process.join("fdinfo")).into_iter().flatten().flatten();
+    let has_it = |process: &u32| {
+        let files = std::fs::read_dir(format!("/proc/{process}/fdinfo")).into_iter().flatten().flatten();
         files.into_iter().any(|file| std::fs::read_to_string(file.path()).is_ok_and(|text| text.contains(&index)))
     };
-    let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_process = |path: &PathBuf| {
-        path.file_name()
-            .and_then(|name| name.to_str())
-            .is_some_and(|name| name.bytes().all(|byte| byte.is_ascii_digit()))
-    };
-    processes.filter(is_process).find(has_it).map_or("another process".to_owned(), |process| {
-        let name = std::fs::read_to_string(process.join("comm")).unwrap_or_default();
-        let id = process.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        format!("process {id} ({})", name.trim())
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let mut processes = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+    processes.find(has_it).map_or("another process".to_owned(), |process| {
+        let name = std::fs::read_to_string(format!("/proc/{process}/comm")).unwrap_or_default();
+        format!("process {process} ({})", name.trim())
     })
 }
 
@@ -254,18 +242,6 @@ mod tests {
         let mut buffer = [0; 3];
         program.read_exact(&mut buffer).unwrap();
         assert_eq!(&buffer, b"new");
-    }
-
-    #[test]
-    fn a_link_leads_to_it_while_it_is_there() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("uno");
-        let mut pty = Pty::open().unwrap();
-        pty.link(&path).unwrap();
-        assert_eq!(pty.path(), path);
-        assert!(std::fs::canonicalize(&path).unwrap().starts_with("/dev/pts"));
-        drop(pty);
-        assert!(!path.is_symlink());
     }
 
     #[test]

@@ -17,9 +17,9 @@ use proptest::prelude::*;
 use std::error::Error;
 use std::fs;
 use std::path::Path;
-use uno::capture::Capture;
 use uno::elf::Image;
 use uno::hex::{self, Bootloader};
+use uno::recording;
 
 /// The reader of a kind of file, and a file of that kind.
 type Reader = (&'static str, fn(&Path) -> Result<(), Box<dyn Error>>, fn() -> Vec<u8>);
@@ -118,7 +118,7 @@ const READERS: [Reader; 11] = [
     ),
     (
         "logic.vcd",
-        |path| Ok(Capture::read(path, &[(wiring::ENCODER_A, "A"), (wiring::ENCODER_B, "B")]).map(drop)?),
+        |path| Ok(recording::read(path, &[(wiring::ENCODER_A, "A"), (wiring::ENCODER_B, "B")]).map(drop)?),
         || {
             b"$timescale 1 us $end\n$scope module analyser $end\n$var wire 1 ! A $end\n$var wire 1 \" B $end\n\
               $upscope $end\n$enddefinitions $end\n#0 0! 0\"\n#10 1!\n#20 1\"\n#30 0!\n"

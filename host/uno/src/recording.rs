@@ -1,18 +1,18 @@
-//! Recordings of real signals: the levels of some pins, from a logic analyser's VCD file.
+//! Recordings of the pins, as VCD files: [`read`] takes a logic analyser's, [`write()`] makes one for PulseView or GTKWave.
 //!
-//! A [`Capture`] holds levels on the Uno's pins, in cycles. It converts from any time unit of the file. The caller
-//! chooses channels by the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an
-//! error. The firmware, not this module, interprets the signal.
+//! Levels are at cycles of the Uno. The reader converts from any time unit of the file. The caller chooses channels by
+//! the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an error. The firmware,
+//! not this module, interprets the signal.
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, ErrorKind, Read};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::Path;
 
-use vcd::{Command, IdCode, Parser, Scope, ScopeItem, TimescaleUnit, Value, Var};
+use vcd::{Command, IdCode, Parser, Scope, ScopeItem, SimulationCommand, TimescaleUnit, Value, Var, Writer};
 
-use crate::file_error::FileError;
-use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange};
+use crate::error::FileError;
+use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Wire};
 
 /// Longest recording, in hours. The firmware would take days to play a longer one.
 const MOST_HOURS: u64 = 24;
@@ -23,13 +23,11 @@ const MOST_SCOPES: usize = 50;
 /// Longest head of a file, in which its channels are declared.
 const MOST_HEAD_BYTES: u64 = 1 << 20;
 
-/// A recording, as levels on the Uno's pins.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Capture {
-    /// The levels, sorted by cycle from the recording's time 0. The first of each channel is its initial level, and the
-    /// others are edges.
-    pub changes: Vec<PinChange>,
-}
+/// Unit of time of a written file: 100 ps, so that a cycle of 62.5 ns is exactly 625 units.
+const UNITS: (u32, TimescaleUnit) = (100, TimescaleUnit::PS);
+
+/// Units of time a cycle.
+const UNITS_PER_CYCLE: u64 = 10_000_000_000 / CYCLES_PER_SECOND;
 
 /// A channel that is being read.
 struct Channel {
@@ -38,79 +36,118 @@ struct Channel {
     level: Option<bool>,
 }
 
-impl Capture {
-    /// Reads the recording at `path`. `channels` maps pins to channel names in the file. A name that exists in several
-    /// scopes is written `scope.name`.
-    ///
-    /// # Errors
-    ///
-    /// If the file is no VCD, has no such channels, or leaves their levels open.
-    pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Capture, FileError> {
-        let file = File::open(path).map_err(|source| FileError::unread(path, source))?;
-        Capture::parse(path, BufReader::new(file), channels)
+/// The levels of the recording at `path`, sorted by cycle from its time 0. The first of each channel is its initial
+/// level, and the others are edges. `channels` maps pins to channel names in the file. A name that exists in several
+/// scopes is written `scope.name`.
+///
+/// # Errors
+///
+/// If the file is no VCD, has no such channels, or leaves their levels open.
+pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Vec<PinChange>, FileError> {
+    let file = File::open(path).map_err(|source| FileError::unread(path, source))?;
+    parse(path, BufReader::new(file), channels)
+}
+
+fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Vec<PinChange>, FileError> {
+    let read_error = |source| FileError::unread(path, source);
+    let wrong = |problem: String| FileError::new(path, problem);
+    let mut file = file;
+    let head = head(&mut file).map_err(read_error)?;
+    let mut parser = Parser::new(head.chain(file));
+    let header = parser.parse_header().map_err(read_error)?;
+    let timescale =
+        header.timescale.ok_or_else(|| wrong("has no $timescale: export the recording as VCD once more".to_owned()))?;
+
+    let mut known = Vec::new();
+    list_channels("", &header.items, &mut known);
+    let mut wires = BTreeMap::new();
+    for &(pin, name) in channels {
+        let channel = Channel { pin, name: name.to_owned(), level: None };
+        if wires.insert(find_channel(path, name, &known)?, channel).is_some() {
+            return Err(wrong(format!("has channel `{name}` given for two signals: each needs its own")));
+        }
     }
 
-    fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Capture, FileError> {
-        let read_error = |source| FileError::unread(path, source);
-        let wrong = |problem: String| FileError::new(path, problem);
-        let mut file = file;
-        let head = head(&mut file).map_err(read_error)?;
-        let mut parser = Parser::new(head.chain(file));
-        let header = parser.parse_header().map_err(read_error)?;
-        let timescale = header
-            .timescale
-            .ok_or_else(|| wrong("has no $timescale: export the recording as VCD once more".to_owned()))?;
-
-        let mut known = Vec::new();
-        list_channels("", &header.items, &mut known);
-        let mut wires = BTreeMap::new();
-        for &(pin, name) in channels {
-            let channel = Channel { pin, name: name.to_owned(), level: None };
-            if wires.insert(find_channel(path, name, &known)?, channel).is_some() {
-                return Err(wrong(format!("has channel `{name}` given for two signals: each needs its own")));
+    let mut changes = Vec::new();
+    let mut time = 0;
+    while let Some(command) = parser.next().transpose().map_err(read_error)? {
+        match command {
+            Command::Timestamp(later) if later < time => {
+                return Err(wrong(format!("goes back in time at line {}", parser.line())));
             }
-        }
-
-        let mut changes = Vec::new();
-        let mut time = 0;
-        while let Some(command) = parser.next().transpose().map_err(read_error)? {
-            match command {
-                Command::Timestamp(later) if later < time => {
-                    return Err(wrong(format!("goes back in time at line {}", parser.line())));
-                }
-                Command::Timestamp(later) => time = later,
-                Command::ChangeScalar(wire, value) => {
-                    let Some(channel) = wires.get_mut(&wire) else { continue };
-                    let high = match value {
-                        Value::V0 => false,
-                        Value::V1 => true,
-                        Value::X | Value::Z => {
-                            return Err(wrong(format!(
-                                "has `{value}` on channel `{}` at line {}: only 0 and 1 are levels",
-                                channel.name,
-                                parser.line()
-                            )));
-                        }
-                    };
-                    if channel.level.replace(high) != Some(high) {
-                        let cycle = to_cycles(time, timescale);
-                        if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
-                            return Err(wrong(format!(
-                                "is longer than {MOST_HOURS} h at line {}: cut the recording, or check its $timescale",
-                                parser.line()
-                            )));
-                        }
-                        changes.push(PinChange { cycle, pin: channel.pin, high });
+            Command::Timestamp(later) => time = later,
+            Command::ChangeScalar(wire, value) => {
+                let Some(channel) = wires.get_mut(&wire) else { continue };
+                let high = match value {
+                    Value::V0 => false,
+                    Value::V1 => true,
+                    Value::X | Value::Z => {
+                        return Err(wrong(format!(
+                            "has `{value}` on channel `{}` at line {}: only 0 and 1 are levels",
+                            channel.name,
+                            parser.line()
+                        )));
                     }
+                };
+                if channel.level.replace(high) != Some(high) {
+                    let cycle = to_cycles(time, timescale);
+                    if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
+                        return Err(wrong(format!(
+                            "is longer than {MOST_HOURS} h at line {}: cut the recording, or check its $timescale",
+                            parser.line()
+                        )));
+                    }
+                    changes.push(PinChange { cycle, pin: channel.pin, high });
                 }
-                _ => {}
             }
-        }
-        match wires.into_values().find(|channel| channel.level.is_none()) {
-            Some(Channel { name, .. }) => Err(wrong(format!("holds no samples of channel `{name}`"))),
-            None => Ok(Capture { changes }),
+            _ => {}
         }
     }
+    match wires.into_values().find(|channel| channel.level.is_none()) {
+        Some(Channel { name, .. }) => Err(wrong(format!("holds no samples of channel `{name}`"))),
+        None => Ok(changes),
+    }
+}
+
+/// Writes `changes`, in any order, as a VCD file with every wire by its name, inputs and outputs together. Each wire
+/// starts at rest. Changes on other pins are left out. [`read`] returns exactly the same cycles.
+///
+/// # Errors
+///
+/// The errors of the writer.
+pub fn write(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
+    let mut changes: Vec<PinChange> = changes.into_iter().collect();
+    changes.sort_by_key(|change| change.cycle);
+    let mut writer = Writer::new(file);
+    writer.timescale(UNITS.0, UNITS.1)?;
+    writer.add_module("uno")?;
+    let mut codes = Vec::new();
+    for wire in wires {
+        codes.push((wire, writer.add_wire(1, wire.name)?));
+    }
+    writer.upscope()?;
+    writer.enddefinitions()?;
+
+    writer.timestamp(0)?;
+    writer.begin(SimulationCommand::Dumpvars)?;
+    for &(wire, code) in &codes {
+        writer.change_scalar(code, wire.high_at_rest)?;
+    }
+    writer.end()?;
+
+    let mut now = 0;
+    for change in changes {
+        if change.cycle != now {
+            now = change.cycle;
+            writer.timestamp(now * UNITS_PER_CYCLE)?;
+        }
+        for &(wire, code) in &codes {
+            if wire.pin == change.pin {
+                writer.change_scalar(code, change.high)?;
+            }
+        }
+    }
+    writer.flush()
 }
 
 /// The file's head, up to the end of the channels' declarations.
@@ -183,7 +220,6 @@ fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdC
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pins::Wire;
 
     const CHANNELS: [(Pin, &str); 2] = [(Pin::D2, "A"), (Pin::D3, "B")];
 
@@ -194,9 +230,9 @@ mod tests {
         )
     }
 
-    fn parse(file: &str, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
-        Capture::parse(Path::new("pins.vcd"), file.as_bytes(), channels)
-            .map(|capture| capture.changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect())
+    fn levels(file: &str, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
+        parse(Path::new("pins.vcd"), file.as_bytes(), channels)
+            .map(|changes| changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect())
             .map_err(|error| error.to_string())
     }
 
@@ -206,28 +242,28 @@ mod tests {
         for (timescale, time) in [("1 us", 1000), ("10 us", 100), ("1 ms", 1), ("100 ps", 10_000_000)] {
             let file = recording(timescale, &format!("#0 0! 1\" #{time} 1! 1\" b101 # #{} 0\"", 3 * time));
             let expected = [(0, a, false), (0, b, true), (16_000, a, true), (48_000, b, false)];
-            assert_eq!(parse(&file, &CHANNELS).unwrap(), expected, "{timescale}");
+            assert_eq!(levels(&file, &CHANNELS).unwrap(), expected, "{timescale}");
         }
     }
 
     #[test]
     fn a_time_between_two_cycles_goes_to_the_nearest() {
         let file = recording("1 ns", "#0 0! 0\" #31 1! #32 0! #94 1!");
-        let cycles: Vec<u64> = parse(&file, &CHANNELS).unwrap().iter().map(|change| change.0).collect();
+        let cycles: Vec<u64> = levels(&file, &CHANNELS).unwrap().iter().map(|change| change.0).collect();
         assert_eq!(cycles, [0, 0, 0, 1, 2]);
     }
 
     #[test]
     fn a_wrong_choice_of_channels_is_an_error_with_the_available_ones() {
         let file = recording("1 us", "#0 0! 0\"");
-        let error = |channels: &[(Pin, &str)]| parse(&file, channels).unwrap_err();
+        let error = |channels: &[(Pin, &str)]| levels(&file, channels).unwrap_err();
         let with_b = |b| [CHANNELS[0], (Pin::D3, b)];
         let unknown = error(&with_b("C"));
         assert_eq!(unknown, "pins.vcd has no channel `C`; it has `A`, `B`, `bus`");
         assert!(error(&with_b("bus")).contains("8 bits wide"));
         assert!(error(&with_b("A")).contains("given for two signals"));
         assert!(error(&[CHANNELS[0], CHANNELS[1], (Pin::D8, "B")]).contains("given for two signals"));
-        assert!(parse(&file, &[(Pin::D2, "analyser.A"), CHANNELS[1]]).is_ok());
+        assert!(levels(&file, &[(Pin::D2, "analyser.A"), CHANNELS[1]]).is_ok());
     }
 
     #[test]
@@ -235,16 +271,16 @@ mod tests {
         let file = recording("1 us", "#0 0! 0\" 1$")
             .replace("$enddefinitions", "$scope module other $end $var wire 1 $ A $end $upscope $end $enddefinitions");
         assert_eq!(
-            parse(&file, &CHANNELS).unwrap_err(),
+            levels(&file, &CHANNELS).unwrap_err(),
             "pins.vcd has several channels `A`: write one of `analyser.A`, `other.A`"
         );
-        let chosen = parse(&file, &[(Pin::D2, "other.A"), CHANNELS[1]]).unwrap();
+        let chosen = levels(&file, &[(Pin::D2, "other.A"), CHANNELS[1]]).unwrap();
         assert!(chosen.contains(&(0, Pin::D2, true)));
     }
 
     #[test]
     fn a_recording_that_leaves_levels_open_is_refused() {
-        let error = |file: &str| parse(file, &CHANNELS).unwrap_err();
+        let error = |file: &str| levels(file, &CHANNELS).unwrap_err();
         let open = error(&recording("1 us", "#0 0! 0\"\n#5 x!"));
         assert!(open.contains("pins.vcd has `x` on channel `A` at line 9"), "{open}");
         assert!(error(&recording("1 us", "#0 0!")).contains("no samples of channel `B`"));
@@ -256,12 +292,12 @@ mod tests {
 
     #[test]
     fn a_recording_that_would_never_end_or_is_nested_without_end_is_refused() {
-        let endless = parse(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
+        let endless = levels(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
         assert!(endless.contains("pins.vcd is longer than 24 h at line 9"), "{endless}");
         let nested = "$timescale 1 us $end\n".to_owned() + &"$scope module a $end\n".repeat(100_000);
-        let error = Capture::parse(Path::new("pins.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();
+        let error = parse(Path::new("pins.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("more than 50 scopes"), "{error}");
-        let error = Capture::parse(Path::new("pins.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
+        let error = parse(Path::new("pins.vcd"), vec![b' '; 2 << 20].as_slice(), &CHANNELS).unwrap_err();
         assert!(std::error::Error::source(&error).unwrap().to_string().contains("has no $enddefinitions"), "{error}");
     }
 
@@ -272,20 +308,18 @@ mod tests {
             Wire { pin: Pin::D3, name: "data", high_at_rest: false },
             Wire { pin: Pin::D8, name: "button", high_at_rest: true },
         ];
-        let mut written = Vec::new();
-        for count in 1..500_u64 {
-            written.push(PinChange {
-                cycle: count * count * 7919,
-                pin: [Pin::D2, Pin::D3, Pin::D8][count as usize % 3],
-                // The button begins high, the others low.
-                high: (count.div_ceil(3) % 2 == 1) != (count % 3 == 2),
-            });
-        }
+        let written = (1..500_u64).map(|count| PinChange {
+            cycle: count * count * 7919,
+            pin: wires[count as usize % 3].pin,
+            // The button begins high, the others low.
+            high: (count.div_ceil(3) % 2 == 1) != (count % 3 == 2),
+        });
+        let written: Vec<PinChange> = written.collect();
         let mut file = Vec::new();
-        crate::waveform::write(&mut file, &wires, written.iter().rev().copied()).unwrap();
-        let read = Capture::parse(Path::new("pins.vcd"), &*file, &wires.map(|wire| (wire.pin, wire.name)));
+        write(&mut file, &wires, written.iter().rev().copied()).unwrap();
+        let read = parse(Path::new("pins.vcd"), &*file, &wires.map(|wire| (wire.pin, wire.name)));
 
         let at_rest = wires.map(|wire| PinChange { cycle: 0, pin: wire.pin, high: wire.high_at_rest });
-        assert_eq!(read.unwrap().changes, [&at_rest[..], &written].concat());
+        assert_eq!(read.unwrap(), [&at_rest[..], &written].concat());
     }
 }

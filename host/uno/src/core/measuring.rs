@@ -1,27 +1,36 @@
-//! Interrupt statistics: for each vector a count and the range of its cycles, and the longest time with interrupts off.
+//! Measuring: for each interrupt vector a count and the range of its cycles, the longest time with interrupts off, and
+//! the turns of the main loop.
 //!
-//! The recorder is off by default, because watching every instruction slows the simulation. It does not measure how
-//! long an interrupt waited; the longest time off is a bound for that.
+//! A turn lasts from one `wdr` instruction to the next. So this works for any loop that feeds the watchdog once a turn.
+//! The time of interrupts during a turn is included, sleep is not. Both recorders are off by default, because watching
+//! every instruction slows the simulation. They do not measure how long an interrupt waited; the longest time off is a
+//! bound for that.
 
 use std::collections::BTreeMap;
 use std::mem::take;
 
-/// Cycles of one vector's handler, from its entry (4 cycles) to the end of its `reti`, with the handlers that
-/// interrupted it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct HandlerCycles {
-    /// Times it ran.
+/// Durations in cycles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cycles {
+    /// Their number.
     pub count: u64,
-    /// Fewest cycles of a run.
+    /// The shortest.
     pub fewest: u64,
-    /// Most cycles of a run.
+    /// The longest.
     pub most: u64,
-    /// Cycles of all runs.
+    /// All of them.
     pub total: u64,
 }
 
-impl HandlerCycles {
-    /// Mean cycles of a run.
+impl Cycles {
+    fn add(&mut self, cycles: u64) {
+        self.fewest = if self.count == 0 { cycles } else { self.fewest.min(cycles) };
+        self.most = self.most.max(cycles);
+        self.count += 1;
+        self.total += cycles;
+    }
+
+    /// The mean.
     pub fn mean(&self) -> f64 {
         self.total as f64 / self.count as f64
     }
@@ -41,8 +50,9 @@ pub enum Place {
 /// The statistics since the start of measuring.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InterruptStatistics {
-    /// By vector, counted from 0 (reset): INT0 is 1, PCINT0 3, Timer1 overflow 13.
-    pub handlers: BTreeMap<u8, HandlerCycles>,
+    /// The runs of each handler, from its entry (4 cycles) to the end of its `reti`, with the handlers that interrupted
+    /// it. By vector, counted from 0 (reset): INT0 is 1, PCINT0 3, Timer1 overflow 13.
+    pub handlers: BTreeMap<u8, Cycles>,
     /// Longest stretch of cycles with the interrupt flag of SREG clear, handlers included.
     pub longest_off: u64,
     /// Longest critical section of the main program, outside every handler. It lasts from the end of the instruction
@@ -53,9 +63,9 @@ pub struct InterruptStatistics {
 
 /// Turns the edges that simavr shows into statistics.
 #[derive(Default)]
-pub(super) struct InterruptRecorder {
+pub(crate) struct InterruptRecorder {
     /// `None` while it does not measure.
-    pub(super) statistics: Option<InterruptStatistics>,
+    pub(crate) statistics: Option<InterruptStatistics>,
     /// Handlers that have begun and not returned: vector and first cycle.
     running: Vec<(u8, u64)>,
     off_since: Option<u64>,
@@ -66,7 +76,7 @@ pub(super) struct InterruptRecorder {
 }
 
 impl InterruptRecorder {
-    pub(super) fn turn_on(&mut self) {
+    pub(crate) fn turn_on(&mut self) {
         *self = Self {
             statistics: Some(InterruptStatistics::default()),
             running: take(&mut self.running),
@@ -74,36 +84,25 @@ impl InterruptRecorder {
         };
     }
 
-    pub(super) fn begins(&mut self, vector: u8, cycle: u64) {
+    pub(crate) fn begins(&mut self, vector: u8, cycle: u64) {
         if self.statistics.is_some() {
             self.running.push((vector, cycle));
             self.off_since.get_or_insert(cycle);
         }
     }
 
-    pub(super) fn ends(&mut self, vector: u8, cycle: u64) {
+    pub(crate) fn ends(&mut self, vector: u8, cycle: u64) {
         // Measuring may have begun inside a handler.
         let Some((_, begun)) = self.running.pop_if(|(running, _)| *running == vector) else {
             return;
         };
-        let Some(statistics) = &mut self.statistics else {
-            return;
-        };
-        let cycles = cycle - begun;
-        let handler = statistics.handlers.entry(vector).or_insert(HandlerCycles {
-            count: 0,
-            fewest: cycles,
-            most: cycles,
-            total: 0,
-        });
-        handler.count += 1;
-        handler.fewest = handler.fewest.min(cycles);
-        handler.most = handler.most.max(cycles);
-        handler.total += cycles;
+        if let Some(statistics) = &mut self.statistics {
+            statistics.handlers.entry(vector).or_default().add(cycle - begun);
+        }
     }
 
     /// The interrupt flag of SREG after an instruction.
-    pub(super) fn interrupts_enabled(&mut self, enabled: bool, cycle: u64) {
+    pub(crate) fn interrupts_enabled(&mut self, enabled: bool, cycle: u64) {
         if !enabled {
             self.off_since.get_or_insert(cycle);
             if self.running.is_empty() && self.knows_who {
@@ -122,7 +121,39 @@ impl InterruptRecorder {
     }
 
     /// A reset ends every handler without a return.
-    pub(super) fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = Self { statistics: self.statistics.take(), ..Self::default() };
+    }
+}
+
+/// Times the main loop's turns.
+#[derive(Default)]
+pub(crate) struct TurnRecorder {
+    /// The complete turns; `None` while it does not measure.
+    pub(crate) turns: Option<Cycles>,
+    begun: Option<u64>,
+}
+
+impl TurnRecorder {
+    pub(crate) fn turn_on(&mut self) {
+        *self = Self { turns: Some(Cycles::default()), begun: None };
+    }
+
+    /// A `wdr` begins.
+    pub(crate) fn watchdog_is_fed(&mut self, cycle: u64) {
+        let begun = self.begun.replace(cycle);
+        if let (Some(turns), Some(begun)) = (&mut self.turns, begun) {
+            turns.add(cycle - begun);
+        }
+    }
+
+    /// The processor has slept, which is not a part of the turn.
+    pub(crate) fn slept(&mut self, cycles: u64) {
+        self.begun = self.begun.map(|begun| begun + cycles);
+    }
+
+    /// A reset ends a turn, which is not counted.
+    pub(crate) fn reset(&mut self) {
+        self.begun = None;
     }
 }

@@ -10,11 +10,13 @@
 
 use simavr_ffi as simavr;
 
+use super::chip::Chip;
+
 /// Inputs that are pins of the board.
 pub(super) const ADC_CHANNELS: usize = 6;
 
 /// Voltage of AVCC, of AREF, and of a digital output that is high.
-pub(super) const SUPPLY_MILLIVOLTS: u16 = 5000;
+pub(crate) const SUPPLY_MILLIVOLTS: u16 = 5000;
 
 /// The internal reference in millivolts, and the bits of ADMUX that choose it (data sheet, table 24-3).
 const BANDGAP_MILLIVOLTS: u16 = 1100;
@@ -28,25 +30,20 @@ const ADCSRA: u16 = 0x7A;
 const ADMUX: u16 = 0x7C;
 
 /// Sets the input and the end of the running conversion. simavr calls this when the sample is taken.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip and `adc` its ADC.
-pub(super) unsafe fn set_right(avr: *mut simavr::avr_t, adc: *mut simavr::avr_adc_t, millivolts: &[u16; ADC_CHANNELS]) {
-    // SAFETY: the caller vouches for both; the registers are addresses inside `data`.
-    unsafe {
-        // From here on simavr waits 11 times this number of cycles.
-        let prescaler = 1_u8 << (*(*avr).data.add(ADCSRA.into()) & 0b111).max(1);
-        (*adc).current_prescale = prescaler;
-        let reference = match *(*avr).data.add(ADMUX.into()) & REFS {
-            REFS => BANDGAP_MILLIVOLTS,
-            _ => SUPPLY_MILLIVOLTS,
-        };
-        for (value, &input) in (*adc).adc_values.iter_mut().zip(millivolts) {
-            let reference = u32::from(reference);
-            let result = (u32::from(input) * 1024 / reference).min(LARGEST);
-            // The smallest voltage that simavr converts to this result.
-            *value = (result * reference).div_ceil(LARGEST) as u16;
-        }
+pub(super) fn set_right(chip: Chip, millivolts: &[u16; ADC_CHANNELS]) {
+    let reference = match chip.read(ADMUX) & REFS {
+        REFS => BANDGAP_MILLIVOLTS,
+        _ => SUPPLY_MILLIVOLTS,
+    };
+    let reference = u32::from(reference);
+    let adc: *mut simavr::avr_adc_t = chip.peripheral(ADCSRA);
+    // SAFETY: ADCSRA is the ADC's, and no reference to the ADC is alive.
+    let adc = unsafe { &mut *adc };
+    // From here on simavr waits 11 times this number of cycles.
+    adc.current_prescale = 1_u8 << (chip.read(ADCSRA) & 0b111).max(1);
+    for (value, &input) in adc.adc_values.iter_mut().zip(millivolts) {
+        let result = (u32::from(input) * 1024 / reference).min(LARGEST);
+        // The smallest voltage that simavr converts to this result.
+        *value = (result * reference).div_ceil(LARGEST) as u16;
     }
 }

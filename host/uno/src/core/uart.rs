@@ -7,6 +7,8 @@
 
 use simavr_ffi as simavr;
 
+use super::chip::Chip;
+
 /// Complete bytes that the receiver holds: two in its buffer and one in the shift register (data sheet, USART0,
 /// receiver error flags).
 const RECEIVER_BYTES: u16 = 3;
@@ -17,6 +19,7 @@ const UCSR0B: u16 = 0xC1;
 const UCSR0C: u16 = 0xC2;
 const UBRR0L: u16 = 0xC4;
 const UBRR0H: u16 = 0xC5;
+const UDR0: u16 = 0xC6;
 
 /// UCSR0A: a byte waits.
 const RXC0: u8 = 1 << 7;
@@ -33,20 +36,14 @@ const UPM01: u8 = 1 << 5;
 
 /// Cycles of a byte on the serial line, from the UART's registers (data sheet, USART0, clock generation and frame
 /// formats).
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip.
-pub(super) unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
-    // SAFETY: the registers are addresses inside `data`, and the caller vouches for `avr`.
-    let register = |address: u16| unsafe { *(*avr).data.add(address.into()) };
-    let divisor = u64::from(u16::from_le_bytes([register(UBRR0L), register(UBRR0H) & 0x0F])) + 1;
-    let cycles_per_bit = match register(UCSR0A) & U2X0 {
+pub(super) fn cycles_per_byte(chip: Chip) -> u64 {
+    let divisor = u64::from(u16::from_le_bytes([chip.read(UBRR0L), chip.read(UBRR0H) & 0x0F])) + 1;
+    let cycles_per_bit = match chip.read(UCSR0A) & U2X0 {
         0 => 16 * divisor,
         _ => 8 * divisor,
     };
-    let format = register(UCSR0C);
-    let data_bits = match (register(UCSR0B) & 0b100) | (format >> 1 & 0b11) {
+    let format = chip.read(UCSR0C);
+    let data_bits = match (chip.read(UCSR0B) & 0b100) | (format >> 1 & 0b11) {
         size @ 0..=3 => 5 + u64::from(size),
         _ => 9,
     };
@@ -55,48 +52,46 @@ pub(super) unsafe fn cycles_per_byte(avr: *mut simavr::avr_t) -> u64 {
     cycles_per_bit * (1 + data_bits + parity_bits + stop_bits)
 }
 
+/// The chip's UART.
+pub(super) fn of(chip: Chip) -> *mut simavr::avr_uart_t {
+    chip.peripheral(UDR0)
+}
+
 /// Keeps the receiver's interrupt requested while bytes wait in it, as the chip does. simavr requests it once in a
 /// byte's time, and so delays a firmware that reads faster.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip, and `uart` its UART.
-pub(super) unsafe fn hand_over_received(avr: *mut simavr::avr_t, uart: *mut simavr::avr_uart_t) {
-    // SAFETY: the caller vouches for both; UCSR0A is an address inside `data`.
+pub(super) fn hand_over_received(chip: Chip) {
+    let uart = of(chip);
+    // SAFETY: `uart` is a part of the chip, and no reference to it is alive.
     unsafe {
         if (*uart).input.read != (*uart).input.write {
             (*uart).rx_cnt = 0;
-            if *(*avr).data.add(UCSR0A.into()) & RXC0 != 0 && (*uart).rxc.pending() == 0 {
-                simavr::avr_raise_interrupt(avr, &raw mut (*uart).rxc);
+            if chip.read(UCSR0A) & RXC0 != 0 && (*uart).rxc.pending() == 0 {
+                simavr::avr_raise_interrupt(chip.avr(), &raw mut (*uart).rxc);
             }
         }
     }
 }
 
-/// Gives the receiver a byte whose stop bit has just ended, on its line `input`. Returns whether it had room.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip, `uart` its UART, and `input` the UART's line for received bytes.
-pub(super) unsafe fn receive(
-    avr: *mut simavr::avr_t,
-    uart: *mut simavr::avr_uart_t,
-    input: *mut simavr::avr_irq_t,
-    byte: u8,
-) -> bool {
-    // SAFETY: the caller guarantees all three; the registers are addresses inside `data`.
+/// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
+pub(super) fn receive(chip: Chip, byte: u8) -> bool {
+    let uart = of(chip);
+    // SAFETY: as in `hand_over_received`.
     unsafe {
-        let fifo = &(*uart).input;
-        let waiting = fifo.write.wrapping_sub(fifo.read) % fifo.buffer.len() as u16;
-        let on = *(*avr).data.add(UCSR0B.into()) & RXEN0 != 0;
-        if on && waiting >= RECEIVER_BYTES {
-            *(*avr).data.add(UCSR0A.into()) |= DOR0;
+        let waiting = (*uart).input.write.wrapping_sub((*uart).input.read) % (*uart).input.buffer.len() as u16;
+        if chip.read(UCSR0B) & RXEN0 != 0 && waiting >= RECEIVER_BYTES {
+            chip.set(UCSR0A, chip.read(UCSR0A) | DOR0);
             return false;
         }
         // simavr would set the flag a whole byte later; it is due now.
         (*uart).cycles_per_byte = 1;
-        simavr::avr_raise_irq(input, byte.into());
-        (*uart).cycles_per_byte = cycles_per_byte(avr);
+        flood(chip, byte);
+        (*uart).cycles_per_byte = cycles_per_byte(chip);
     }
     true
+}
+
+/// Gives the receiver a byte, independent of the line's pace and the receiver's room.
+pub(super) fn flood(chip: Chip, byte: u8) {
+    // SAFETY: as in `hand_over_received`; the UART has this line.
+    unsafe { simavr::avr_raise_irq((*of(chip)).io.irq.add(simavr::UART_IRQ_INPUT as usize), byte.into()) };
 }

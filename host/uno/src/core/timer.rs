@@ -9,11 +9,10 @@
 //! simavr.
 
 use std::ffi::c_void;
-use std::ptr::NonNull;
 
 use simavr_ffi as simavr;
 
-use super::io_register::Writer;
+use super::chip::{Chip, Writer};
 
 // Registers by their address in the data space (data sheet, register summary).
 const TCNT0: u16 = 0x46;
@@ -33,7 +32,7 @@ const LAST_PRESCALER: u8 = 5;
 
 /// Timer1 of a chip.
 pub(super) struct Timer1 {
-    timer: NonNull<simavr::avr_timer_t>,
+    timer: *mut simavr::avr_timer_t,
     compare_writer: Writer,
     counter_writer: Writer,
     /// Cycles from the running period's bottom to the match of output A; 0 without a match.
@@ -41,19 +40,12 @@ pub(super) struct Timer1 {
 }
 
 impl Timer1 {
-    /// Finds a chip's Timer1.
-    ///
-    /// # Safety
-    ///
-    /// `avr` must be an initialised chip that outlives the result, and whose writers have not been replaced.
-    pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Timer1 {
-        // SAFETY: the caller vouches for `avr`.
-        let (compare_writer, counter_writer) = unsafe { (Writer::of(avr, OCR1AL), Writer::of(avr, TCNT1L)) };
+    /// A chip's Timer1. The chip's writers must not have been replaced, and it must outlive the result.
+    pub(super) fn of(chip: Chip) -> Timer1 {
         Timer1 {
-            // The parameter of simavr's writer of TCNT1 is the timer.
-            timer: NonNull::new(counter_writer.parameter().cast()).expect("the ATmega328P has a Timer1"),
-            compare_writer,
-            counter_writer,
+            timer: chip.peripheral(TCNT1L),
+            compare_writer: chip.writer(OCR1AL),
+            counter_writer: chip.writer(TCNT1L),
             running_compare_cycles: 0,
         }
     }
@@ -63,41 +55,30 @@ impl Timer1 {
         if high {
             // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it
             // meanwhile.
-            self.running_compare_cycles = unsafe { (*self.timer.as_ptr()).comp[0].comp_cycles };
+            self.running_compare_cycles = unsafe { (*self.timer).comp[0].comp_cycles };
         }
     }
 
     /// Whether the timer runs from the chip's clock, in fast PWM with a top that is not OCR1A.
-    ///
-    /// # Safety
-    ///
-    /// `avr` must be this timer's chip.
-    unsafe fn is_buffered(&self, avr: *mut simavr::avr_t) -> bool {
-        // SAFETY: the caller guarantees `avr`, and with it the timer; TCCR1B is an address inside `data`.
-        let (timer, control) = unsafe { (self.timer.as_ref(), *(*avr).data.add(TCCR1B.into())) };
-        (1..=LAST_PRESCALER).contains(&(control & CS1))
+    fn is_buffered(&self, chip: Chip) -> bool {
+        // SAFETY: as in `output_becomes`.
+        let timer = unsafe { &*self.timer };
+        (1..=LAST_PRESCALER).contains(&(chip.read(TCCR1B) & CS1))
             && timer.wgm_op_mode_kind == simavr::avr_timer_wgm_fast_pwm as i32
             && timer.mode.top() != simavr::avr_timer_wgm_reg_ocra
     }
 }
 
-/// Stops all timers, as a reset does. simavr's reset keeps their modes and periods.
-///
-/// # Safety
-///
-/// `avr` must be an initialised chip that is not running.
-pub(super) unsafe fn stop_all(avr: *mut simavr::avr_t, timer1: &Timer1) {
-    // SAFETY: the caller vouches for `avr`. The parameter of simavr's writer of TCNTn is the timer; Timer1's has been replaced.
-    unsafe {
-        let others = [TCNT0, TCNT2].map(|counter| Writer::of(avr, counter).parameter().cast::<simavr::avr_timer_t>());
-        for timer in [timer1.timer.as_ptr()].into_iter().chain(others) {
-            let timer = &mut *timer;
-            timer.mode = timer.wgm_op[0];
-            timer.wgm_op_mode_kind = timer.mode.kind() as i32;
-            timer.cs_div_value = 0;
-            timer.tov_cycles = 0;
-            timer.tov_top = 0;
-        }
+/// Stops all timers, as a reset does. simavr's reset keeps their modes and periods. The chip must not be running.
+pub(super) fn stop_all(chip: Chip, timer1: &Timer1) {
+    for timer in [chip.peripheral(TCNT0), timer1.timer, chip.peripheral(TCNT2)] {
+        // SAFETY: TCNT0 and TCNT2 belong to the other timers, and keep their writers. No reference to a timer is alive.
+        let timer = unsafe { &mut *timer };
+        timer.mode = timer.wgm_op[0];
+        timer.wgm_op_mode_kind = timer.mode.kind() as i32;
+        timer.cs_div_value = 0;
+        timer.tov_cycles = 0;
+        timer.tov_top = 0;
     }
 }
 
@@ -105,13 +86,13 @@ pub(super) unsafe fn stop_all(avr: *mut simavr::avr_t, timer1: &Timer1) {
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip, and `timer` its own timer. `timer` must not move while the chip runs, and no
-/// reference to it may be alive while the chip runs.
-pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, timer: *mut Timer1) {
-    // SAFETY: the caller guarantees both; the addresses are those of I/O registers.
+/// `timer` must be the chip's. It must not move while the chip runs, and no reference to it may be alive while the chip
+/// runs.
+pub(super) unsafe fn take_over_writes(chip: Chip, timer: *mut Timer1) {
+    // SAFETY: the caller guarantees `timer`.
     unsafe {
-        Writer::replace(avr, OCR1AL, on_compare_write, timer.cast());
-        Writer::replace(avr, TCNT1L, on_counter_write, timer.cast());
+        chip.replace_writer(OCR1AL, on_compare_write, timer.cast());
+        chip.replace_writer(TCNT1L, on_counter_write, timer.cast());
     }
 }
 
@@ -120,14 +101,14 @@ unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, lo
     // SAFETY: `timer1` is the one that `take_over_writes` registered, alive and not borrowed, and `avr` its chip.
     // simavr's writer may call back, so no reference into it is kept over the call.
     unsafe {
-        let timer1 = timer1.cast::<Timer1>();
-        if !(*timer1).is_buffered(avr) {
+        let (chip, timer1) = (Chip::of(avr), timer1.cast::<Timer1>());
+        if !(*timer1).is_buffered(chip) {
             let writer = (*timer1).compare_writer;
-            return writer.write(avr, register, low);
+            return writer.write(chip, register, low);
         }
-        *(*avr).data.add(register.into()) = low;
-        let compare = u16::from_le_bytes([low, *(*avr).data.add(OCR1AH.into())]);
-        let timer = (*timer1).timer.as_mut();
+        chip.set(register, low);
+        let compare = u16::from_le_bytes([low, chip.read(OCR1AH)]);
+        let timer = &mut *(*timer1).timer;
         // The match of the running period is already planned. The next period uses this value.
         timer.comp[0].comp_cycles = match compare <= timer.tov_top {
             true => u64::from(timer.cs_div_value) * (u64::from(compare) + 1),
@@ -140,17 +121,16 @@ unsafe extern "C" fn on_compare_write(avr: *mut simavr::avr_t, register: u16, lo
 unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, low: u8, timer1: *mut c_void) {
     // SAFETY: as in `on_compare_write`.
     unsafe {
-        let timer1 = timer1.cast::<Timer1>();
+        let (chip, timer1) = (Chip::of(avr), timer1.cast::<Timer1>());
         let writer = (*timer1).counter_writer;
-        if !(*timer1).is_buffered(avr) {
-            return writer.write(avr, register, low);
+        if !(*timer1).is_buffered(chip) {
+            return writer.write(chip, register, low);
         }
-        let timer = (*timer1).timer.as_ptr();
-        let control = (*avr).data.add(TCCR1A.into());
-        let counter = u16::from_le_bytes([low, *(*avr).data.add(TCNT1H.into())]);
+        let timer = (*timer1).timer;
+        let counter = u16::from_le_bytes([low, chip.read(TCNT1H)]);
         let prescaler = u64::from((*timer).cs_div_value);
         let (cycle, top, next_compare_cycles, connections) =
-            ((*avr).cycle, (*timer).tov_top, (*timer).comp[0].comp_cycles, *control);
+            ((*avr).cycle, (*timer).tov_top, (*timer).comp[0].comp_cycles, chip.read(TCCR1A));
 
         // The prescaler runs on, so the counter has had its new value since the last timer clock.
         let since_clock = cycle.wrapping_sub((*timer).tov_base) % prescaler;
@@ -161,10 +141,10 @@ unsafe extern "C" fn on_counter_write(avr: *mut simavr::avr_t, register: u16, lo
         let running = (*timer1).running_compare_cycles;
         let is_ahead = running > prescaler * (u64::from(counter) + 1);
         (*timer).comp[0].comp_cycles = if is_ahead { running } else { 0 };
-        *control = connections & !COM1;
-        writer.write(avr, register, low);
+        chip.set(TCCR1A, connections & !COM1);
+        writer.write(chip, register, low);
 
-        *control = connections;
+        chip.set(TCCR1A, connections);
         (*timer).comp[0].comp_cycles = next_compare_cycles;
         (*timer).tov_top = top;
         (*avr).cycle = cycle;

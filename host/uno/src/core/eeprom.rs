@@ -2,7 +2,7 @@
 //!
 //! simavr stores a byte at once. Its writer of EECR is replaced by one that lets simavr store the byte, and then keeps
 //! EEPE set for as long as the chip does (data sheet, 8.4.2). Until then EECR accepts no other command. A reset lets
-//! the pending write finish (8.4.3). [`TornByte`] is the result of a power failure.
+//! the pending write finish (8.4.3). [`Eeprom::tear`] has the result of a power failure.
 //!
 //! Only writes that erase first are timed (EEPM 00). The core is not halted for the few cycles after a command.
 
@@ -10,7 +10,7 @@ use std::ffi::c_void;
 
 use simavr_ffi as simavr;
 
-use super::io_register::Writer;
+use super::chip::{Chip, Writer};
 use crate::pins::CYCLES_PER_SECOND;
 
 /// Cycles of a write (data sheet, table 8-1): the first half erases the byte, the second writes it.
@@ -42,31 +42,17 @@ struct Write {
     begun: u64,
 }
 
-/// A byte whose write was interrupted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TornByte {
-    /// Its address.
-    pub(super) address: usize,
-    /// Bits that the cell sets for any written value: all of them while it is being erased.
-    pub(super) ones: u8,
-}
-
 impl Eeprom {
-    /// Finds a chip's EEPROM.
-    ///
-    /// # Safety
-    ///
-    /// `avr` must be an initialised chip whose writers have not been replaced.
-    pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Eeprom {
-        // SAFETY: the caller vouches for `avr`.
-        Eeprom { writer: unsafe { Writer::of(avr, EECR) }, write: None }
+    /// A chip's EEPROM. The chip's writers must not have been replaced.
+    pub(super) fn of(chip: Chip) -> Eeprom {
+        Eeprom { writer: chip.writer(EECR), write: None }
     }
 
-    /// The result for the byte that is being written, after a power failure at `cycle`.
-    pub(super) fn torn_byte(&self, cycle: u64) -> Option<TornByte> {
-        let Write { address, begun } = self.write?;
-        let ones = if cycle - begun < WRITE_CYCLES / 2 { 0xFF } else { STILL_ERASED };
-        Some(TornByte { address, ones })
+    /// Leaves the byte of `content` that is being written as a power failure at `cycle` does.
+    pub(super) fn tear(&self, content: &mut [u8], cycle: u64) {
+        if let Some(Write { address, begun }) = self.write {
+            content[address] |= if cycle - begun < WRITE_CYCLES / 2 { 0xFF } else { STILL_ERASED };
+        }
     }
 
     /// Applies a reset: the pending write finishes, and EECR is as at power-up.
@@ -79,31 +65,29 @@ impl Eeprom {
 ///
 /// # Safety
 ///
-/// `avr` must be an initialised chip, and `eeprom` its own EEPROM. `eeprom` must not move while the chip runs, and no
-/// reference to it may be alive while the chip runs.
-pub(super) unsafe fn take_over_writes(avr: *mut simavr::avr_t, eeprom: *mut Eeprom) {
-    // SAFETY: the caller guarantees both; the address is that of an I/O register.
-    unsafe { Writer::replace(avr, EECR, on_control_write, eeprom.cast()) };
+/// `eeprom` must be the chip's. It must not move while the chip runs, and no reference to it may be alive while the chip
+/// runs.
+pub(super) unsafe fn take_over_writes(chip: Chip, eeprom: *mut Eeprom) {
+    // SAFETY: the caller guarantees `eeprom`.
+    unsafe { chip.replace_writer(EECR, on_control_write, eeprom.cast()) };
 }
 
 /// simavr's callback for a write of EECR.
 unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, value: u8, parameter: *mut c_void) {
-    // SAFETY: `parameter` is the one that `take_over_writes` registered, alive and not borrowed, and `avr` its chip;
-    // the registers are addresses inside `data`.
+    // SAFETY: `parameter` is the one that `take_over_writes` registered, alive and not borrowed, and `avr` its chip.
     unsafe {
-        let eeprom = parameter.cast::<Eeprom>();
-        let control = (*avr).data.add(register.into());
+        let (chip, eeprom) = (Chip::of(avr), parameter.cast::<Eeprom>());
         if (*eeprom).write.is_some() {
-            *control = value & !(EERE | EEMPE) | EEPE;
+            chip.set(register, value & !(EERE | EEMPE) | EEPE);
             return;
         }
-        let writes = *control & EEMPE != 0 && value & EEPE != 0;
+        let writes = chip.read(register) & EEMPE != 0 && value & EEPE != 0;
         let writer = (*eeprom).writer;
-        writer.write(avr, register, value);
+        writer.write(chip, register, value);
         if writes {
-            let address = u16::from_le_bytes([*(*avr).data.add(EEARL.into()), *(*avr).data.add(EEARH.into())]);
-            (*eeprom).write = Some(Write { address: address.into(), begun: (*avr).cycle });
-            *control |= EEPE;
+            let address = u16::from_le_bytes([chip.read(EEARL), chip.read(EEARH)]);
+            (*eeprom).write = Some(Write { address: address.into(), begun: chip.cycle() });
+            chip.set(register, chip.read(register) | EEPE);
             simavr::avr_cycle_timer_register(avr, WRITE_CYCLES, Some(on_written), parameter);
         }
     }
@@ -113,8 +97,9 @@ unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, va
 unsafe extern "C" fn on_written(avr: *mut simavr::avr_t, _: u64, parameter: *mut c_void) -> u64 {
     // SAFETY: as in `on_control_write`.
     unsafe {
+        let chip = Chip::of(avr);
         (*parameter.cast::<Eeprom>()).write = None;
-        *(*avr).data.add(EECR.into()) &= !EEPE;
+        chip.set(EECR, chip.read(EECR) & !EEPE);
     }
     // No second time.
     0
