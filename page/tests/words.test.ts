@@ -132,7 +132,7 @@ test("what the session, weeder serve and the project's Rust say in English is kn
     }
     for (const [path, text] of [
         ["../host/link/src/error.rs", en.heard.servedGone],
-        ["../host/serve/src/routes.rs", en.heard.servedNoAnswer],
+        ["../host/serve/src/machine.rs", en.heard.servedNoAnswer],
         ["../host/serve/src/machine.rs", en.heard.servedNotThere],
     ] as const)
         assert(readFileSync(path, "utf8").includes(text), `${path} does not say: ${text}`);

@@ -265,7 +265,7 @@ test("the servo is calibrated by eye, and timed, while the machine stands", asyn
     // The steps and the next step are the manual's.
     await part(page, "set-up-steps").filter({ hasText: "Time the servo" }).waitFor();
     await part(page, "margin-said")
-        .filter({ hasText: "Next, time the servo: `calibrate servo` (1 of 2 done)" })
+        .filter({ hasText: "Next, time the servo: calibrate servo (1 of 2 done)" })
         .waitFor();
     await inspect(page, "phone-calibrate");
     await part(page, "servo-save").click();

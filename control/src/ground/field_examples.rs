@@ -134,6 +134,11 @@ impl<M: Memory> FieldExamples<M> {
         self.examples.get(..self.used.into()).unwrap_or(&self.examples)
     }
 
+    /// The memory, for a test or another machine.
+    pub fn into_memory(self) -> M {
+        self.memory
+    }
+
     /// The byte that holds a slot's pending bit.
     fn pending(&mut self, number: u8) -> &mut u8 {
         &mut self.pending[usize::from(number / 8)]
