@@ -14,13 +14,13 @@ pub fn allow(cpu: &CPU) {
 
 /// Notes that a turn begins.
 pub fn begin_turn() {
-    // SAFETY: outside of handlers, only this file uses GPIOR0.
+    // SAFETY: outside of handlers, only this file uses GPIOR0, and a handler in between leaves the bit clear, which is right too.
     unsafe { asm!("sbi 0x1e, 7", options(nostack, preserves_flags)) };
 }
 
 /// Sleeps until the next interrupt, if none has come since the turn began. One that comes between the two instructions is followed by a
 /// sleep, of 1.024 ms at most.
 pub fn sleep() {
-    // SAFETY: the instructions change nothing.
+    // SAFETY: the instructions change no register and no memory. The loop calls it with interrupts on, so the clock ends the sleep.
     unsafe { asm!("sbic 0x1e, 7", "sleep", options(nostack, preserves_flags)) };
 }

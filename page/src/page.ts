@@ -35,7 +35,7 @@ import {
 } from "./words/words.ts";
 
 /** Share of a frame's time for the chip. The rest is for the picture and the operator's clicks. */
-const CHIP_SHARE = 0.75;
+const CHIP_SHARE = 0.8;
 /** Longest time that passes in a frame: a page that was hidden does not catch up. */
 const LONGEST_FRAME_S = 0.1;
 /** Time between two pictures of the row under reduced motion. */

@@ -64,6 +64,11 @@ const RETI = 0x9518;
 const SEI = 0x9478;
 const SLEEP = 0x9588;
 
+/** The cycle of a peripheral's next event, from the CPU's private list. */
+function nextEvent(cpu: CPU): number {
+    return (cpu as unknown as { nextClockEvent: { cycles: number } | null }).nextClockEvent?.cycles ?? Infinity;
+}
+
 export class Chip {
     /** The board's pins, each a bit of a port: D0 to D13, then A0 to A5. */
     readonly pins: readonly { readonly port: AVRIOPort; readonly bit: number }[];
@@ -130,8 +135,10 @@ export class Chip {
                     instruction = program[cpu.pc];
                     avrInstruction(cpu);
                 }
-                this.#isAsleep = instruction === SLEEP && ((cpu.data[SMCR] ?? 0) & SE) !== 0;
+                if (instruction === SLEEP) this.#isAsleep = ((cpu.data[SMCR] ?? 0) & SE) !== 0;
             }
+            // Nothing else happens behind most instructions.
+            if (cpu.nextInterrupt < 0 && cpu.cycles < nextEvent(cpu)) continue;
             const next = cpu.pc;
             cpu.tick();
             if (cpu.pc !== next) {
@@ -145,8 +152,7 @@ export class Chip {
     #skipToEvent(): void {
         const cpu = this.#cpu;
         if (cpu.nextInterrupt >= 0 && cpu.interruptsEnabled) return;
-        const { nextClockEvent } = cpu as unknown as { nextClockEvent?: { cycles: number } };
-        cpu.cycles = Math.max(cpu.cycles, Math.min(this.#until, nextClockEvent?.cycles ?? this.#until));
+        cpu.cycles = Math.max(cpu.cycles, Math.min(this.#until, nextEvent(cpu)));
     }
 
     /** Calls `happen` after this number of cycles, unless a reset comes before. */

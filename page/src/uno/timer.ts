@@ -1,7 +1,7 @@
 // A timer of avr8js that is called only when something happens.
 //
 // avr8js calls a timer at each of its steps: two million times a second at a prescaler of 8. The count is right after any number of
-// steps (`count`), so a call is needed only at a compare match and at the end of the period. `lazily` postpones the calls up to there.
+// steps (`count`), so a call is needed only at a compare match and at the end of the period. `addTimer` postpones the calls up to there.
 // A write to a register calls the timer first, and at the next step again.
 
 import { AVRTimer, type AVRTimerConfig, type CPU } from "avr8js";
@@ -19,7 +19,7 @@ interface State {
     readonly timerMode: number;
 }
 
-/** Adds a timer to a chip. */
+/** Adds a timer to a chip, which then calls it only when something happens. */
 export function addTimer(cpu: CPU, config: AVRTimerConfig): void {
     const timer = new AVRTimer(cpu, config);
     const { count } = timer;
