@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use crate::error::FileError;
+use crate::file_error::FileError;
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf,

@@ -1,10 +1,7 @@
-//! The errors of a virtual Uno: it could not start, it stopped, a wait timed out, or a file cannot be used.
-
-use std::fmt::Display;
-use std::io;
-use std::path::{Path, PathBuf};
+//! The errors of a virtual Uno: it could not start, it stopped, or a wait timed out.
 
 use crate::elf::EEPROM_BYTES;
+use crate::file_error::FileError;
 
 /// Why a virtual Uno could not start, or stopped.
 #[derive(Debug, thiserror::Error)]
@@ -78,27 +75,4 @@ pub enum UnoError {
         /// The received text; [`Uno::received`](crate::Uno::received) still returns it.
         received: String,
     },
-}
-
-/// A file that cannot be used, and why.
-#[derive(Debug, thiserror::Error)]
-#[error("{} {problem}", path.display())]
-pub struct FileError {
-    path: PathBuf,
-    problem: String,
-    source: Option<io::Error>,
-}
-
-impl FileError {
-    pub(crate) fn new(path: &Path, problem: impl Display) -> Self {
-        Self { path: path.into(), problem: problem.to_string(), source: None }
-    }
-
-    pub(crate) fn unread(path: &Path, source: io::Error) -> Self {
-        Self::failed(path, "cannot be read", source)
-    }
-
-    pub(crate) fn failed(path: &Path, problem: impl Display, source: io::Error) -> Self {
-        Self { source: Some(source), ..Self::new(path, problem) }
-    }
 }

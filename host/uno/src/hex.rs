@@ -5,7 +5,8 @@
 //! run a bootloader; [`Uno`](crate::Uno) does.
 
 use crate::elf::{FLASH_BYTES, Image};
-use crate::error::{FileError, UnoError};
+use crate::error::UnoError;
+use crate::file_error::FileError;
 use ihex::{Reader, ReaderError, Record};
 use std::fmt::Display;
 use std::path::Path;

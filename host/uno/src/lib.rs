@@ -1,9 +1,9 @@
 #![doc = include_str!("../README.md")]
 //! # Imports
 //!
-//! They run one way: `error` -> `elf` -> `hex`, `core` -> `board` -> `pty`. Inside `core`: `chip` -> `timer`, `eeprom`,
+//! They run one way: `file_error` -> `elf` -> `error` -> `hex`, `core` -> `board` -> `pty`. Inside `core`: `chip` -> `timer`, `eeprom`,
 //! `adc`, `uart`, with `measuring` beside them -> `recorder`, which owns what simavr calls back with -> `core`
-//! itself, which runs it. `pins` knows none of these and is known to all; `recording` knows only `pins` and `error`.
+//! itself, which runs it. `pins` knows none of these and is known to all; `recording` knows only `pins` and `file_error`.
 
 #[cfg(feature = "simavr")]
 mod board;
@@ -13,6 +13,8 @@ mod core;
 pub mod elf;
 #[cfg(feature = "simavr")]
 mod error;
+#[cfg(feature = "simavr")]
+mod file_error;
 #[cfg(feature = "simavr")]
 pub mod hex;
 mod pins;
@@ -27,5 +29,6 @@ pub use self::{
     board::{BAUD, SENT_BYTE_CYCLES, Uno},
     core::measuring::{Cycles, InterruptStatistics, Place},
     core::recorder::{ReceivedByte, Reset, ResetCause},
-    error::{FileError, UnoError},
+    error::UnoError,
+    file_error::FileError,
 };

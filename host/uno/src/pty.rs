@@ -11,7 +11,7 @@
 //! and do not report who opens it.
 
 use crate::board::BAUD;
-use crate::error::FileError;
+use crate::file_error::FileError;
 use rustix::fd::OwnedFd;
 use rustix::fs::{OFlags, fcntl_setfl, inotify};
 use rustix::io::Errno;

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use vcd::{Command, IdCode, Parser, Scope, ScopeItem, SimulationCommand, TimescaleUnit, Value, Var, Writer};
 
-use crate::error::FileError;
+use crate::file_error::FileError;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Wire};
 
 /// Longest recording, in hours. The firmware would take days to play a longer one.

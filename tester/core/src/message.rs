@@ -20,9 +20,6 @@ pub const STEPS: usize = 24;
 /// Most steps of a pattern.
 pub const PATTERN_STEPS: usize = 128;
 
-/// Most pieces in the tester's queue.
-pub const QUEUE_PIECES: usize = 64;
-
 /// A step of a pattern: it waits 10 cycles and 3 for each `delay`, and then changes the lines of `toggle`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Step {

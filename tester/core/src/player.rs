@@ -3,10 +3,12 @@
 //! A piece is an action on the lines, and the cycles since the previous event.
 //! It has no clock: the caller fires each event in time, and then waits as long as the player says.
 
-use crate::message::QUEUE_PIECES;
 use crate::pins::{ALL_LINES, AT_REST, Line};
 use heapless::Deque;
 use serde::{Deserialize, Serialize};
+
+/// Most pieces in the tester's queue.
+pub const QUEUE_PIECES: usize = 64;
 
 /// One action, once or several times. Each is an event, a number of cycles after the previous event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

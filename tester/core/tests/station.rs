@@ -1,10 +1,9 @@
 //! The station's commands on a board without a chip.
 
 use tester_core::frame::{Receiver, encode};
-use tester_core::message::{Command, Done, QUEUE_PIECES, Record, Refusal, Step};
+use tester_core::message::{Command, Done, Record, Refusal, Step};
 use tester_core::pins::{AT_REST, Line};
-use tester_core::player::{Action, Piece};
-use tester_core::player::{Next, Player};
+use tester_core::player::{Action, Next, Piece, Player, QUEUE_PIECES};
 use tester_core::station::{Board, Station};
 
 /// A board without a chip.

@@ -1,12 +1,12 @@
 //! A plot's counts and measurements, and its measures by the paper's Eq. 22 to 27. The paper models four of them on
 //! speed and spacing.
 
-use super::table::{count, number};
 use crate::table::{fixed, short};
 use anyhow::{Result, anyhow};
 use files::FileError;
 use files::csv_table::Line;
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 const M2_PER_HA: f64 = 10_000.0;
 const S_PER_H: f64 = 3600.0;
@@ -202,5 +202,26 @@ impl Response {
             Self::PerformanceIndex => performance.performance_index,
             Self::FieldEfficiency => performance.field_efficiency_percent,
         }
+    }
+}
+
+/// Parses a count. Its least value is the one in [`PlotRecord::check`].
+fn count(line: Line, column: &str, least: u32) -> Result<u32, FileError> {
+    line.value(column, &format!("a whole number, {least} or more"))
+}
+
+fn number(line: Line, column: &str) -> Result<f64, FileError> {
+    let Number(value) = line.value(column, "a number, like 1.5")?;
+    Ok(value)
+}
+
+/// A decimal number, without `inf` and `nan`.
+struct Number(f64);
+
+impl FromStr for Number {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        text.parse().ok().filter(|value: &f64| value.is_finite()).map(Self).ok_or(())
     }
 }

@@ -7,7 +7,6 @@ use super::plot::{COLUMNS, PlotRecord};
 use files::FileError;
 use files::csv_table::{CsvTable, Line};
 use std::path::Path;
-use std::str::FromStr;
 
 /// Reads the plots of a trial.
 ///
@@ -41,27 +40,6 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
         plots.push((line.number(), plot));
     }
     Ok(plots.into_iter().map(|(_, plot)| plot).collect())
-}
-
-/// Parses a count. Its least value is the one in [`PlotRecord::check`].
-pub(super) fn count(line: Line, column: &str, least: u32) -> Result<u32, FileError> {
-    line.value(column, &format!("a whole number, {least} or more"))
-}
-
-pub(super) fn number(line: Line, column: &str) -> Result<f64, FileError> {
-    let Number(value) = line.value(column, "a number, like 1.5")?;
-    Ok(value)
-}
-
-/// A decimal number, without `inf` and `nan`.
-struct Number(f64);
-
-impl FromStr for Number {
-    type Err = ();
-
-    fn from_str(text: &str) -> Result<Self, ()> {
-        text.parse().ok().filter(|value: &f64| value.is_finite()).map(Self).ok_or(())
-    }
 }
 
 #[cfg(test)]
