@@ -73,7 +73,7 @@ const SPARE_MS: u8 = 7;
 /// Longest wait of a command in fixed frames.
 const FRAME_MS: u8 = 20;
 
-/// How late the end switch may be read: the loop sleeps for so long at most.
+/// How late the end switch may be read: the loop sleeps until the clock's interrupt, every 1.024 ms.
 const LATE_MS: u16 = 1;
 
 /// The servo's measured times.
@@ -81,7 +81,7 @@ const LATE_MS: u16 = 1;
 pub struct SwingTimes {
     /// The longest time from the command until the tool was out, plus the longest wait of a command.
     pub out_ms: u16,
-    /// The shortest time from the command until the tool began to come back. It is never too long, although the switch is read late.
+    /// The shortest time from the command until the tool began to come back, less a millisecond: the switch is read late.
     pub in_ms: u16,
 }
 

@@ -1,8 +1,8 @@
 // A timer of avr8js that is called only when something happens.
 //
-// avr8js calls a timer at each of its steps: two million times a second at a prescaler of 8. The count is right after any number of
-// steps (`count`), so a call is needed only at a compare match and at the end of the period. `addTimer` postpones the calls up to there.
-// A write to a register calls the timer first, and at the next step again.
+// avr8js calls a timer at each of its steps: two million times a second at a prescaler of 8. One call can count any number of steps
+// (`count`). So a call is needed only at a compare match, at the top and at the end of the period, and `addTimer` postpones it up to
+// there. A write to a register calls the timer first, and at the next step again. tests/timer.test.ts compares both.
 
 import { AVRTimer, type AVRTimerConfig, type CPU } from "avr8js";
 
@@ -26,7 +26,7 @@ export function addTimer(cpu: CPU, config: AVRTimerConfig): void {
     const add = cpu.addClockEvent.bind(cpu);
     cpu.addClockEvent = (callback, cycles) =>
         add(callback, callback === count && cycles > 1 ? cycles + moreCycles(timer as unknown as State) : cycles);
-    for (const register of [config.TCCRA, config.OCRA, config.OCRB, config.ICR]) {
+    for (const register of [config.TCCRA, config.TCCRB, config.OCRA, config.OCRB, config.ICR]) {
         const write = cpu.writeHooks[register];
         if (!register || !write) continue;
         cpu.writeHooks[register] = (...change) => {
@@ -40,7 +40,8 @@ export function addTimer(cpu: CPU, config: AVRTimerConfig): void {
 
 /** Cycles from a timer's next step to the first step at which something happens. */
 function moreCycles({ tcnt, ocrA, ocrB, TOP, divider, timerMode }: State): number {
-    if (!COUNTS_UP.includes(timerMode)) return 0;
-    const next = Math.min(...[ocrA, ocrB, TOP + 1].filter((value) => value > tcnt));
-    return Number.isFinite(next) ? (next - tcnt - 1) * divider : 0;
+    // A top that was set below the count ends the period at once.
+    if (!COUNTS_UP.includes(timerMode) || tcnt > TOP) return 0;
+    // From 0 to 0 in one call would look like no step: the top comes between.
+    return (Math.min(...[ocrA, ocrB, TOP, TOP + 1].filter((value) => value > tcnt)) - tcnt - 1) * divider;
 }
