@@ -51,6 +51,9 @@ test("a timer that is called seldom counts, matches and moves its pins as one th
             write(TCCRA, a ?? 0);
             write(TCCRB, b ?? 0);
         }
+        // Another mode while it counts.
+        if (pick === 0) write(TCCRA, [0x00, 0x82, 0xc2, 0x50, 0xa3][below(5)] ?? 0);
+        if (pick === 1) write(TCCRB, [0x1a, 0x19, 0x0a, 0x09, 0x02, 0x1b][below(6)] ?? 0);
         if (pick === 2) write(OCRA, value, true);
         if (pick === 3) write(OCRB, value, true);
         if (pick === 4) write(ICR, value, true);
