@@ -94,10 +94,7 @@ impl<'a> Player<'a> {
     /// the log shows it.
     pub(super) fn new(stretch: &'a Stretch<'a>, pace: Pace) -> Self {
         let canopies = Canopies::of(stretch);
-        // It starts a little earlier, so that it sees a detection at that position in full.
-        let began = stretch.began();
-        let has_rolled = began != stretch.first.position;
-        let position = if has_rolled { began.wrapping_sub(DETECTION_TICKS + 1) } else { began };
+        let position = stretch.began();
         let broken = canopies.over(position).is_some();
         // The log's sensors. Add another only if the log has its level; else refuse such a log in `replay_stretch`.
         let readings = Readings {

@@ -1,7 +1,7 @@
 //! A stretch of a log, from one start of the link to its end: its lines in order, and the machine's positions that
 //! follow from them.
 
-use super::ReplayError;
+use super::{DETECTION_TICKS, ReplayError};
 use crate::examples::{Taught, taught};
 use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
@@ -83,26 +83,35 @@ impl<'a> Stretch<'a> {
         Ok(first.map(|first| Self { settings, examples, built_in, first, happened }))
     }
 
-    /// The position where watching began, if the log shows it. If all ground up to the tool was already seen, it is the
-    /// start of the log, or the beginning of the detection in the beam there.
+    /// The position from which the machine is replayed. If the log shows where watching began, it is that, or a little
+    /// earlier if the machine has rolled since: a detection there is seen in full. Else it is the front of the first
+    /// detection in the log that the machine had reached by then, and the gap that the firmware wants to see ahead of it.
     pub(super) fn began(&self) -> i32 {
         let first = self.first.position;
         // There the tool had all of this to go: the distance from the beam, and the margin ahead of unseen ground.
         let all_mm = self.settings.get(Setting::BeamToToolMm) + self.settings.get(Setting::MarginMm);
-        let unseen_mm = self.first.unseen_mm.clamp(0, all_mm.into()) as u16;
-        if unseen_mm > 0 {
-            return first.wrapping_sub(self.settings.wheel().ticks(all_mm - unseen_mm).0);
-        }
-        self.in_the_beam_at_first().map_or(first, |(from, _)| from)
+        let rolled = if self.first.unseen_mm > 0 {
+            let unseen_mm = self.first.unseen_mm.min(all_mm.into()) as u16;
+            if unseen_mm == all_mm {
+                return first;
+            }
+            self.settings.wheel().ticks(all_mm - unseen_mm).0
+        } else {
+            let front = self.reached_at_first().map_or(first, |(front, _)| front);
+            first.wrapping_sub(front).wrapping_add(self.settings.ticks(Setting::MergeGapMm).0)
+        };
+        first.wrapping_sub(rolled).wrapping_sub(DETECTION_TICKS + 1)
     }
 
-    /// The ground of the detection that was in the beam when the log began.
-    fn in_the_beam_at_first(&self) -> Option<(i32, i32)> {
+    /// Front and end of the first detection in the log whose front the machine had reached when the log began.
+    fn reached_at_first(&self) -> Option<(i32, i32)> {
         let widest = self.settings.ticks(Setting::MaxWidthMm).0;
+        let margins = 2 * self.settings.ticks(Setting::MarginMm).0;
         self.happened.iter().find_map(|(_, happened)| match happened {
             Happened::Event(EventLine::Detection { position, hold, .. }) => {
                 let before = self.first.position.wrapping_sub(*position);
-                (0..=widest).contains(&before).then_some((*position, position.wrapping_add(*hold)))
+                let end = position.wrapping_add(hold.wrapping_sub(margins));
+                (0..=widest).contains(&before).then_some((*position, end))
             }
             _ => None,
         })
@@ -115,9 +124,10 @@ impl<'a> Stretch<'a> {
             return i32::MIN;
         }
         let first = self.first.position;
-        // The hold includes both margins.
-        let behind = self.in_the_beam_at_first().map_or(0, |(_, to)| to.wrapping_sub(first).max(0));
-        first.saturating_add(self.settings.ticks(Setting::BeamToToolMm).0).saturating_add(behind)
+        let reached = self.reached_at_first().map_or(0, |(_, end)| end.wrapping_sub(first).max(0));
+        // The zone of the last canopy before.
+        let zone = [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| self.settings.ticks(setting).0);
+        zone.into_iter().fold(first.saturating_add(reached), i32::saturating_add)
     }
 
     /// The machine's position at a typed command that changes no state: between its last position, with that time, and

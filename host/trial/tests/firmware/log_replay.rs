@@ -7,7 +7,7 @@ use field::row::{Canopy, Row};
 use link::log::{self, Entry, Kind, LogWriter};
 use link::replay::{Replayed, replay};
 use link::session::{Happening, Session};
-use link::{Link, LinkError, Status};
+use link::{EventLine, Link, LinkError, Status};
 use model_test::cases;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -192,6 +192,29 @@ fn a_row_at_a_steady_speed_is_decided_the_same_on_the_host() {
     weed.text = weed.text.replace("weed", "plant");
     let difference = replay(&tampered).expect("it can be replayed").difference.expect("they differ");
     assert!(difference.to_string().contains("the replay `weed pos="), "{difference}");
+}
+
+/// The session begins at each position of a metre with a weed and a plant.
+#[test]
+fn a_log_that_begins_anywhere_in_the_row_is_decided_the_same_on_the_host() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let log = logged(&row(), &motion, &["start"]);
+    let (settings, lines) = log.split_at(log.iter().position(|entry| entry.kind == Kind::Status).expect("a status"));
+    for first in 1650..3550 {
+        let is_behind = |entry: &&Entry| match (entry.kind, EventLine::parse(&entry.text)) {
+            (Kind::Status, _) => Status::parse(&entry.text).expect("a status").position > first,
+            // It is reported when the canopy has passed the beam.
+            (_, Some(EventLine::Detection { position, hold, .. })) => position + hold > first,
+            (_, Some(EventLine::Swing { position, .. })) => position > first,
+            _ => false,
+        };
+        let behind: Vec<Entry> = lines.iter().filter(is_behind).cloned().collect();
+        let text = format!("state=work tool=out pos={first} speed_mm_s=500 windows=1 unseen_mm=0");
+        let status = Entry { kind: Kind::Status, text, ..behind[0].clone() };
+        let replayed = replay(&[settings, &[status], &behind].concat()).expect("the log can be replayed");
+        assert_eq!(replayed.difference, None, "from {first}: {replayed:#?}");
+        assert!(replayed.objects >= 1 && replayed.swings >= 1, "from {first}: {replayed:#?}");
+    }
 }
 
 #[test]
