@@ -9,7 +9,7 @@ const CLASSES: usize = 3;
 const NAMES: [&str; CLASSES] = ["beet", "fat hen", "chickweed"];
 
 /// Leaf length (mm), leaf width (mm), leaf stalk (mm), and the class.
-const MEASURED: [([i32; 3], u8); 12] = [
+const MEASURED: [([i16; 3], u8); 12] = [
     ([48, 27, 22], 0),
     ([55, 30, 27], 0),
     ([61, 33, 31], 0),
@@ -48,7 +48,7 @@ fn main() -> Result<(), ClassifyError> {
     Ok(())
 }
 
-fn report([length, width, stalk]: [i32; 3], answer: &Answer<CLASSES>) {
+fn report([length, width, stalk]: [i16; 3], answer: &Answer<CLASSES>) {
     let name = NAMES[usize::from(answer.label)];
     let verdict = match answer.kind {
         Kind::Known => format!("a {name}"),

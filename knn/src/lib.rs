@@ -14,7 +14,7 @@
 //!
 //! // Leaf length and width in mm, and what the plant was: 0 beet, 1 chickweed.
 //! const SCALE: Scale<2> = Scale::new([Range { lowest: 0, highest: 90 }, Range { lowest: 0, highest: 50 }]);
-//! const fn example(length_mm: i32, width_mm: i32, label: u8) -> Example<2> {
+//! const fn example(length_mm: i16, width_mm: i16, label: u8) -> Example<2> {
 //!     Example::new(SCALE.quantise(&[length_mm, width_mm]), label)
 //! }
 //! let built_in = [example(48, 27, 0), example(55, 30, 0), example(12, 8, 1), example(15, 10, 1)];
@@ -35,7 +35,7 @@
 //! |---|---|---|
 //! | `[Example<F>; n]` | n (F + 1) | |
 //! | [`Table<F, N>`](Table) | N (F + 1) + 2 | `add_example` O(1), `remove` O(n) |
-//! | [`Scale<F>`](Scale) | 7 F | `quantise`: F subtractions, shifts and multiplications |
+//! | [`Scale<F>`](Scale) | 5 F | `quantise`: F subtractions, shifts and multiplications |
 //! | [`Nearest`] for k, which may be kept | 4 k + 7 + 2 C | |
 //! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
 //!

@@ -10,9 +10,9 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Range {
     /// Maps onto 0, as does everything below it.
-    pub lowest: i32,
+    pub lowest: i16,
     /// Maps onto 255, as does everything above it.
-    pub highest: i32,
+    pub highest: i16,
 }
 
 /// A scale for each of `FEATURES` features.
@@ -29,7 +29,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
     ///
     /// const SCALE: Scale<2> = Scale::new([Range { lowest: 0, highest: 1000 }, Range { lowest: -50, highest: 50 }]);
     /// assert_eq!(SCALE.quantise(&[500, 0]), [127, 127]);
-    /// assert_eq!(SCALE.quantise(&[i32::MAX, i32::MIN]), [255, 0]);
+    /// assert_eq!(SCALE.quantise(&[i16::MAX, i16::MIN]), [255, 0]);
     /// ```
     #[must_use]
     pub const fn new(ranges: [Range; FEATURES]) -> Self {
@@ -48,7 +48,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
     /// on either side are for values outside the training. So a stranger stays far from all examples, instead of saturating onto
     /// the outermost. One extreme value stretches its feature's range and compresses the other values: remove outliers first.
     #[must_use]
-    pub const fn learn_ranges(rows: &[[i32; FEATURES]]) -> Option<[Range; FEATURES]> {
+    pub const fn learn_ranges(rows: &[[i16; FEATURES]]) -> Option<[Range; FEATURES]> {
         let Some((first, others)) = rows.split_first() else {
             return None;
         };
@@ -79,13 +79,13 @@ impl<const FEATURES: usize> Scale<FEATURES> {
     /// ```
     /// use knn::Scale;
     ///
-    /// // A leaf's length in micrometres would drown the number of its teeth; scaled, both count alike.
-    /// let scale = Scale::learn(&[[51_000, 2], [70_000, 14], [63_000, 26]]).expect("there are rows");
-    /// assert_eq!(scale.quantise(&[51_000, 2]), [63, 63]);
-    /// assert_eq!(scale.quantise(&[70_000, 26]), [191, 191]);
+    /// // A leaf's length in hundredths of a millimetre would drown the number of its teeth; scaled, both count alike.
+    /// let scale = Scale::learn(&[[5100, 2], [7000, 14], [6300, 26]]).expect("there are rows");
+    /// assert_eq!(scale.quantise(&[5100, 2]), [63, 63]);
+    /// assert_eq!(scale.quantise(&[7000, 26]), [191, 191]);
     /// ```
     #[must_use]
-    pub const fn learn(rows: &[[i32; FEATURES]]) -> Option<Self> {
+    pub const fn learn(rows: &[[i16; FEATURES]]) -> Option<Self> {
         match Self::learn_ranges(rows) {
             Some(ranges) => Some(Self::new(ranges)),
             None => None,
@@ -94,7 +94,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
 
     /// The features as bytes. Values outside their range become 0 or 255.
     #[must_use]
-    pub const fn quantise(&self, values: &[i32; FEATURES]) -> [u8; FEATURES] {
+    pub const fn quantise(&self, values: &[i16; FEATURES]) -> [u8; FEATURES] {
         let mut bytes = [0; FEATURES];
         let mut feature = 0;
         while feature < FEATURES {
@@ -106,7 +106,7 @@ impl<const FEATURES: usize> Scale<FEATURES> {
 }
 
 impl Range {
-    /// The range widened by half its width on either side, within `i32`.
+    /// The range widened by half its width on either side, within `i16`.
     const fn with_room(self) -> Self {
         let width = self.highest.abs_diff(self.lowest);
         // Rounded up, so that a width of 1 gets room too; a width of 0 stays 0.
@@ -118,7 +118,7 @@ impl Range {
 /// `byte = ((value - offset) >> shift) * factor >> 8`, limited to 0..=255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct FeatureScale {
-    offset: i32,
+    offset: i16,
     /// Brings the range's width below 512: a byte needs no finer step.
     shift: u8,
     /// Bytes a step, with 8 fractional bits; 0 for a constant feature.
@@ -131,23 +131,20 @@ impl FeatureScale {
             return Self { offset: range.lowest, shift: 0, factor: 0 };
         }
         let width = range.highest.abs_diff(range.lowest);
-        // At most 23, because the width has 32 bits and 9 are kept.
-        let shift = 23_u32.saturating_sub(width.leading_zeros());
+        // At most 7, because the width has 16 bits and 9 are kept.
+        let shift = 7_u32.saturating_sub(width.leading_zeros());
         // From 1 to 511, so the factor is from 128 to 65,280 and fits. Rounded up, it takes `highest` to 255.
         let steps = width >> shift;
-        Self { offset: range.lowest, shift: shift as u8, factor: (255_u32 * 256).div_ceil(steps) as u16 }
+        Self { offset: range.lowest, shift: shift as u8, factor: (255_u32 * 256).div_ceil(steps as u32) as u16 }
     }
 
-    const fn quantise(self, value: i32) -> u8 {
+    const fn quantise(self, value: i16) -> u8 {
         if value <= self.offset {
             return 0;
         }
         // Above the offset, the wrapped difference is exact.
-        let steps = (value as u32).wrapping_sub(self.offset as u32) >> self.shift;
-        // 511 steps with the smallest factor, 128, already give 255. So a limit of 16 bits changes nothing, and the product of two
-        // 16-bit numbers fits 32 bits.
-        let steps = if steps > u16::MAX as u32 { u16::MAX as u32 } else { steps };
-        let byte = (steps * self.factor as u32) >> 8;
+        let steps = (value as u16).wrapping_sub(self.offset as u16) >> self.shift;
+        let byte = (steps as u32 * self.factor as u32) >> 8;
         if byte > 255 { 255 } else { byte as u8 }
     }
 }

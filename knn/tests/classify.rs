@@ -219,10 +219,10 @@ fn smartcore_class<const FEATURES: usize>(examples: &[Example<FEATURES>], query:
 #[test]
 fn on_fishers_irises_smartcore_gives_the_same_classes_and_few_are_wrong() {
     let irises = iris::load_dataset();
-    let rows: Vec<[i32; 4]> = irises
+    let rows: Vec<[i16; 4]> = irises
         .data
         .chunks_exact(4)
-        .map(|row| std::array::from_fn(|feature| (f64::from(row[feature]) * 10.0).round() as i32))
+        .map(|row| std::array::from_fn(|feature| (f64::from(row[feature]) * 10.0).round() as i16))
         .collect();
     let scale = Scale::learn(&rows).expect("there are rows");
     let examples: Vec<Example<4>> =

@@ -25,7 +25,7 @@ pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
     let (mut bytes, mut place) = ([0; 8 * features::COUNT], 0);
     while place < bytes.len() {
         let knn::Range { lowest, highest } = table::RANGES[place / 8];
-        bytes[place] = [lowest.to_le_bytes(), highest.to_le_bytes()][place % 8 / 4][place % 4];
+        bytes[place] = [(lowest as i32).to_le_bytes(), (highest as i32).to_le_bytes()][place % 8 / 4][place % 4];
         place += 1;
     }
     bytes
@@ -39,7 +39,7 @@ pub const K: u8 = table::K;
 
 /// Half the width, in mm, of the narrowest plant among the examples. A detection narrower than this has a weed's width.
 pub const NARROW_MM: i16 = {
-    let (mut narrowest, mut index) = (i32::MAX, 0);
+    let (mut narrowest, mut index) = (i16::MAX, 0);
     while index < COUNT {
         let ([.., hold, _], label) = table::TRAINED[index];
         let width = hold - features::HOLD_BEYOND_WIDTH_MM;
@@ -48,7 +48,7 @@ pub const NARROW_MM: i16 = {
         }
         index += 1;
     }
-    (narrowest / 2) as i16
+    narrowest / 2
 };
 
 /// Most examples within the flash budget, at 6 bytes each.
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn the_bytes_of_the_scale_are_the_ranges_of_all_its_features() {
-        let bounds = table::RANGES.iter().flat_map(|range| [range.lowest, range.highest]);
+        let bounds = table::RANGES.iter().flat_map(|range| [range.lowest, range.highest].map(i32::from));
         assert_eq!(SCALE_BYTES[..], bounds.flat_map(i32::to_le_bytes).collect::<Vec<u8>>());
     }
 

@@ -19,7 +19,7 @@ mod reference {
 }
 
 /// Hold minus width, in mm.
-pub const HOLD_BEYOND_WIDTH_MM: i32 = 2 * reference::MARGIN_MM as i32;
+pub const HOLD_BEYOND_WIDTH_MM: i16 = 2 * reference::MARGIN_MM as i16;
 
 /// The feature vector of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,14 +53,9 @@ impl Features {
 
     /// The features in the paper's order: speed, encoder value, delay, hold, actuation.
     #[inline(never)]
-    pub const fn values(&self) -> [i32; COUNT] {
-        [
-            self.speed_mm_s as i32,
-            self.spacing_mm as i32,
-            self.delay_mm as i32,
-            self.hold_mm as i32,
-            self.actuation_mm as i32,
-        ]
+    pub const fn values(&self) -> [i16; COUNT] {
+        let Self { speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm } = *self;
+        [speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm]
     }
 }
 

@@ -168,12 +168,12 @@ impl KeepOut {
     /// Drops the canopies that end at a position or behind it.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn leave(&mut self, position: WrappedPosition) {
-        if !position.is_ahead_of(self.known_from) {
-            return;
+        if position.is_ahead_of(self.known_from) {
+            (self.known_from, self.has_dropped) = (position, true);
         }
-        (self.known_from, self.has_dropped) = (position, true);
-        // They are in order, so only the first can lie behind.
-        while self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(position)) {
+        // They are in order, so only the first can lie behind. If the second does too, the next turn drops it: until then the unknown
+        // ground covers it.
+        if self.canopies.first().is_some_and(|canopy| !canopy.trailing.is_ahead_of(self.known_from)) {
             self.canopies.remove(0);
         }
     }
@@ -201,7 +201,7 @@ impl KeepOut {
 
     /// Zones at the tool or ahead of it.
     pub fn ahead(&self, tool: WrappedPosition, margin: Length) -> u8 {
-        self.canopies.iter().filter(|canopy| !tool.is_ahead_of(canopy.trailing + margin)).count() as u8
+        self.canopies.iter().map(|canopy| u8::from(!(tool - margin).is_ahead_of(canopy.trailing))).sum()
     }
 }
 
@@ -317,6 +317,20 @@ mod tests {
         assert_eq!(keep_out.ahead(WrappedPosition::new(1395), MARGIN), 2);
         assert_eq!(keep_out.ahead(WrappedPosition::new(1396), MARGIN), 1);
         assert_eq!(keep_out.ahead(WrappedPosition::new(2396), MARGIN), 0);
+    }
+
+    #[test]
+    fn canopies_that_end_in_one_turn_make_room_for_as_many() {
+        let at = WrappedPosition::new;
+        let mut keep_out = KeepOut::new(at(0));
+        let mut plants = (0..).map(|plant| canopy(500 * plant, 500 * plant + 50));
+        plants.by_ref().take(CAPACITY).for_each(|plant| keep_out.push(plant, at(0), MARGIN).expect("there is room"));
+        keep_out.leave(at(1200));
+        for plant in plants.by_ref().take(3) {
+            keep_out.push(plant, at(1350), MARGIN).expect("three are behind");
+            assert!(closed(&keep_out, 0, 1294) && !closed(&keep_out, 1295, 1404) && closed(&keep_out, 1405, 1405));
+        }
+        assert_eq!(keep_out.push(plants.next().expect("more"), at(1350), MARGIN), Err(ScheduleFull));
     }
 
     #[test]

@@ -242,11 +242,15 @@ fn is_blank(byte: &u8) -> bool {
 
 /// A whole number of 16 bits, digits only.
 fn number(digits: &[u8]) -> Option<u16> {
-    digits.iter().try_fold(0_u16, |number, &digit| {
+    let mut number = 0_u16;
+    for &digit in digits {
         let digit = digit.wrapping_sub(b'0');
-        (digit <= 9).then_some(())?;
-        number.checked_mul(10)?.checked_add(u16::from(digit))
-    })
+        if digit > 9 || number > u16::MAX / 10 {
+            return None;
+        }
+        number = (number * 10).checked_add(digit.into())?;
+    }
+    Some(number)
 }
 
 /// Collects bytes into lines.

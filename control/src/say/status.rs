@@ -106,7 +106,7 @@ pub(super) fn write_example(listed: &Listed, line: &mut Line) {
 
 pub(super) fn write_detection(detection: &Classified, line: &mut Line) {
     line.say(texts::DUMPED);
-    detection.features().values().iter().for_each(|&value| line.number(value));
+    detection.features().values().iter().for_each(|&value| line.number(value.into()));
     line.say(names::class(detection.vote.class));
     line.say(texts::VOTES);
     line.counted(detection.vote.votes.into());

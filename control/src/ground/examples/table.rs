@@ -22,7 +22,7 @@ pub const RADIUS: u32 = 172;
 pub const K: u8 = 3;
 
 /// Speed, spacing, delay, hold and actuation of each example, and its label.
-pub const TRAINED: [([i32; FEATURES], u8); 64] = [
+pub const TRAINED: [([i16; FEATURES], u8); 64] = [
     ([278, 71, 300, 114, 453], label::WEED),
     ([278, 190, 300, 114, 453], label::WEED),
     ([278, 282, 300, 120, 459], label::WEED),

@@ -33,7 +33,7 @@ pub fn rust(training: &Training, how: &str) -> String {
     let _ = writeln!(text, "pub const RADIUS: u32 = {radius};");
     let _ = writeln!(text, "\n/// Examples that vote.\npub const K: u8 = {k};");
     let _ = writeln!(text, "\n/// Speed, spacing, delay, hold and actuation of each example, and its label.");
-    let _ = writeln!(text, "pub const TRAINED: [([i32; FEATURES], u8); {}] = [", kept.len());
+    let _ = writeln!(text, "pub const TRAINED: [([i16; FEATURES], u8); {}] = [", kept.len());
     for example in in_order(kept) {
         let name = if label_of(example.kind) == label::PLANT { "PLANT" } else { "WEED" };
         let _ = writeln!(text, "    ({:?}, label::{name}),", example.features.values());
