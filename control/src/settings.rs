@@ -5,6 +5,7 @@
 
 use crate::{
     memory::checksum,
+    named::named,
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
@@ -24,27 +25,11 @@ pub struct Description {
 /// The one table. Everything else about the settings comes from it.
 macro_rules! settings {
     ($($(#[$doc:meta])* $Variant:ident $name:literal $(in $unit:literal)?: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
-        /// A setting.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        #[expect(missing_docs, reason = "the help texts say what each is")]
-        pub enum Setting {
-            $($(#[$doc])* $Variant,)*
-        }
-
-        impl Setting {
-            /// The names, in the table's order.
-            pub(crate) const WORDS: &[&str] = &[$($name),*];
-
-            /// The number of settings.
-            pub const COUNT: u8 = Self::WORDS.len() as u8;
-
-            /// The setting at an index of the table.
-            pub const fn from_index(index: u8) -> Option<Self> {
-                match index {
-                    $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*
-                    _ => None,
-                }
+        named! {
+            /// A setting.
+            #[expect(missing_docs, reason = "the help texts say what each is")]
+            Setting {
+                $($(#[$doc])* $Variant = $name,)*
             }
         }
 
