@@ -33,16 +33,11 @@ macro_rules! settings {
             }
         }
 
-        const DESCRIPTIONS: [Description; Setting::COUNT as usize] = [
-            $(Description {
-                least: $least,
-                greatest: $greatest,
-                default: $default,
-                hold_only: $hold_only,
-            },)*
-        ];
+        /// Least and greatest value and default of each setting.
+        const ROWS: [[u16; 3]; Setting::COUNT as usize] =
+            [$([$least, if $hold_only { $greatest | HOLD_ONLY } else { $greatest }, $default]),*];
 
-        $(const _: () = assert!($least <= $default && $default <= $greatest, $name);)*
+        $(const _: () = assert!($least <= $default && $default <= $greatest && $greatest < HOLD_ONLY, $name);)*
 
         pub(crate) const UNITS: &[&str] = &[$(concat!($(" ", $unit)?)),*];
         pub(crate) const HELPS: &[&str] = &[$($help),*];
@@ -209,15 +204,11 @@ avr_progmem::progmem! {
     static progmem NUMBERS: [u8; 6 * Setting::COUNT as usize] = numbers();
 }
 
-/// Least and greatest value and default of each setting, little-endian.
+/// The rows, little-endian.
 const fn numbers() -> [u8; 6 * Setting::COUNT as usize] {
     let (mut bytes, mut place) = ([0; 6 * Setting::COUNT as usize], 0);
     while place < bytes.len() {
-        let Description { least, greatest, default, hold_only } = DESCRIPTIONS[place / 6];
-        assert!(greatest < HOLD_ONLY);
-        let greatest = if hold_only { greatest | HOLD_ONLY } else { greatest };
-        let numbers = [least.to_le_bytes(), greatest.to_le_bytes(), default.to_le_bytes()];
-        bytes[place] = numbers[place % 6 / 2][place % 2];
+        bytes[place] = ROWS[place / 6][place % 6 / 2].to_le_bytes()[place % 2];
         place += 1;
     }
     bytes
