@@ -5,42 +5,44 @@
 //! digit after the other: the first says where to look, the second which fault it is. The console shows its name. A warning is
 //! counted and reported, and has no other effect.
 
-/// A latched alarm, in the order of the codes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Alarm {
-    /// The beam was broken over more ground than any plant covers: an object hangs in it, or it is out of line.
-    BeamBlocked,
-    /// The beam changes more often than plants and leaves can cause: dust, or a loose wire.
-    BeamFlickers,
-    /// Edges of the beam came faster than the loop could take them.
-    BeamEdgesLost,
-    /// The first beam misses what the second sees: a torn wire, or a dirty lens.
-    BeamBlind,
-    /// The second beam misses what the first sees.
-    SecondBeamBlind,
-    /// Plants pass the beam while the encoder stands still.
-    EncoderSilent,
-    /// Edges without progress: only one of the encoder's channels works.
-    EncoderChannelDead,
-    /// Both channels often change at once, which a turning wheel does not cause.
-    EncoderJumps,
-    /// The machine is faster than `top_speed_mm_s`.
-    TooFast,
-    /// The tool was rolled back to ground that has been dropped.
-    RolledBackTooFar,
-    /// More canopies stand between beam and tool than can be remembered.
-    ScheduleFull,
-    /// Too many consecutive detections were as narrow as a weed, and none was a plant: the examples may not know this crop.
-    CropUnknown,
-    /// The end switch contradicts the tool's command.
-    ToolStuck,
-    /// No valid copy of the settings in the EEPROM: the defaults are in use.
-    SettingsLost,
-    /// The saved settings contradict each other.
-    SettingsContradict,
-    /// Too little stack is free.
-    StackLow,
+use crate::named::named;
+
+named! {
+    /// A latched alarm, in the order of the codes.
+    Alarm {
+        /// The beam was broken over more ground than any plant covers: an object hangs in it, or it is out of line.
+        BeamBlocked = "beam_blocked",
+        /// The beam changes more often than plants and leaves can cause: dust, or a loose wire.
+        BeamFlickers = "beam_flickers",
+        /// Edges of the beam came faster than the loop could take them.
+        BeamEdgesLost = "beam_edges_lost",
+        /// The first beam misses what the second sees: a torn wire, or a dirty lens.
+        BeamBlind = "beam_blind",
+        /// The second beam misses what the first sees.
+        SecondBeamBlind = "second_beam_blind",
+        /// Plants pass the beam while the encoder stands still.
+        EncoderSilent = "encoder_silent",
+        /// Edges without progress: only one of the encoder's channels works.
+        EncoderChannelDead = "encoder_channel_dead",
+        /// Both channels often change at once, which a turning wheel does not cause.
+        EncoderJumps = "encoder_jumps",
+        /// The machine is faster than `top_speed_mm_s`.
+        TooFast = "too_fast",
+        /// The tool was rolled back to ground that has been dropped.
+        RolledBackTooFar = "rolled_back_too_far",
+        /// More canopies stand between beam and tool than can be remembered.
+        ScheduleFull = "schedule_full",
+        /// Too many consecutive detections were as narrow as a weed, and none was a plant: the examples may not know this crop.
+        CropUnknown = "crop_unknown",
+        /// The end switch contradicts the tool's command.
+        ToolStuck = "tool_stuck",
+        /// No valid copy of the settings in the EEPROM: the defaults are in use.
+        SettingsLost = "settings_lost",
+        /// The saved settings contradict each other.
+        SettingsContradict = "settings_contradict",
+        /// Too little stack is free.
+        StackLow = "stack_low",
+    }
 }
 
 impl Alarm {
@@ -66,14 +68,14 @@ impl Alarm {
     }
 }
 
-/// A warning.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Warning {
-    /// The tool was commanded out too late: the speed jumped, or a plant came up too near.
-    LateCommand,
-    /// The machine has worked over a long distance without a plant: the beam may be blind, or too high.
-    NoPlants,
-    /// Too many consecutive detections gave no slip: the stand is too dense for two beams, or the beams see differently.
-    SlipUnknown,
+named! {
+    /// A warning.
+    Warning {
+        /// The tool was commanded out too late: the speed jumped, or a plant came up too near.
+        LateCommand = "late_command",
+        /// The machine has worked over a long distance without a plant: the beam may be blind, or too high.
+        NoPlants = "no_plants",
+        /// Too many consecutive detections gave no slip: the stand is too dense for two beams, or the beams see differently.
+        SlipUnknown = "slip_unknown",
+    }
 }

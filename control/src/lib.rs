@@ -23,6 +23,7 @@ pub mod alarm;
 pub mod ground;
 pub mod measure;
 pub mod memory;
+mod named;
 pub mod operate;
 pub mod say;
 pub mod settings;

@@ -5,6 +5,7 @@
 
 use crate::{
     memory::checksum,
+    named::named,
     units::{Ticks, TicksPerSecond, Wheel},
 };
 
@@ -24,40 +25,19 @@ pub struct Description {
 /// The one table. Everything else about the settings comes from it.
 macro_rules! settings {
     ($($(#[$doc:meta])* $Variant:ident $name:literal $(in $unit:literal)?: $least:literal to $greatest:literal, $default:literal, $hold_only:literal, $help:literal;)*) => {
-        /// A setting.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        #[expect(missing_docs, reason = "the help texts say what each is")]
-        pub enum Setting {
-            $($(#[$doc])* $Variant,)*
-        }
-
-        impl Setting {
-            /// The names, in the table's order.
-            pub(crate) const WORDS: &[&str] = &[$($name),*];
-
-            /// The number of settings.
-            pub const COUNT: u8 = Self::WORDS.len() as u8;
-
-            /// The setting at an index of the table.
-            pub const fn from_index(index: u8) -> Option<Self> {
-                match index {
-                    $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*
-                    _ => None,
-                }
+        named! {
+            /// A setting.
+            #[expect(missing_docs, reason = "the help texts say what each is")]
+            Setting {
+                $($(#[$doc])* $Variant = $name,)*
             }
         }
 
-        const DESCRIPTIONS: [Description; Setting::COUNT as usize] = [
-            $(Description {
-                least: $least,
-                greatest: $greatest,
-                default: $default,
-                hold_only: $hold_only,
-            },)*
-        ];
+        /// Least and greatest value and default of each setting.
+        const ROWS: [[u16; 3]; Setting::COUNT as usize] =
+            [$([$least, if $hold_only { $greatest | HOLD_ONLY } else { $greatest }, $default]),*];
 
-        $(const _: () = assert!($least <= $default && $default <= $greatest, $name);)*
+        $(const _: () = assert!($least <= $default && $default <= $greatest && $greatest < HOLD_ONLY, $name);)*
 
         pub(crate) const UNITS: &[&str] = &[$(concat!($(" ", $unit)?)),*];
         pub(crate) const HELPS: &[&str] = &[$($help),*];
@@ -224,15 +204,11 @@ avr_progmem::progmem! {
     static progmem NUMBERS: [u8; 6 * Setting::COUNT as usize] = numbers();
 }
 
-/// Least and greatest value and default of each setting, little-endian.
+/// The rows, little-endian.
 const fn numbers() -> [u8; 6 * Setting::COUNT as usize] {
     let (mut bytes, mut place) = ([0; 6 * Setting::COUNT as usize], 0);
     while place < bytes.len() {
-        let Description { least, greatest, default, hold_only } = DESCRIPTIONS[place / 6];
-        assert!(greatest < HOLD_ONLY);
-        let greatest = if hold_only { greatest | HOLD_ONLY } else { greatest };
-        let numbers = [least.to_le_bytes(), greatest.to_le_bytes(), default.to_le_bytes()];
-        bytes[place] = numbers[place % 6 / 2][place % 2];
+        bytes[place] = ROWS[place / 6][place % 6 / 2].to_le_bytes()[place % 2];
         place += 1;
     }
     bytes

@@ -3,24 +3,26 @@
 //! A bootloader, such as optiboot, may clear the flags before the firmware starts. The mark survives a reset, so a stalled loop and
 //! a panic are still known then. Any other cause is [`Cause::Unknown`].
 
-/// The cause of a start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Cause {
-    /// The power came on.
-    PowerOn,
-    /// The reset pin was pulled: by the button, or by a computer that opened the serial line.
-    ResetPin,
-    /// The supply was too low for a moment.
-    BrownOut,
-    /// The watchdog expired, without a mark.
-    Watchdog,
-    /// The loop stopped turning.
-    LoopStalled,
-    /// The firmware panicked: an impossible state.
-    Panic,
-    /// The flags were cleared before the firmware saw them.
-    Unknown,
+use crate::named::named;
+
+named! {
+    /// The cause of a start.
+    Cause {
+        /// The power came on.
+        PowerOn = "power_on",
+        /// The reset pin was pulled: by the button, or by a computer that opened the serial line.
+        ResetPin = "reset_pin",
+        /// The supply was too low for a moment.
+        BrownOut = "brown_out",
+        /// The watchdog expired, without a mark.
+        Watchdog = "watchdog",
+        /// The loop stopped turning.
+        LoopStalled = "loop_stalled",
+        /// The firmware panicked: an impossible state.
+        Panic = "panic",
+        /// The flags were cleared before the firmware saw them.
+        Unknown = "unknown",
+    }
 }
 
 /// Marks that the firmware leaves in SRAM. At power-up SRAM holds either of them with a chance of one in 32,768.

@@ -1,22 +1,23 @@
 //! The tool's command: in or out, since when, and whether it was in time; and why the tool may be out while the machine works.
 
 use crate::{
+    named::named,
     operate::servo::HalfMicros,
     units::{Instant, Interval, count},
 };
 
-/// Why the tool is out of the row while the machine works.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Reason {
-    /// A plant is at the tool or comes up.
-    Plant,
-    /// The beam has not seen the ground.
-    UnseenGround,
-    /// The machine would reach a plant just behind the beam before the tool is out.
-    TooFast,
-    /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
-    EncoderDoubtful,
+named! {
+    /// Why the tool is out of the row while the machine works.
+    Reason {
+        /// A plant is at the tool or comes up.
+        Plant = "plant",
+        /// The beam has not seen the ground.
+        UnseenGround = "unseen_ground",
+        /// The machine would reach a plant just behind the beam before the tool is out.
+        TooFast = "too_fast",
+        /// The encoder fell silent while the machine rolled, or the beam broke while it stands.
+        EncoderDoubtful = "encoder_doubtful",
+    }
 }
 
 /// The tool.

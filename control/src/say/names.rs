@@ -1,4 +1,4 @@
-//! Names: the text of each of the machine's words (`words`), and the search for a typed word.
+//! Names: the text of each of the machine's words, and the search for a typed word.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -54,11 +54,6 @@ pub fn state(state: State) -> Text {
         State::Work => texts::WORK,
         State::Alarm(_) => texts::IN_ALARM,
     }
-}
-
-/// An alarm's name.
-pub fn alarm(alarm: Alarm) -> Text {
-    alarm.text()
 }
 
 /// A warning's name.

@@ -1,7 +1,7 @@
 //! All texts of the machine, and their numbers: a [`Text`].
 //!
-//! Texts about settings are in the settings' table, and words that the console also reads in [`words`](crate::say::words). A `#` in
-//! a text stands for a number of its line. `packed` stores and reads the texts.
+//! Names are with the enums that have them (`named!`), and texts about commands and settings in those tables. A `#`
+//! in a text stands for a number of its line. `packed` stores and reads the texts.
 
 use crate::{
     alarm::{Alarm, Warning},
@@ -11,7 +11,7 @@ use crate::{
     say::{
         line_tables::line,
         version,
-        words::{Argument, Word},
+        words::{self, Argument, Word},
     },
     settings::{self, Setting},
     status_table,
@@ -22,8 +22,8 @@ pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
     KEYED,
     COMMAND_ERRORS,
-    TAKES_WORDS,
-    HELPS,
+    words::TAKES,
+    words::HELPS,
     settings::UNITS,
     settings::HELPS,
     Setting::WORDS,
@@ -91,11 +91,16 @@ const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
 }
 
 const fn is_same_text(one: &[u8], other: &[u8]) -> bool {
+    one.len() == other.len() && begins(one, 0, other)
+}
+
+/// Whether a part is at this offset of a text.
+pub(super) const fn begins(text: &[u8], at: usize, part: &[u8]) -> bool {
     let mut same = 0;
-    while same < one.len() && same < other.len() && one[same] == other[same] {
+    while same < part.len() && at + same < text.len() && text[at + same] == part[same] {
         same += 1;
     }
-    same == one.len() && same == other.len()
+    same == part.len()
 }
 
 macro_rules! texts_of_events {
@@ -255,76 +260,14 @@ command_errors! {
     TestSpeed "test row takes a speed in mm/s from 100 to #";
 }
 
-/// The texts about the commands.
-macro_rules! commands {
-    ($($Word:ident $takes:literal, $help:literal;)*) => {
-        const TAKES_WORDS: &[&str] = &[$($takes),*];
-        const HELPS: &[&str] = &[$($help),*];
-
-        const _: () = {
-            let mut place = 0;
-            $(
-                assert!(Word::$Word as u8 == place, "the commands stand here in the order of their words");
-                place += 1;
-            )*
-            assert!(place == Word::COUNT);
-        };
-    };
-}
-
 impl Word {
     /// Its arguments, each after a blank.
     pub(crate) fn takes(self) -> Text {
-        const { Text::first_of(TAKES_WORDS) }.plus(self as u8)
+        const { Text::first_of(words::TAKES) }.plus(self as u8)
     }
 
     /// Its help text.
     pub(crate) fn help(self) -> Text {
-        const { Text::first_of(HELPS) }.plus(self as u8)
+        const { Text::first_of(words::HELPS) }.plus(self as u8)
     }
-}
-
-commands! {
-    Help " [name]",
-        "this list, or what a setting is";
-    Status "",
-        "position, state and counts";
-    Get " [name]",
-        "one setting, or all";
-    Set " name value",
-        "change a setting";
-    Save "",
-        "keep the settings";
-    Revert "",
-        "restore saved settings";
-    Defaults "",
-        "restore factory settings";
-    Calibrate " start|servo|MM [force]",
-        "measure a distance, or time the servo";
-    Servo " in|out|US",
-        "move the tool";
-    Test " row [MM_S]|watchdog",
-        "swing as for plants, or reset";
-    Start " [now]",
-        "weed; now, over unseen ground";
-    Hold "",
-        "tool out of the row";
-    Clear "",
-        "clear an alarm";
-    Events " on|off",
-        "plants, swings and alarms";
-    Plot " on|off|teleplot",
-        "curves for Arduino, or Teleplot";
-    Label " plant|weed [force]",
-        "label the last detection";
-    Teach " N|plant|weed",
-        "teach an example";
-    Examples "",
-        "all examples";
-    Forget " N|all",
-        "forget field examples";
-    Dump "",
-        "the last 16 detections";
-    Version "",
-        "the firmware";
 }

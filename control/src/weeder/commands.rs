@@ -61,9 +61,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// [`CommandError::NotInHold`].
     pub fn take_defaults(&mut self) -> Result<(), CommandError> {
-        if self.is_working() {
-            return Err(CommandError::NotInHold);
-        }
+        self.expect_no_work()?;
         self.configuration.take_defaults();
         Ok(())
     }
@@ -73,9 +71,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// [`CommandError::NotInHold`] and [`CommandError::NothingSaved`].
     pub fn take_saved(&mut self) -> Result<(), CommandError> {
-        if self.is_working() {
-            return Err(CommandError::NotInHold);
-        }
+        self.expect_no_work()?;
         self.configuration.take_saved()
     }
 
@@ -97,9 +93,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// # Errors
     /// [`CommandError::NotInHold`], and a [`Contradiction`](crate::settings::Contradiction).
     pub fn save(&mut self) -> Result<(), CommandError> {
-        if self.is_working() {
-            return Err(CommandError::NotInHold);
-        }
+        self.expect_no_work()?;
         self.configuration.save()
     }
 
@@ -147,9 +141,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`CommandError::NotInHold`], because new examples would classify the plants between beam and tool differently;
     /// [`CommandError::IncompleteExample`] and [`CommandError::ExamplesFull`].
     pub fn teach(&mut self, label: u8) -> Result<(), CommandError> {
-        if self.is_working() {
-            return Err(CommandError::NotInHold);
-        }
+        self.expect_no_work()?;
         let features = self.told.take().ok_or(CommandError::IncompleteExample)?;
         self.classifier.keep(Example::new(features, label)).map_err(|ExamplesFull| CommandError::ExamplesFull)?;
         // Teaching shows that the operator is watching, so the count restarts.
@@ -180,6 +172,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Selects the curves for a plotter, or none.
     pub fn set_plot(&mut self, plot: Plot) {
         self.telemetry.set(plot);
+    }
+
+    /// Refuses a command that is not for a working machine.
+    #[inline(always)]
+    fn expect_no_work(&self) -> Result<(), CommandError> {
+        if self.is_working() { Err(CommandError::NotInHold) } else { Ok(()) }
     }
 
     /// Counts a console line with an error.

@@ -25,7 +25,7 @@ use eeprom::{Eeprom, Half};
 use knn::Example;
 use proptest::prelude::*;
 use rig::{Beams, ByExamples, Rig};
-use std::{cell::Cell, collections::VecDeque, rc::Rc};
+use std::{cell::Cell, collections::VecDeque};
 
 /// Detections below this width are weeds, where width alone decides.
 const PLANT_MM: i16 = 60;
@@ -38,8 +38,8 @@ const MARGINS_MM: i16 = 100;
 struct Observed {
     nearest: ByExamples<Half>,
     by: Classification,
-    /// The width of the last weed, in millimetres.
-    weed: Rc<Cell<Option<i16>>>,
+    /// The width of the weed classified just now, in millimetres.
+    weed: Cell<Option<i16>>,
 }
 
 impl Classifier for Observed {
@@ -105,8 +105,6 @@ pub struct Decisions {
     /// Typed bytes, and the lines that they make.
     typed: VecDeque<u8>,
     lines: VecDeque<String>,
-    /// The width of the weed classified just now.
-    weed: Rc<Cell<Option<i16>>>,
     eeprom: Eeprom,
     beginning: Beginning,
 }
@@ -141,10 +139,9 @@ impl Decisions {
     }
 
     fn start(eeprom: Eeprom, beginning: Beginning, world: &World, cause: Cause) -> Self {
-        let weed = Rc::default();
         let [for_settings, for_examples] = eeprom.halves();
         let nearest = Nearest::uninit(&EXAMPLES[..], for_examples);
-        let classifier = Observed { nearest, by: beginning.classification, weed: Rc::clone(&weed) };
+        let classifier = Observed { nearest, by: beginning.classification, weed: Cell::new(None) };
         let (readings, beams) = shown(beginning.steps, world);
         let weeder = Rig::wake_at(classifier, for_settings, readings, beams, cause);
         Self {
@@ -155,7 +152,6 @@ impl Decisions {
             line: LineBuffer::new(),
             typed: VecDeque::new(),
             lines: VecDeque::new(),
-            weed,
             eeprom,
             beginning,
         }
@@ -222,7 +218,7 @@ impl Machine for Decisions {
     }
 
     fn take_weed(&mut self) -> Option<i16> {
-        self.weed.take()
+        self.weeder.classifier().weed.take()
     }
 
     fn settings(&self) -> &Settings {

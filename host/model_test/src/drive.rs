@@ -597,13 +597,11 @@ impl<M: Machine> Drive<M> {
 
     /// The saved settings, with the leads that were found, if those are in doubt.
     fn with_leads_of(&self, kept: &Option<Settings>, found: &Option<Settings>) -> Option<Settings> {
-        let (Some(kept), Some(found)) = (kept, found) else { return kept.clone() };
+        let (true, Some(kept), Some(found)) = (self.leads_in_doubt, kept, found) else { return kept.clone() };
         let mut kept = kept.clone();
         for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
-            if self.leads_in_doubt {
-                // It was within its range.
-                let _ = kept.set(lead, found.get(lead));
-            }
+            // It was within its range.
+            let _ = kept.set(lead, found.get(lead));
         }
         Some(kept)
     }

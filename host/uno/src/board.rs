@@ -220,7 +220,7 @@ impl Uno {
         let deadline = self.cycle() + timeout_cycles;
         loop {
             let bytes = to_bytes(&self.core.recorder().log.received);
-            if let Some(start) = find(&bytes, text.as_bytes()) {
+            if let Some(start) = (0..=bytes.len()).find(|&start| bytes[start..].starts_with(text.as_bytes())) {
                 let end = start + text.len();
                 self.core.recorder_mut().log.received.drain(..end);
                 return Ok(String::from_utf8_lossy(&bytes[..end]).into_owned());
@@ -432,9 +432,4 @@ fn in_sram(address: u16, length: usize) -> Option<Range<usize>> {
 
 fn to_bytes(received: &[ReceivedByte]) -> Vec<u8> {
     received.iter().map(|received| received.byte).collect()
-}
-
-/// The index of `text` in `bytes`.
-fn find(bytes: &[u8], text: &[u8]) -> Option<usize> {
-    (0..=bytes.len()).find(|&start| bytes[start..].starts_with(text))
 }
