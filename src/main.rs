@@ -36,7 +36,8 @@ use control::{
     weeder::{Controller, Uninit},
 };
 use embedded_hal::digital::{InputPin, OutputPin};
-use embedded_hal_nb::serial::{Read, Write};
+use embedded_hal_nb::serial::Read;
+use ufmt::uWrite;
 
 /// The decisions, with this machine's classifier and memories.
 type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
@@ -115,7 +116,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
                 && let Some(byte) = console.next_byte()
             {
                 // The room was just checked.
-                let _ = serial.write(byte);
+                let _ = serial.write_char(byte.into());
             } else if console.listens()
                 && let Ok(byte) = serial.read()
             {

@@ -84,6 +84,20 @@ impl Write for Serial {
     }
 }
 
+/// Text, a character at a time. A character without room is an error, because no call waits.
+impl ufmt::uWrite for Serial {
+    type Error = nb::Error<Infallible>;
+
+    fn write_str(&mut self, text: &str) -> Result<(), Self::Error> {
+        text.bytes().try_for_each(|byte| self.write(byte))
+    }
+
+    fn write_char(&mut self, character: char) -> Result<(), Self::Error> {
+        // The console's text is ASCII.
+        self.write(character as u8)
+    }
+}
+
 handler! {
     /// A byte was received: 46 cycles, 51 if one slot is left and the byte becomes the mark.
     on_received = "__vector_18" {

@@ -10,6 +10,7 @@ use crate::{
         texts::{self, Text},
     },
 };
+use ufmt::{Formatter, uDisplay, uWrite};
 
 /// Most texts of a line; a setting's line has ten. A power of two, for short arithmetic.
 pub const TEXTS: usize = 16;
@@ -118,6 +119,13 @@ impl Iterator for Line {
     }
 }
 
+/// The whole rest of a line, for callers that can wait.
+impl uDisplay for Line {
+    fn fmt<W: uWrite + ?Sized>(&self, out: &mut Formatter<'_, W>) -> Result<(), W::Error> {
+        self.clone().try_for_each(|character| out.write_char(character.into()))
+    }
+}
+
 impl Default for Line {
     fn default() -> Self {
         Self::new()
@@ -130,7 +138,10 @@ mod tests {
     use std::string::{String, ToString};
 
     fn written(mut line: Line) -> String {
+        let mut shown = String::new();
+        ufmt::uwrite!(&mut shown, "{}", line).expect("a string takes all");
         let written = String::from_utf8(line.by_ref().collect()).expect("ASCII");
+        assert_eq!(shown, written);
         assert!(line.is_done());
         written
     }
