@@ -5,7 +5,7 @@
 
 use avr_device::atmega328p::{PORTB, PORTD, portb};
 use core::convert::Infallible;
-use embedded_hal::digital::{ErrorType, InputPin, OutputPin, PinState};
+use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
 /// The status LED on D13 (PB5), lit when high.
 pub struct Lamp<'a>(&'a portb::RegisterBlock);
@@ -44,13 +44,6 @@ impl OutputPin for Lamp<'_> {
     fn set_high(&mut self) -> Result<(), Infallible> {
         self.0.portb().modify(|_, w| w.pb5().set_bit());
         Ok(())
-    }
-
-    fn set_state(&mut self, state: PinState) -> Result<(), Infallible> {
-        match state {
-            PinState::Low => self.set_low(),
-            PinState::High => self.set_high(),
-        }
     }
 }
 

@@ -12,8 +12,6 @@ use avr_device::{
     interrupt,
 };
 use control::operate::servo::{self, Action, FRAME, HalfMicros};
-use core::convert::Infallible;
-use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
 /// From here on, 5 us before its end, a frame ends by itself. This is longer than the time from reading the counter to setting it.
 /// A width written later could miss the restart, and appear one frame later.
@@ -86,7 +84,6 @@ fn change(timer: &TC1, since_rise: HalfMicros, left: HalfMicros, compare: u16, r
 ///
 /// The caller has turned interrupts off, and the loop never continues: it may have been interrupted inside an access to a 16-bit
 /// register of Timer1. The timer must run.
-/// The timer must run.
 pub unsafe fn end_with(width: HalfMicros) {
     // SAFETY: the caller guarantees that no other code uses the timer any more.
     let timer = unsafe { &*TC1::ptr() };
@@ -104,21 +101,4 @@ pub unsafe fn end_with(width: HalfMicros) {
 /// OCR1A for a pulse of `width`: the pin is high from 0 through the match.
 const fn compare(width: HalfMicros) -> u16 {
     width.saturating_sub(1)
-}
-
-impl ErrorType for Servo {
-    type Error = Infallible;
-}
-
-impl SetDutyCycle for Servo {
-    /// A frame's length in steps of 0.5 us.
-    fn max_duty_cycle(&self) -> u16 {
-        FRAME
-    }
-
-    /// Commands a pulse width for the next frame.
-    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-        self.command(duty, 0);
-        Ok(())
-    }
 }

@@ -9,7 +9,7 @@
 mod fragments;
 
 use self::fragments::FRAGMENTS;
-use crate::say::texts::{COUNT, GROUPS, Text};
+use crate::say::texts::{COUNT, GROUPS, Text, begins};
 
 /// The characters in the texts. Each is stored as its index here.
 const CHARACTERS: ([u8; 128], usize) = {
@@ -372,15 +372,6 @@ const STARTS: [usize; 129] = {
     assert!(FRAGMENTS.len() + CHARACTERS.1 <= 256 && place == FRAGMENTS.len());
     starts
 };
-
-/// Whether a part is at this offset of a text.
-const fn begins(text: &[u8], at: usize, part: &[u8]) -> bool {
-    let mut same = 0;
-    while same < part.len() && at + same < text.len() && text[at + same] == part[same] {
-        same += 1;
-    }
-    same == part.len()
-}
 
 #[cfg(test)]
 mod tests {

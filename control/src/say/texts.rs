@@ -91,11 +91,16 @@ const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
 }
 
 const fn is_same_text(one: &[u8], other: &[u8]) -> bool {
+    one.len() == other.len() && begins(one, 0, other)
+}
+
+/// Whether a part is at this offset of a text.
+pub(super) const fn begins(text: &[u8], at: usize, part: &[u8]) -> bool {
     let mut same = 0;
-    while same < one.len() && same < other.len() && one[same] == other[same] {
+    while same < part.len() && at + same < text.len() && text[at + same] == part[same] {
         same += 1;
     }
-    same == one.len() && same == other.len()
+    same == part.len()
 }
 
 macro_rules! texts_of_events {
