@@ -32,7 +32,7 @@ Examples:
   weeder serve --lan 192.168.4.1 --allow-start       a phone may start the machine
   weeder serve --port left=/dev/ttyACM0 --port right=/dev/ttyACM1
   weeder serve --all                                 every named row, and every other Uno
-  weeder serve --port uno --page weeder-release/page --http-port 8080")]
+  weeder serve --page weeder-release/page --http-port 8080")]
 pub struct Arguments {
     #[command(flatten)]
     ports: Ports,

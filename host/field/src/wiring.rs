@@ -69,7 +69,7 @@ pins! {
     SECOND_BEAM: D10 "second_beam" true, "second beam's output, optional", EXTERNAL,
         "low = broken; `set second_beam_mm` enables it";
     /// Status LED, an output.
-    LED: D13 "led" false, "the Uno's own LED", "", "on = work; one flash a second = hold; groups of flashes = alarm code";
+    LED: D13 "led" false, "the Uno's own LED", "", "on = work, or tool out in a test; one flash a second = hold; groups = alarm";
 }
 
 /// The connections as a table in Markdown.
