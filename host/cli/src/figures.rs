@@ -23,7 +23,7 @@ Examples:
 The status is 1 if --check finds a difference.")]
 pub struct Arguments {
     /// The pages with figures.
-    #[arg(default_values = ["docs/figures.md", "docs/set-up.md", "README.md"], value_name = "PAGE.md")]
+    #[arg(default_values = ["docs/calibration.md", "docs/figures.md", "docs/set-up.md", "README.md"], value_name = "PAGE.md")]
     pages: Vec<PathBuf>,
     /// Write nothing, but list the figures that differ from their commands' output.
     #[arg(long)]

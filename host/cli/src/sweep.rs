@@ -93,7 +93,7 @@ pub struct Arguments {
     /// The parameter along the second axis, and its values.
     #[arg(long, value_name = "NAME=FROM..TO:STEP", value_parser = axis(), hide_possible_values = true)]
     y: Option<Axis>,
-    /// The result to show for two axes.
+    /// The result to show for two axes. With one axis, the table has all results.
     #[arg(long, default_value = RESULT, value_parser = PossibleValuesParser::new(RESULTS))]
     result: String,
     /// The controller: the firmware, the firmware without leads, the paper's, or the ideal controller.

@@ -6,6 +6,7 @@
 
 use crate::experiment::{Engine, Experiment, PlotOutcome, Treatment};
 use crate::shard::{Numbered, Shard};
+use crate::statistics::Share;
 use anyhow::{Context, Error, Result, ensure};
 use field::conditions::Conditions;
 use rayon::prelude::*;
@@ -57,9 +58,9 @@ impl FromStr for Axis {
 
 /// The names of a point's results: plants damaged (Eq. 23), weeds gone from the whole plot (Eq. 22), ground of the row
 /// that was weeded, the largest share that the servo allows with every canopy and margin kept, field efficiency
-/// (Eq. 24), performance index in ha %2/(h hp) (Eq. 27), and rows in which an alarm took the tool out. The others are
-/// in percent.
-pub const RESULTS: [&str; 7] = [
+/// (Eq. 24), performance index in ha %2/(h hp) (Eq. 27), rows in which an alarm took the tool out, and plants' zones that
+/// the tool reached. All but the index are in percent.
+pub const RESULTS: [&str; 8] = [
     "plant_damage",
     "weeding_efficiency",
     "in_row_weeding",
@@ -67,6 +68,7 @@ pub const RESULTS: [&str; 7] = [
     "field_efficiency",
     "performance_index",
     "alarms",
+    "zones_reached",
 ];
 
 fn results(outcome: &PlotOutcome, rows: u32) -> [f64; RESULTS.len()] {
@@ -81,6 +83,7 @@ fn results(outcome: &PlotOutcome, rows: u32) -> [f64; RESULTS.len()] {
         performance.field_efficiency_percent,
         performance.performance_index,
         100.0 * f64::from(outcome.alarms) / f64::from(rows),
+        Share::of(outcome.zones.reached, outcome.zones.all).percent(),
     ]
 }
 
