@@ -8,7 +8,7 @@
 # firmware.txt        its size, and its worst-case stack and time
 # page/               the page: open its index.html, or serve it to a phone with `weeder serve`
 # weeder              the host tools, for computers like this one, with the page inside
-# manual/             README.md and docs/, as Markdown; book/ is the same manual for a browser
+# manual/             README.md and docs/, as Markdown, and the sources that docs/ links; book/ is docs/ for a browser
 # sbom/               the parts as CycloneDX, for programs: packages, versions, licences
 # licences/           the parts, their authors and licences, with the licences' texts
 # SHA256SUMS          of each of these files: `sha256sum --check SHA256SUMS`
@@ -62,11 +62,14 @@ cp -r page/dist "$folder/page"
 WEEDER_PAGE="$folder/page" cargo build --locked --release --package weeder-cli
 cp "$target/release/weeder" "$folder/"
 
-# The manual, with its links unchanged. Links to sources do not work here.
+# The manual, with the sources that docs/ links. Other links to sources do not work here.
 mkdir "$folder/manual"
 cp -r README.md CHANGELOG.md CONTRIBUTING.md docs "$folder/manual/"
+grep -oh '](\.\./[^)#]*' docs/*.md | sed 's|^](\.\./||' | LC_ALL=C sort -u | xargs cp --parents --target-directory="$folder/manual"
 cargo install --quiet --locked mdbook --version 0.5.4 --no-default-features --features search --root "$target/mdbook"
 "$target/mdbook/bin/mdbook" build --dest-dir "$folder/book"
+# mdBook has made .html of the linked .md, which are outside of the book.
+sed -i -e 's|href="\.\./|href="../manual/|g' -e 's|\(href="\.\./manual/[^"#]*\)\.html|\1.md|g' "$folder"/book/*.html
 
 # Licences. Tools that only run during the build are left out.
 mkdir -p "$folder/licences/texts"
