@@ -65,7 +65,7 @@ else
 fi
 
 if ! command -v rustup >/dev/null; then
-    echo "setup.sh: rustup is missing. Install it from https://rustup.rs says, then run this again." >&2
+    echo "setup.sh: rustup is missing. Install it from https://rustup.rs, then run this again." >&2
     exit 1
 fi
 channel=$(sed -n 's/^channel = "\(.*\)"$/\1/p' rust-toolchain.toml)

@@ -53,7 +53,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
     max_term_width = 100,
     after_help = "Each command's --help has examples.\n\
         A report goes into a folder (--out FOLDER), and a single table into a file (--out FILE.csv).\n\
-        Existing files are replaced only with --force. - is standard input for a file that is read.\n\
+        Existing files are replaced only with --force; a log of `record` or `monitor` is continued.\n\
+        - is standard input for a file that is read.\n\
         Status 0: success.\n\
         Status 1: a plant was damaged, something differs, a bound is over its budget, or the machine refused a command.\n\
         Status 2: an error. The message says what would be right."
