@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
     };
     let notes = [
-        format!("Drawn by lot: {}", output::command_line()?),
+        format!("Randomised: {}", output::command_line()?),
         "Mark out the plots side by side in this order; a block is a stretch of field that is as even as it can be."
             .to_owned(),
         "Count weeds on the same marked ground before and after, and the plants; write down area and time with turns."
