@@ -405,7 +405,7 @@ export const en = {
             "second_beam_mm is to be 0, or 72 or more from beam and tool, and beam_to_tool_mm 1000 at most",
         refusedEncoder: "a wheel gives 900 ticks a metre or more, take a finer encoder",
         refusedRolls: "the machine rolls, stop first",
-        refusedNoObject: "there is no object without a label, let the beam see one first",
+        refusedNoObject: "there is no detection without a label, let the beam see one first",
         refusedIncomplete: "tell its 5 features first, as examples lists them",
         refusedFull: "all 32 places are taken, forget one first",
         refusedNumber: "no field example has this number, examples lists them",
