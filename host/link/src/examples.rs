@@ -30,7 +30,7 @@ pub enum ExamplesError {
     )]
     OtherTable,
     #[error(
-        "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {0}`"
+        "the machine was taught an example by hand that no detection can have: have it forget that one, by `forget {0}`"
     )]
     NoObject(u16),
     #[error("the machine is at work and takes no examples: hold it first, by its switch or `hold`; nothing was sent")]

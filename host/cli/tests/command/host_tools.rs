@@ -170,7 +170,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     assert!(refused.contains("room for 30 of its 32") && refused.contains("nothing was sent"), "{refused}");
     fs::write(taught, format!("{heading}278,250,300,120,459,\n")).expect("it can be written");
     let refused = printed(&weeder(&["examples", "push", taught], other.path(), ""), 2);
-    assert!(refused.contains("has no labelled object"), "{refused}");
+    assert!(refused.contains("has no labelled detection"), "{refused}");
 }
 
 #[test]
@@ -286,7 +286,7 @@ fn a_session_is_logged_and_replayed() {
     assert!(text.contains(",event,swing tool=out pos=0\n"), "{text}");
     let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", log]).output().expect("it ends");
     let replayed = printed(&output, 0);
-    assert!(replayed.contains("0 objects, 0 alarms and 2 swings"), "{replayed}");
+    assert!(replayed.contains("0 detections, 0 alarms and 2 swings"), "{replayed}");
     // An existing log is continued.
     printed(&weeder(&["monitor", "--plain", "--log", log], uno.path(), ""), 0);
     assert_eq!(fs::read_to_string(log).expect("it is there").matches(",connected,").count(), 2);
