@@ -302,8 +302,8 @@ function marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElem
     return marks;
 }
 
-const inWords = (file: File, { lengthMm, timeMs, objects, swings, alarms }: Picture) =>
-    say("logHas", {
+function inWords(file: File, { lengthMm, timeMs, objects, swings, alarms, unknownMs }: Picture): string {
+    const has = say("logHas", {
         file: file.name,
         distance: metres(lengthMm),
         time: duration(timeMs),
@@ -311,6 +311,8 @@ const inWords = (file: File, { lengthMm, timeMs, objects, swings, alarms }: Pict
         swings,
         count: alarms.length,
     });
+    return [has, ...unknownMs.map((ms) => say("logUnknown", { time: duration(ms) }))].join(" ");
+}
 
 function agreement({ objects, alarms, swings, difference, notes }: Replayed): string {
     return [
