@@ -374,6 +374,12 @@ mod tests {
 496,status,state=hold tool=out pos=5 speed_mm_s=0 windows=0 unseen_mm=400
 ";
 
+    const BEGIN: &str = "time_ms,kind,line\n0,connected,0.2.0\n";
+
+    fn status(time_ms: u64, tool: &str, position: u64) -> String {
+        format!("{time_ms},status,state=work tool={tool} pos={position} speed_mm_s=500 windows=0 unseen_mm=0\n")
+    }
+
     /// The picture of a log that is read in pieces of this length.
     fn shown(text: &str, length: usize) -> Value {
         begin(false);
@@ -410,27 +416,24 @@ mod tests {
 
     /// A log of a wheel with 2000 ticks a metre: a status at 0 and at 1000 ticks, these lines, and one at 2000.
     fn changed(lines: &str) -> String {
-        let status = |time_ms: u32, tool: &str, pos: u32| {
-            format!("{time_ms},status,state=work tool={tool} pos={pos} speed_mm_s=500 windows=0 unseen_mm=0\n")
-        };
         let [first, second] = [status(0, "in", 0), status(1000, "in", 1000)];
         let settings = "0,setting,beam_to_tool_mm=400\n0,setting,ticks_per_m=2000\n";
         let last = status(3000, "out", 2000);
-        format!("time_ms,kind,line\n0,connected,0.2.0\n{settings}{first}{second}{lines}{last}")
+        format!("{BEGIN}{settings}{first}{second}{lines}{last}")
     }
 
     #[test]
     fn ground_is_drawn_by_the_wheel_of_its_time() {
         let command = |line: &str, answer: &str| format!("1100,command,{line}\n1200,answer,{answer}\n");
         let set = command("set ticks_per_m 1000", "ok");
-        let ticks_per_m = "\"ticks_per_m=1000 from 0 to 20000, default 0, not saved\"\n1200,answer,ok";
+        let shown_ticks = "\"ticks_per_m=1000 from 0 to 20000, default 0, not saved\"\n1200,answer,ok";
         let nominal_mm = |wheel_mm: f64| 500.0 + 1000.0 * std::f64::consts::PI * wheel_mm / 2400.0;
         for (lines, last_mm) in [
             (String::new(), 1000.0),
             (set.clone(), 1500.0),
             (command("set ticks_per_m 1000", "error: the machine is at work"), 1000.0),
-            (command("calibrate 1000 force", ticks_per_m), 1500.0),
-            (command("get ticks_per_m", ticks_per_m), 1500.0),
+            (command("calibrate 1000 force", shown_ticks), 1500.0),
+            (command("get ticks_per_m", shown_ticks), 1500.0),
             (command("set wheel_mm 500", "ok"), nominal_mm(500.0)),
             (command("defaults", "ok"), nominal_mm(400.0)),
             ([command("save", "ok"), set, command("revert", "ok")].concat(), 1000.0),
@@ -463,24 +466,20 @@ mod tests {
     #[test]
     fn the_tool_is_in_the_row_from_a_swing_in_to_the_next_out_or_an_alarm() {
         let swing = |tool: &str, pos: u32| format!("9,event,swing tool={tool} pos={pos}\n");
-        let status = "1,status,state=hold tool=out pos=0 speed_mm_s=500 windows=0 unseen_mm=0\n";
+        let status = status(1, "out", 0);
         let alarm = "9,event,alarm code=3-1 name=too_fast pos=9000\n";
         let setting = "0,setting,ticks_per_m=1000\n";
         let swings =
             [("in", 1000), ("out", 2000), ("in", 3000), ("in", 3500), ("out", 4000), ("in", 8000), ("in", 9500)];
         let swings: String = swings.map(|(tool, pos)| swing(tool, pos)).concat();
-        shown(&format!("time_ms,kind,line\n0,connected,0.2.0\n{setting}{status}{swings}{alarm}"), 64);
+        shown(&format!("{BEGIN}{setting}{status}{swings}{alarm}"), 64);
         assert_eq!(rows(WORKED), [[1000.0, 2000.0], [3000.0, 4000.0], [8000.0, 9000.0], [9500.0, 9500.0]]);
     }
 
     #[test]
     fn statuses_close_together_are_left_out_and_lines_keep_their_numbers() {
-        let status = |time_ms: u64, position: u64| {
-            let figures = "speed_mm_s=500 windows=0 unseen_mm=0";
-            format!("{time_ms},status,state=work tool=in pos={position} {figures}\n")
-        };
-        let statuses: String = (0..10).map(|number| status(100 * number, 1000 * number)).collect();
-        let log = format!("time_ms,kind,line\n0,connected,0.2.0\n{statuses}0,connected,0.2.0\n{}", status(50, 0));
+        let statuses: String = (0..10).map(|number| status(100 * number, "in", 1000 * number)).collect();
+        let log = format!("{BEGIN}{statuses}0,connected,0.2.0\n{}", status(50, "in", 0));
         shown(&log, 100);
         let times: Vec<f64> = rows::<3>(SPEEDS).iter().map(|speed| speed[1]).collect();
         assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 50.0]);

@@ -19,8 +19,13 @@ export class Log {
     /** Records an event at a time. */
     add(happening: Happening, nowMs: number): void {
         this.#from ??= nowMs;
-        const write = (kind: string, line: string) =>
-            this.#write(Math.round(nowMs - (this.#from ?? nowMs)), kind, line);
+        const timeMs = Math.round(nowMs - this.#from);
+        const write = (kind: string, line: string) => {
+            this.isFull = this.#lines.length >= MOST;
+            if (this.isFull) return;
+            const field = /[",\n]/.test(line) ? `"${line.replaceAll('"', '""')}"` : line;
+            this.#lines.push(`${timeMs},${kind},${field}`);
+        };
         if (happening.is === "connected") {
             write("connected", happening.version);
             for (const { name, value } of happening.settings) write("setting", `${name}=${value}`);
@@ -32,12 +37,5 @@ export class Log {
     /** The file. */
     text(): string {
         return `${["time_ms,kind,line", ...this.#lines].join("\n")}\n`;
-    }
-
-    #write(timeMs: number, kind: string, line: string): void {
-        this.isFull = this.#lines.length >= MOST;
-        if (this.isFull) return;
-        const field = /[",\n]/.test(line) ? `"${line.replaceAll('"', '""')}"` : line;
-        this.#lines.push(`${timeMs},${kind},${field}`);
     }
 }
