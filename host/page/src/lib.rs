@@ -3,8 +3,8 @@
 //!
 //! [`answer`] takes a question as JSON and returns its answer as JSON. `console`, `trial` and `record` define their
 //! forms, and `page/src/link/`, `page/src/row/` and `page/src/record/` have their types. In a browser, as WebAssembly,
-//! both pass through one buffer (`exports`). The only state between questions is the log that is being read, and the
-//! rolling machine.
+//! both pass through one buffer (`exports`). The only state between questions is the log that is being read, the rolling
+//! machine, and the measurements of a set-up.
 
 mod console;
 #[cfg(target_arch = "wasm32")]
