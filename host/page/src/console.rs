@@ -74,8 +74,7 @@ impl Change {
     /// the result. Settings and values that this version does not know come last: the firmware may know them.
     pub fn steps(&self) -> Value {
         let (from, _) = settings(Settings::new(), &self.from);
-        let (to, unknown) = settings(from.clone(), &self.to);
-        let mut to = to;
+        let (mut to, unknown) = settings(from.clone(), &self.to);
         let is_another = |setting: Setting| setting.is_of_the_wheel() && from.get(setting) != to.get(setting);
         if Setting::all().any(is_another) && !self.to.contains_key(&name(Setting::TicksPerM)) {
             // The new wheel has no measured value yet: the firmware resets it by itself.

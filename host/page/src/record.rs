@@ -80,11 +80,6 @@ impl Ground {
         self.end_mm = self.end_mm.max(tool_mm);
         tool_mm
     }
-
-    /// The ground in the beam at a count, as a position of the tool.
-    fn beam_mm(&mut self, position: i32) -> f64 {
-        self.tool_mm(position) + f64::from(self.settings.get(Setting::BeamToToolMm))
-    }
 }
 
 /// The picture of a log, in the form of `page/src/record/picture.ts`.
@@ -180,7 +175,7 @@ impl Picture {
         let ground = &mut self.ground;
         match *event {
             EventLine::Detection { class, position, delay, hold, .. } => {
-                let from_mm = ground.beam_mm(position);
+                let from_mm = ground.tool_mm(position) + f64::from(ground.settings.get(Setting::BeamToToolMm));
                 // The tool reaches the zone after this number of counts.
                 let zone_mm = ground.tool_mm(position.wrapping_add(delay));
                 let zone_end_mm = zone_mm + f64::from(hold) * tick_mm(&ground.settings);

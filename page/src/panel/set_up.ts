@@ -23,6 +23,7 @@ interface Advice {
 export class SetUp {
     /** An instance for the measurements of this machine. */
     readonly #rust = new Rust(module);
+    #marginMm: number | null = null;
 
     constructor(
         private readonly parts: Parts,
@@ -30,7 +31,7 @@ export class SetUp {
         ask: Ask,
     ) {
         parts.button("margin-set", () => {
-            const set = ask(`set margin_mm ${this.#advice().marginMm}`).then(() => ask("save"));
+            const set = ask(`set margin_mm ${this.#marginMm}`).then(() => ask("save"));
             void parts.attempt("margin-said", set);
         });
     }
@@ -48,30 +49,21 @@ export class SetUp {
 
     /** Shows the steps and their state, after these new lines. */
     show(lines: readonly string[] = []): void {
-        const advice = this.#advice(lines);
-        const list = this.parts.html("set-up-steps");
-        list.replaceChildren(
-            ...advice.steps.map((manual) => {
+        const settings = Object.fromEntries(this.machine.settings.map(({ name, value }) => [name, value]));
+        const { steps, next, missing, marginMm, warning } = this.#rust.ask<Advice>({ setUp: { lines, settings } });
+        this.#marginMm = marginMm;
+        this.parts.html("set-up-steps").replaceChildren(
+            ...steps.map((manual) => {
                 const [title, how] = step(manual.title, manual.how);
                 const codes = manual.tasks.flatMap((task) => [" ", make("code", "", task)]);
                 return make("li", "", make("b", "", title), ". ", how, ...codes);
             }),
         );
-        const steps = advice.missing.map((step) => `${told(step)}.`).join(" ");
-        const { next, warning } = advice;
-        this.parts.write(
-            "margin-said",
-            next === null ? say("beforeMargin", { steps }) : say("next", { step: told(next) }),
-        );
+        const before = () => say("beforeMargin", { steps: missing.map((step) => `${told(step)}.`).join(" ") });
+        this.parts.write("margin-said", next === null ? before() : say("next", { step: told(next) }));
         this.parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
         const button = this.parts.get("margin-set", HTMLButtonElement);
-        button.hidden = advice.marginMm === null || advice.marginMm === this.machine.setting("margin_mm");
-        if (advice.marginMm !== null)
-            button.textContent = say("setMargin", { margin: quantity(advice.marginMm, "millimeter") });
-    }
-
-    #advice(lines: readonly string[] = []): Advice {
-        const settings = Object.fromEntries(this.machine.settings.map(({ name, value }) => [name, value]));
-        return this.#rust.ask<Advice>({ setUp: { lines, settings } });
+        button.hidden = marginMm === null || marginMm === this.machine.setting("margin_mm");
+        if (marginMm !== null) button.textContent = say("setMargin", { margin: quantity(marginMm, "millimeter") });
     }
 }

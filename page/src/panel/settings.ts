@@ -104,13 +104,10 @@ export class SettingsForm {
 
     #count(): void {
         const { size } = this.#wanted;
-        this.parts.get("settings-send", HTMLButtonElement).disabled = size === 0 && !this.#isUnsaved;
+        const isSaved = this.machine.settings.every(({ value, saved }) => value === saved);
+        this.parts.get("settings-send", HTMLButtonElement).disabled = size === 0 && isSaved;
         this.parts.get("settings-undo", HTMLButtonElement).disabled = size === 0;
         this.parts.write("settings-send", size === 0 ? say("save") : say("sendAndSave", { count: size }));
-    }
-
-    get #isUnsaved(): boolean {
-        return this.machine.settings.some(({ value, saved }) => value !== saved);
     }
 
     #say(text: () => string): void {
