@@ -108,7 +108,7 @@ test("a log that lacks the settings behind revert says from when on it is not dr
     writeFileSync("build/files/reverted.csv", `${lines.join("\n")}\n`);
     const opened = await openLog("build/files/reverted.csv");
     const said = (await inView(opened.page, "log-said").textContent()) ?? "";
-    assert.match(said, /^reverted\.csv: .* From 3\.0 sec on nothing is drawn or counted, /);
+    assert.match(said, /^reverted\.csv: .* From 9\.0 sec on nothing is drawn or counted, /);
     await close(opened);
 });
 

@@ -6,9 +6,9 @@
 //! Distances are millimetres of the tool's travel since the start of the log, by the wheel. After a reset, or for
 //! another machine, the ground continues one metre farther. An event without a position has that of the line before.
 //!
-//! The picture follows the settings by the typed commands and their answers. After `revert` the values can be missing:
-//! they are in the log only if `save` was typed before. Then the picture stops, and says when. It goes on where `get` has
-//! shown the values, or at the next connection.
+//! The picture follows the settings by the typed commands and all answers. After `revert` the values can be missing: a
+//! log of `weeder record` has them only if `save` was typed before. Then the picture stops, and says when. It goes on
+//! where `get` has shown the values, or at the next connection.
 
 use control::say::command::{self, Command};
 use gps::job::{Job, Wanted, tick_mm};
@@ -90,7 +90,8 @@ struct Picture {
     unanswered: VecDeque<Option<Command>>,
     /// Position and state of the last stored speed of the stretch.
     shown: Option<(f64, Mode)>,
-    /// Times after which nothing is drawn, because settings are unknown.
+    /// Whether nothing is drawn, because settings are unknown; and the times at which that began.
+    is_stopped: bool,
     unknown_ms: Vec<u64>,
     time_ms: u64,
     swings: usize,
@@ -120,14 +121,10 @@ impl Picture {
             }
             Kind::Command => self.unanswered.push_back(command::parse(entry.text.as_bytes()).ok()),
             Kind::Answer if entry.text == "ok" || entry.text.starts_with("error") => {
-                let command = self.unanswered.pop_front().flatten().filter(|_| entry.text == "ok");
-                let was_known = self.ground.unknown.is_empty();
-                if let Some(command) = command {
+                if let Some(Some(command)) = self.unanswered.pop_front()
+                    && entry.text == "ok"
+                {
                     self.ground.follow(command);
-                }
-                if was_known && !self.ground.unknown.is_empty() {
-                    self.unknown_ms.push(entry.time_ms);
-                    self.end_stretch();
                 }
             }
             Kind::Setting | Kind::Answer => {
@@ -135,8 +132,14 @@ impl Picture {
                     self.ground.take(setting, value);
                 }
             }
-            Kind::Status | Kind::Event if !self.ground.unknown.is_empty() => {}
+            Kind::Status | Kind::Event if !self.ground.unknown.is_empty() => {
+                if !std::mem::replace(&mut self.is_stopped, true) {
+                    self.unknown_ms.push(entry.time_ms);
+                    self.end_stretch();
+                }
+            }
             Kind::Status => {
+                self.is_stopped = false;
                 let Some(status) = Status::parse(&entry.text) else { return };
                 let here_mm = self.ground.tool_mm(status.position);
                 self.ground.here = Some((status.position, here_mm));
@@ -371,6 +374,13 @@ mod tests {
 
     const BEGIN: &str = "time_ms,kind,line\n0,connected,0.2.0\n";
 
+    /// What `get` answers about [`SCALE`].
+    const SETTINGS: &str = "1300,answer,ticks_per_rev=2400
+1300,answer,wheel_mm=400
+1300,answer,ticks_per_m=1000
+1300,answer,beam_to_tool_mm=500
+";
+
     fn status(time_ms: u64, tool: &str, position: u64) -> String {
         format!("{time_ms},status,state=work tool={tool} pos={position} speed_mm_s=500 windows=0 unseen_mm=0\n")
     }
@@ -432,6 +442,7 @@ mod tests {
             (command("set wheel_mm 500", "ok"), nominal_mm(500.0)),
             (command("defaults", "ok"), nominal_mm(400.0)),
             ([command("save", "ok"), set, command("revert", "ok")].concat(), 1000.0),
+            (command("revert", "ok") + SETTINGS, 1500.0),
             (command("revert", "\"error: no settings are saved, save does it\""), 1000.0),
         ] {
             let picture = shown(&changed(&lines), 64);
@@ -446,13 +457,11 @@ mod tests {
         let plant = "event,plant pos=1200 votes=3 spacing=1000 delay=680 hold=540 actuation=1220\n";
         let reverted = format!("1100,command,revert\n1200,answer,ok\n1300,{plant}");
         let picture = shown(&changed(&reverted), 64);
-        assert_eq!(picture["unknownMs"], json!([1200]));
+        assert_eq!(picture["unknownMs"], json!([1300]));
         assert_eq!((rows::<3>(SPEEDS).len(), rows::<5>(OBJECTS).len()), (2, 0));
         assert_eq!(rows(WORKED), [[0.0, 500.0]]);
 
-        let values = ["ticks_per_rev=2400", "wheel_mm=400", "ticks_per_m=1000", "beam_to_tool_mm=500"];
-        let answer: String = values.map(|value| format!("1400,answer,{value}\n")).concat();
-        shown(&changed(&format!("{reverted}1400,command,get\n{answer}1400,answer,ok\n1500,{plant}")), 64);
+        shown(&changed(&format!("{reverted}1400,command,get\n{SETTINGS}1400,answer,ok\n1500,{plant}")), 64);
         // It goes on behind a metre.
         assert_eq!(rows::<5>(OBJECTS)[0][1], 2000.0);
         assert_eq!(rows::<3>(SPEEDS)[2], [2300.0, 3000.0, 500.0]);

@@ -1,5 +1,5 @@
 // The log of a session, for `weeder replay`: a CSV file of `time_ms,kind,line`, with the firmware's own lines. It has
-// the machine's settings and examples at each connection, so that it can be replayed alone.
+// the machine's settings and examples at each connection, so that it can be replayed alone. Changed settings are answers.
 
 import type { Happening } from "./session.ts";
 
@@ -31,6 +31,8 @@ export class Log {
             for (const { name, value } of happening.settings) write("setting", `${name}=${value}`);
             for (const example of happening.examples) write("example", example);
         } else if (happening.is === "lost") write("lost", happening.why);
+        // Of `revert`, and of a change at another computer, no typed line has the values.
+        else if (happening.is === "settings") for (const line of happening.lines) write("answer", line);
         else if ("line" in happening && happening.is !== "started") write(happening.is, happening.line);
     }
 

@@ -164,9 +164,11 @@ export class ServedMachine implements Link {
             case "lost":
                 this.#lose(message.why);
                 break;
-            case "settings":
-                this.onHappening({ is: "settings", settings: linesOf("setting", message.said) });
+            case "settings": {
+                const lines = message.said;
+                this.onHappening({ is: "settings", settings: linesOf("setting", lines), lines });
                 break;
+            }
             case "examples":
                 this.onHappening({ is: "examples", examples: message.said });
                 break;

@@ -47,7 +47,7 @@ interface Head {
     readonly alarms: readonly Trouble[];
     /** Whether it has a satellite receiver's positions. */
     readonly hasPlaces: boolean;
-    /** Times after which nothing is drawn: the log lacks the settings in use. */
+    /** Times from which on nothing is drawn: the log lacks the settings in use. */
     readonly unknownMs: readonly number[];
 }
 
