@@ -117,7 +117,6 @@ async function workServed(): Promise<void> {
     }
 }
 
-/** Shows the chosen view. */
 function choose(): void {
     const shown = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
     const focused = document.activeElement;

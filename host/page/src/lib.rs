@@ -65,7 +65,6 @@ pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
     TABLES.with_borrow(|tables| read(tables.get(number).map_or(&[], Vec::as_slice)))
 }
 
-/// Replaces a table.
 fn put(number: usize, table: Vec<f64>) {
     TABLES.with_borrow_mut(|tables| tables[number] = table);
 }

@@ -65,9 +65,7 @@ pub enum Different {
     SpeedKmH(f64),
     /// The share of the wheel's distance that is lost, below 1.
     Slip(f64),
-    /// Whether the first beam's wire is torn.
     BeamWireTorn(bool),
-    /// Whether the encoder is dead.
     EncoderDead(bool),
     /// The spacing of plants that are sown from now on.
     SpacingMm(f64),

@@ -36,7 +36,6 @@ export class Log {
         else if ("line" in happening && happening.is !== "started") write(happening.is, happening.line);
     }
 
-    /** The file. */
     text(): string {
         return `${["time_ms,kind,line", ...this.#lines].join("\n")}\n`;
     }

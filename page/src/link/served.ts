@@ -73,7 +73,6 @@ export class Served {
         this.machines = allowed.machines.map((name, number) => new ServedMachine(number, name));
     }
 
-    /** Starts to receive the events. */
     listen(): void {
         this.#heardMs = performance.now();
         const events = new EventSource("/events");

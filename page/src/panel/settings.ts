@@ -71,13 +71,7 @@ export class SettingsForm {
             input.checked = wanted === 1;
             input.addEventListener("change", () => change(input.checked ? 1 : 0));
         } else {
-            Object.assign(input, {
-                type: "number",
-                inputMode: "numeric",
-                step: "1",
-                min: `${least}`,
-                max: `${greatest}`,
-            });
+            Object.assign(input, { type: "number", inputMode: "numeric", min: `${least}`, max: `${greatest}` });
             input.value = String(wanted);
             input.addEventListener("input", () => change(input.value === "" ? Number.NaN : input.valueAsNumber));
         }

@@ -119,7 +119,6 @@ export class Machine {
         };
     }
 
-    /** Applies a change from now on. */
     change(change: Change): void {
         this.#set(this.#rust.ask<Levels>({ change }));
     }

@@ -73,7 +73,6 @@ export class Trial {
         return `${whyInWords(left, [...outcome.notKept.values()])} ${groundInWords(losses.groundMm)}`.trim();
     }
 
-    /** Whether the status lamp is lit. */
     get isLampLit(): boolean {
         return this.uno.isHigh(PIN.lamp);
     }
@@ -86,7 +85,6 @@ export class Trial {
         return { alongMm: this.machine.toolMm, acrossMm: this.machine.acrossMm };
     }
 
-    /** Takes an event of the console. */
     take(happening: Happening): void {
         if (happening.is === "started") {
             this.#zero = this.machine.ticks;

@@ -38,7 +38,6 @@ export class Uno {
     onByte: (byte: number) => void = () => {};
     /** Resets since the first power-up, oldest first. */
     readonly resets: Reset[] = [];
-    /** The content of the EEPROM. */
     readonly eeprom: Uint8Array;
     readonly #program: Uint16Array;
     readonly #backend: EEPROMBackend;
