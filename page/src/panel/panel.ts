@@ -281,9 +281,7 @@ function inConsole(happening: Happening): Parameters<Console["add"]> | undefined
     }
 }
 
-/**
- * Reserves room at the page's end for the dock on the screen, so that the browser scrolls the focused element above it.
- */
+/** Reserves room for the dock at the page's end, so that the browser scrolls the focused element above it. */
 function followDock(dock: HTMLElement): void {
     new ResizeObserver(() => {
         if (dock.offsetHeight > 0) document.documentElement.style.setProperty("--dock", `${dock.offsetHeight}px`);

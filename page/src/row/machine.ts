@@ -92,9 +92,7 @@ export class Machine {
     isWeeding = false;
     /** Whether the beam is broken. */
     isBroken = false;
-    /**
-     * Net counts of a perfect encoder since the machine was placed in front of the row, and the distance of one count.
-     */
+    /** Net counts of a perfect encoder since the start, and the distance of one count. */
     ticks = 0;
     groundMmATick = 0;
     /** Changes of the tool's command so far. The first is not a swing. */
