@@ -478,6 +478,9 @@ mod tests {
         let swings: String = swings.map(|(tool, pos)| swing(tool, pos)).concat();
         shown(&format!("{BEGIN}{setting}{status}{swings}{alarm}"), 64);
         assert_eq!(rows(WORKED), [[1000.0, 2000.0], [3000.0, 4000.0], [8000.0, 9000.0], [9500.0, 9500.0]]);
+        // A reset takes the tool out.
+        shown(&changed("2000,lost,pulled\n2000,connected,0.2.0\n"), 64);
+        assert_eq!(rows(WORKED), [[0.0, 500.0]]);
     }
 
     #[test]
