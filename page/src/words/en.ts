@@ -285,6 +285,8 @@ export const en = {
         noLog: "{file} is no log: {why}",
         emptyLog: "{file} has no machine in it.",
         logHas: "{file}: {distance} in {time}, {objects} detections, {swings} swings, {count} alarm or warning.|{file}: {distance} in {time}, {objects} detections, {swings} swings, {count} alarms and warnings.",
+        logUnknown:
+            "From {time} on nothing is drawn or counted, because the log lacks the settings to which revert returned. The row goes on where get shows them, or at the next connection.",
         logDrawing: "The row of the log: detections, keep-out zones, where the tool went, speed and alarms",
         whereInLog: "Where in the log",
         backward: "Back",
