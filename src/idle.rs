@@ -18,9 +18,10 @@ pub fn begin_turn() {
     unsafe { asm!("sbi 0x1e, 7", options(nostack, preserves_flags)) };
 }
 
-/// Sleeps until the next interrupt, if none has come since the turn began. One that comes between the two instructions is followed by a
-/// sleep, of 1.024 ms at most.
+/// Sleeps until the next interrupt, if none has come since the turn began. The instruction after `sei` comes before any interrupt (data
+/// sheet, 7.7), so one that comes after the question ends the sleep.
 pub fn sleep() {
-    // SAFETY: the instructions change no register and no memory. The loop calls it with interrupts on, so the clock ends the sleep.
-    unsafe { asm!("sbic 0x1e, 7", "sleep", options(nostack, preserves_flags)) };
+    // SAFETY: the instructions change no register and no memory. The loop calls it with interrupts on, as they are left, and the clock
+    // ends the sleep.
+    unsafe { asm!("cli", "sbis 0x1e, 7", "rjmp 0f", "sei", "sleep", "0: sei", options(nostack, preserves_flags)) };
 }

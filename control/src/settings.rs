@@ -76,12 +76,12 @@ settings! {
     K "k": 1 to 15, 3, false,
         "nearest examples that vote";
     MinWidthMm "min_width_mm" in "mm": 0 to 100, 0, false,
-        "narrower objects are dust; 0 none";
+        "narrower detections are dust; 0 none";
     /// Consecutive narrow detections without a plant that raise an alarm; 0 for never.
     MisfitAfter "misfit_after": 0 to 100, 5, false,
-        "alarm at so many narrow objects in a row; 0 never";
+        "alarm at so many narrow detections in a row; 0 never";
     MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
-        "alarm where an object is wider";
+        "alarm where a detection is wider";
     MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
         "shorter gaps belong to the canopy";
     GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,

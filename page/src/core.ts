@@ -22,5 +22,4 @@ export const ready = (async () => {
     rust = new Rust(module);
 })();
 
-/** Asks a question. Throws if it is invalid: the page and its Rust are then of different versions. */
 export const ask = <Answer>(question: unknown): Answer => rust.ask(question);

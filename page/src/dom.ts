@@ -36,7 +36,6 @@ export class Parts {
         });
     }
 
-    /** Replaces an element's text. */
     write(name: string, text: string): void {
         const element = this.html(name);
         show(element);
@@ -70,7 +69,6 @@ export class Parts {
 /** A text as the page shows it: without the backticks around commands. */
 export const plain = (text: string): string => text.replaceAll("`", "");
 
-/** A new element with a class and children. */
 export function make<Name extends keyof HTMLElementTagNameMap>(
     name: Name,
     className: string,

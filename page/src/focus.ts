@@ -6,7 +6,6 @@ const CAN_TAKE = "a[href], button, input, select, textarea, [tabindex]";
 const canTake = (element: HTMLElement): boolean =>
     element.isConnected && !element.matches(":disabled") && element.getClientRects().length > 0;
 
-/** Follows the focus from now on. */
 export function keepFocus(): void {
     /** The last element with keyboard focus and its ancestors, from the inside out. */
     let last: HTMLElement[] = [];

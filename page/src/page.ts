@@ -17,7 +17,6 @@ import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
 import { Drawing } from "./try/drawing.ts";
 import { inWords } from "./try/outcome.ts";
-import { commandsSetUp, machineSetUp } from "./try/set_up.ts";
 import { Trial } from "./try/trial.ts";
 import { CYCLES_PER_SECOND } from "./uno/uno.ts";
 import {
@@ -61,7 +60,7 @@ languages.value = language();
 languages.addEventListener("change", () => speak(languages.value as Code));
 page.say("unchecked", () => say("unchecked"));
 
-const trial = new Trial(hex, Date.now(), machineSetUp());
+const trial = new Trial(hex, Date.now(), true);
 const drawing = new Drawing(page.get("drawing", SVGSVGElement), trial);
 const trialPanel = new Panel(page.html("try-panel"), "try");
 /** The chip's time. Timeouts use it, so that a slow or paused trial causes no timeout. */
@@ -76,7 +75,7 @@ trialPanel.onHappening = (happening) => {
     if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
     if (happening.is !== settleAt) return;
     settleAt = undefined;
-    for (const command of [...commandsSetUp(), "save", "clear"]) trialPanel.ask(command).catch(() => {});
+    for (const command of [...trial.machine.setUp, "save", "clear"]) trialPanel.ask(command).catch(() => {});
 };
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
@@ -118,7 +117,6 @@ async function workServed(): Promise<void> {
     }
 }
 
-/** Shows the chosen view. */
 function choose(): void {
     const shown = VIEWS.find((view) => `#${view}` === location.hash) ?? "try";
     const focused = document.activeElement;

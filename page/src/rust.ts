@@ -1,5 +1,5 @@
 // The project's own Rust (host/page, as WebAssembly): it takes a question as JSON, and returns its answer. Its only
-// state between questions is the log that is being read, and the rolling machine.
+// state between questions is the log that is being read, the rolling machine, and the measurements of a set-up.
 
 /** The module's exports: see host/page/src/exports.rs. */
 interface Exports {

@@ -145,6 +145,24 @@ test("a setting that is saved is there after the supply has sagged", async () =>
     await close(opened);
 });
 
+test("a wheel that is measured once counts once, also where its setting is read again", async () => {
+    const opened = await tryIt(browser);
+    const { page } = opened;
+    // Until the page has read its settings.
+    await pass(page, 2);
+    // The servo was timed, so that the wheel is the next step.
+    const timed = "calibrated lead_out_ms=130 lead_in_ms=55 set=yes\r\n";
+    await page.evaluate((line) => globalThis.trial.onText(line + line), timed);
+    await type(page, "calibrate start", /^ok$/);
+    await pass(page, 4);
+    await type(page, "calibrate 1900 force", /^ticks_per_m=/);
+    await type(page, "get", /^ticks_per_m=/);
+    const next = part(page, "margin-said").filter({ hasText: "Next, measure 10 m:" });
+    await next.waitFor({ state: "attached" });
+    assert.match((await next.textContent()) ?? "", /\(1 of 3 done\)/);
+    await close(opened);
+});
+
 test("HOLD takes the tool out at once, even while other commands wait for their answers", async () => {
     const opened = await tryIt(browser);
     const { page } = opened;

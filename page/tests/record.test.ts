@@ -101,6 +101,17 @@ test("a file that is no log is told, and so is one without a machine", async () 
     }
 });
 
+test("a log that lacks the settings behind revert says from when on it is not drawn", async () => {
+    const status = (ms: number) => `${ms},status,state=work tool=in pos=${ms} speed_mm_s=500 windows=0 unseen_mm=0`;
+    const reverted = ["2000,command,revert", "3000,answer,ok"];
+    const lines = ["time_ms,kind,line", "0,connected,0.2.0", status(0), status(2000), ...reverted, status(9000)];
+    writeFileSync("build/files/reverted.csv", `${lines.join("\n")}\n`);
+    const opened = await openLog("build/files/reverted.csv");
+    const said = (await inView(opened.page, "log-said").textContent()) ?? "";
+    assert.match(said, /^reverted\.csv: .* From 9\.0 sec on nothing is drawn or counted, /);
+    await close(opened);
+});
+
 /**
  * A log of this many hours as `weeder record` writes it: at 2.5 km/h, with a status ten times a second, a plant each
  * 0.3 m, its swings, and an alarm an hour.

@@ -2,6 +2,7 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
+import { Log } from "../src/link/log.ts";
 import { type Happening, Refused, Session, type Wire } from "../src/link/session.ts";
 import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
 import { wokenUp } from "./operator.ts";
@@ -150,5 +151,8 @@ test("what a command has changed is asked for behind it", async () => {
     await Promise.all(answers);
     const [[settings], [examples]] = [changed("settings"), changed("examples")];
     assert(settings?.is === "settings" && settings.settings.some(({ name, value }) => name === "k" && value === 5));
+    const log = new Log();
+    log.add(settings, 0);
+    assert.match(log.text(), /^0,answer,"k=5 from /m, "the log has them, whatever has changed them");
     assert(examples?.is === "examples" && examples.examples.length > 0);
 });

@@ -6,7 +6,8 @@ import { readdirSync, readFileSync } from "node:fs";
 import test, { after, before } from "node:test";
 import faults from "faults.json";
 import type { Browser, Page } from "playwright-core";
-import { ask } from "../src/core.ts";
+import { ask, module } from "../src/core.ts";
+import { Rust } from "../src/rust.ts";
 import { en } from "../src/words/en.ts";
 import { type Code, LANGUAGES, type Language, speak, told } from "../src/words/words.ts";
 import { assertOnScreen } from "./boxes.ts";
@@ -145,7 +146,12 @@ test("what the session, weeder serve and the project's Rust say in English is kn
     const measured = [...timed, ...stretch, ...stretch, ...stretch];
     const settings = { lead_out_ms: 158, lead_in_ms: 52, ticks_per_m: 1910, margin_mm: 50 };
     const advice = (lines: string[], changed: Record<string, number> = {}) =>
-        ask<{ next: string | null; missing: string[]; marginMm: number | null; warning: string | null }>({
+        new Rust(module).ask<{
+            next: string | null;
+            missing: string[];
+            marginMm: number | null;
+            warning: string | null;
+        }>({
             setUp: { lines, settings: { ...settings, ...changed } },
         });
     const least = Number(/set margin_mm (\d+)/.exec(advice(measured).next ?? "")?.[1]);

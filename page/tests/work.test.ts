@@ -119,7 +119,7 @@ test("the log of a row at work is replayed by weeder without a difference", asyn
     await part(page, "log-save").click();
     await (await download).saveAs("build/files/log.csv");
     const replayed = execFileSync(WEEDER, ["replay", "build/files/log.csv"], { encoding: "utf8" });
-    assert.match(replayed, /^The same: [3-9]\d* objects, 0 alarms and [1-9]\d* swings/);
+    assert.match(replayed, /^The same: [3-9]\d* detections, 0 alarms and [1-9]\d* swings/);
     await close({ page, errors });
 });
 

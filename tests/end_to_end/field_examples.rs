@@ -77,7 +77,7 @@ fn an_object_that_was_labelled_is_known_when_it_comes_again() {
     assert!(seen[0].ends_with(",weed"), "{seen:?}");
     assert_eq!(
         refusal(&mut uno, "label weed"),
-        "error: there is no object without a label, let the beam see one first"
+        "error: there is no detection without a label, let the beam see one first"
     );
     assert_eq!(field_examples(&mut uno).len(), 1);
 
@@ -151,7 +151,7 @@ fn a_full_store_refuses_to_learn_until_something_is_forgotten() {
 #[test]
 fn without_an_object_there_is_nothing_to_label() {
     let mut uno = started();
-    let none = "error: there is no object without a label, let the beam see one first";
+    let none = "error: there is no detection without a label, let the beam see one first";
     assert_eq!(refusal(&mut uno, "label plant"), none);
     assert_eq!(answers(&mut uno), [""; 0]);
 }

@@ -250,7 +250,7 @@ command_errors! {
     SecondBeamAstray "second_beam_mm is to be 0, or 72 or more from beam and tool, and beam_to_tool_mm 1000 at most";
     EncoderTooCoarse "a wheel gives 900 ticks a metre or more, take a finer encoder";
     Rolls "the machine rolls, stop first";
-    NothingToLabel "there is no object without a label, let the beam see one first";
+    NothingToLabel "there is no detection without a label, let the beam see one first";
     IncompleteExample "tell its 5 features first, as examples lists them";
     ExamplesFull "all 32 places are taken, forget one first";
     NoSuchExample "no field example has this number, examples lists them";

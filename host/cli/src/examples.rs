@@ -153,7 +153,7 @@ pub fn in_table(file: &Path) -> Result<Vec<Taught>> {
     let unlabelled = objects.iter().filter(|object| object.kind.is_none()).count();
     ensure!(
         !examples.is_empty(),
-        "{} has no labelled object: fill in the column {}, plant or weed",
+        "{} has no labelled detection: fill in the column {}, plant or weed",
         file.display(),
         table::LABEL
     );

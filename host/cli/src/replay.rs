@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
             say!("Note: {note}")?;
         }
         say!(
-            "The same: {} objects, {} alarms and {} swings, which differ by {} ticks at the most",
+            "The same: {} detections, {} alarms and {} swings, which differ by {} ticks at the most",
             replayed.objects,
             replayed.alarms,
             replayed.swings,

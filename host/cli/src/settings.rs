@@ -20,7 +20,6 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:\n  \
     weeder settings pull machine.toml           write the machine's settings into a file\n  \
     weeder settings push machine.toml           set and save them on a machine\n  \
-    weeder settings push set-up                 start with the simulated machine's, except its margin\n  \
     weeder settings diff machine.toml           list the differences\n  \
     weeder settings pull rows --all             every row, a file for each in the folder rows\n  \
     weeder settings push machine.toml --port left --port right")]
@@ -50,9 +49,8 @@ enum Action {
 Opening the port resets most Unos, and unsaved settings are lost.\n\n\
 Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     Push {
-        /// A file for all rows, or a folder with a file for each row; - for standard input. Or a preset of `weeder
-        /// trial`, such as set-up, without its margin.
-        #[arg(value_name = "FILE.toml|FOLDER|PRESET", value_parser = source::file)]
+        /// A file for all rows, or a folder with a file for each row; - for standard input.
+        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
         file: PathBuf,
         /// Do not `save` them: the next reset loses them. On most Unos, opening the port is a reset.
         #[arg(long)]
@@ -203,23 +201,15 @@ impl Chosen {
     }
 }
 
-/// The settings of a preset, as a start. The margin is left out: it must cover measured values.
-fn of_preset(file: &Path) -> Option<Result<Vec<(Setting, u16)>>> {
-    let conditions = Conditions::preset(file.to_str()?).filter(|_| !file.exists())?;
-    let settings = |conditions: Conditions| {
-        let find = |(name, value): (String, u16)| Some((Setting::find(name.as_bytes())?, value));
-        conditions.settings.into_iter().filter_map(find).filter(|&(setting, _)| setting != Setting::MarginMm).collect()
-    };
-    Some(conditions.map(settings).map_err(Into::into))
-}
-
-/// The settings of a file or a preset, at least one.
+/// The settings of a file, at least one.
 fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
-    if let Some(wanted) = of_preset(file) {
-        let wanted = wanted?;
-        ensure!(!wanted.is_empty(), "the preset {} changes nothing: it has the factory settings", file.display());
-        return Ok(wanted);
-    }
+    // Its leads and its stroke, on another machine, would bring the tool over plants.
+    let is_preset = !file.exists() && file.to_str().and_then(Conditions::preset).is_some();
+    ensure!(
+        !is_preset,
+        "{} is a simulated machine, and its settings hold for no other: measure yours with `weeder set-up`",
+        file.display()
+    );
     let wanted = settings_file::read(file)?;
     ensure!(!wanted.is_empty(), "{} names no setting: `weeder settings pull` writes them all", file.display());
     Ok(wanted)

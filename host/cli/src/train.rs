@@ -168,7 +168,7 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
             })
         ),
         false => say!(
-            "Objects     {}\nExamples    {} chosen\n\nBy the built-in table alone\n\n{before}\n\nBy both together\n\n{after}\n",
+            "Detections  {}\nExamples    {} chosen\n\nBy the built-in table alone\n\n{before}\n\nBy both together\n\n{after}\n",
             objects.len(),
             chosen.len()
         ),
@@ -179,19 +179,19 @@ fn beside(arguments: &Arguments, table: Option<&OutFile>, objects: &[Labelled]) 
 
 /// The report of a training. `another_field` has the seed of another field and the classification of its detections.
 fn report(training: &Training, objects: &[Labelled], another_field: Option<&(u64, Confusion)>) -> Result<()> {
-    say!("Objects     {}", objects.len())?;
+    say!("Detections  {}", objects.len())?;
     say!("k           {}", training.k)?;
-    say!("Radius      {} (squared distance beyond which an object is unknown)", training.radius)?;
+    say!("Radius      {} (squared distance beyond which a detection is unknown)", training.radius)?;
     say!("Scale       value that maps onto 0, and onto 255")?;
     for (column, range) in table::COLUMNS.iter().zip(training.ranges) {
         say!("            {column:<13} {:>6} {:>6}", range.lowest, range.highest)?;
     }
     say!("Taken out   {} as noise", training.edited_out)?;
     say!("Examples    {} kept", training.kept.len())?;
-    say!("\nBefore condensing: each object classified by all others\n\n{}", training.leave_one_out)?;
-    say!("\nAfter condensing: all objects classified by the table\n\n{}", training.by_table)?;
+    say!("\nBefore condensing: each detection classified by all others\n\n{}", training.leave_one_out)?;
+    say!("\nAfter condensing: all detections classified by the table\n\n{}", training.by_table)?;
     if let Some((seed, classified)) = another_field {
-        say!("\nObjects of another field (seed {seed}), classified by the table\n\n{classified}")?;
+        say!("\nDetections of another field (seed {seed}), classified by the table\n\n{classified}")?;
     }
     say!("")
 }

@@ -80,7 +80,7 @@ impl Training {
     }
 }
 
-const NO_OBJECTS: &str = "there are no objects to learn from: label some plants and some weeds";
+const NO_OBJECTS: &str = "there are no detections to learn from: label some plants and some weeds";
 
 /// A detection is a stranger if it is farther from every example than nearly all detections are from their nearest
 /// neighbour of the same class. These are the share that is nearly all, and the factor of the squared distance (twice
@@ -110,12 +110,12 @@ const ENEMY_DIVISOR: u32 = 4;
 pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Training> {
     let first = objects.first().context(NO_OBJECTS)?;
     let is_mixed = objects.iter().any(|object| object.kind != first.kind);
-    ensure!(is_mixed, "all objects are of the class {}: label some of the other class too", first.kind);
+    ensure!(is_mixed, "all detections are of the class {}: label some of the other class too", first.kind);
     let fewest = k.unwrap_or(1);
     ensure!((1..=MAX_K).contains(&fewest), "k is {fewest}: it has to be 1 to {MAX_K}");
     ensure!(
         objects.len() > usize::from(fewest),
-        "there are {} objects, too few for a vote of {fewest}: label more, or choose a smaller --k",
+        "there are {} detections, too few for a vote of {fewest}: label more, or choose a smaller --k",
         objects.len()
     );
 
@@ -150,7 +150,7 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
     match training.by_table.plants_taken_for_weeds().saturating_sub(leave_one_out.plants_taken_for_weeds()) {
         0 => Ok(training),
         plants => bail!(
-            "with a vote of {k}, so few examples cut {} that all objects together spare: choose a smaller --k",
+            "with a vote of {k}, so few examples cut {} that all detections together spare: choose a smaller --k",
             counted(plants, "plant")
         ),
     }

@@ -158,11 +158,11 @@ fn objects_that_need_more_examples_than_there_is_room_for_are_refused_by_name() 
 #[test]
 fn no_objects_and_objects_of_one_class_are_refused() {
     let said = |objects: &[Labelled], k| train(objects, k, 64).unwrap_err().to_string();
-    assert!(said(&[], None).starts_with("there are no objects to learn from"));
+    assert!(said(&[], None).starts_with("there are no detections to learn from"));
     let weeds: Vec<Labelled> = clear_case().into_iter().filter(|object| object.kind == Kind::Weed).collect();
-    assert!(said(&weeds, None).starts_with("all objects are of the class weed"));
+    assert!(said(&weeds, None).starts_with("all detections are of the class weed"));
     let few = [labelled(Kind::Plant, 556, 500, 150), labelled(Kind::Weed, 556, 300, 15)];
-    assert!(said(&few, Some(3)).starts_with("there are 2 objects, too few for a vote of 3"));
+    assert!(said(&few, Some(3)).starts_with("there are 2 detections, too few for a vote of 3"));
     assert_eq!(said(&few, Some(16)), "k is 16: it has to be 1 to 15");
 }
 
@@ -223,7 +223,7 @@ fn files_that_have_one_class_each_make_one_table() {
     let weeds = format!("{HEADER}694,300,226,117,440,weed\n");
     assert_eq!(read_text(&[&plants, &weeds]).unwrap().len(), 2);
     let error = read_text(&[&plants, &plants]).unwrap_err();
-    assert_eq!(error, "1.csv, line 2: up to here there is no label weed: some objects of either class are needed");
+    assert_eq!(error, "1.csv, line 2: up to here there is no label weed: some detections of either class are needed");
 }
 
 #[test]
@@ -250,7 +250,7 @@ fn a_bad_line_is_named_with_what_would_be_right() {
         ("694,500,226,250,573\n", "line 2: fields: 5, where the header has 6"),
         (
             "694,500,226,250,573,weed\n",
-            "line 2: up to here there is no label plant: some objects of either class are needed",
+            "line 2: up to here there is no label plant: some detections of either class are needed",
         ),
         ("", "line 1: no line is below the header"),
     ] {

@@ -30,7 +30,7 @@ pub enum ExamplesError {
     )]
     OtherTable,
     #[error(
-        "the machine was taught an example by hand that no object can have: have it forget that one, by `forget {0}`"
+        "the machine was taught an example by hand that no detection can have: have it forget that one, by `forget {0}`"
     )]
     NoObject(u16),
     #[error("the machine is at work and takes no examples: hold it first, by its switch or `hold`; nothing was sent")]
@@ -167,7 +167,7 @@ static VALUES: LazyLock<[HashMap<u8, i16>; COUNT]> = LazyLock::new(|| {
     std::array::from_fn(|feature| {
         let mut spans: HashMap<u8, (i16, i16)> = HashMap::new();
         for value in i16::MIN..=i16::MAX {
-            let byte = SCALE.quantise(&[value.into(); COUNT])[feature];
+            let byte = SCALE.quantise(&[value; COUNT])[feature];
             spans.entry(byte).or_insert((value, value)).1 = value;
         }
         let middle = |(byte, (first, last)): (u8, (i16, i16))| match (first, last) {
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn the_bytes_of_every_detection_come_back_from_its_millimetres() {
         for value in i16::MIN..=i16::MAX {
-            let example = Example::new(SCALE.quantise(&[value.into(); COUNT]), label::WEED);
+            let example = Example::new(SCALE.quantise(&[value; COUNT]), label::WEED);
             let features = features_of(&example).expect("it is an object's");
             assert_eq!(example_of(&features, label::WEED), example);
         }

@@ -21,17 +21,11 @@ const PULSE_AND_GAP_MS: f64 = 6.0;
 /// Pulses are whole steps of this, us, rounded outwards.
 const PULSE_STEP_US: f64 = 5.0;
 
-/// The parts of a margin besides the servo, mm: 2 % of slip over the 400 mm from beam to tool, and the firmware's own
-/// worst swing.
-const SLIP_AND_FIRMWARE_MM: f64 = 8.0 + 5.0;
-
 /// The required swing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Swing {
     /// The zone of a single plant along the row, mm; 0 for its canopy.
     pub stem_zone_mm: u32,
-    /// The margin beside it before wheel and servo have been measured, mm.
-    pub margin_mm: u32,
     /// Smallest angle at which the tool's edge has cleared the canopy or the protected width, degrees.
     pub angle_degrees: f64,
     /// Pulse with the tool in the row, us.
@@ -92,10 +86,8 @@ impl Swing {
         let lead_out_ms = dead_ms(inputs.most_dead_time.max(inputs.least_dead_time)) + loaded_ms + PULSE_AND_GAP_MS;
         let protected_mm = MM.value(inputs.protected);
         let stem_zone_mm = if protected_mm > 0.0 { protected_mm + MM.value(inputs.stem_off) } else { 0.0 };
-        let scatter_s = (inputs.most_dead_time - inputs.least_dead_time).abs();
         Ok(Self {
             stem_zone_mm: stem_zone_mm.ceil() as u32,
-            margin_mm: (MM.value(machine.weeder.speed * scatter_s) + SLIP_AND_FIRMWARE_MM).ceil() as u32,
             angle_degrees,
             servo_in_us: inputs.pulse_in.round() as u32,
             servo_out_us: (inputs.pulse_in + stroke_us).round() as u32,
@@ -113,10 +105,8 @@ impl Swing {
     pub fn set_lines(&self) -> Vec<String> {
         let pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
         let leads = [("lead_out_ms", self.lead_out_ms), ("lead_in_ms", self.lead_in_ms)];
-        let zone = [("stem_zone_mm", self.stem_zone_mm), ("margin_mm", self.margin_mm)];
-        let zone = if self.stem_zone_mm > 0 { &zone[..] } else { &[] };
-        let settings = pulses.iter().chain(&leads).chain(zone);
-        settings.map(|(name, value)| format!("set {name} {value}")).collect()
+        let zone = (self.stem_zone_mm > 0).then_some(("stem_zone_mm", self.stem_zone_mm));
+        pulses.into_iter().chain(leads).chain(zone).map(|(name, value)| format!("set {name} {value}")).collect()
     }
 
     /// Its description, in sentences. `torque` is the one used in the calculation.
@@ -173,8 +163,8 @@ mod tests {
         let mut machine = Machine::default();
         machine.swing.protected = MM.of(90.0);
         let stem = Swing::with_tool(&machine, torque, 100.0).expect("it swings");
-        // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees; 30 ms at 2.5 km/h are 21 mm.
-        let lines = ["set servo_out_us 1695", "set lead_out_ms 143", "set stem_zone_mm 100", "set margin_mm 34"];
+        // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees.
+        let lines = ["set servo_out_us 1695", "set lead_out_ms 143", "set stem_zone_mm 100"];
         assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
         assert!(
             stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),

@@ -6,6 +6,7 @@ use link::settings::{Setting, Settings, explain, name, steps, unit};
 use link::{ConsoleLine, Field, Values};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 /// The meaning of a line, in the form of `page/src/link/console_line.ts`: its name, its fields, and `isEvent` if it is
@@ -73,8 +74,7 @@ impl Change {
     /// the result. Settings and values that this version does not know come last: the firmware may know them.
     pub fn steps(&self) -> Value {
         let (from, _) = settings(Settings::new(), &self.from);
-        let (to, unknown) = settings(from.clone(), &self.to);
-        let mut to = to;
+        let (mut to, unknown) = settings(from.clone(), &self.to);
         let is_another = |setting: Setting| setting.is_of_the_wheel() && from.get(setting) != to.get(setting);
         if Setting::all().any(is_another) && !self.to.contains_key(&name(Setting::TicksPerM)) {
             // The new wheel has no measured value yet: the firmware resets it by itself.
@@ -100,7 +100,11 @@ fn settings(mut settings: Settings, values: &BTreeMap<String, u16>) -> (Settings
     (settings, unknown)
 }
 
-/// The typed lines and the output of a session, and the present settings by name.
+thread_local! {
+    static SET_UP: RefCell<SetUp> = RefCell::default();
+}
+
+/// New lines of a session, and the present settings by name. A typed line begins with `> `.
 #[derive(Deserialize)]
 pub struct Heard {
     lines: Vec<String>,
@@ -108,9 +112,12 @@ pub struct Heard {
 }
 
 impl Heard {
-    /// The steps, and the results of the session, in the form of `page/src/panel/set_up.ts`.
+    /// The steps, and the results of all lines so far, in the form of `page/src/panel/set_up.ts`.
     pub fn advice(&self) -> Value {
-        let set_up = SetUp::of_lines(self.lines.iter().map(String::as_str));
+        let set_up = SET_UP.with_borrow_mut(|set_up| {
+            self.lines.iter().for_each(|line| set_up.take_line(line));
+            set_up.clone()
+        });
         let (settings, _) = settings(Settings::new(), &self.settings);
         let manual = set_up::steps().into_iter().map(|step| {
             let tasks: Vec<String> = step.tasks.iter().map(task).collect();

@@ -3,8 +3,8 @@
 //!
 //! [`answer`] takes a question as JSON and returns its answer as JSON. `console`, `trial` and `record` define their
 //! forms, and `page/src/link/`, `page/src/row/` and `page/src/record/` have their types. In a browser, as WebAssembly,
-//! both pass through one buffer (`exports`). The only state between questions is the log that is being read, and the
-//! rolling machine.
+//! both pass through one buffer (`exports`). The only state between questions is the log that is being read, the rolling
+//! machine, and the measurements of a set-up.
 
 mod console;
 #[cfg(target_arch = "wasm32")]
@@ -65,7 +65,6 @@ pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
     TABLES.with_borrow(|tables| read(tables.get(number).map_or(&[], Vec::as_slice)))
 }
 
-/// Replaces a table.
 fn put(number: usize, table: Vec<f64>) {
     TABLES.with_borrow_mut(|tables| tables[number] = table);
 }

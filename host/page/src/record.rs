@@ -5,6 +5,10 @@
 //!
 //! Distances are millimetres of the tool's travel since the start of the log, by the wheel. After a reset, or for
 //! another machine, the ground continues one metre farther. An event without a position has that of the line before.
+//!
+//! The picture follows the settings by the typed commands and all answers. After `revert` the values can be missing: a
+//! log of `weeder record` has them only if `save` was typed before. Then the picture stops, and says when. It goes on
+//! where `get` has shown the values, or at the next connection.
 
 use control::say::command::{self, Command};
 use gps::job::{Job, Wanted, tick_mm};
@@ -24,29 +28,57 @@ const SPEED_MS: u64 = 300;
 /// Ground between two stretches of a log.
 const APART_MM: f64 = 1000.0;
 
+/// The settings that make a count a position.
+const SCALE: [Setting; 4] = [Setting::TicksPerRev, Setting::WheelMm, Setting::TicksPerM, Setting::BeamToToolMm];
+
 /// How a machine's count becomes ground.
 #[derive(Default)]
 struct Ground {
     settings: Settings,
-    /// The tool's position at the encoder's 0. `None` before the first position of a stretch.
-    zero_mm: Option<f64>,
+    /// The saved settings, if the log has them.
+    saved: Option<Settings>,
+    /// The settings of [`SCALE`] whose values the log does not have.
+    unknown: Vec<Setting>,
+    /// The last status: its count, and the tool's position. `None` before the first position of a stretch. With another
+    /// wheel the ground goes on from here.
+    here: Option<(i32, f64)>,
     /// The farthest position so far.
     end_mm: f64,
 }
 
 impl Ground {
-    /// The tool's position at a count.
-    fn tool_mm(&mut self, position: i32) -> f64 {
-        let rolled_mm = f64::from(position) * tick_mm(&self.settings);
-        let zero_mm = *self.zero_mm.get_or_insert(self.end_mm - rolled_mm);
-        let tool_mm = zero_mm + rolled_mm;
-        self.end_mm = self.end_mm.max(tool_mm);
-        tool_mm
+    /// Takes a value that the machine has shown or accepted. One that this version does not accept is ignored.
+    fn take(&mut self, setting: Setting, value: u16) {
+        if self.settings.set(setting, value).is_ok() {
+            self.unknown.retain(|&unknown| unknown != setting);
+        }
     }
 
-    /// The ground in the beam at a count, as a position of the tool.
-    fn beam_mm(&mut self, position: i32) -> f64 {
-        self.tool_mm(position) + f64::from(self.settings.get(Setting::BeamToToolMm))
+    /// Follows a command that the machine has carried out, as the firmware does (`control::operate::configuration`).
+    fn follow(&mut self, command: Command) {
+        match command {
+            Command::Set(setting, value) => {
+                self.take(setting, value);
+                if setting.is_of_the_wheel() {
+                    self.take(Setting::TicksPerM, 0);
+                }
+            }
+            Command::Save => self.saved = self.unknown.is_empty().then(|| self.settings.clone()),
+            Command::Defaults => (self.settings, self.unknown) = (Settings::new(), Vec::new()),
+            Command::Revert => match &self.saved {
+                Some(saved) => (self.settings, self.unknown) = (saved.clone(), Vec::new()),
+                None => self.unknown = SCALE.to_vec(),
+            },
+            _ => {}
+        }
+    }
+
+    /// The tool's position at a count.
+    fn tool_mm(&mut self, position: i32) -> f64 {
+        let (here, here_mm) = *self.here.get_or_insert((position, self.end_mm));
+        let tool_mm = here_mm + f64::from(position.wrapping_sub(here)) * tick_mm(&self.settings);
+        self.end_mm = self.end_mm.max(tool_mm);
+        tool_mm
     }
 }
 
@@ -54,11 +86,13 @@ impl Ground {
 #[derive(Default)]
 struct Picture {
     ground: Ground,
-    /// Changes of settings that are not answered yet, and other commands.
-    unanswered: VecDeque<Option<(Setting, u16)>>,
-    here_mm: f64,
-    /// Position and state of the last stored speed.
+    /// Commands that are not answered yet; `None` for a parse error.
+    unanswered: VecDeque<Option<Command>>,
+    /// Position and state of the last stored speed of the stretch.
     shown: Option<(f64, Mode)>,
+    /// Whether nothing is drawn, because settings are unknown; and the times at which that began.
+    is_stopped: bool,
+    unknown_ms: Vec<u64>,
     time_ms: u64,
     swings: usize,
     /// The tool's positions, each with whether it is out from there on.
@@ -80,51 +114,61 @@ impl Picture {
         self.time_ms = entry.time_ms;
         match entry.kind {
             Kind::Connected => {
-                if self.ground.zero_mm.take().is_some() {
-                    self.ground.end_mm += APART_MM;
-                }
+                self.end_stretch();
                 self.unanswered.clear();
+                (self.ground.settings, self.ground.saved) = (Settings::new(), None);
+                self.ground.unknown.clear();
             }
-            Kind::Setting => {
+            Kind::Command => self.unanswered.push_back(command::parse(entry.text.as_bytes()).ok()),
+            Kind::Answer if entry.text == "ok" || entry.text.starts_with("error") => {
+                if let Some(Some(command)) = self.unanswered.pop_front()
+                    && entry.text == "ok"
+                {
+                    self.ground.follow(command);
+                }
+            }
+            Kind::Setting | Kind::Answer => {
                 if let Some((setting, value)) = shown(&entry.text) {
-                    // A value that this version does not accept is ignored.
-                    let _ = self.ground.settings.set(setting, value);
+                    self.ground.take(setting, value);
+                }
+            }
+            Kind::Status | Kind::Event if !self.ground.unknown.is_empty() => {
+                if !std::mem::replace(&mut self.is_stopped, true) {
+                    self.unknown_ms.push(entry.time_ms);
+                    self.end_stretch();
                 }
             }
             Kind::Status => {
+                self.is_stopped = false;
                 let Some(status) = Status::parse(&entry.text) else { return };
-                self.here_mm = self.ground.tool_mm(status.position);
-                let is_near = |(mm, mode): (f64, Mode)| (self.here_mm - mm).abs() < SPEED_MM && mode == status.mode;
+                let here_mm = self.ground.tool_mm(status.position);
+                self.ground.here = Some((status.position, here_mm));
+                let is_near = |(mm, mode): (f64, Mode)| (here_mm - mm).abs() < SPEED_MM && mode == status.mode;
                 if self.shown.is_some_and(is_near) {
                     return;
                 }
-                self.shown = Some((self.here_mm, status.mode));
-                if self.tables[SPEEDS].is_empty() {
-                    self.changes.insert(0, (self.here_mm, status.tool_out));
+                if self.shown.replace((here_mm, status.mode)).is_none() {
+                    self.changes.push((here_mm, status.tool_out));
                 }
-                self.tables[SPEEDS].extend([self.here_mm, entry.time_ms as f64, f64::from(status.speed_mm_s)]);
+                self.tables[SPEEDS].extend([here_mm, entry.time_ms as f64, f64::from(status.speed_mm_s)]);
             }
             Kind::Event => {
                 if let Some(event) = EventLine::parse(&entry.text) {
                     self.take_event(&event, &entry.text, entry.time_ms);
                 }
             }
-            Kind::Command => {
-                self.unanswered.push_back(match command::parse(entry.text.as_bytes()) {
-                    Ok(Command::Set(setting, value)) => Some((setting, value)),
-                    _ => None,
-                });
-            }
-            Kind::Answer if entry.text == "ok" || entry.text.starts_with("error") => {
-                if let Some(Some((setting, value))) = self.unanswered.pop_front()
-                    && entry.text == "ok"
-                {
-                    let _ = self.ground.settings.set(setting, value);
-                }
-            }
             Kind::Gps => self.has_places = true,
             _ => {}
         }
+    }
+
+    /// Ends the ground of a wheel's counts. What follows begins farther on.
+    fn end_stretch(&mut self) {
+        if self.ground.here.take().is_some() {
+            self.changes.push((self.ground.end_mm, true));
+            self.ground.end_mm += APART_MM;
+        }
+        self.shown = None;
     }
 
     fn take_event(&mut self, event: &EventLine, line: &str, time_ms: u64) {
@@ -134,11 +178,10 @@ impl Picture {
         let ground = &mut self.ground;
         match *event {
             EventLine::Detection { class, position, delay, hold, .. } => {
-                let tick_mm = tick_mm(&ground.settings);
+                let from_mm = ground.tool_mm(position) + f64::from(ground.settings.get(Setting::BeamToToolMm));
                 // The tool reaches the zone after this number of counts.
                 let zone_mm = ground.tool_mm(position.wrapping_add(delay));
-                let zone_end_mm = zone_mm + f64::from(hold) * tick_mm;
-                let from_mm = ground.beam_mm(position);
+                let zone_end_mm = zone_mm + f64::from(hold) * tick_mm(&ground.settings);
                 let class = match class {
                     Class::Plant => 0.0,
                     Class::Weed => 1.0,
@@ -157,7 +200,10 @@ impl Picture {
                 self.alarms.push(trouble(mm, false));
                 self.changes.push((mm, true));
             }
-            EventLine::Warning { .. } => self.alarms.push(trouble(self.here_mm, true)),
+            EventLine::Warning { .. } => {
+                let mm = ground.here.map_or(ground.end_mm, |(_, here_mm)| here_mm);
+                self.alarms.push(trouble(mm, true));
+            }
             // An alarm puts the tool out, and a start may let it in: the swing reports it.
             _ => {}
         }
@@ -262,10 +308,12 @@ fn ended(answer: impl FnOnce(&mut Log) -> Result<Value, String>) -> Value {
 pub fn picture() -> Value {
     ended(|log| {
         log.picture.worked();
-        let Picture { ground, time_ms, swings, has_places, alarms, tables, .. } = std::mem::take(&mut log.picture);
+        let Picture { ground, unknown_ms, time_ms, swings, has_places, alarms, tables, .. } =
+            std::mem::take(&mut log.picture);
         tables.into_iter().enumerate().for_each(|(number, table)| crate::put(number, table));
         Ok(json!({
             "lengthMm": ground.end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
+            "unknownMs": unknown_ms,
         }))
     })
 }
@@ -324,6 +372,19 @@ mod tests {
 496,status,state=hold tool=out pos=5 speed_mm_s=0 windows=0 unseen_mm=400
 ";
 
+    const BEGIN: &str = "time_ms,kind,line\n0,connected,0.2.0\n";
+
+    /// What `get` answers about [`SCALE`].
+    const SETTINGS: &str = "1300,answer,ticks_per_rev=2400
+1300,answer,wheel_mm=400
+1300,answer,ticks_per_m=1000
+1300,answer,beam_to_tool_mm=500
+";
+
+    fn status(time_ms: u64, tool: &str, position: u64) -> String {
+        format!("{time_ms},status,state=work tool={tool} pos={position} speed_mm_s=500 windows=0 unseen_mm=0\n")
+    }
+
     /// The picture of a log that is read in pieces of this length.
     fn shown(text: &str, length: usize) -> Value {
         begin(false);
@@ -358,27 +419,74 @@ mod tests {
         }
     }
 
+    /// A log of a wheel with 2000 ticks a metre: a status at 0 and at 1000 ticks, these lines, and one at 2000.
+    fn changed(lines: &str) -> String {
+        let [first, second] = [status(0, "in", 0), status(1000, "in", 1000)];
+        let settings = "0,setting,beam_to_tool_mm=400\n0,setting,ticks_per_m=2000\n";
+        let last = status(3000, "out", 2000);
+        format!("{BEGIN}{settings}{first}{second}{lines}{last}")
+    }
+
+    #[test]
+    fn ground_is_drawn_by_the_wheel_of_its_time() {
+        let command = |line: &str, answer: &str| format!("1100,command,{line}\n1200,answer,{answer}\n");
+        let set = command("set ticks_per_m 1000", "ok");
+        let shown_ticks = "\"ticks_per_m=1000 from 0 to 20000, default 0, not saved\"\n1200,answer,ok";
+        let nominal_mm = |wheel_mm: f64| 500.0 + 1000.0 * std::f64::consts::PI * wheel_mm / 2400.0;
+        for (lines, last_mm) in [
+            (String::new(), 1000.0),
+            (set.clone(), 1500.0),
+            (command("set ticks_per_m 1000", "error: the machine is at work"), 1000.0),
+            (command("calibrate 1000 force", shown_ticks), 1500.0),
+            (command("get ticks_per_m", shown_ticks), 1500.0),
+            (command("set wheel_mm 500", "ok"), nominal_mm(500.0)),
+            (command("defaults", "ok"), nominal_mm(400.0)),
+            ([command("save", "ok"), set, command("revert", "ok")].concat(), 1000.0),
+            (command("revert", "ok") + SETTINGS, 1500.0),
+            (command("revert", "\"error: no settings are saved, save does it\""), 1000.0),
+        ] {
+            let picture = shown(&changed(&lines), 64);
+            let positions: Vec<f64> = rows::<3>(SPEEDS).iter().map(|[mm, ..]| mm.round()).collect();
+            assert_eq!(positions, [0.0, 500.0, f64::round(last_mm)], "{lines}");
+            assert_eq!(picture["unknownMs"], json!([]), "{lines}");
+        }
+    }
+
+    #[test]
+    fn where_the_log_lacks_the_saved_settings_nothing_is_drawn() {
+        let plant = "event,plant pos=1200 votes=3 spacing=1000 delay=680 hold=540 actuation=1220\n";
+        let reverted = format!("1100,command,revert\n1200,answer,ok\n1300,{plant}");
+        let picture = shown(&changed(&reverted), 64);
+        assert_eq!(picture["unknownMs"], json!([1300]));
+        assert_eq!((rows::<3>(SPEEDS).len(), rows::<5>(OBJECTS).len()), (2, 0));
+        assert_eq!(rows(WORKED), [[0.0, 500.0]]);
+
+        shown(&changed(&format!("{reverted}1400,command,get\n{SETTINGS}1400,answer,ok\n1500,{plant}")), 64);
+        // It goes on behind a metre.
+        assert_eq!(rows::<5>(OBJECTS)[0][1], 2000.0);
+        assert_eq!(rows::<3>(SPEEDS)[2], [2300.0, 3000.0, 500.0]);
+    }
+
     #[test]
     fn the_tool_is_in_the_row_from_a_swing_in_to_the_next_out_or_an_alarm() {
         let swing = |tool: &str, pos: u32| format!("9,event,swing tool={tool} pos={pos}\n");
-        let status = "1,status,state=hold tool=out pos=0 speed_mm_s=500 windows=0 unseen_mm=0\n";
+        let status = status(1, "out", 0);
         let alarm = "9,event,alarm code=3-1 name=too_fast pos=9000\n";
         let setting = "0,setting,ticks_per_m=1000\n";
         let swings =
             [("in", 1000), ("out", 2000), ("in", 3000), ("in", 3500), ("out", 4000), ("in", 8000), ("in", 9500)];
         let swings: String = swings.map(|(tool, pos)| swing(tool, pos)).concat();
-        shown(&format!("time_ms,kind,line\n0,connected,0.2.0\n{setting}{status}{swings}{alarm}"), 64);
+        shown(&format!("{BEGIN}{setting}{status}{swings}{alarm}"), 64);
         assert_eq!(rows(WORKED), [[1000.0, 2000.0], [3000.0, 4000.0], [8000.0, 9000.0], [9500.0, 9500.0]]);
+        // A reset takes the tool out.
+        shown(&changed("2000,lost,pulled\n2000,connected,0.2.0\n"), 64);
+        assert_eq!(rows(WORKED), [[0.0, 500.0]]);
     }
 
     #[test]
     fn statuses_close_together_are_left_out_and_lines_keep_their_numbers() {
-        let status = |time_ms: u64, position: u64| {
-            let figures = "speed_mm_s=500 windows=0 unseen_mm=0";
-            format!("{time_ms},status,state=work tool=in pos={position} {figures}\n")
-        };
-        let statuses: String = (0..10).map(|number| status(100 * number, 1000 * number)).collect();
-        let log = format!("time_ms,kind,line\n0,connected,0.2.0\n{statuses}0,connected,0.2.0\n{}", status(50, 0));
+        let statuses: String = (0..10).map(|number| status(100 * number, "in", 1000 * number)).collect();
+        let log = format!("{BEGIN}{statuses}0,connected,0.2.0\n{}", status(50, "in", 0));
         shown(&log, 100);
         let times: Vec<f64> = rows::<3>(SPEEDS).iter().map(|speed| speed[1]).collect();
         assert_eq!(times, [0.0, 300.0, 600.0, 900.0, 50.0]);

@@ -9,9 +9,10 @@ use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
 use field::rolling::Rolling;
 use field::row::{Canopy, Row};
-use field::servo::Servo;
 use field::verdict::{Timing, Verdict, judge};
 use field::{Kind, Machine};
+use link::set_up::{Task, steps};
+use link::settings::{Setting, name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::cell::RefCell;
@@ -26,18 +27,22 @@ const BEFORE_MM: f64 = 500.0;
 /// An arm within this angle of fully out counts as fully out. It is half a millimetre at the tool's end, and 1 us of a
 /// pulse: avr8js does not time edges more exactly (docs/simulators.md).
 const CLEAR_WITHIN_DEGREES: f64 = 0.09;
+/// The margin from the measurements of the machine that is set up.
+const MARGIN_MM: u16 = 11;
 
-/// A machine before a row. Missing values are those of the machine from the box.
+/// A machine before a row.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Begun {
     /// The Uno's cycle at this moment, with the beam at 0 mm.
     cycle: u64,
     sowing: Sown,
-    tool_width_mm: Option<f64>,
-    second_beam_mm: Option<f64>,
-    servo_in_us: Option<f64>,
-    servo_out_us: Option<f64>,
+    /// Whether it is set up by the manual, except for the second beam. Otherwise it is the machine from the box.
+    #[serde(default)]
+    is_set_up: bool,
+    /// Distance from the beam back to a second one; 0 without one.
+    #[serde(default)]
+    second_beam_mm: f64,
 }
 
 /// The parameters of an endless row.
@@ -60,9 +65,7 @@ pub enum Different {
     SpeedKmH(f64),
     /// The share of the wheel's distance that is lost, below 1.
     Slip(f64),
-    /// Whether the first beam's wire is torn.
     BeamWireTorn(bool),
-    /// Whether the encoder is dead.
     EncoderDead(bool),
     /// The spacing of plants that are sown from now on.
     SpacingMm(f64),
@@ -120,22 +123,15 @@ fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Result<Answer, String
 }
 
 impl Begun {
-    /// Begins a trial, and replaces an earlier one. Returns the machine's dimensions, and the levels of its pins.
+    /// Begins a trial, and replaces an earlier one. Returns the machine's dimensions, the levels of its pins, and the
+    /// commands that set up its firmware.
     pub fn begin(self) -> Value {
-        let servo = Servo::default();
-        let servo = Servo {
-            in_us: self.servo_in_us.unwrap_or(servo.in_us),
-            out_us: self.servo_out_us.unwrap_or(servo.out_us),
-            ..servo
-        };
-        let machine = Machine::default();
-        let machine = Machine {
-            tool_width_mm: self.tool_width_mm.unwrap_or(machine.tool_width_mm),
-            second_beam_mm: self.second_beam_mm.unwrap_or(machine.second_beam_mm),
+        let mut machine = Machine {
+            second_beam_mm: self.second_beam_mm,
             clear_within_degrees: CLEAR_WITHIN_DEGREES,
-            servo,
-            ..machine
+            ..Machine::default()
         };
+        let set_up = if self.is_set_up { set_up(&mut machine) } else { Vec::new() };
         let Sown { seed, spacing_mm, weed_share, first_mm } = self.sowing;
         let planting = Planting { spacing_mm, ..Planting::default() };
         let mut sowing = Sowing::new(planting, weed_share, first_mm, seed);
@@ -154,10 +150,31 @@ impl Begun {
         let dimensions = json!({
             "beamToToolMm": machine.beam_to_tool_mm, "armMm": machine.arm_mm, "toolWidthMm": machine.tool_width_mm,
         });
-        let answer = json!({ "dimensions": dimensions, "levels": trial.levels() });
+        let answer = json!({ "dimensions": dimensions, "levels": trial.levels(), "setUp": set_up });
         TRIAL.set(Some(trial));
         answer
     }
+}
+
+/// Sets a machine up by the manual's steps, without the second beam. Returns the commands for its firmware.
+fn set_up(machine: &mut Machine) -> Vec<String> {
+    let mut commands = Vec::new();
+    for task in steps().into_iter().flat_map(|step| step.tasks) {
+        match task {
+            Task::Fit("machine.tool_width_mm", width_mm) => machine.tool_width_mm = width_mm,
+            Task::Set(Setting::ServoInUs, pulse_us) => machine.servo.in_us = pulse_us.into(),
+            Task::Set(Setting::ServoOutUs, pulse_us) => machine.servo.out_us = pulse_us.into(),
+            _ => {}
+        }
+        match task {
+            Task::Set(setting, value) if setting != Setting::SecondBeamMm => {
+                commands.push(format!("set {} {value}", name(setting)));
+            }
+            Task::SetMargin => commands.push(format!("set margin_mm {MARGIN_MM}")),
+            _ => {}
+        }
+    }
+    commands
 }
 
 impl Different {

@@ -61,10 +61,7 @@ const OTHERS: Readonly<Record<string, string>> = {
 
 /** Timeout of an answer: a page is written in 10 ms, and sent in 27 at 57600 baud. */
 const ANSWER_MS = 1000;
-/**
- * Time between two sync commands, and their number after a reset: the old bootloader blinks for a second before it
- * listens.
- */
+/** Time between two sync commands, and their number after a reset: the old bootloader first blinks for a second. */
 const CALL_MS = 150;
 const CALLS = 12;
 /** The most resets of the board, and tries of a page. */

@@ -39,3 +39,9 @@ export function steps(from: readonly Setting[], to: ReadonlyMap<string, number>)
     const { steps, ...rest } = ask<Steps>({ steps: change });
     return { ...rest, steps: [...steps, ...(bad ?? [])] };
 }
+
+/** Distance of an encoder count, by the values of the settings: of the calibrated wheel, or of its diameter. */
+export function tickMm(value: (setting: string) => number): number {
+    const perMetre = value("ticks_per_m");
+    return perMetre > 0 ? 1000 / perMetre : (Math.PI * value("wheel_mm")) / Math.max(value("ticks_per_rev"), 1);
+}

@@ -1,5 +1,5 @@
 // The log of a session, for `weeder replay`: a CSV file of `time_ms,kind,line`, with the firmware's own lines. It has
-// the machine's settings and examples at each connection, so that it can be replayed alone.
+// the machine's settings and examples at each connection, so that it can be replayed alone. Changed settings are answers.
 
 import type { Happening } from "./session.ts";
 
@@ -19,25 +19,24 @@ export class Log {
     /** Records an event at a time. */
     add(happening: Happening, nowMs: number): void {
         this.#from ??= nowMs;
-        const write = (kind: string, line: string) =>
-            this.#write(Math.round(nowMs - (this.#from ?? nowMs)), kind, line);
+        const timeMs = Math.round(nowMs - this.#from);
+        const write = (kind: string, line: string) => {
+            this.isFull = this.#lines.length >= MOST;
+            if (this.isFull) return;
+            const field = /[",\n]/.test(line) ? `"${line.replaceAll('"', '""')}"` : line;
+            this.#lines.push(`${timeMs},${kind},${field}`);
+        };
         if (happening.is === "connected") {
             write("connected", happening.version);
             for (const { name, value } of happening.settings) write("setting", `${name}=${value}`);
             for (const example of happening.examples) write("example", example);
         } else if (happening.is === "lost") write("lost", happening.why);
+        // Of `revert`, and of a change at another computer, no typed line has the values.
+        else if (happening.is === "settings") for (const line of happening.lines) write("answer", line);
         else if ("line" in happening && happening.is !== "started") write(happening.is, happening.line);
     }
 
-    /** The file. */
     text(): string {
         return `${["time_ms,kind,line", ...this.#lines].join("\n")}\n`;
-    }
-
-    #write(timeMs: number, kind: string, line: string): void {
-        this.isFull = this.#lines.length >= MOST;
-        if (this.isFull) return;
-        const field = /[",\n]/.test(line) ? `"${line.replaceAll('"', '""')}"` : line;
-        this.#lines.push(`${timeMs},${kind},${field}`);
     }
 }

@@ -73,7 +73,6 @@ export class Served {
         this.machines = allowed.machines.map((name, number) => new ServedMachine(number, name));
     }
 
-    /** Starts to receive the events. */
     listen(): void {
         this.#heardMs = performance.now();
         const events = new EventSource("/events");
@@ -164,9 +163,11 @@ export class ServedMachine implements Link {
             case "lost":
                 this.#lose(message.why);
                 break;
-            case "settings":
-                this.onHappening({ is: "settings", settings: linesOf("setting", message.said) });
+            case "settings": {
+                const lines = message.said;
+                this.onHappening({ is: "settings", settings: linesOf("setting", lines), lines });
                 break;
+            }
             case "examples":
                 this.onHappening({ is: "examples", examples: message.said });
                 break;

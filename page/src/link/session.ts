@@ -41,7 +41,8 @@ export type Happening =
     | { is: "event"; event: EventLine; line: string }
     | { is: "command"; line: string }
     | { is: "answer"; line: string }
-    | { is: "settings"; settings: readonly Setting[] }
+    /** The settings after a command has changed some, and the lines that show them. */
+    | { is: "settings"; settings: readonly Setting[]; lines: readonly string[] }
     | { is: "examples"; examples: readonly string[] }
     /** The help texts of the settings, by name. */
     | { is: "help"; help: Map<string, string> };
@@ -212,7 +213,7 @@ export class Session implements Link {
     /** Asks the machine for all that the page shows. */
     async #introduce(): Promise<void> {
         const version = await this.#version();
-        const settings = await this.#settings();
+        const { settings } = await this.#settings();
         const examples = await this.#ask("examples", false);
         await this.#ask("events on", false);
         this.#isReady = true;
@@ -234,10 +235,11 @@ export class Session implements Link {
         return said.version;
     }
 
-    async #settings(): Promise<Setting[]> {
-        const settings = linesOf("setting", await this.#ask("get", false));
+    async #settings(): Promise<{ settings: Setting[]; lines: string[] }> {
+        const lines = await this.#ask("get", false);
+        const settings = linesOf("setting", lines);
         if (settings.length === 0) throw new NoMachine(english("noSettings"));
-        return settings;
+        return { settings, lines };
     }
 
     /** An answer is missing: a connected machine is asked for everything again. */
@@ -303,7 +305,7 @@ export class Session implements Link {
     /** Asks for what a command has changed. */
     async #follow(command: string): Promise<void> {
         if (/^\s*(set|defaults|revert|calibrate|save)\b/.test(command))
-            this.onHappening({ is: "settings", settings: await this.#settings() });
+            this.onHappening({ is: "settings", ...(await this.#settings()) });
         if (/^\s*(label|teach|forget)\b/.test(command))
             this.onHappening({ is: "examples", examples: await this.#ask("examples", false) });
         // The page needs the events.

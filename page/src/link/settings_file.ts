@@ -4,6 +4,7 @@
 import { download } from "../dom.ts";
 import { english } from "../words/words.ts";
 import type { Setting } from "./console_line.ts";
+import { tickMm } from "./grammar.ts";
 
 /** An error in a settings file, and what would be right. */
 export class SettingsFileError extends Error {}
@@ -58,14 +59,10 @@ export function parse(text: string, settings: readonly Setting[]): Map<string, n
             );
         values.set(name, value);
     }
+    // Settings that the file does not name are the machine's.
+    const value = (name: string) => values.get(name) ?? settings.find((setting) => setting.name === name)?.value ?? 0;
     if (oldMergeGap !== undefined && !values.has("merge_gap_mm"))
-        values.set("merge_gap_mm", Math.min(1000, Math.round(oldMergeGap / ticksPerMm(values, settings))));
+        values.set("merge_gap_mm", Math.min(1000, Math.round(oldMergeGap * tickMm(value))));
     if (values.size === 0) throw new SettingsFileError(english("fileEmpty"));
     return values;
-}
-
-/** Ticks in a millimetre with these values. Missing values are the machine's. */
-function ticksPerMm(values: ReadonlyMap<string, number>, settings: readonly Setting[]): number {
-    const value = (name: string) => values.get(name) ?? settings.find((setting) => setting.name === name)?.value ?? 0;
-    return value("ticks_per_m") / 1000 || value("ticks_per_rev") / (Math.PI * value("wheel_mm"));
 }

@@ -27,7 +27,6 @@ export class Examples {
         parts.button("examples-forget", () => void this.#forget("all"));
     }
 
-    /** Shows the last object. */
     show(): void {
         const [last] = this.machine.objects;
         const width = quantity(last ? this.machine.widthMm(last) : 0, "millimeter");
@@ -35,7 +34,6 @@ export class Examples {
         this.parts.write("last-object", seen ?? say("nothingSeen"));
     }
 
-    /** Shows the examples as they are known. */
     showExamples(): void {
         const field = linesOf("example", this.machine.examples).filter(({ fromField }) => fromField);
         this.parts.write("examples-count", say("places", { count: field.length, all: PLACES }));

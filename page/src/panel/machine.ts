@@ -3,6 +3,7 @@
 import faults from "faults.json";
 import { plain } from "../dom.ts";
 import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
+import { tickMm } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
@@ -127,9 +128,7 @@ export class Machine {
 
     /** Distance of an encoder count. */
     get tickMm(): number {
-        const perMetre = this.setting("ticks_per_m");
-        if (perMetre > 0) return 1000 / perMetre;
-        return (Math.PI * this.setting("wheel_mm")) / Math.max(this.setting("ticks_per_rev"), 1);
+        return tickMm((name) => this.setting(name));
     }
 
     ticks(millimetres: number): number {

@@ -139,18 +139,16 @@ export class Panel {
     /** Shows changes and moving parts. */
     show(): void {
         const { machine } = this;
+        const { status } = machine;
         const parts = this.#parts;
         parts.root.dataset.state = machine.state;
         parts.write("state", machine.stateWord);
         parts.write("why", machine.why);
         this.#tell();
-        parts.write("speed", machine.status ? number(machine.status.speedMmS * 0.0036, 1) : "-");
+        parts.write("speed", status ? number(status.speedMmS * 0.0036, 1) : "-");
         parts.write("tool", machine.version === undefined ? "-" : say(machine.toolOut ? "toolOut" : "toolIn"));
-        parts.write(
-            "place",
-            machine.status ? quantity((machine.status.position * machine.tickMm) / 1000, "meter", 2) : "-",
-        );
-        parts.write("zones", machine.status ? String(machine.status.zones) : "-");
+        parts.write("place", status ? quantity((status.position * machine.tickMm) / 1000, "meter", 2) : "-");
+        parts.write("zones", status ? String(status.zones) : "-");
         const trouble = machine.alarm ?? machine.warning;
         parts.html("alarm").hidden = trouble === undefined;
         parts.html("alarm").classList.toggle("warning", machine.alarm === undefined);
@@ -230,7 +228,6 @@ export class Panel {
         if (isOther || nowMs - this.#heard.sinceMs > LASTING_MS) this.#parts.write("heard", this.#row + heard);
     }
 
-    /** Shows the error of such a command. */
     #drive(command: Promise<unknown>): void {
         void this.#parts.attempt("drive-said", command, undefined, (error) => sentence(told(error)));
     }
@@ -284,9 +281,7 @@ function inConsole(happening: Happening): Parameters<Console["add"]> | undefined
     }
 }
 
-/**
- * Reserves room at the page's end for the dock on the screen, so that the browser scrolls the focused element above it.
- */
+/** Reserves room for the dock at the page's end, so that the browser scrolls the focused element above it. */
 function followDock(dock: HTMLElement): void {
     new ResizeObserver(() => {
         if (dock.offsetHeight > 0) document.documentElement.style.setProperty("--dock", `${dock.offsetHeight}px`);

@@ -1,10 +1,11 @@
 // Setting up the machine: the steps of the manual, the next measurement, and the least margin. The project's Rust has
-// the steps and calculates the margin (host/page/src/console.rs). This module stores the session's lines for it.
+// the steps, remembers the measurements and calculates the margin (host/page/src/console.rs).
 
-import { ask as askRust } from "../core.ts";
+import { module } from "../core.ts";
 import { make, type Parts } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
+import { Rust } from "../rust.ts";
 import { quantity, say, step, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
@@ -19,12 +20,10 @@ interface Advice {
     readonly warning: string | null;
 }
 
-/** Greatest number of lines, and of lines about plants among them. The oldest are dropped first. */
-const LINES = 200;
-const PLANTS = 12;
-
 export class SetUp {
-    #lines: string[] = [];
+    /** An instance for the measurements of this machine. */
+    readonly #rust = new Rust(module);
+    #marginMm: number | null = null;
 
     constructor(
         private readonly parts: Parts,
@@ -32,60 +31,39 @@ export class SetUp {
         ask: Ask,
     ) {
         parts.button("margin-set", () => {
-            const set = ask(`set margin_mm ${this.#advice().marginMm}`).then(() => ask("save"));
+            const set = ask(`set margin_mm ${this.#marginMm}`).then(() => ask("save"));
             void parts.attempt("margin-said", set);
         });
     }
 
-    /** Stores lines about a measurement. */
+    /** Takes lines about a measurement. */
     take(happening: Happening): void {
         const { is } = happening;
         if (is === "connected" || is === "settings")
-            for (const name of ["servo_in_us", "servo_out_us"]) this.#keep(`${name}=${this.machine.setting(name)}`);
-        else if (is === "command" && /^(calibrate|set margin_mm) /.test(happening.line))
-            this.#keep(`> ${happening.line}`);
-        else if (is === "answer" && read(happening.line).is === "setting") this.#keep(happening.line);
+            this.show(["servo_in_us", "servo_out_us"].map((name) => `${name}=${this.machine.setting(name)}`));
+        else if (is === "command") this.show([`> ${happening.line}`]);
+        else if (is === "answer" && read(happening.line).is === "setting") this.show([happening.line]);
         else if (is === "event" && ["calibratedBySwitch", "calibratedByEye", "slip"].includes(happening.event.is))
-            this.#keep(happening.line);
-        else return;
-        this.show();
+            this.show([happening.line]);
     }
 
-    /** Shows the steps and their state. */
-    show(): void {
-        const advice = this.#advice();
-        const list = this.parts.html("set-up-steps");
-        list.replaceChildren(
-            ...advice.steps.map((manual) => {
+    /** Shows the steps and their state, after these new lines. */
+    show(lines: readonly string[] = []): void {
+        const settings = Object.fromEntries(this.machine.settings.map(({ name, value }) => [name, value]));
+        const { steps, next, missing, marginMm, warning } = this.#rust.ask<Advice>({ setUp: { lines, settings } });
+        this.#marginMm = marginMm;
+        this.parts.html("set-up-steps").replaceChildren(
+            ...steps.map((manual) => {
                 const [title, how] = step(manual.title, manual.how);
                 const codes = manual.tasks.flatMap((task) => [" ", make("code", "", task)]);
                 return make("li", "", make("b", "", title), ". ", how, ...codes);
             }),
         );
-        const steps = advice.missing.map((step) => `${told(step)}.`).join(" ");
-        const { next, warning } = advice;
-        this.parts.write(
-            "margin-said",
-            next === null ? say("beforeMargin", { steps }) : say("next", { step: told(next) }),
-        );
+        const before = () => say("beforeMargin", { steps: missing.map((step) => `${told(step)}.`).join(" ") });
+        this.parts.write("margin-said", next === null ? before() : say("next", { step: told(next) }));
         this.parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
         const button = this.parts.get("margin-set", HTMLButtonElement);
-        button.hidden = advice.marginMm === null || advice.marginMm === this.machine.setting("margin_mm");
-        if (advice.marginMm !== null)
-            button.textContent = say("setMargin", { margin: quantity(advice.marginMm, "millimeter") });
-    }
-
-    #keep(line: string): void {
-        if (this.#lines.at(-1) === line && !line.startsWith("calibrated") && !line.startsWith("slip")) return;
-        const plants = this.#lines.filter((kept) => kept.startsWith("slip"));
-        if (line.startsWith("slip") && plants.length >= PLANTS)
-            this.#lines.splice(this.#lines.indexOf(plants[0] ?? ""), 1);
-        this.#lines.push(line);
-        if (this.#lines.length > LINES) this.#lines.shift();
-    }
-
-    #advice(): Advice {
-        const settings = Object.fromEntries(this.machine.settings.map(({ name, value }) => [name, value]));
-        return askRust<Advice>({ setUp: { lines: this.#lines, settings } });
+        button.hidden = marginMm === null || marginMm === this.machine.setting("margin_mm");
+        if (marginMm !== null) button.textContent = say("setMargin", { margin: quantity(marginMm, "millimeter") });
     }
 }

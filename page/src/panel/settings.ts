@@ -71,13 +71,7 @@ export class SettingsForm {
             input.checked = wanted === 1;
             input.addEventListener("change", () => change(input.checked ? 1 : 0));
         } else {
-            Object.assign(input, {
-                type: "number",
-                inputMode: "numeric",
-                step: "1",
-                min: `${least}`,
-                max: `${greatest}`,
-            });
+            Object.assign(input, { type: "number", inputMode: "numeric", min: `${least}`, max: `${greatest}` });
             input.value = String(wanted);
             input.addEventListener("input", () => change(input.value === "" ? Number.NaN : input.valueAsNumber));
         }
@@ -104,13 +98,10 @@ export class SettingsForm {
 
     #count(): void {
         const { size } = this.#wanted;
-        this.parts.get("settings-send", HTMLButtonElement).disabled = size === 0 && !this.#isUnsaved;
+        const isSaved = this.machine.settings.every(({ value, saved }) => value === saved);
+        this.parts.get("settings-send", HTMLButtonElement).disabled = size === 0 && isSaved;
         this.parts.get("settings-undo", HTMLButtonElement).disabled = size === 0;
         this.parts.write("settings-send", size === 0 ? say("save") : say("sendAndSave", { count: size }));
-    }
-
-    get #isUnsaved(): boolean {
-        return this.machine.settings.some(({ value, saved }) => value !== saved);
     }
 
     #say(text: () => string): void {

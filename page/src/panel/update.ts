@@ -42,24 +42,18 @@ export class Update {
     take({ is }: Happening): void {
         // Without saved ones, its firmware has another table, or none were ever saved.
         const hasSaved = this.panel.machine.settings.some(({ saved }) => saved !== undefined);
-        if (is === "connected" && this.#isOwn && hasSaved) keep(KEPT, "");
+        if (is === "connected" && this.#changes().isOwn && hasSaved) keep(KEPT, "");
         if (is === "connected") this.parts.write("restore-said", "");
         if (["connected", "lost", "settings", "event"].includes(is)) this.#show();
     }
 
-    /** Settings that only the machine has, and settings that only this page's firmware has. */
-    #changes(): { gone: string[]; added: string[] } {
-        const names = this.panel.machine.settings.map(({ name }) => name);
-        const { settings } = this.#own;
-        return {
-            gone: names.filter((name) => !settings.includes(name)),
-            added: settings.filter((name) => !names.includes(name)),
-        };
-    }
-
-    get #isOwn(): boolean {
-        const { gone, added } = this.#changes();
-        return this.panel.machine.version === this.#own.version && gone.length + added.length === 0;
+    /** The settings that only the machine has, and that only this page's firmware has; whether all is the same. */
+    #changes(): { gone: string[]; added: string[]; isOwn: boolean } {
+        const { settings, version } = this.panel.machine;
+        const names = settings.map(({ name }) => name);
+        const gone = names.filter((name) => !this.#own.settings.includes(name));
+        const added = this.#own.settings.filter((name) => !names.includes(name));
+        return { gone, added, isOwn: version === this.#own.version && gone.length + added.length === 0 };
     }
 
     /** The stored settings that differ from the machine's. */
@@ -69,10 +63,10 @@ export class Update {
 
     #show(): void {
         const { version } = this.panel.machine;
-        const isOther = version !== undefined && !this.#isOwn;
+        const { gone, added, isOwn } = this.#changes();
+        const isOther = version !== undefined && !isOwn;
         this.parts.html("update").hidden = !isOther;
         if (isOther) {
-            const { gone, added } = this.#changes();
             const said = () => [
                 say("otherFirmware", { theirs: version, ours: this.#own.version }),
                 gone.length > 0 && say("settingsGone", { names: gone.join(", ") }),
@@ -82,8 +76,7 @@ export class Update {
             ];
             this.parts.say("update-said", () => said().filter(Boolean).join(" "));
         }
-        const kept = this.#kept();
-        this.parts.html("restore").hidden = version === undefined || isOther || kept.length === 0;
+        this.parts.html("restore").hidden = version === undefined || isOther || this.#kept().length === 0;
     }
 
     async #putBack(): Promise<void> {

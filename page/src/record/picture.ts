@@ -47,6 +47,8 @@ interface Head {
     readonly alarms: readonly Trouble[];
     /** Whether it has a satellite receiver's positions. */
     readonly hasPlaces: boolean;
+    /** Times from which on nothing is drawn: the log lacks the settings in use. */
+    readonly unknownMs: readonly number[];
 }
 
 /** Rows of numbers in the log's order. */

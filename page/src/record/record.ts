@@ -53,7 +53,6 @@ export class RecordView {
     readonly #resized = new ResizeObserver(() => this.#draw());
     #rows: readonly Row[] = [];
     #windowMm = WINDOW_MM.first;
-    /** The middle of the window. */
     #middleMm = 0;
     #isToBeDrawn = false;
     #work = new AbortController();
@@ -173,7 +172,6 @@ export class RecordView {
         this.#draw();
     }
 
-    /** Moves to the next or previous alarm of any row. */
     #toAlarm(way: 1 | -1): void {
         const alarms = this.#rows.flatMap(({ file, picture }) => picture.alarms.map((alarm) => ({ ...alarm, file })));
         // After rolling back, the machine may have reached an alarm's position again.
@@ -243,6 +241,7 @@ export class RecordView {
             draw("rect", { class: className, x: x(one), width: Math.max(x(other) - x(one), 1), y: top, height });
         const objects = shown.objects.near(fromMm, toMm);
         const row = AT.rowEnd - AT.row;
+        const middle = x(this.#middleMm);
         drawing.ariaLabel = `${file.name}: ${say("logDrawing")}`;
         drawing.setAttribute("viewBox", `0 0 ${clientWidth} ${HEIGHT}`);
         drawing.replaceChildren(
@@ -259,13 +258,7 @@ export class RecordView {
                 "stroke-width": 1.5,
                 d: speedLine(shown.speeds.near(fromMm - BESIDE_MM, toMm + BESIDE_MM), shown.fastestMmS, x),
             }),
-            draw("line", {
-                stroke: "var(--rule)",
-                x1: x(this.#middleMm),
-                x2: x(this.#middleMm),
-                y1: 0,
-                y2: AT.speedEnd,
-            }),
+            draw("line", { stroke: "var(--rule)", x1: middle, x2: middle, y1: 0, y2: AT.speedEnd }),
             ...shown.alarms
                 .filter(({ mm }) => mm >= fromMm && mm <= toMm)
                 .map(({ mm, isWarning }) => {
@@ -302,8 +295,8 @@ function marks(fromMm: number, toMm: number, x: (mm: number) => number): SVGElem
     return marks;
 }
 
-const inWords = (file: File, { lengthMm, timeMs, objects, swings, alarms }: Picture) =>
-    say("logHas", {
+function inWords(file: File, { lengthMm, timeMs, objects, swings, alarms, unknownMs }: Picture): string {
+    const has = say("logHas", {
         file: file.name,
         distance: metres(lengthMm),
         time: duration(timeMs),
@@ -311,6 +304,8 @@ const inWords = (file: File, { lengthMm, timeMs, objects, swings, alarms }: Pict
         swings,
         count: alarms.length,
     });
+    return [has, ...unknownMs.map((ms) => say("logUnknown", { time: duration(ms) }))].join(" ");
+}
 
 function agreement({ objects, alarms, swings, difference, notes }: Replayed): string {
     return [

@@ -24,14 +24,10 @@ export function span({ placeMm, widthMm }: Thing): { startMm: number; endMm: num
     return { startMm: placeMm - widthMm / 2, endMm: placeMm + widthMm / 2 };
 }
 
-/** The differences from the machine from the box. */
-export interface MachineKind {
-    readonly toolWidthMm?: number;
-    /** Distance from the beam back to a second one; 0 without one. */
+/** The differences from the machine from the box: `Begun` in host/page/src/trial.rs. */
+interface MachineKind {
+    readonly isSetUp?: boolean;
     readonly secondBeamMm?: number;
-    /** Pulse widths for the tool in the row, and out of it. */
-    readonly servoInUs?: number;
-    readonly servoOutUs?: number;
 }
 
 /** The random row in front of the machine, which continues while the machine rolls. */
@@ -65,12 +61,20 @@ export type Change =
 
 type Levels = [pin: number, high: boolean][];
 
+interface Begun {
+    readonly dimensions: Dimensions;
+    readonly setUp: readonly string[];
+    readonly levels: Levels;
+}
+
 /** The tables of host/page/src/trial.rs. */
 const TABLE = { now: 0, changes: 1, sown: 2 } as const;
 
 export class Machine {
     readonly uno: Uno;
     readonly dimensions: Dimensions;
+    /** The commands that set up its firmware. */
+    readonly setUp: readonly string[];
     /** The things in the row so far. */
     readonly things: Thing[] = [];
     /** The ground that the beam sees, and the ground under the tool. */
@@ -88,9 +92,7 @@ export class Machine {
     isWeeding = false;
     /** Whether the beam is broken. */
     isBroken = false;
-    /**
-     * Net counts of a perfect encoder since the machine was placed in front of the row, and the distance of one count.
-     */
+    /** Net counts of a perfect encoder since the start, and the distance of one count. */
     ticks = 0;
     groundMmATick = 0;
     /** Changes of the tool's command so far. The first is not a swing. */
@@ -101,10 +103,9 @@ export class Machine {
     /** Places a standing machine in front of a row, at the Uno's cycle. */
     constructor(uno: Uno, sowing: Sowing, kind: MachineKind = {}) {
         this.uno = uno;
-        const { dimensions, levels } = this.#rust.ask<{ dimensions: Dimensions; levels: Levels }>({
-            begin: { cycle: uno.cycle, sowing, ...kind },
-        });
-        this.dimensions = dimensions;
+        const begin = { cycle: uno.cycle, sowing, ...kind };
+        const { dimensions, setUp, levels } = this.#rust.ask<Begun>({ begin });
+        [this.dimensions, this.setUp] = [dimensions, setUp];
         this.#set(levels);
         this.#look();
         uno.set(PIN.workSwitch, true);
@@ -116,7 +117,6 @@ export class Machine {
         };
     }
 
-    /** Applies a change from now on. */
     change(change: Change): void {
         this.#set(this.#rust.ask<Levels>({ change }));
     }

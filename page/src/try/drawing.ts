@@ -157,7 +157,6 @@ export class Drawing {
         this.#angle.textContent = `${Math.round(degrees) + 0}\u00b0`;
     }
 
-    /** Draws a sign at each judged plant. */
     #drawVerdicts({ machine, outcome }: Trial): void {
         for (const [index, shape] of this.#things.shown) {
             const [thing, verdict] = [machine.things[index], outcome.plants.get(index)];

@@ -4,7 +4,7 @@
 // host/field/src/budget.rs without guarded ground, and add up to the whole stretch. The firmware's output decides: its
 // state, its reason, and its keep-out zones.
 
-import { type Machine, span, type Thing } from "../row/machine.ts";
+import type { Machine, Thing } from "../row/machine.ts";
 import { quantity, say, type Word } from "../words/words.ts";
 
 /** A keep-out zone along the row. */
@@ -92,13 +92,11 @@ export class Losses {
     }
 }
 
-/** The kind of the thing nearest to a position, within its own width. */
+/** The kind of the thing nearest to a position. */
 function nearest(things: readonly Thing[], placeMm: number): Thing["kind"] | undefined {
-    const away = (thing: Thing) => Math.abs(thing.placeMm - placeMm);
-    const first = things.findIndex((thing) => span(thing).endMm >= placeMm);
-    const [one, other] = first < 0 ? [things.at(-1), undefined] : [things[first - 1], things[first]];
-    if (!one || !other) return (one ?? other)?.kind;
-    return away(one) < away(other) ? one.kind : other.kind;
+    const awayMm = (thing: Thing) => Math.abs(thing.placeMm - placeMm);
+    const nearer = (one: Thing, other: Thing) => (awayMm(one) < awayMm(other) ? one : other);
+    return things.length > 0 ? things.reduce(nearer).kind : undefined;
 }
 
 /** The parts of the ground, in words; empty without ground. */

@@ -9,7 +9,6 @@ export class Outcome {
     /** The verdicts on plants, and whether weeds were cut, by number in the row. */
     readonly plants = new Map<number, Verdict>();
     readonly weeds = new Map<number, boolean>();
-    /** Why plants were not kept. */
     readonly notKept = new Map<number, NotKept>();
     /** The firmware's margin on both sides of a canopy. */
     marginMm = 50;
@@ -40,7 +39,6 @@ export class Outcome {
     }
 }
 
-/** The totals in words. */
 export function inWords({ plants, weeds }: Outcome["totals"]): string {
     const passed = plants.kept + plants.marginCut + plants.damaged;
     if (passed === 0) return say("noPlantYet");

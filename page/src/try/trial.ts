@@ -5,7 +5,7 @@
 
 import type { Line } from "../link/console_line.ts";
 import type { Happening } from "../link/session.ts";
-import { Machine, type MachineKind, PIN } from "../row/machine.ts";
+import { Machine, PIN } from "../row/machine.ts";
 import { CYCLES_PER_SECOND, Uno } from "../uno/uno.ts";
 import { groundInWords, Losses, whyInWords, type Zone } from "./losses.ts";
 import { Outcome } from "./outcome.ts";
@@ -36,10 +36,10 @@ export class Trial {
     /** The machine's count when the firmware began to count. */
     #zero = 0;
 
-    /** A trial with a machine from the box, with the differences in `kind`. */
-    constructor(hex: string, seed: number, kind: MachineKind = {}) {
+    /** A trial with the machine from the box, or with the machine that is set up. */
+    constructor(hex: string, seed: number, isSetUp = false) {
         this.uno = new Uno(hex);
-        this.machine = new Machine(this.uno, { ...SOWING, seed }, kind);
+        this.machine = new Machine(this.uno, { ...SOWING, seed }, { isSetUp });
         this.losses = new Losses(this.machine.toolMm);
         this.uno.onByte = (byte) => this.onText(String.fromCharCode(byte));
         this.#mark();
@@ -73,20 +73,15 @@ export class Trial {
         return `${whyInWords(left, [...outcome.notKept.values()])} ${groundInWords(losses.groundMm)}`.trim();
     }
 
-    /** Whether the status lamp is lit. */
     get isLampLit(): boolean {
         return this.uno.isHigh(PIN.lamp);
     }
 
-    /**
-     * The tool's position, as a point of its track. As in the machine's model, the arm's swing moves it only across the
-     * row.
-     */
+    /** The tool's position. As in the machine's model, the arm's swing moves it only across the row. */
     get tool(): TrackPoint {
         return { alongMm: this.machine.toolMm, acrossMm: this.machine.acrossMm };
     }
 
-    /** Takes an event of the console. */
     take(happening: Happening): void {
         if (happening.is === "started") {
             this.#zero = this.machine.ticks;

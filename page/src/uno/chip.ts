@@ -116,7 +116,6 @@ export class Chip {
         return this.#cpu.cycles;
     }
 
-    /** The present content of SRAM. */
     get sram(): Uint8Array {
         return this.#cpu.data.slice(SRAM_START);
     }

@@ -17,9 +17,7 @@ export { CYCLES_PER_SECOND, type ResetCause } from "./chip.ts";
 /** Cycles of a byte that a terminal sends at 115200 baud: a start bit, eight data bits and a stop bit. */
 const SENT_BYTE_CYCLES = Math.round((10 * CYCLES_PER_SECOND) / 115_200);
 
-/**
- * Content of SRAM at power-up. A real chip's content is random; a byte other than zero reveals code that expects zeros.
- */
+/** Content of SRAM at power-up: random on a real chip. A byte other than zero reveals code that expects zeros. */
 const sramAtPowerUp = () => new Uint8Array(SRAM_BYTES).fill(0xc5);
 
 /** Cycles after which a byte that could not be taken is offered again: the shortest instruction. */
@@ -38,7 +36,6 @@ export class Uno {
     onByte: (byte: number) => void = () => {};
     /** Resets since the first power-up, oldest first. */
     readonly resets: Reset[] = [];
-    /** The content of the EEPROM. */
     readonly eeprom: Uint8Array;
     readonly #program: Uint16Array;
     readonly #backend: EEPROMBackend;
@@ -50,9 +47,7 @@ export class Uno {
     #lineFree = 0;
     #chip: Chip;
 
-    /**
-     * Powers up an Uno with a firmware. `eeprom` has the first bytes of the EEPROM, and the others are erased.
-     */
+    /** Powers up an Uno with a firmware. `eeprom` has the first bytes of the EEPROM, and the others are erased. */
     constructor(hex: string, eeprom: Uint8Array = new Uint8Array()) {
         this.#program = new Uint16Array(readHex(hex, FLASH_BYTES).buffer);
         const memory = new Uint8Array(EEPROM_BYTES).fill(0xff);

@@ -285,6 +285,8 @@ export const en = {
         noLog: "{file} is no log: {why}",
         emptyLog: "{file} has no machine in it.",
         logHas: "{file}: {distance} in {time}, {objects} detections, {swings} swings, {count} alarm or warning.|{file}: {distance} in {time}, {objects} detections, {swings} swings, {count} alarms and warnings.",
+        logUnknown:
+            "From {time} on nothing is drawn or counted, because the log lacks the settings to which revert returned. The row goes on where get shows them, or at the next connection.",
         logDrawing: "The row of the log: detections, keep-out zones, where the tool went, speed and alarms",
         whereInLog: "Where in the log",
         backward: "Back",
@@ -405,7 +407,7 @@ export const en = {
             "second_beam_mm is to be 0, or 72 or more from beam and tool, and beam_to_tool_mm 1000 at most",
         refusedEncoder: "a wheel gives 900 ticks a metre or more, take a finer encoder",
         refusedRolls: "the machine rolls, stop first",
-        refusedNoObject: "there is no object without a label, let the beam see one first",
+        refusedNoObject: "there is no detection without a label, let the beam see one first",
         refusedIncomplete: "tell its 5 features first, as examples lists them",
         refusedFull: "all 32 places are taken, forget one first",
         refusedNumber: "no field example has this number, examples lists them",

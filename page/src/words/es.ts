@@ -283,6 +283,8 @@ export const es: Language = {
         noLog: "{file} no es un registro: {why}",
         emptyLog: "{file} no tiene ninguna máquina.",
         logHas: "{file}: {distance} en {time}, {objects} detecciones, {swings} giros, {count} alarma o aviso.|{file}: {distance} en {time}, {objects} detecciones, {swings} giros, {count} alarmas y avisos.",
+        logUnknown:
+            "Desde {time} no se dibuja ni se cuenta nada, porque al registro le faltan los ajustes a los que volvió revert. La hilera sigue donde get los muestra, o en la próxima conexión.",
         logDrawing:
             "La hilera del registro: detecciones, zonas de exclusión, paso de la herramienta, velocidad y alarmas",
         whereInLog: "Lugar en el registro",

@@ -282,6 +282,8 @@ export const fr: Language = {
         noLog: "{file} n'est pas un journal : {why}",
         emptyLog: "{file} n'a aucune machine.",
         logHas: "{file} : {distance} en {time}, {objects} détections, {swings} pivotements, {count} alarme ou avertissement.|{file} : {distance} en {time}, {objects} détections, {swings} pivotements, {count} alarmes et avertissements.",
+        logUnknown:
+            "À partir de {time}, rien n'est dessiné ni compté, car le journal n'a pas les réglages que revert a repris. Le rang continue là où get les montre, ou à la prochaine connexion.",
         logDrawing: "Le rang du journal : détections, zones interdites, passage de l'outil, vitesse et alarmes",
         whereInLog: "Place dans le journal",
         backward: "Reculer",

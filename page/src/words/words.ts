@@ -159,10 +159,7 @@ onLanguage(() => {
     for (const [element, text] of shown) if (element.isConnected) element.textContent = text();
 });
 
-/**
- * Shows a text in an element, also after a change of language. Without a text, other code writes the element from now
- * on.
- */
+/** Shows a text in an element, also after a change of language. Without a text, other code writes it. */
 export function show(element: Element, text?: () => string): void {
     shown.delete(element);
     if (!text) return;
@@ -172,9 +169,7 @@ export function show(element: Element, text?: () => string): void {
 
 const words = new Map(Object.entries(en.words).map(([word, text]) => [text as string, word as Word]));
 
-/**
- * Sets the page's texts and the names of its elements in the current language, now and after each change of language.
- */
+/** Sets the texts and names of the page's elements in the current language, now and after each change. */
 export function translate(root: Element | DocumentFragment): void {
     const nodes: (() => void)[] = [];
     const take = (text: string, write: (text: string) => void) => {

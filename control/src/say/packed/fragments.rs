@@ -3,22 +3,22 @@
 
 #[rustfmt::skip]
 pub(super) const FRAGMENTS: &[&str] = &[
-    "\r\n", " [", " mm", " ms", " p", " s", " ta", " take", "# ", "#,", "#,#,", ", ",
-    ", or ", "0 ", "00 ", ":#", "; ", "; 0 ", "; 0 n", "=#", "=# ", "_m", "_mm", "_mm,",
-    "_ms", "_s", "a ", "ac", "ack", "al", "alar", "alarm ", "ali", "alibr", "all", "am",
-    "ame", "an", "an ", "and", "and ", "ar", "ar ", "are ", "at", "at ", "atch", "ate",
-    "be", "beam", "beam_", "bel", "bj", "bje", "bjec", "br", "calibr", "calibrate", "ce", "ch",
-    "ch ", "chan", "ck", "co", "coder", "comm", "con", "d ", "d b", "d_", "de", "der",
-    "di", "do", "du", "e ", "ee", "eed", "eed ", "eed_mm", "el", "em", "en", "en ",
-    "encoder", "er", "ere ", "ervo", "ex", "exam", "examp", "example", "fa", "fi", "fir", "first",
-    "for", "force", "fr", "fro", "from ", "ga", "ge", "hol", "il", "in", "ind", "ing",
-    "ing ", "is", "is ", "ke", "know", "known", "l ", "la", "le", "lea", "lead_", "li",
-    "list", "lists th", "lo", "lost", "m ", "mm", "ms", "name", "no", "not ", "now", "of",
-    "off", "ol", "on", "one", "op", "or", "or ", "ou", "oun", "out", "ow", "p ",
-    "pl", "plan", "plant", "re", "row", "s ", "s th", "s=# ", "s_", "sa", "save", "se",
+    "\r\n", " [", " detection", " mm", " ms", " p", " s", " ta", " take", "# ", "#,", "#,#,",
+    ", ", ", or ", "0 ", "00 ", ":#", "; ", "; 0 ", "; 0 n", "=#", "=# ", "_m", "_mm",
+    "_mm,", "_ms", "_s", "a ", "ac", "ack", "al", "alar", "alarm ", "ali", "alibr", "all",
+    "am", "ame", "an", "an ", "and", "and ", "ar", "ar ", "are ", "at", "at ", "atch",
+    "ate", "be", "beam", "beam_", "bel", "br", "calibr", "calibrate", "ce", "ch", "ch ", "chan",
+    "ck", "co", "coder", "comm", "con", "ction", "d ", "d b", "d_", "de", "der", "dete",
+    "detection", "di", "do", "du", "e ", "ee", "eed", "eed ", "eed_mm", "el", "em", "en",
+    "en ", "encoder", "er", "ere ", "ervo", "ex", "exam", "examp", "example", "fa", "fi", "fir",
+    "first", "for", "force", "fr", "fro", "from ", "ga", "ge", "hol", "il", "in", "ind",
+    "ing", "ing ", "is", "is ", "it", "ke", "l ", "la", "le", "lea", "lead_", "li",
+    "list", "lo", "m ", "mm", "ms", "name", "no", "not ", "now", "of", "off", "ol",
+    "on", "one", "op", "or", "or ", "ou", "oun", "out", "ow", "p ", "pl", "plan",
+    "plant", "re", "row", "s ", "s a ", "s and ", "s th", "s=# ", "s_", "sa", "save", "se",
     "servo", "servo_", "set", "sett", "setting", "sp", "speed_mm", "st", "st ", "star", "stat", "sw",
-    "t ", "ta", "te", "ter", "th", "the ", "the tool ", "ti", "to", "to ", "tool", "tool ",
-    "ts ", "ul", "un", "unse", "us", "ve", "ver", "vo", "wh", "whee", "wi", "y ",
+    "t ", "ta", "te", "ter", "th", "the ", "the tool ", "ti", "tion", "to", "to ", "tool",
+    "tool ", "ul", "un", "unse", "us", "ve", "ver", "vo", "wh", "whee", "wi", "y ",
 ];
 
 #[cfg(test)]

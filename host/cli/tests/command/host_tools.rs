@@ -1,7 +1,6 @@
 //! The host tools at a pseudo terminal, as a user runs them, with the virtual Uno at its other end.
 
 use crate::typed::{printed, typed};
-use field::conditions::Conditions;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -171,7 +170,7 @@ fn examples_are_pulled_taught_to_another_machine_and_compared() {
     assert!(refused.contains("room for 30 of its 32") && refused.contains("nothing was sent"), "{refused}");
     fs::write(taught, format!("{heading}278,250,300,120,459,\n")).expect("it can be written");
     let refused = printed(&weeder(&["examples", "push", taught], other.path(), ""), 2);
-    assert!(refused.contains("has no labelled object"), "{refused}");
+    assert!(refused.contains("has no labelled detection"), "{refused}");
 }
 
 #[test]
@@ -196,21 +195,10 @@ fn pushed_settings_survive_a_reset_unless_no_save_is_given() {
 }
 
 #[test]
-fn a_preset_is_pushed_by_its_name_and_the_margin_stays() {
-    let uno = uno();
-    printed(&weeder(&["monitor", "--plain"], uno.path(), "clear\n"), 0);
-    let pushed = printed(&weeder(&["settings", "push", "set-up"], uno.path(), ""), 0);
-    assert!(pushed.starts_with("Set: ") && pushed.contains("servo_out_us"), "{pushed}");
-    assert!(!pushed.contains("margin_mm"), "{pushed}");
-    let json = printed(&weeder(&["settings", "pull", "--json"], uno.path(), ""), 0);
-    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
-    let set_up = Conditions::preset("set-up").expect("there is one").expect("it is right");
-    assert_eq!((json["margin_mm"].as_u64(), set_up.settings.contains_key("margin_mm")), (Some(50), true));
-    for (name, value) in set_up.settings.iter().filter(|(name, _)| *name != "margin_mm") {
-        assert_eq!(json[name].as_u64(), Some((*value).into()), "{name}");
-    }
-    let nothing = printed(&weeder(&["settings", "push", "from-the-box"], uno.path(), ""), 2);
-    assert!(nothing.contains("the preset from-the-box changes nothing"), "{nothing}");
+fn the_settings_of_a_simulated_machine_are_not_pushed_to_a_real_one() {
+    let words = ["settings", "push", "paper"];
+    let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
+    assert!(error.contains("paper is a simulated machine, and its settings hold for no other"), "{error}");
 }
 
 #[test]
@@ -298,7 +286,7 @@ fn a_session_is_logged_and_replayed() {
     assert!(text.contains(",event,swing tool=out pos=0\n"), "{text}");
     let output = Command::new(env!("CARGO_BIN_EXE_weeder")).args(["replay", log]).output().expect("it ends");
     let replayed = printed(&output, 0);
-    assert!(replayed.contains("0 objects, 0 alarms and 2 swings"), "{replayed}");
+    assert!(replayed.contains("0 detections, 0 alarms and 2 swings"), "{replayed}");
     // An existing log is continued.
     printed(&weeder(&["monitor", "--plain", "--log", log], uno.path(), ""), 0);
     assert_eq!(fs::read_to_string(log).expect("it is there").matches(",connected,").count(), 2);

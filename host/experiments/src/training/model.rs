@@ -59,7 +59,7 @@ impl Model {
     /// If k does not suit the number of examples.
     pub fn table(&self, objects: &[Recorded]) -> Result<Table, ClassifyError> {
         let header = [
-            "object",
+            "detection",
             "speed\nmm/s",
             "spacing\nmm",
             "hold\nmm",

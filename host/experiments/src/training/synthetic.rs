@@ -222,7 +222,7 @@ fn roll_past(row: &Row, headland_mm: f64, speed_mm_s: f64, slip: f64) -> Result<
     let planted = row.canopies().len();
     ensure!(
         seen.len() == planted,
-        "the beam saw {} objects on a row of {planted}: it has to see each as one",
+        "the beam saw {} canopies on a row of {planted}: it has to see each as one",
         seen.len()
     );
     Ok(seen)

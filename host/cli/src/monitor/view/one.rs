@@ -162,6 +162,6 @@ fn draw_objects(machine: &RowModel, frame: &mut Frame, area: Rect) {
     let widths = [Constraint::Length(8), Constraint::Length(5), Constraint::Length(9), Constraint::Length(9)];
     let table = Table::new(machine.objects.iter().map(row), widths)
         .header(Row::new(["class", "votes", "width", "spacing"]).dim())
-        .block(Block::bordered().title(" objects, the newest first "));
+        .block(Block::bordered().title(" detections, the newest first "));
     frame.render_widget(table, area);
 }
