@@ -202,15 +202,20 @@ impl Session {
     }
 
     fn listen(&mut self, mut link: Link, now: Instant) -> Result<(), SettingsError> {
+        let mut is_more_to_read = true;
         for _ in 0..LINES {
-            let Some(line) = link.next_line()? else { break };
+            let Some(line) = link.next_line()? else {
+                is_more_to_read = false;
+                break;
+            };
             if is_greeting(&line) {
                 self.lose("the Uno was reset".to_owned());
                 return self.connect(link);
             }
             self.take(line);
         }
-        let is_old = |asked: &&Asked| now.saturating_duration_since(asked.since) > PATIENCE;
+        // The answer may be behind lines that came while the computer was busy.
+        let is_old = |asked: &&Asked| !is_more_to_read && now.saturating_duration_since(asked.since) > PATIENCE;
         if let Some(Asked { line, .. }) = self.asked.front().filter(is_old) {
             return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
         }

@@ -156,6 +156,18 @@ fn an_answer_that_does_not_come_is_given_up() {
 }
 
 #[test]
+fn a_computer_that_was_busy_reads_all_that_has_come_before_it_gives_an_answer_up() {
+    let mut talk = Talk::connected();
+    talk.board.say(&b"swing tool=out pos=9\r\n".repeat(4 * LINES));
+    assert!(talk.session.command("hold"));
+    talk.turn();
+    talk.now += 2 * PATIENCE;
+    let happened: Vec<_> = (0..5).flat_map(|_| talk.turn()).collect();
+    assert!(happened.contains(&answered("ok")), "{happened:?}");
+    assert!(talk.session.is_connected());
+}
+
+#[test]
 fn hold_is_typed_at_once_and_waiting_commands_are_dropped() {
     let mut talk = Talk::connected();
     // One command that is being answered, and two that wait.
