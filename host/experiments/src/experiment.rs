@@ -32,6 +32,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::cell::LazyCell;
 use std::ops::AddAssign;
 use std::path::PathBuf;
@@ -100,7 +101,7 @@ pub struct Experiment {
 }
 
 /// One plot, weeded by one controller.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotOutcome {
     /// The controller.
     pub controller: Treatment,
@@ -388,6 +389,25 @@ impl PlotOutcome {
         self.alarms += other.alarms;
         self.moved_s += other.moved_s;
         self.record.time_s += other.record.time_s;
+    }
+
+    /// What only a simulated field can tell of a plot, by its column's name. Shares are in percent.
+    pub fn figures(&self) -> [(&'static str, Value); 12] {
+        let Self { zones, effect, .. } = self;
+        [
+            ("zones", zones.all.into()),
+            ("zones_reached", zones.reached.into()),
+            ("margins_cut", zones.margins_cut.into()),
+            ("in_row_weeds_before", effect.in_row.before.into()),
+            ("in_row_weeds_after", effect.in_row.after.into()),
+            ("in_row_weeded_percent", (100.0 * self.weeded_share).into()),
+            ("in_row_bound_percent", (100.0 * self.weedable_share).into()),
+            ("undamaged_bound_percent", (100.0 * self.undamaged_share).into()),
+            ("damaged_by_tool", effect.damaged.into()),
+            ("damaged_unseen", effect.unseen.into()),
+            ("damaged_by_sweeps", effect.swept.into()),
+            ("damaged_in_next_row", effect.neighbours.into()),
+        ]
     }
 
     /// Puts the counts of all rows into the record.

@@ -144,13 +144,8 @@ impl Model {
 
     /// Records a HOLD to all.
     pub fn held(&mut self, hold: Hold) {
+        self.sent(None, "hold");
         self.hold = Some(hold);
-        for row in &mut self.rows {
-            row.answer = Answer::Waiting;
-        }
-        if self.are_several() {
-            self.say("> all: hold".to_owned());
-        }
     }
 
     /// Takes an event of a row.
