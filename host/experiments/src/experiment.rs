@@ -25,7 +25,7 @@ use field::optimum::undamaged_share;
 use field::row::{MAX_WIDTH_MM, Problem, Row};
 use field::stand::Stand;
 use field::tool_path::{Effect, effect};
-use field::trial::{Start, Trial, Weeded};
+use field::trial::{Trial, Weeded};
 use field::verdict::{Judgement, Timing, Verdict, judge};
 use knn::Example;
 use rand::{RngExt, SeedableRng};
@@ -329,16 +329,8 @@ impl Experiment {
                 ),
             })?;
         let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut chance(1));
-        let trial = Trial {
-            row: stand.row.clone(),
-            machine: self.conditions.machine(chance(2).random()),
-            motion: drive.motion.clone(),
-            timing: self.conditions.timing(),
-            start: Start::Command,
-            settings: self.conditions.firmware_settings(),
-            examples: self.examples.clone(),
-        };
-        Ok((stand, drive, trial))
+        let trial = self.conditions.trial(stand.row.clone(), drive.motion.clone(), chance(2).random());
+        Ok((stand, drive, Trial { examples: self.examples.clone(), ..trial }))
     }
 }
 

@@ -10,7 +10,10 @@
 mod parameters;
 
 use crate::machine::{Dirt, Machine};
+use crate::motion::Motion;
+use crate::row::Row;
 use crate::servo::{Scatter, Servo};
+use crate::trial::{Start, Trial};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 use files::FileError;
@@ -188,6 +191,19 @@ impl Conditions {
             lead_out_ms: of(Setting::LeadOutMs),
             lead_in_ms: of(Setting::LeadInMs),
             stem_zone_mm: of(Setting::StemZoneMm),
+        }
+    }
+
+    /// The trial of a row and a motion with this machine and these settings. The seed is that of [`Self::machine`].
+    pub fn trial(&self, row: Row, motion: Motion, seed: u64) -> Trial {
+        Trial {
+            row,
+            machine: self.machine(seed),
+            motion,
+            timing: self.timing(),
+            start: Start::Command,
+            settings: self.firmware_settings(),
+            examples: Vec::new(),
         }
     }
 

@@ -76,7 +76,7 @@ impl Recorder {
 
     /// The receiver's port is there, of this name.
     pub fn found(&mut self, time_ms: u64, port: &str) -> Lines {
-        self.lines = LineReader::new();
+        self.lines = LineReader::default();
         self.is_first = true;
         self.heard_ms = Some(time_ms);
         vec![(Kind::GpsFound, port.to_owned())]

@@ -106,8 +106,12 @@ impl Link {
     /// # Errors
     /// If the port is gone, or something else than the weeder's firmware is at its other end.
     pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
-        let mut link =
-            Self { port: Box::new(port), lines: LineReader::new(), events: VecDeque::new(), version: String::new() };
+        let mut link = Self {
+            port: Box::new(port),
+            lines: LineReader::default(),
+            events: VecDeque::new(),
+            version: String::new(),
+        };
         if resets {
             link.greeting()?;
         }

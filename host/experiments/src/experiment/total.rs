@@ -23,11 +23,6 @@ impl Total {
         Share::of(self.plots.effect.injured(), self.plots.effect.plants)
     }
 
-    /// Zones over which the tool was not fully out, with the interval of their share.
-    pub fn reached(&self) -> Share {
-        Share::of(self.plots.zones.reached, self.plots.zones.all)
-    }
-
     /// Plants damaged, % (Eq. 23).
     pub fn plant_damage_percent(&self) -> f64 {
         self.damage().percent()
@@ -35,7 +30,7 @@ impl Total {
 
     /// Zones over which the tool was not fully out, % of all.
     pub fn zones_reached_percent(&self) -> f64 {
-        self.reached().percent()
+        Share::of(self.plots.zones.reached, self.plots.zones.all).percent()
     }
 
     /// Other zones whose margin was cut, % of all.

@@ -134,16 +134,19 @@ fn noise_between_the_lines_does_not_end_a_session() {
 }
 
 #[test]
-fn an_uno_that_is_unplugged_is_lost_and_found_again() {
-    let mut talk = Talk::connected();
-    talk.board.plug(false);
-    let lost = talk.second();
-    assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.contains("plug the Uno in again")), "{lost:?}");
-    assert!(!talk.session.is_connected());
-    assert_eq!(talk.second(), []);
-    talk.board.plug(true);
-    let found = [talk.second(), talk.second()].concat();
-    assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
+fn an_uno_that_is_unplugged_or_never_was_there_is_lost_once_and_found_later() {
+    let unplugged = Talk::connected();
+    unplugged.board.plug(false);
+    let absent = Talk::waiting(ScriptedBoard::default());
+    for (mut talk, problem) in [(unplugged, "plug the Uno in again"), (absent, "there is no port it")] {
+        let lost = talk.second();
+        assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.contains(problem)), "{lost:?}");
+        assert!(!talk.session.is_connected());
+        assert_eq!(talk.second(), []);
+        talk.board.plug(true);
+        let found = [talk.second(), talk.second()].concat();
+        assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
+    }
 }
 
 #[test]
@@ -197,15 +200,4 @@ fn after_a_reset_everything_is_asked_again_and_commands_from_before_it_are_not_e
     let happened = talk.second();
     assert!(matches!(happened.as_slice(), [Happening::Lost(_), Happening::Connected { .. }]), "{happened:?}");
     assert!(talk.session.is_idle());
-}
-
-#[test]
-fn a_session_without_an_uno_says_why_once_and_finds_it_later() {
-    let mut talk = Talk::waiting(ScriptedBoard::default());
-    let lost = talk.second();
-    assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.starts_with("there is no port it")), "{lost:?}");
-    assert_eq!(talk.second(), []);
-    talk.board.plug(true);
-    let found = [talk.second(), talk.second()].concat();
-    assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
 }
