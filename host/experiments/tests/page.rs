@@ -6,8 +6,9 @@ use experiments::experiment::{PlotOutcome, Total, Treatment, Zones};
 use experiments::page::Page;
 use experiments::statistics::Mean;
 use field::budget::{Budget, Part, Reason};
+use field::machine::Machine;
+use field::motion::Motion;
 use field::tool_path::{Effect, WeedCount};
-use field::{Machine, Motion};
 use roxmltree::{Document, Node, ParsingOptions};
 
 /// Four speeds, two spacings, three replications. With `damages`, damage grows with speed.

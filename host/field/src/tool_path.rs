@@ -222,14 +222,14 @@ impl Tools<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::row::{Canopy, Row};
     use rand::SeedableRng;
     use uno::CYCLES_PER_SECOND;
 
     /// A stem at 1000 mm on the row's line, and weeds before it, beside it and between the rows.
-    fn stand() -> Stand {
+    pub(crate) fn stand() -> Stand {
         let weed = |along_mm, across_mm| Weed { along_mm, across_mm };
         Stand {
             row: Row::new(vec![Canopy::plant(1000.0, 150.0)]).unwrap(),

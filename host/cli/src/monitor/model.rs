@@ -76,7 +76,7 @@ pub struct RowModel {
 }
 
 /// The state of the machine.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Model {
     /// Its rows, at least one.
     pub rows: Vec<RowModel>,
@@ -94,14 +94,7 @@ pub struct Model {
 impl Model {
     /// Rows in unknown state.
     pub fn new(names: Vec<String>) -> Self {
-        Self {
-            rows: names.into_iter().map(RowModel::new).collect(),
-            target: None,
-            hold: None,
-            lines: VecDeque::new(),
-            line: CommandLine::default(),
-            rings: false,
-        }
+        Self { rows: names.into_iter().map(RowModel::new).collect(), ..Self::default() }
     }
 
     /// Whether to ring the bell: since the last call an alarm was latched or a row was lost.
