@@ -209,10 +209,7 @@ impl Guide {
         for setting in set {
             say!("  {} is set and saved", name(setting))?;
         }
-        let settings = settings::read(&mut self.link)?;
-        for pulse in [Setting::ServoInUs, Setting::ServoOutUs] {
-            self.state.measured.take_line(&format!("{}={}", name(pulse), settings.get(pulse)));
-        }
+        self.state.measured.settings = settings::read(&mut self.link)?;
         Ok(())
     }
 

@@ -204,13 +204,14 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let out = arguments.out.clone().filter(|_| part.is_none());
     let shown = Shown { out, replace, json, brief, result: None };
     let folder = shown.folder(REPORT)?;
+    let examples = arguments.examples.as_deref().map(examples::in_table).transpose()?.unwrap_or_default();
     let experiment = Experiment {
         speeds_km_h: distinct(arguments.speeds.clone()),
         spacings_cm: distinct(arguments.spacings.clone()),
         replications: arguments.replications,
         controllers: arguments.controllers(),
         conditions: Conditions::load(&arguments.field)?,
-        examples: arguments.examples.as_deref().map(examples::in_table).transpose()?.unwrap_or_default(),
+        examples: examples.into_iter().map(|example| (example.features, example.label)).collect(),
         seed: arguments.seed,
     };
     let plants = experiment.plants();

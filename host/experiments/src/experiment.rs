@@ -7,8 +7,6 @@
 //! models in both cases. A simulated plot has the same record as one counted by hand ([`PlotRecord`]), and the same
 //! code evaluates both.
 
-mod taught;
-
 pub mod table;
 pub mod total;
 
@@ -93,9 +91,8 @@ pub struct Experiment {
     pub controllers: Vec<Treatment>,
     /// The field and the machine.
     pub conditions: Conditions,
-    /// Examples that are taught to the firmware.
-    #[serde(with = "taught")]
-    pub examples: Vec<Example<{ features::COUNT }>>,
+    /// The features and the label of each example that is taught to the firmware.
+    pub examples: Vec<([u8; features::COUNT], u8)>,
     /// Selects the random fields.
     pub seed: u64,
 }
@@ -330,7 +327,8 @@ impl Experiment {
             })?;
         let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut chance(1));
         let trial = self.conditions.trial(stand.row.clone(), drive.motion.clone(), chance(2).random());
-        Ok((stand, drive, Trial { examples: self.examples.clone(), ..trial }))
+        let examples = self.examples.iter().map(|&(features, label)| Example::new(features, label)).collect();
+        Ok((stand, drive, Trial { examples, ..trial }))
     }
 }
 

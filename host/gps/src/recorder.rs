@@ -65,7 +65,7 @@ impl Recorder {
                 self.wheel = Some((status.position, ticks));
                 self.receiver.rolled(time_ms as f64, ticks as f64 * self.tick_m, f64::from(status.speed_mm_s));
             }
-            Happening::Event(..) | Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
+            _ => {}
         }
     }
 

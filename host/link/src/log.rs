@@ -145,7 +145,7 @@ impl LogWriter {
             Happening::Command(line) => self.line(time_ms, Kind::Command, line),
             Happening::Answer(line) => self.line(time_ms, Kind::Answer, line),
             // They follow from the commands.
-            Happening::Settings(..) | Happening::Examples(_) => Ok(()),
+            Happening::Answered { .. } | Happening::Settings(..) | Happening::Examples(_) => Ok(()),
         }
     }
 

@@ -59,6 +59,13 @@ pub enum Happening {
     Command(String),
     /// A line of the answer to it. The last one is `ok` or begins with `error:`.
     Answer(String),
+    /// That was the last line of the answer.
+    Answered {
+        /// The command.
+        command: String,
+        /// The line that begins with `error:`, if the firmware refused.
+        refusal: Option<String>,
+    },
     /// The settings after a command has changed or saved some, and the lines that show them.
     Settings(Settings, Vec<String>),
     /// The examples after a command has changed some, a line each.
@@ -271,7 +278,11 @@ impl Session {
                 if is_done {
                     self.own.extend(changed_by(&asked.line));
                 }
+                let refusal = (is_end && !is_done).then(|| line.clone());
                 self.happened.push_back(Happening::Answer(line));
+                if is_end {
+                    self.happened.push_back(Happening::Answered { command: asked.line.clone(), refusal });
+                }
             }
         }
         if is_end {

@@ -62,10 +62,7 @@ impl Novice {
             Task::Fit(part, value) => self.conditions.set(part, value)?,
             Task::Set(setting, value) => self.set(setting, value)?,
             Task::TimeServo => {
-                let [in_us, out_us] = [Setting::ServoInUs, Setting::ServoOutUs];
-                for pulse in [in_us, out_us] {
-                    self.measured.take_line(&format!("{}={}", name(pulse), self.settings().get(pulse)));
-                }
+                self.measured.settings = self.settings();
                 for timing in 0..TIMINGS {
                     let Some(SwingTimes { out_ms, in_ms }) = self.time_servo(timing) else { continue };
                     self.measured.take_line(&format!("calibrated lead_out_ms={out_ms} lead_in_ms={in_ms} set=yes"));

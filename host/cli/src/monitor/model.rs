@@ -148,9 +148,6 @@ impl Model {
         }
         match heard.what {
             What::Happened(happening) => self.update(heard.row, happening),
-            What::Answered { refusal, .. } => {
-                self.rows[heard.row].answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
-            }
             What::NotTyped { command, why } => {
                 self.rows[heard.row].answer = Answer::Refused;
                 self.say_of(heard.row, &format!("-- `{command}` was not typed: {why}"));
@@ -171,7 +168,7 @@ impl Model {
             Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
             Happening::Command(line) => (!self.are_several()).then(|| format!("> {line}")),
             Happening::Answer(line) => Some(line.clone()),
-            Happening::Status(..) | Happening::Settings(..) | Happening::Examples(_) => None,
+            _ => None,
         };
         if let Happening::Answer(line) = &happening
             && let Some(head) = self.rows[number].heading.before(line)
@@ -274,6 +271,9 @@ impl RowModel {
             Happening::Status(status, _) => self.take_status(status),
             Happening::Event(event, _) => self.take_event(event),
             Happening::Settings(settings, _) => self.settings = settings,
+            Happening::Answered { refusal, .. } => {
+                self.answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
+            }
             Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
         }
     }

@@ -28,9 +28,11 @@ impl Talk {
         talk
     }
 
-    /// The next turn's events.
+    /// The next turn's events, without the ends of answers.
     fn turn(&mut self) -> Vec<Happening> {
-        self.session.turn(self.now)
+        let mut happened = self.session.turn(self.now);
+        happened.retain(|happening| !matches!(happening, Happening::Answered { .. }));
+        happened
     }
 
     /// The events of the next second, without statuses.
