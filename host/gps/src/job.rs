@@ -285,8 +285,7 @@ impl Job {
             Some(track) => track.find(distance_m, recorded_ms as f64, offset),
             None => Err(Missing::NoFixBefore),
         };
-        let beam_to_tool_mm = read.settings.as_ref().map_or(0.0, |to| f64::from(to.get(Setting::BeamToToolMm)));
-        let (beam, tool) = (self.antenna.beam(), self.antenna.tool(beam_to_tool_mm));
+        let (beam, tool) = (self.antenna.beam(), self.antenna.tool(read.mm(Setting::BeamToToolMm)));
         let (mut events, mut ground) = (read.events, read.ground);
         for event in &mut events {
             let offset = match event.kind {

@@ -80,9 +80,10 @@ pub struct LogWriter {
     path: PathBuf,
     file: csv::Writer<File>,
     began: Instant,
-    /// Lines below the header: those found at opening, and those added since.
+    /// Lines below the header that were found at opening.
     found: u64,
-    added: u64,
+    /// Lines that were written since.
+    pub added: u64,
 }
 
 impl LogWriter {
@@ -144,7 +145,7 @@ impl LogWriter {
             Happening::Command(line) => self.line(time_ms, Kind::Command, line),
             Happening::Answer(line) => self.line(time_ms, Kind::Answer, line),
             // They follow from the commands.
-            Happening::Settings(..) | Happening::Examples(_) => Ok(()),
+            Happening::Answered { .. } | Happening::Settings(..) | Happening::Examples(_) => Ok(()),
         }
     }
 
@@ -159,11 +160,6 @@ impl LogWriter {
     /// Lines in the file, without the header.
     pub fn lines(&self) -> u64 {
         self.found + self.added
-    }
-
-    /// Lines that were written since the file was opened.
-    pub fn added(&self) -> u64 {
-        self.added
     }
 
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {

@@ -194,7 +194,10 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
 }
 
 /// Asks for the machine's status.
-pub(super) fn status(link: &mut Link) -> Result<Status, LinkError> {
+///
+/// # Errors
+/// If the console fails, or the firmware has another status than this program.
+pub fn status(link: &mut Link) -> Result<Status, LinkError> {
     let lines = link.ask("status")?;
     lines.iter().find_map(|line| Status::parse(line)).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")))
 }
