@@ -330,11 +330,7 @@ use Contents::{Brief, Ground, Plants};
 const COLUMNS: [Column; 12] = [
     ("km/h", |total| total.speed_km_h().to_string(), &[Brief, Plants, Ground]),
     ("controller", |total| name(total.plots.controller).to_owned(), &[Brief, Plants, Ground]),
-    (
-        "plants\ndamaged, %",
-        |total| format!("{:.1} ({})", total.plant_damage_percent(), total.damage()),
-        &[Brief, Plants],
-    ),
+    ("plants\ndamaged, %", |total| format!("{} ({})", total.damage().shown(), total.damage()), &[Brief, Plants]),
     ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
     ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
     ("rows with\nan alarm", |total| total.plots.alarms.to_string(), &[Plants]),
@@ -456,10 +452,10 @@ fn damage(totals: &[Total], controller: Treatment) -> String {
     let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
     match worst {
         Some(worst) if damaged > 0 => format!(
-            "Plants damaged by {name}: {damaged} of {plants} ({} %), most of them at {} km/h, {:.1} %.",
+            "Plants damaged by {name}: {damaged} of {plants} ({} %), most of them at {} km/h, {} %.",
             Share::of(damaged, plants),
             worst.speed_km_h(),
-            worst.plant_damage_percent()
+            worst.damage().shown()
         ),
         _ => format!("Plants damaged by {name}: none of {plants} ({} %).", Share::of(damaged, plants)),
     }

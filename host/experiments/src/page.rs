@@ -179,7 +179,7 @@ fn beside_others(firmware: &[&Total]) -> Table {
             "a light beam".to_owned(),
             short(total.speed_km_h()),
             format!("{in_row} in the row, {in_plot} in the plot"),
-            format!("{} ({})", fixed(total.plant_damage_percent(), 2), total.damage()),
+            format!("{} ({})", total.damage().shown(), total.damage()),
             "this report".to_owned(),
         ]);
     }
