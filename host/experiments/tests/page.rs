@@ -183,7 +183,7 @@ fn the_simulated_machine_stands_beside_published_ones_and_is_marked() {
     let xml = closed(&html);
     let rows = cells(&parse(&xml), "This machine, simulated, and machines in fields");
     assert_eq!(rows[1][0], "this firmware, SIMULATED");
-    assert_eq!(rows[1][3..6], ["2.5", "41.3 in the row, \u{2013} in the plot", "0.00 (below 3.0)"]);
+    assert_eq!(rows[1][3..6], ["2.5", "41.3 in the row, \u{2013} in the plot", "0.0 (below 3.0)"]);
     let jia = rows.iter().find(|row| row[0].starts_with("Jia")).unwrap();
     assert_eq!(jia[3..6], ["4 to 7", "95.8", "0.6"]);
     assert!(rows.iter().skip(2).all(|row| !row[0].contains("SIMULATED") && !row[6].is_empty()));
