@@ -270,6 +270,18 @@ impl Settings {
         Ok(())
     }
 
+    /// Sets a value as the console does: another wheel needs a new calibration.
+    ///
+    /// # Errors
+    /// As [`set`](Self::set).
+    pub fn change(&mut self, setting: Setting, value: u16) -> Result<(), OutOfRange> {
+        self.set(setting, value)?;
+        if setting.is_of_the_wheel() {
+            self.set(Setting::TicksPerM, 0)?;
+        }
+        Ok(())
+    }
+
     /// The first contradiction between settings, if any.
     ///
     /// At top speed, a plant just behind the beam must not reach the tool's margin before the tool is out. This takes the lead, an

@@ -69,11 +69,7 @@ impl<M: Memory> Configuration<M> {
             if setting.is_hold_only() && is_working {
                 return Err(CommandError::NotInHold);
             }
-            settings.set(setting, value).map_err(|_| CommandError::OutOfRange)?;
-            // Another wheel needs a new calibration.
-            if setting.is_of_the_wheel() {
-                let _ = settings.set(Setting::TicksPerM, 0);
-            }
+            settings.change(setting, value).map_err(|_| CommandError::OutOfRange)?;
         }
         // Settings that already contradict each other are corrected one at a time.
         if let Some(contradiction) = settings.contradiction()

@@ -180,7 +180,7 @@ impl Logs {
     /// Says what is in them, and fails if one could not be written.
     fn end(&self) -> Result<()> {
         for Log { path, writer, .. } in &self.logs {
-            tell!("{} lines were added: {} has {} now", writer.added(), path.display(), writer.lines());
+            tell!("{} lines were added: {} has {} now", writer.added, path.display(), writer.lines());
         }
         self.check()
     }

@@ -118,7 +118,7 @@ struct Guide {
 
 impl Guide {
     fn lead(mut self) -> Result<()> {
-        if self.status()?.mode == Mode::Alarm {
+        if settings::status(&mut self.link)?.mode == Mode::Alarm {
             // A new board has no saved settings, which is an alarm. This saves the present ones.
             self.link.ask("save")?;
             self.link.ask("clear")?;
@@ -149,11 +149,6 @@ impl Guide {
     fn keep(&self) -> Result<()> {
         whole_file::write(&self.path, |to| to.write_all(self.state.text().as_bytes()))
             .with_context(|| format!("{} cannot be written", self.path.display()))
-    }
-
-    fn status(&mut self) -> Result<Status> {
-        let lines = self.link.ask("status")?;
-        lines.iter().find_map(|line| Status::parse(line)).context("the machine gives no status")
     }
 
     /// Asks for a line. `None` at the end of the input.
@@ -214,10 +209,7 @@ impl Guide {
         for setting in set {
             say!("  {} is set and saved", name(setting))?;
         }
-        let settings = settings::read(&mut self.link)?;
-        for pulse in [Setting::ServoInUs, Setting::ServoOutUs] {
-            self.state.measured.take_line(&format!("{}={}", name(pulse), settings.get(pulse)));
-        }
+        self.state.measured.settings = settings::read(&mut self.link)?;
         Ok(())
     }
 
@@ -328,7 +320,7 @@ impl Guide {
     fn stands_at(&mut self, from: Option<i32>) -> Result<i32> {
         let mut before = None;
         loop {
-            let Status { position, speed_mm_s, .. } = self.status()?;
+            let Status { position, speed_mm_s, .. } = settings::status(&mut self.link)?;
             let has_rolled = from.is_none_or(|from| position.abs_diff(from) > ROLLED_TICKS);
             if has_rolled && speed_mm_s == 0 && before == Some(position) {
                 return Ok(position);

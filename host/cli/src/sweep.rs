@@ -17,7 +17,6 @@ use field::conditions::{Conditions, PARAMETERS};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
-use std::fs;
 use std::sync::LazyLock;
 use trial::report::number_table;
 
@@ -131,7 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         x: arguments.x.clone(),
         y: arguments.y.clone(),
         controller: arguments.controller,
-        conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
+        conditions: Conditions::load(&arguments.field)?,
         speed_km_h: arguments.speed,
         spacing_cm: arguments.spacing,
         seed: arguments.seed,

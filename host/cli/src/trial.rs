@@ -22,9 +22,8 @@ use field::budget;
 use field::conditions::{Conditions, presets};
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
 use trial::report::number_table;
@@ -205,13 +204,14 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     let out = arguments.out.clone().filter(|_| part.is_none());
     let shown = Shown { out, replace, json, brief, result: None };
     let folder = shown.folder(REPORT)?;
+    let examples = arguments.examples.as_deref().map(examples::in_table).transpose()?.unwrap_or_default();
     let experiment = Experiment {
         speeds_km_h: distinct(arguments.speeds.clone()),
         spacings_cm: distinct(arguments.spacings.clone()),
         replications: arguments.replications,
         controllers: arguments.controllers(),
-        conditions: Conditions::load(&arguments.field, |file| fs::read_to_string(file))?,
-        examples: arguments.examples.as_deref().map(examples::in_table).transpose()?.unwrap_or_default(),
+        conditions: Conditions::load(&arguments.field)?,
+        examples: examples.into_iter().map(|example| (example.features, example.label)).collect(),
         seed: arguments.seed,
     };
     let plants = experiment.plants();
@@ -283,8 +283,8 @@ fn show(
         let [plants, ground] = [Plants, Ground].map(|contents| by_speed(&totals, contents));
         say!("{plants}\n{ground}\n\n{LOSS_BUDGET}\n{}\n\n{}", loss_budget(&totals), summary.join("\n"))
     };
-    let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.alarms).sum();
-    let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.effect.injured()).sum();
+    let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
+    let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.effect.injured()).sum();
     if let Some(folder) = folder {
         // Only the report has the comparison with the paper.
         let summary = [summary, against_the_paper(outcomes)].concat();
@@ -308,7 +308,7 @@ fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
 
 /// The totals of one controller, by speed.
 fn of(totals: &[Total], controller: Treatment) -> impl Iterator<Item = &Total> {
-    totals.iter().filter(move |total| total.controller == controller)
+    totals.iter().filter(move |total| total.plots.controller == controller)
 }
 
 /// A column: its heading, its value for a total, and the tables that have it.
@@ -328,22 +328,18 @@ enum Contents {
 use Contents::{Brief, Ground, Plants};
 
 const COLUMNS: [Column; 12] = [
-    ("km/h", |total| total.speed_km_h.to_string(), &[Brief, Plants, Ground]),
-    ("controller", |total| name(total.controller).to_owned(), &[Brief, Plants, Ground]),
-    (
-        "plants\ndamaged, %",
-        |total| format!("{:.1} ({})", total.plant_damage_percent(), total.damage()),
-        &[Brief, Plants],
-    ),
+    ("km/h", |total| total.speed_km_h().to_string(), &[Brief, Plants, Ground]),
+    ("controller", |total| name(total.plots.controller).to_owned(), &[Brief, Plants, Ground]),
+    ("plants\ndamaged, %", |total| format!("{} ({})", total.damage().shown(), total.damage()), &[Brief, Plants]),
     ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
     ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
-    ("rows with\nan alarm", |total| total.alarms.to_string(), &[Plants]),
+    ("rows with\nan alarm", |total| total.plots.alarms.to_string(), &[Plants]),
     ("row ground\nweeded, %", weeded, &[Brief, Ground]),
     ("most\nlost to, %", most_lost, &[Brief, Ground]),
-    ("with all\nmargins\nkept at\nmost, %", |total| format!("{:.1}", 100.0 * total.weedable_share), &[Ground]),
-    ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.undamaged_share), &[Ground]),
-    ("weeds\ngone in\nrow, %", |total| gone(total.effect.in_row), &[Brief, Ground]),
-    ("weeds\ngone in\nplot, %", |total| gone(total.effect.in_plot), &[Ground]),
+    ("with all\nmargins\nkept at\nmost, %", |total| format!("{:.1}", 100.0 * total.plots.weedable_share), &[Ground]),
+    ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.plots.undamaged_share), &[Ground]),
+    ("weeds\ngone in\nrow, %", |total| gone(total.plots.effect.in_row), &[Brief, Ground]),
+    ("weeds\ngone in\nplot, %", |total| gone(total.plots.effect.in_plot), &[Ground]),
 ];
 
 /// A controller's title without its article, for a table.
@@ -371,15 +367,15 @@ fn loss_budget(totals: &[Total]) -> Table {
     let headings = budget::Part::ALL.map(|part| in_two_lines(part.title()));
     let mut table = number_table(std::iter::once("km/h".to_owned()).chain(headings), 0);
     for total in of(totals, Treatment::Firmware) {
-        let shares = total.budget.tenths().map(|(_, tenths)| format!("{:.1}", f64::from(tenths) / 10.0));
-        table.add_row(std::iter::once(total.speed_km_h.to_string()).chain(shares));
+        let shares = total.plots.budget.tenths().map(|(_, tenths)| format!("{:.1}", f64::from(tenths) / 10.0));
+        table.add_row(std::iter::once(total.speed_km_h().to_string()).chain(shares));
     }
     table
 }
 
 /// The largest loss of the row's ground.
 fn most_lost(total: &Total) -> String {
-    let (part, share) = total.budget.largest_loss();
+    let (part, share) = total.plots.budget.largest_loss();
     format!("{} {:.1}", part.key(), 100.0 * share)
 }
 
@@ -398,14 +394,15 @@ fn gone(weeds: WeedCount) -> String {
 fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let mut sentences: Vec<String> =
         experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
-    let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.alarms).sum();
+    let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
     if alarms > 0 {
         sentences.push(format!(
             "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row. Exclude those rows.",
             experiment.rows()
         ));
     }
-    let short_of_bound = of(totals, Treatment::Firmware).map(|total| total.weedable_share - total.weeded_share);
+    let short_of_bound =
+        of(totals, Treatment::Firmware).map(|total| total.plots.weedable_share - total.plots.weeded_share);
     let zone = match experiment.conditions.timing().stem_zone_mm {
         0 => "canopy".to_owned(),
         zone_mm => format!("zone of {zone_mm} mm round the stem"),
@@ -416,7 +413,7 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
         100.0 * short_of_bound.fold(0.0, f64::max)
     ));
     let mut weeds = Effect::default();
-    of(totals, Treatment::Firmware).for_each(|total| weeds += total.effect);
+    of(totals, Treatment::Firmware).for_each(|total| weeds += total.plots.effect);
     let Effect { damaged, unseen, swept, neighbours, .. } = weeds;
     if damaged + swept + neighbours > 0 {
         sentences.push(format!(
@@ -449,15 +446,16 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
 /// How many plants a controller damaged, and where it damaged most.
 fn damage(totals: &[Total], controller: Treatment) -> String {
     let name = controller.title();
-    let (damaged, plants) = of(totals, controller)
-        .fold((0, 0), |(damaged, plants), total| (damaged + total.effect.injured(), plants + total.effect.plants));
+    let (damaged, plants) = of(totals, controller).fold((0, 0), |(damaged, plants), total| {
+        (damaged + total.plots.effect.injured(), plants + total.plots.effect.plants)
+    });
     let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
     match worst {
         Some(worst) if damaged > 0 => format!(
-            "Plants damaged by {name}: {damaged} of {plants} ({} %), most of them at {} km/h, {:.1} %.",
+            "Plants damaged by {name}: {damaged} of {plants} ({} %), most of them at {} km/h, {} %.",
             Share::of(damaged, plants),
-            worst.speed_km_h,
-            worst.plant_damage_percent()
+            worst.speed_km_h(),
+            worst.damage().shown()
         ),
         _ => format!("Plants damaged by {name}: none of {plants} ({} %).", Share::of(damaged, plants)),
     }
@@ -505,25 +503,15 @@ fn write_report(
     folder.write(controllers, |to| experiment::write_csv(outcomes, &experiment.controllers, to))
 }
 
-fn in_json(outcome: &PlotOutcome) -> serde_json::Value {
-    let in_row = outcome.effect.in_row;
-    json!({
+fn in_json(outcome: &PlotOutcome) -> Value {
+    let lost = outcome.budget.shares().map(|(part, share)| (part.key(), 100.0 * share));
+    let mut plot = json!({
         "controller": outcome.controller.title(),
         "record": outcome.record,
         "performance": outcome.record.performance(),
-        "in_row_weeds_before": in_row.before,
-        "in_row_weeds_after": in_row.after,
-        "in_row_weeded_percent": 100.0 * outcome.weeded_share,
-        "in_row_bound_percent": 100.0 * outcome.weedable_share,
-        "undamaged_bound_percent": 100.0 * outcome.undamaged_share,
-        "damaged_by_tool": outcome.effect.damaged,
-        "damaged_unseen": outcome.effect.unseen,
-        "damaged_by_sweeps": outcome.effect.swept,
-        "damaged_in_next_row": outcome.effect.neighbours,
-        "zones": outcome.zones.all,
-        "zones_reached": outcome.zones.reached,
-        "margins_cut": outcome.zones.margins_cut,
         "alarms": outcome.alarms,
-        "loss_budget_percent": outcome.budget.shares().map(|(part, share)| (part.key(), 100.0 * share)).collect::<BTreeMap<_, _>>(),
-    })
+        "loss_budget_percent": BTreeMap::from_iter(lost),
+    });
+    outcome.figures().into_iter().for_each(|(name, figure)| plot[name] = figure);
+    plot
 }

@@ -40,17 +40,14 @@ pub const NOTE: &str = "#2a6f97";
 /// Width and height of a legend's mark.
 pub const MARK_SIZE: f64 = 12.0;
 
-/// An empty picture of this size.
+/// A picture of this size: paper without anything on it.
 pub fn document(width: f64, height: f64) -> Document {
+    let paper = rectangle(0.0, 0.0, width, height, PAPER).set("rx", 10);
     Document::new()
         .set("viewBox", (0, 0, width.round() as i32, height.round() as i32))
         .set("font-family", "system-ui, sans-serif")
         .set("font-size", 12)
-}
-
-/// The paper that a picture of that size is drawn on.
-pub fn paper(width: f64, height: f64) -> Rectangle {
-    rectangle(0.0, 0.0, width, height, PAPER).set("rx", 10)
+        .add(paper)
 }
 
 /// A value with one decimal place, which is finer than a screen shows.

@@ -7,8 +7,6 @@
 //! models in both cases. A simulated plot has the same record as one counted by hand ([`PlotRecord`]), and the same
 //! code evaluates both.
 
-mod taught;
-
 pub mod table;
 pub mod total;
 
@@ -25,13 +23,14 @@ use field::optimum::undamaged_share;
 use field::row::{MAX_WIDTH_MM, Problem, Row};
 use field::stand::Stand;
 use field::tool_path::{Effect, effect};
-use field::trial::{Start, Trial, Weeded};
+use field::trial::{Trial, Weeded};
 use field::verdict::{Judgement, Timing, Verdict, judge};
 use knn::Example;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::cell::LazyCell;
 use std::ops::AddAssign;
 use std::path::PathBuf;
@@ -92,15 +91,14 @@ pub struct Experiment {
     pub controllers: Vec<Treatment>,
     /// The field and the machine.
     pub conditions: Conditions,
-    /// Examples that are taught to the firmware.
-    #[serde(with = "taught")]
-    pub examples: Vec<Example<{ features::COUNT }>>,
+    /// The features and the label of each example that is taught to the firmware.
+    pub examples: Vec<([u8; features::COUNT], u8)>,
     /// Selects the random fields.
     pub seed: u64,
 }
 
 /// One plot, weeded by one controller.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlotOutcome {
     /// The controller.
     pub controller: Treatment,
@@ -328,16 +326,9 @@ impl Experiment {
                 ),
             })?;
         let drive = drive(&self.conditions, &stand.span_mm, plot.speed_km_h, &mut chance(1));
-        let trial = Trial {
-            row: stand.row.clone(),
-            machine: self.conditions.machine(chance(2).random()),
-            motion: drive.motion.clone(),
-            timing: self.conditions.timing(),
-            start: Start::Command,
-            settings: self.conditions.firmware_settings(),
-            examples: self.examples.clone(),
-        };
-        Ok((stand, drive, trial))
+        let trial = self.conditions.trial(stand.row.clone(), drive.motion.clone(), chance(2).random());
+        let examples = self.examples.iter().map(|&(features, label)| Example::new(features, label)).collect();
+        Ok((stand, drive, Trial { examples, ..trial }))
     }
 }
 
@@ -388,6 +379,25 @@ impl PlotOutcome {
         self.alarms += other.alarms;
         self.moved_s += other.moved_s;
         self.record.time_s += other.record.time_s;
+    }
+
+    /// What only a simulated field can tell of a plot, by its column's name. Shares are in percent.
+    pub fn figures(&self) -> [(&'static str, Value); 12] {
+        let Self { zones, effect, .. } = self;
+        [
+            ("zones", zones.all.into()),
+            ("zones_reached", zones.reached.into()),
+            ("margins_cut", zones.margins_cut.into()),
+            ("in_row_weeds_before", effect.in_row.before.into()),
+            ("in_row_weeds_after", effect.in_row.after.into()),
+            ("in_row_weeded_percent", (100.0 * self.weeded_share).into()),
+            ("in_row_bound_percent", (100.0 * self.weedable_share).into()),
+            ("undamaged_bound_percent", (100.0 * self.undamaged_share).into()),
+            ("damaged_by_tool", effect.damaged.into()),
+            ("damaged_unseen", effect.unseen.into()),
+            ("damaged_by_sweeps", effect.swept.into()),
+            ("damaged_in_next_row", effect.neighbours.into()),
+        ]
     }
 
     /// Puts the counts of all rows into the record.

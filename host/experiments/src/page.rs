@@ -107,7 +107,7 @@ const MEASURES: [Measure; 3] = [
             "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.",
         ],
         table: "Ground of the row weeded by each controller, %",
-        value: |total| 100.0 * total.weeded_share,
+        value: |total| 100.0 * total.plots.weeded_share,
     },
     Measure {
         chart: [
@@ -125,14 +125,14 @@ const BOUND: &str = "most with every zone and margin kept";
 
 impl Controllers {
     fn of(totals: &[Total]) -> Result<Self> {
-        let of = |controller| totals.iter().filter(move |total| total.controller == controller);
+        let of = |controller| totals.iter().filter(move |total| total.plots.controller == controller);
         let curve = |name: &str, controller, value: fn(&Total) -> f64| Curve {
             name: name.to_owned(),
-            points: of(controller).map(|total| (total.speed_km_h, value(total))).collect(),
+            points: of(controller).map(|total| (total.speed_km_h(), value(total))).collect(),
         };
         // The largest share that this servo can weed is that of every controller.
-        let first = totals.first().map_or(Treatment::Firmware, |total| total.controller);
-        let bound = curve(BOUND, first, |total| 100.0 * total.weedable_share);
+        let first = totals.first().map_or(Treatment::Firmware, |total| total.plots.controller);
+        let bound = curve(BOUND, first, |total| 100.0 * total.plots.weedable_share);
         let present = || Treatment::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
         let (mut figures, mut tables) = (Vec::new(), Vec::new());
         for (Measure { chart, table, value }, bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
@@ -172,14 +172,14 @@ fn beside_others(firmware: &[&Total]) -> Table {
     for total in firmware {
         let gone = |percent: Option<f64>| optional(percent, |percent| fixed(percent, 1));
         let [in_row, in_plot] =
-            [total.effect.in_row, total.effect.in_plot].map(|weeds| gone(weeds.efficiency_percent()));
+            [total.plots.effect.in_row, total.plots.effect.in_plot].map(|weeds| gone(weeds.efficiency_percent()));
         table.rows.push(vec![
             "this firmware, SIMULATED".to_owned(),
             "the simulated field's".to_owned(),
             "a light beam".to_owned(),
-            short(total.speed_km_h),
+            short(total.speed_km_h()),
             format!("{in_row} in the row, {in_plot} in the plot"),
-            format!("{} ({})", fixed(total.plant_damage_percent(), 2), total.damage()),
+            format!("{} ({})", total.damage().shown(), total.damage()),
             "this report".to_owned(),
         ]);
     }
@@ -202,8 +202,8 @@ struct Bar {
 
 impl Bar {
     fn of(total: &Total) -> Self {
-        let name = format!("{} km/h", short(total.speed_km_h));
-        let parts = total.budget.tenths().into_iter().filter(|(_, tenths)| *tenths > 0);
+        let name = format!("{} km/h", short(total.speed_km_h()));
+        let parts = total.plots.budget.tenths().into_iter().filter(|(_, tenths)| *tenths > 0);
         let words: Vec<String> =
             parts.clone().map(|(part, tenths)| format!("{} {} %", part.title(), percent(tenths))).collect();
         let label = |tenths| if tenths < LEAST_LABELLED { String::new() } else { percent(tenths) };
@@ -220,8 +220,8 @@ fn losses(firmware: &[&Total]) -> Table {
     let titles = Part::ALL.map(|part| format!("{}, %", part.title()));
     let mut table = Table::new("Where the row's ground went", ["speed".to_owned()].into_iter().chain(titles));
     for total in firmware {
-        let shares = total.budget.tenths().map(|(_, tenths)| percent(tenths));
-        let speed = format!("{} km/h", short(total.speed_km_h));
+        let shares = total.plots.budget.tenths().map(|(_, tenths)| percent(tenths));
+        let speed = format!("{} km/h", short(total.speed_km_h()));
         table.rows.push([speed].into_iter().chain(shares).collect());
     }
     table

@@ -2,12 +2,13 @@
 
 use expect_test::expect;
 use experiments::evaluation::{Analysis, PlotRecord};
-use experiments::experiment::{Total, Treatment, Zones};
+use experiments::experiment::{PlotOutcome, Total, Treatment, Zones};
 use experiments::page::Page;
 use experiments::statistics::Mean;
 use field::budget::{Budget, Part, Reason};
+use field::machine::Machine;
+use field::motion::Motion;
 use field::tool_path::{Effect, WeedCount};
-use field::{Machine, Motion};
 use roxmltree::{Document, Node, ParsingOptions};
 
 /// Four speeds, two spacings, three replications. With `damages`, damage grows with speed.
@@ -39,18 +40,19 @@ fn trial(damages: bool) -> Analysis {
 /// A total with these plants damaged, zones reached and ground weeded, each out of a thousand.
 fn total(controller: Treatment, speed_km_h: f64, damaged: u32, reached: u32, weeded: f64) -> Total {
     let plants = if damaged == 0 { 97 } else { 1000 };
-    Total {
+    let plots = PlotOutcome {
         controller,
-        speed_km_h,
+        record: PlotRecord { speed_km_h, ..PlotRecord::default() },
         effect: Effect { plants, damaged, in_row: WeedCount { before: 10_000, after: 5874 }, ..Effect::default() },
         zones: Zones { all: 1000, reached, margins_cut: 0 },
         weeded_share: weeded / 1000.0,
         weedable_share: if speed_km_h == 1.0 { 0.432 } else { 0.269 },
         undamaged_share: 0.0,
         budget: budget(weeded),
-        weeded_percent: Mean::of(&[]),
         alarms: 0,
-    }
+        moved_s: 0.0,
+    };
+    Total { plots, weeded_percent: Mean::of(&[]) }
 }
 
 fn totals() -> Vec<Total> {
@@ -181,7 +183,7 @@ fn the_simulated_machine_stands_beside_published_ones_and_is_marked() {
     let xml = closed(&html);
     let rows = cells(&parse(&xml), "This machine, simulated, and machines in fields");
     assert_eq!(rows[1][0], "this firmware, SIMULATED");
-    assert_eq!(rows[1][3..6], ["2.5", "41.3 in the row, \u{2013} in the plot", "0.00 (below 3.0)"]);
+    assert_eq!(rows[1][3..6], ["2.5", "41.3 in the row, \u{2013} in the plot", "0.0 (below 3.0)"]);
     let jia = rows.iter().find(|row| row[0].starts_with("Jia")).unwrap();
     assert_eq!(jia[3..6], ["4 to 7", "95.8", "0.6"]);
     assert!(rows.iter().skip(2).all(|row| !row[0].contains("SIMULATED") && !row[6].is_empty()));

@@ -10,14 +10,17 @@
 mod parameters;
 
 use crate::machine::{Dirt, Machine};
+use crate::motion::Motion;
+use crate::row::Row;
 use crate::servo::{Scatter, Servo};
+use crate::trial::{Start, Trial};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 use files::FileError;
 use files::toml_entry::{self, Entry};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
-use std::io;
+use std::fs;
 use std::ops::Range;
 use std::path::Path;
 use thiserror::Error;
@@ -50,18 +53,21 @@ pub fn presets() -> impl Iterator<Item = &'static str> {
 }
 
 impl Conditions {
-    /// The conditions of a preset, or of a file. `read` returns the file's text.
+    /// The conditions of a preset, or of a file.
     ///
     /// # Errors
     /// If it is neither, or something in the file is wrong: with the line.
-    pub fn load(preset_or_file: &str, read: impl FnOnce(&Path) -> io::Result<String>) -> Result<Self, FileError> {
+    pub fn load(preset_or_file: &str) -> Result<Self, FileError> {
         let path = Path::new(preset_or_file);
         match Self::preset(preset_or_file) {
             Some(conditions) => conditions,
             None => {
                 let presets = presets().collect::<Vec<_>>().join(", ");
                 let problem = format!("is none of the presets ({presets}), and as a file it cannot be read");
-                Self::parse(path, &read(path).map_err(|source| FileError::unusable(path, problem, source))?)
+                Self::parse(
+                    path,
+                    &fs::read_to_string(path).map_err(|source| FileError::unusable(path, problem, source))?,
+                )
             }
         }
     }
@@ -185,6 +191,19 @@ impl Conditions {
             lead_out_ms: of(Setting::LeadOutMs),
             lead_in_ms: of(Setting::LeadInMs),
             stem_zone_mm: of(Setting::StemZoneMm),
+        }
+    }
+
+    /// The trial of a row and a motion with this machine and these settings. The seed is that of [`Self::machine`].
+    pub fn trial(&self, row: Row, motion: Motion, seed: u64) -> Trial {
+        Trial {
+            row,
+            machine: self.machine(seed),
+            motion,
+            timing: self.timing(),
+            start: Start::Command,
+            settings: self.firmware_settings(),
+            examples: Vec::new(),
         }
     }
 
@@ -338,7 +357,7 @@ mod tests {
             let said = parse(text).unwrap_err();
             assert!(said.starts_with(error), "{said}");
         }
-        let said = Conditions::load("no-such-field", |_| Err(io::ErrorKind::NotFound.into())).unwrap_err().to_string();
+        let said = Conditions::load("no-such-field").unwrap_err().to_string();
         assert!(said.starts_with("no-such-field is none of the presets (transplanted, even-stand"), "{said}");
     }
 

@@ -23,7 +23,7 @@ const BRAKING_MM_S2: f64 = 1000.0;
 
 /// Distance between two corrections of the steering, and of constant speed and slip, without the distance for changing
 /// the speed.
-const LEG_MM: Range<f64> = 1000.0..2000.0;
+pub const LEG_MM: Range<f64> = 1000.0..2000.0;
 
 /// Distance that the tool rolls on behind the row.
 const RUN_OUT_MM: f64 = 300.0;
@@ -93,7 +93,8 @@ pub struct Steering {
     /// Positions, and the deviation from the line there, positive to the left. Empty for a machine that stays on the
     /// line.
     knots: Vec<(f64, f64)>,
-    within_mm: f64,
+    /// The farthest that it strays.
+    pub(crate) within_mm: f64,
 }
 
 impl Steering {
@@ -114,11 +115,6 @@ impl Steering {
     /// Deviation of the machine's middle from the row's line, when its tool works this ground.
     pub fn across_mm(&self, place_mm: f64) -> f64 {
         interpolated(&self.knots, place_mm).unwrap_or(0.0)
-    }
-
-    /// The farthest that it strays.
-    pub fn within_mm(&self) -> f64 {
-        self.within_mm
     }
 }
 

@@ -36,14 +36,6 @@ pub mod verdict;
 pub mod wheel;
 pub mod wiring;
 
-pub use conditions::Conditions;
-pub use machine::Machine;
-pub use motion::Motion;
-pub use row::{Canopy, Kind, Row};
-pub use servo::Servo;
-pub use trial::{Start, Trial};
-pub use verdict::{Judgement, Timing, Verdict, judge};
-
 /// A number and a noun, such as `1 plant` and `2 plants`.
 pub fn counted(number: impl std::fmt::Display, noun: &str) -> String {
     let number = number.to_string();

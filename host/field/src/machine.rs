@@ -13,7 +13,7 @@
 
 use crate::motion::{Motion, marks};
 use crate::row::Row;
-use crate::servo::{OUT_DEGREES, Servo};
+use crate::servo::Servo;
 use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -136,11 +136,6 @@ impl Machine {
     /// Share of a stroke during which the tool does not work the row's line.
     pub fn idle_share_of_stroke(&self) -> f64 {
         (1.0 - self.line_degrees() / self.servo.stroke_degrees()).max(0.0)
-    }
-
-    /// Time in which the servo turns by its whole stroke without load.
-    pub fn stroke_s(&self) -> f64 {
-        self.servo.travel_ms / 1000.0 * self.servo.stroke_degrees() / OUT_DEGREES
     }
 
     /// How far from the row's line the tool's nearer edge is when it is fully out.

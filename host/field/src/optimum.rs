@@ -59,19 +59,12 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::{Canopy, Row};
-    use crate::stand::Stem;
+    use crate::tool_path::tests::stand;
 
     #[test]
     fn the_bound_is_the_row_less_each_zone_and_the_quickest_swings() {
-        let stand = Stand {
-            row: Row::new(vec![Canopy::plant(1000.0, 150.0)]).unwrap(),
-            stems: vec![Stem { along_mm: 1000.0, across_mm: 0.0, protected_mm: 45.0, is_seen: true }],
-            neighbours: Vec::new(),
-            weeds: Vec::new(),
-            counted_mm: 0.0..2000.0,
-            span_mm: 0.0..2000.0,
-        };
+        let mut stand = stand();
+        stand.stems[0].protected_mm = 45.0;
         let share = |speed_mm_s: f64| {
             let motion = Motion::steady(-500.0, 1e6, speed_mm_s, 3000.0);
             undamaged_share(&stand, &Machine::default(), &motion, &Steering::default())

@@ -226,10 +226,6 @@ fn grown_together(mut canopies: Vec<Canopy>) -> Vec<Canopy> {
 mod tests {
     use super::*;
 
-    /// The standard deviations in the presets' comments, with plants 20 and 25 cm apart.
-    const MAIZE_SD_MM: [f64; 2] = [73.0, 88.0];
-    const MAIZE_UNEVEN_SD_MM: [f64; 2] = [114.0, 128.0];
-
     fn try_grow(preset: &str, changes: &[(&str, f64)], spacing_mm: f64, seed: u64) -> Result<Stand, Problem> {
         Stand::grow(&Conditions::with(preset, changes), spacing_mm, &mut ChaCha8Rng::seed_from_u64(seed))
     }
@@ -274,21 +270,21 @@ mod tests {
 
     #[test]
     fn plants_are_sown_as_unevenly_as_the_deviation_of_their_spacing_says() {
-        for sd_mm in [0.0, 20.0, 60.0] {
-            let changes = [("plot.row_m", 1000.0), ("crop.spacing_sd_mm", sd_mm)];
-            let sown_mm = spacing_sd_mm(&grow("even-stand", &changes, 5));
-            assert!((sown_mm - sd_mm).abs() <= 0.05 * sd_mm, "{sown_mm} mm, not {sd_mm}");
-        }
-    }
-
-    #[test]
-    fn the_maize_presets_stand_as_unevenly_as_they_say() {
-        for (preset, sd_mm) in [("maize", MAIZE_SD_MM), ("maize-uneven", MAIZE_UNEVEN_SD_MM)] {
-            for (spacing_mm, sd_mm) in [200.0, 250.0].into_iter().zip(sd_mm) {
-                let stand = try_grow(preset, &[("plot.row_m", 1000.0)], spacing_mm, 5);
-                let sown_mm = spacing_sd_mm(&stand.unwrap());
-                assert!((sown_mm - sd_mm).abs() < 4.0, "{preset} at {spacing_mm} mm: {sown_mm} mm");
-            }
+        let even = |sd_mm: f64| ("even-stand", vec![("crop.spacing_sd_mm", sd_mm)], 500.0, sd_mm, 0.05 * sd_mm);
+        // As the presets' comments say.
+        let of_preset = |preset, spacing_mm, sd_mm| (preset, Vec::new(), spacing_mm, sd_mm, 4.0);
+        for (preset, mut changes, spacing_mm, sd_mm, within_mm) in [
+            even(0.0),
+            even(20.0),
+            even(60.0),
+            of_preset("maize", 200.0, 73.0),
+            of_preset("maize", 250.0, 88.0),
+            of_preset("maize-uneven", 200.0, 114.0),
+            of_preset("maize-uneven", 250.0, 128.0),
+        ] {
+            changes.push(("plot.row_m", 1000.0));
+            let sown_mm = spacing_sd_mm(&try_grow(preset, &changes, spacing_mm, 5).unwrap());
+            assert!((sown_mm - sd_mm).abs() <= within_mm, "{preset} at {spacing_mm} mm: {sown_mm} mm, not {sd_mm}");
         }
     }
 

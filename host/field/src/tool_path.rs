@@ -151,7 +151,7 @@ impl Tools<'_> {
 
     /// Whether the tool can swing as far aside as the zone of a stem in the next row.
     fn reaches(&self, stem: &Stem) -> bool {
-        let tip_mm = self.machine.room_mm() + self.machine.tool_width_mm + self.steering.within_mm();
+        let tip_mm = self.machine.room_mm() + self.machine.tool_width_mm + self.steering.within_mm;
         tip_mm > stem.across_mm - stem.protected_mm
     }
 
@@ -194,7 +194,7 @@ impl Tools<'_> {
             // clear of the zone.
             self.between_turns_s(&times).any(|stretch| {
                 let [from, to] = [stretch.start, stretch.end].map(|time_s| self.covered_mm(time_s));
-                let near_mm = protected_mm + self.steering.within_mm();
+                let near_mm = protected_mm + self.steering.within_mm;
                 let comes_near =
                     from.start.min(to.start) < across_mm + near_mm && across_mm - near_mm < from.end.max(to.end);
                 let sample = |time_s: f64| (time_s - times.start) / SAMPLE_S;
@@ -222,14 +222,14 @@ impl Tools<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::row::{Canopy, Row};
     use rand::SeedableRng;
     use uno::CYCLES_PER_SECOND;
 
     /// A stem at 1000 mm on the row's line, and weeds before it, beside it and between the rows.
-    fn stand() -> Stand {
+    pub(crate) fn stand() -> Stand {
         let weed = |along_mm, across_mm| Weed { along_mm, across_mm };
         Stand {
             row: Row::new(vec![Canopy::plant(1000.0, 150.0)]).unwrap(),

@@ -16,7 +16,7 @@ use crate::ground::{share_of, union};
 use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
 use crate::row::{Canopy, Row};
-use crate::servo::{Command, Stroke};
+use crate::servo::{Command, OUT_DEGREES, Stroke};
 use serde::Serialize;
 use std::ops::Range;
 use strum::Display;
@@ -172,7 +172,8 @@ impl Judgement {
 /// travelled while the tool swings and does not work the row's line. `T` is the servo's travel. Its dead time costs
 /// nothing with the right leads. The inter-row tools are not part of this figure.
 pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Timing) -> f64 {
-    let swing_s = machine.idle_share_of_stroke() * machine.stroke_s();
+    let stroke_s = machine.servo.travel_ms / 1000.0 * machine.servo.stroke_degrees() / OUT_DEGREES;
+    let swing_s = machine.idle_share_of_stroke() * stroke_s;
     let lost = row.plants().map(|plant| {
         let swing_mm = |ground_mm: f64| {
             let first = motion.passings(ground_mm + machine.beam_to_tool_mm).next();

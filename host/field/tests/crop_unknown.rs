@@ -16,7 +16,6 @@ use field::conditions::Conditions;
 use field::driving::drive;
 use field::native::{Sensors, TURN_S, beams_before};
 use field::stand::Stand;
-use field::trial::{Start, Trial};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::Rig;
@@ -38,15 +37,7 @@ fn weed(preset: &str, number: u64, spacing_mm: f64, speed_km_h: f64) -> (Option<
     };
     let stand = Stand::grow(&conditions, spacing_mm, &mut chance(0)).expect("the plants stand apart");
     let drive = drive(&conditions, &stand.span_mm, speed_km_h, &mut chance(1));
-    let trial = Trial {
-        row: stand.row.clone(),
-        machine: conditions.machine(chance(2).random()),
-        motion: drive.motion.clone(),
-        timing: conditions.timing(),
-        start: Start::Command,
-        settings: conditions.firmware_settings(),
-        examples: Vec::new(),
-    };
+    let trial = conditions.trial(stand.row.clone(), drive.motion.clone(), chance(2).random());
     let readings = Readings::new(Instant::ZERO, Position::new(0));
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
     let mut weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(&trial), Cause::PowerOn);

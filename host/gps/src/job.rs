@@ -212,7 +212,7 @@ impl Job {
                     job.unplugged += 1;
                     job.heard(receiver.silent(), &mut reading, entry);
                 }
-                Kind::Setting => reading.set(&entry.text),
+                Kind::Setting => reading.set(&entry.text, false),
                 Kind::Status => {
                     if let Some(status) = Status::parse(&entry.text) {
                         if reading.is_far(&status) {
@@ -285,8 +285,7 @@ impl Job {
             Some(track) => track.find(distance_m, recorded_ms as f64, offset),
             None => Err(Missing::NoFixBefore),
         };
-        let beam_to_tool_mm = read.settings.as_ref().map_or(0.0, |to| f64::from(to.get(Setting::BeamToToolMm)));
-        let (beam, tool) = (self.antenna.beam(), self.antenna.tool(beam_to_tool_mm));
+        let (beam, tool) = (self.antenna.beam(), self.antenna.tool(read.mm(Setting::BeamToToolMm)));
         let (mut events, mut ground) = (read.events, read.ground);
         for event in &mut events {
             let offset = match event.kind {
@@ -341,10 +340,11 @@ impl Reading {
         self.settings.as_ref().map_or(0.0, |settings| f64::from(settings.get(setting)))
     }
 
-    fn set(&mut self, line: &str) {
+    /// Takes a line `name=value`: shown by the machine, or what it `changed`.
+    fn set(&mut self, line: &str, changed: bool) {
         if let (Some((setting, value)), Some(settings)) = (shown(line), &mut self.settings) {
             // A log of another version may have another range. Then the default is used.
-            let _ = settings.set(setting, value);
+            let _ = if changed { settings.change(setting, value) } else { settings.set(setting, value) };
         }
     }
 
@@ -464,7 +464,7 @@ impl Reading {
                 let (number, time_ms, command) = self.unanswered.pop_front()?;
                 let words: Vec<&str> = command.split_whitespace().collect();
                 match words.as_slice() {
-                    ["set", name, value] => self.set(&format!("{name}={value}")),
+                    ["set", name, value] => self.set(&format!("{name}={value}"), true),
                     ["label", class, ..] => self.label(class, number, time_ms, &command),
                     _ => {}
                 }
@@ -473,7 +473,7 @@ impl Reading {
                 self.unanswered.pop_front();
             }
             // The output of `get` and `calibrate`.
-            ConsoleLine::Setting { .. } => self.set(line),
+            ConsoleLine::Setting { .. } => self.set(line, false),
             _ => {}
         }
         (before != self.tick_mm()).then(|| self.settings.clone()).flatten()

@@ -23,5 +23,4 @@ pub mod track;
 
 pub use antenna::Antenna;
 pub use job::{Job, Wanted};
-pub use receiver::Receiver;
 pub use recorder::Recorder;

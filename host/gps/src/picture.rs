@@ -6,8 +6,8 @@
 use crate::job::{Did, EventKind, Job};
 use crate::plane::{Metres, Place, Plane};
 use drawing::{
-    DOUBTFUL, INK, LEFT_ALONE, Legend, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG, document, line, paper, swatch,
-    tenth, words as text_at,
+    DOUBTFUL, INK, LEFT_ALONE, Legend, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG, document, line, swatch, tenth,
+    words as text_at,
 };
 use link::Class;
 use std::collections::HashSet;
@@ -107,12 +107,11 @@ pub fn draw(jobs: &[&Job], words: &Words) -> Option<Document> {
     for (colour, meaning) in colours.into_iter().zip(&words.legend) {
         legend.explain(|x, y| swatch(x, y, colour), meaning);
     }
-    let mut drawn = document(width, height)
-        .add(paper(width, height))
-        .add(legend.drawn())
-        .add(ground_drawn)
-        .add(points)
-        .add(scale_bar(scale, height, &words.north));
+    let mut drawn = document(width, height).add(legend.drawn()).add(ground_drawn).add(points).add(scale_bar(
+        scale,
+        height,
+        &words.north,
+    ));
     if missing > 0 {
         let text = format!("{} {missing}", words.without_place);
         drawn = drawn.add(text_at(width - FRAME, height - 14.0, &text, INK).set("text-anchor", "end"));

@@ -65,7 +65,7 @@ impl Recorder {
                 self.wheel = Some((status.position, ticks));
                 self.receiver.rolled(time_ms as f64, ticks as f64 * self.tick_m, f64::from(status.speed_mm_s));
             }
-            Happening::Event(..) | Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
+            _ => {}
         }
     }
 
@@ -76,7 +76,7 @@ impl Recorder {
 
     /// The receiver's port is there, of this name.
     pub fn found(&mut self, time_ms: u64, port: &str) -> Lines {
-        self.lines = LineReader::new();
+        self.lines = LineReader::default();
         self.is_first = true;
         self.heard_ms = Some(time_ms);
         vec![(Kind::GpsFound, port.to_owned())]

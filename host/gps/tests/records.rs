@@ -214,6 +214,21 @@ fn a_change_of_the_wheel_begins_a_new_stretch() {
 }
 
 #[test]
+fn another_wheel_has_no_calibration_yet_and_revert_brings_the_old_one_back() {
+    let mut log = whole();
+    let set = vec![
+        (Kind::Command, "set wheel_mm 400"),
+        (Kind::Answer, "ok"),
+        (Kind::Command, "revert"),
+        (Kind::Answer, "ok"),
+        (Kind::Answer, "ticks_per_m=2000 from 0 to 20000, default 0, saved 2000"),
+    ];
+    insert(&mut log, set);
+    // Each change of the tick's length begins a stretch.
+    assert_eq!(Job::read(&log, &Wanted::default()).stretches.len(), 3);
+}
+
+#[test]
 fn ground_that_is_rolled_over_again_counts_once() {
     let status = |time_ms, distance_mm: i64| {
         let text = format!("state=work tool=in pos={} speed_mm_s=0 windows=0 unseen_mm=0", 2 * distance_mm);

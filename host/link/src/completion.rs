@@ -1,37 +1,29 @@
-//! Completes a half-typed command from the firmware's own words and its table of settings.
+//! Completes a half-typed command from the firmware's own words, its table of settings, and its parser.
 
 use super::settings::{Setting, name};
-use control::say::command::Word;
+use control::say::command::{Argument, Word, parse};
 
 /// All lines that complete the last word of `line`, in the order of the firmware's tables.
 pub fn complete(line: &str) -> Vec<String> {
     let (before, begun) = line.rsplit_once(' ').map_or(("", line), |(before, begun)| (before, begun));
     let words: Vec<&str> = before.split_whitespace().collect();
+    let whole = |choice: String| if words.is_empty() { choice } else { format!("{before} {choice}") };
+    let is_command = |choice: &String| parse(whole(choice.clone()).as_bytes()).is_ok();
     let choices: Vec<String> = match words.as_slice() {
-        [] => (0..).map_while(Word::from_index).map(|word| word.text().bytes().map(char::from).collect()).collect(),
+        [] => (0..).map_while(Word::from_index).map(|word| word.text().to_string()).collect(),
         ["get" | "set" | "help"] => Setting::all().map(name).collect(),
-        ["set", setting] => match Setting::find(setting.as_bytes()) {
-            Some(setting) if setting.is_switched() => owned(&["on", "off"]),
-            Some(setting) => vec![setting.description().default.to_string()],
-            None => Vec::new(),
-        },
-        ["start"] => owned(&["now"]),
-        ["events"] => owned(&["on", "off"]),
-        ["plot"] => owned(&["on", "off", "teleplot"]),
-        ["label" | "teach"] => owned(&["plant", "weed"]),
-        ["label", _] => owned(&["force"]),
-        ["forget"] => owned(&["all"]),
-        ["servo"] => owned(&["in", "out"]),
-        ["calibrate"] => owned(&["start", "servo"]),
-        ["test"] => owned(&["row"]),
-        _ => Vec::new(),
+        ["set", setting]
+            if let Some(setting) = Setting::find(setting.as_bytes())
+                && !setting.is_switched() =>
+        {
+            vec![setting.description().default.to_string()]
+        }
+        _ => {
+            let arguments = (0..).map_while(Argument::from_index).map(|argument| argument.text().to_string());
+            arguments.filter(is_command).collect()
+        }
     };
-    let fitting = choices.into_iter().filter(|choice| choice.starts_with(begun));
-    fitting.map(|choice| if words.is_empty() { choice } else { format!("{before} {choice}") }).collect()
-}
-
-fn owned(words: &[&str]) -> Vec<String> {
-    words.iter().map(|&word| word.to_owned()).collect()
+    choices.into_iter().filter(|choice| choice.starts_with(begun)).map(whole).collect()
 }
 
 /// The longest prefix that all lines share.
@@ -54,6 +46,7 @@ mod tests {
         assert_eq!(complete("set wheel_mm "), ["set wheel_mm 400"]);
         assert_eq!(complete("label p"), ["label plant"]);
         assert_eq!(complete("label weed "), ["label weed force"]);
+        assert_eq!(complete("test "), ["test row", "test watchdog"]);
         assert!(complete("").len() > 10);
     }
 

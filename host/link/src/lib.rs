@@ -50,7 +50,7 @@ use std::time::{Duration, Instant};
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
 
-/// Silent reads after which the link gives up an answer: two seconds.
+/// Silent reads in a row after which the link gives up an answer: two seconds.
 const SILENT_READS: usize = 100;
 
 /// Longest time of an answer while lines keep coming. The longest valid answer, all examples, takes less than a second.
@@ -106,8 +106,12 @@ impl Link {
     /// # Errors
     /// If the port is gone, or something else than the weeder's firmware is at its other end.
     pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
-        let mut link =
-            Self { port: Box::new(port), lines: LineReader::new(), events: VecDeque::new(), version: String::new() };
+        let mut link = Self {
+            port: Box::new(port),
+            lines: LineReader::default(),
+            events: VecDeque::new(),
+            version: String::new(),
+        };
         if resets {
             link.greeting()?;
         }
@@ -115,19 +119,19 @@ impl Link {
         link.type_line("")?;
         link.wait_until_quiet()?;
         let mut answer = link.ask("version");
+        let mut retries = 0;
         // The Uno may be starting right now for another reason than this opening.
-        for _ in 0..RETRIES {
-            if !matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
-                break;
-            }
+        while retries < RETRIES && matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
             answer = link.ask("version");
-            // An answer that came too late is not to be the next question's.
-            link.wait_until_quiet()?;
+            retries += 1;
         }
         let answer = answer?;
         match answer.last().map(|line| ConsoleLine::parse(line)) {
             Some(ConsoleLine::Version { version }) => link.version = version,
             _ => return Err(LinkError::NotTheWeeder(answer.join(" "))),
+        }
+        if retries > 0 {
+            link.drop_late_answers(retries)?;
         }
         Ok(link)
     }
@@ -143,6 +147,11 @@ impl Link {
     /// If it is no command, the firmware refuses, or no whole answer comes.
     pub fn ask(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
         self.send(command)?;
+        self.answer(command)
+    }
+
+    /// Waits for the answer to a command that was typed.
+    fn answer(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
         let deadline = Instant::now() + ANSWER_TIME;
         let (mut silent_reads, mut bytes) = (0, 0);
         let mut answer: Vec<String> = Vec::new();
@@ -154,6 +163,7 @@ impl Link {
                 }
                 Received::Bytes(count) => {
                     bytes += count;
+                    silent_reads = 0;
                     continue;
                 }
                 Received::Line(line) => line,
@@ -177,6 +187,18 @@ impl Link {
         }
         let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
         Err(LinkError::Silent { command: command.to_owned(), received: received[tail..].trim().to_owned() })
+    }
+
+    /// Asks for the status, and drops up to `count` answers before it. A virtual Uno on a busy computer may answer an
+    /// earlier question at any time.
+    fn drop_late_answers(&mut self, count: usize) -> Result<(), LinkError> {
+        self.send("status")?;
+        for _ in 0..=count {
+            if self.answer("status")?.iter().any(|line| Status::parse(line).is_some()) {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Types a command and does not wait for its answer, which comes by [`next_line`](Self::next_line).

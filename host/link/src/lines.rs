@@ -23,11 +23,6 @@ pub struct LineReader {
 }
 
 impl LineReader {
-    /// A reader that has read nothing.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Takes bytes as they come.
     pub fn take(&mut self, bytes: &[u8]) {
         for &byte in bytes {
@@ -76,7 +71,7 @@ mod tests {
     use super::*;
 
     fn lines(bytes: &[u8]) -> Vec<String> {
-        let mut reader = LineReader::new();
+        let mut reader = LineReader::default();
         reader.take(bytes);
         std::iter::from_fn(|| reader.next_line()).collect()
     }
@@ -88,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_line_that_comes_in_pieces_is_one_line() {
-        let mut reader = LineReader::new();
+        let mut reader = LineReader::default();
         reader.take(b"swing tool=");
         assert_eq!((reader.next_line(), reader.partial()), (None, "swing tool="));
         reader.take(b"out pos=7\r");
@@ -102,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_line_without_an_end_is_cut_and_the_buffer_is_bounded() {
-        let mut reader = LineReader::new();
+        let mut reader = LineReader::default();
         for _ in 0..10_000 {
             reader.take(&[b'x'; 1000]);
         }

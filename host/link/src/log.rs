@@ -80,9 +80,10 @@ pub struct LogWriter {
     path: PathBuf,
     file: csv::Writer<File>,
     began: Instant,
-    /// Lines below the header: those found at opening, and those added since.
+    /// Lines below the header that were found at opening.
     found: u64,
-    added: u64,
+    /// Lines that were written since.
+    pub added: u64,
 }
 
 impl LogWriter {
@@ -143,8 +144,10 @@ impl LogWriter {
             Happening::Event(_, line) => self.line(time_ms, Kind::Event, line),
             Happening::Command(line) => self.line(time_ms, Kind::Command, line),
             Happening::Answer(line) => self.line(time_ms, Kind::Answer, line),
+            // What `revert` restored, or another session set, follows from no other line.
+            Happening::Settings(_, lines) => lines.iter().try_for_each(|line| self.line(time_ms, Kind::Answer, line)),
             // They follow from the commands.
-            Happening::Settings(..) | Happening::Examples(_) => Ok(()),
+            Happening::Answered { .. } | Happening::Examples(_) => Ok(()),
         }
     }
 
@@ -159,11 +162,6 @@ impl LogWriter {
     /// Lines in the file, without the header.
     pub fn lines(&self) -> u64 {
         self.found + self.added
-    }
-
-    /// Lines that were written since the file was opened.
-    pub fn added(&self) -> u64 {
-        self.added
     }
 
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
@@ -320,6 +318,19 @@ mod tests {
         let entries: Vec<(u64, Kind, String)> =
             read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
         assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
+    }
+
+    #[test]
+    fn what_the_machine_shows_after_a_change_is_in_the_log() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let lines = vec!["wheel_mm=410 mm from 200 to 800, default 400, saved 410".to_owned()];
+        LogWriter::open(&path)
+            .unwrap()
+            .write(&Happening::Settings(crate::settings::Settings::new(), lines.clone()))
+            .unwrap();
+        let [entry] = &read(&path).unwrap()[..] else { panic!("one line") };
+        assert_eq!((entry.kind, &entry.text), (Kind::Answer, &lines[0]));
     }
 
     #[test]

@@ -7,11 +7,10 @@
 //! [`Hold`] follows a HOLD to all rows: which rows have obeyed, and how long the last one took. It has no clock: events
 //! carry their times.
 
-use super::session::{Happening, Session};
+use super::session::{HOLD, Happening, Session};
 use super::settings::SettingsError;
-use super::{ConsoleLine, Link, LinkError};
+use super::{Link, LinkError};
 use std::cmp::Reverse;
-use std::collections::VecDeque;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -35,13 +34,6 @@ pub struct Heard {
 pub enum What {
     /// An event of its session.
     Happened(Happening),
-    /// A command was answered.
-    Answered {
-        /// The command.
-        command: String,
-        /// The line that begins with `error:`, if the firmware refused.
-        refusal: Option<String>,
-    },
     /// A command that was not typed, and why.
     NotTyped {
         /// The command.
@@ -74,7 +66,7 @@ impl Rows {
             .map(|(row, open)| {
                 let (orders, ordered) = mpsc::channel();
                 let (tried, first) = mpsc::channel();
-                let talk = Talk { row, heard: sender.clone(), typed: VecDeque::new() };
+                let talk = Talk { row, heard: sender.clone() };
                 thread::spawn(move || {
                     let mut session = Session::waiting_for(open);
                     session.keeps_hold = true;
@@ -133,13 +125,11 @@ impl Rows {
 struct Talk {
     row: usize,
     heard: Sender<Heard>,
-    /// Typed lines without an answer.
-    typed: VecDeque<String>,
 }
 
 impl Talk {
     /// Runs until all senders of orders and all receivers of events are gone.
-    fn run(mut self, mut session: Session, orders: &Receiver<Order>) {
+    fn run(self, mut session: Session, orders: &Receiver<Order>) {
         loop {
             loop {
                 match orders.try_recv() {
@@ -157,14 +147,14 @@ impl Talk {
                 }
             }
             for happening in session.turn(Instant::now()) {
-                if !self.take(happening) {
+                if !self.tell(What::Happened(happening)) {
                     return;
                 }
             }
         }
     }
 
-    fn type_or_report(&mut self, session: &mut Session, command: String) {
+    fn type_or_report(&self, session: &mut Session, command: String) {
         if !session.is_connected() {
             self.tell(What::NotTyped { command, why: "the row is not there".to_owned() });
         } else if !session.command(&command) {
@@ -172,25 +162,7 @@ impl Talk {
         }
     }
 
-    /// Passes on an event. Returns false if the receiver is gone.
-    fn take(&mut self, happening: Happening) -> bool {
-        let mut answered = None;
-        match &happening {
-            Happening::Command(line) => self.typed.push_back(line.clone()),
-            Happening::Lost(_) => self.typed.clear(),
-            Happening::Answer(line) => {
-                if let ConsoleLine::End { error } = ConsoleLine::parse(line)
-                    && let Some(command) = self.typed.pop_front()
-                {
-                    let refusal = error.map(|_| line.clone());
-                    answered = Some(What::Answered { command, refusal });
-                }
-            }
-            _ => {}
-        }
-        self.tell(What::Happened(happening)) && answered.is_none_or(|answered| self.tell(answered))
-    }
-
+    /// Returns false if the receiver is gone.
     fn tell(&self, what: What) -> bool {
         self.heard.send(Heard { row: self.row, at: Instant::now(), what }).is_ok()
     }
@@ -223,7 +195,7 @@ impl Hold {
     pub fn take(&mut self, heard: &Heard) {
         let Some(held) = self.rows.get_mut(heard.row) else { return };
         match &heard.what {
-            What::Answered { command, refusal } if command == super::session::HOLD => {
+            What::Happened(Happening::Answered { command, refusal }) if command == HOLD => {
                 *held = match (&*held, refusal) {
                     (Held::Obeyed(_), _) => return,
                     (_, None) => Held::Obeyed(heard.at.saturating_duration_since(self.since)),

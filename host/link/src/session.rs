@@ -59,6 +59,13 @@ pub enum Happening {
     Command(String),
     /// A line of the answer to it. The last one is `ok` or begins with `error:`.
     Answer(String),
+    /// That was the last line of the answer.
+    Answered {
+        /// The command.
+        command: String,
+        /// The line that begins with `error:`, if the firmware refused.
+        refusal: Option<String>,
+    },
     /// The settings after a command has changed or saved some, and the lines that show them.
     Settings(Settings, Vec<String>),
     /// The examples after a command has changed some, a line each.
@@ -202,15 +209,20 @@ impl Session {
     }
 
     fn listen(&mut self, mut link: Link, now: Instant) -> Result<(), SettingsError> {
+        let mut is_more_to_read = true;
         for _ in 0..LINES {
-            let Some(line) = link.next_line()? else { break };
+            let Some(line) = link.next_line()? else {
+                is_more_to_read = false;
+                break;
+            };
             if is_greeting(&line) {
                 self.lose("the Uno was reset".to_owned());
                 return self.connect(link);
             }
             self.take(line);
         }
-        let is_old = |asked: &&Asked| now.saturating_duration_since(asked.since) > PATIENCE;
+        // The answer may be behind lines that came while the computer was busy.
+        let is_old = |asked: &&Asked| !is_more_to_read && now.saturating_duration_since(asked.since) > PATIENCE;
         if let Some(Asked { line, .. }) = self.asked.front().filter(is_old) {
             return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
         }
@@ -266,7 +278,11 @@ impl Session {
                 if is_done {
                     self.own.extend(changed_by(&asked.line));
                 }
+                let refusal = (is_end && !is_done).then(|| line.clone());
                 self.happened.push_back(Happening::Answer(line));
+                if is_end {
+                    self.happened.push_back(Happening::Answered { command: asked.line.clone(), refusal });
+                }
             }
         }
         if is_end {

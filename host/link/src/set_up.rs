@@ -147,7 +147,7 @@ pub struct SetUp {
     /// Whether the margin was set in this session.
     sets_margin: bool,
     /// The settings in use, as far as the session shows them.
-    settings: Settings,
+    pub settings: Settings,
     timings: Vec<Timing>,
     ticks_per_m: Vec<u16>,
     slip_permille: VecDeque<i32>,

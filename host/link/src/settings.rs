@@ -128,17 +128,9 @@ pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
             // Both pulses wait for each other.
             None => (first, beside(first, &now, to)),
         };
-        take(&mut now, setting, value);
+        // Values of settings are in their ranges.
+        let _ = now.change(setting, value);
         steps.push((setting, value));
-    }
-}
-
-/// Sets a value as the firmware does: a change of the wheel's settings deletes its measured value.
-fn take(settings: &mut Settings, setting: Setting, value: u16) {
-    // Values of settings are in their ranges.
-    let _ = settings.set(setting, value);
-    if setting.is_of_the_wheel() {
-        let _ = settings.set(Setting::TicksPerM, 0);
     }
 }
 
@@ -194,7 +186,10 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
 }
 
 /// Asks for the machine's status.
-pub(super) fn status(link: &mut Link) -> Result<Status, LinkError> {
+///
+/// # Errors
+/// If the console fails, or the firmware has another status than this program.
+pub fn status(link: &mut Link) -> Result<Status, LinkError> {
     let lines = link.ask("status")?;
     lines.iter().find_map(|line| Status::parse(line)).ok_or_else(|| LinkError::NotTheWeeder(lines.join(" ")))
 }
@@ -220,7 +215,8 @@ pub(super) mod tests {
         let mut now = from.clone();
         for (setting, value) in steps(from, to) {
             let was_right = now.contradiction().is_none();
-            take(&mut now, setting, value);
+            // Values of settings are in their ranges.
+            let _ = now.change(setting, value);
             assert!(!was_right || now.contradiction().is_none(), "{setting:?} {value} from {from:?} to {to:?}");
         }
         assert_eq!(&now, to);

@@ -36,13 +36,35 @@ fn the_greeting_after_a_reset_is_waited_for_and_the_version_asked() {
 
 #[test]
 fn an_uno_that_starts_while_it_is_asked_is_asked_again() {
-    let mut lines = 0;
-    let answer = move |_: &str| {
+    let (mut machine, mut lines) = (machine(), 0);
+    let answer = move |line: &str| {
         lines += 1;
         let greeting = b"weeder 0.2.0, reset by button, state hold\r\n".to_vec();
-        if lines <= 2 { greeting } else { b"weeder 0.2.0\r\nok\r\n".to_vec() }
+        if lines <= 2 { greeting } else { (machine(line).join("\r\n") + "\r\n").into_bytes() }
     };
-    assert_eq!(Link::over(script("", answer), false).unwrap().version(), "0.2.0");
+    let link = Link::over(script("", answer), false).unwrap();
+    assert!(link.version().starts_with(env!("CARGO_PKG_VERSION")), "{}", link.version());
+}
+
+#[test]
+fn an_answer_that_comes_late_and_slowly_belongs_to_its_own_question() {
+    const SILENT_READS_BETWEEN_LINES: usize = 15;
+    let mut machine = machine();
+    // The Uno starts after the first questions are typed, and then answers them.
+    let mut lines = VecDeque::from(["weeder 0.2.0, reset by external, state hold".to_owned()]);
+    let mut reads = 0;
+    let port = ScriptedPort::new(move |line: Option<&str>| {
+        match line {
+            Some("") => {}
+            Some(line) => lines.extend(machine(line)),
+            None => reads += 1,
+        }
+        let is_due = line.is_none() && reads % SILENT_READS_BETWEEN_LINES == 0;
+        let due = if is_due { lines.pop_front() } else { None };
+        Some(due.map_or_else(Vec::new, |line| format!("{line}\r\n").into_bytes()))
+    });
+    let mut link = Link::over(port, false).expect("the firmware answers");
+    assert_eq!(settings::read(&mut link).expect("all are shown"), settings::Settings::new());
 }
 
 #[test]
@@ -106,10 +128,16 @@ fn a_port_that_goes_away_says_so() {
     assert_eq!(error.to_string(), "the port is gone: plug the Uno in again");
 }
 
-/// A link to the firmware's decisions in HOLD, with its built-in examples, after these typed lines.
+/// The firmware's decisions in HOLD, with its built-in examples, which answer a line.
+fn machine() -> impl FnMut(&str) -> Vec<String> {
+    let mut rig = Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new()));
+    move |line| rig.ask(line)
+}
+
+/// A link to the machine, after these typed lines.
 fn link_to_machine(typed: &[&str]) -> Link {
-    let rig = RefCell::new(Rig::new(Nearest::new(&EXAMPLES[..], Volatile::new())));
-    let answer = move |line: &str| (rig.borrow_mut().ask(line).join("\r\n") + "\r\n").into_bytes();
+    let machine = RefCell::new(machine());
+    let answer = move |line: &str| (machine.borrow_mut()(line).join("\r\n") + "\r\n").into_bytes();
     typed.iter().for_each(|line| drop(answer(line)));
     link(answer)
 }

@@ -5,12 +5,12 @@
 //! direct calls and no questions. Their results are in tables of numbers ([`crate::table`]).
 
 use crate::put;
+use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
 use field::rolling::Rolling;
-use field::row::{Canopy, Row};
+use field::row::{Canopy, Kind, Row};
 use field::verdict::{Timing, Verdict, judge};
-use field::{Kind, Machine};
 use link::set_up::{Task, steps};
 use link::settings::{Setting, name};
 use serde::{Deserialize, Serialize};

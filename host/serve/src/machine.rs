@@ -3,7 +3,6 @@
 
 use super::hub::Hub;
 use control::say::command::{Command, parse};
-use link::ConsoleLine;
 use link::rows::Opener;
 use link::session::{HOLD, Happening, Session};
 use std::collections::VecDeque;
@@ -166,19 +165,18 @@ impl Talk {
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
             Happening::Event(_, line) => self.hub.event(self.number, &line),
             Happening::Answer(line) => {
-                let is_end = matches!(ConsoleLine::parse(&line), ConsoleLine::End { .. });
                 let Some(asked) = self.asked.front_mut() else { return };
-                if is_end || asked.answer.len() < LINES {
-                    asked.answer.push(line);
+                asked.answer.truncate(LINES - 1);
+                asked.answer.push(line);
+            }
+            Happening::Answered { command, .. } => {
+                let Some(mut asked) = self.asked.pop_front() else { return };
+                let answer = std::mem::take(&mut asked.answer);
+                // The pages need the events.
+                if parse(command.as_bytes()) == Ok(Command::Events(false)) {
+                    session.turn_events_on();
                 }
-                if is_end && let Some(mut asked) = self.asked.pop_front() {
-                    let answer = std::mem::take(&mut asked.answer);
-                    // The pages need the events.
-                    if parse(asked.line.as_bytes()) == Ok(Command::Events(false)) {
-                        session.turn_events_on();
-                    }
-                    asked.end(&Ok(answer));
-                }
+                asked.end(&Ok(answer));
             }
             Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
             Happening::Examples(lines) => self.hub.know(self.number, "examples", lines.into()),

@@ -8,7 +8,6 @@ use field::conditions::Conditions;
 use field::planting::Planting;
 use field::row::Row;
 use files::csv_table;
-use std::fs;
 use std::path::PathBuf;
 
 /// The arguments.
@@ -93,7 +92,7 @@ impl CourseArguments {
     /// # Errors
     /// If it is no field, or its machine has no room for the distance from beam to tool.
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
-        let mut conditions = Conditions::load(field, |file| fs::read_to_string(file))?;
+        let mut conditions = Conditions::load(field)?;
         if let Some(beam_to_tool_mm) = self.beam_to_tool {
             // A second beam cannot be farther back, and a beam cannot be that far ahead on a machine with two.
             if conditions.machine.second_beam_mm > 0.0 && !(300..=1000).contains(&beam_to_tool_mm) {

@@ -177,10 +177,7 @@ impl Board {
         let (true, Ok(command)) = (is_ok, parse(line.as_bytes())) else { return };
         match command {
             Command::Set(setting, value) => {
-                let _ = self.settings.set(setting, value);
-                if setting.is_of_the_wheel() {
-                    let _ = self.settings.set(Setting::TicksPerM, 0);
-                }
+                let _ = self.settings.change(setting, value);
                 self.begin_rest();
             }
             Command::Defaults | Command::Revert => self.in_doubt = true,

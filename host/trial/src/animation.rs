@@ -4,7 +4,7 @@
 //! Weeded ground darkens behind the tool, and cut weeds disappear. The beam turns dark while it is broken.
 
 use drawing::{INK, LEFT_ALONE, MARK_SIZE, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG};
-use drawing::{Legend, document, line, paper, rectangle, swatch, tenth, words};
+use drawing::{Legend, document, line, rectangle, swatch, tenth, words};
 use field::machine::Machine;
 use field::row::Row;
 use field::verdict::{Judgement, Verdict};
@@ -107,7 +107,7 @@ pub fn draw(row: &Row, machine: &Machine, judgement: &Judgement, speed_mm_s: f64
         .add(line(0.0, ROW_Y, length, ROW_Y, PALE_INK).set("stroke-dasharray", "4 6"))
         .add(standing)
         .add(rolling);
-    document(full_width, HEIGHT).add(paper(full_width, HEIGHT)).add(legend(speed_mm_s)).add(row)
+    document(full_width, HEIGHT).add(legend(speed_mm_s)).add(row)
 }
 
 /// One pass along the row.

@@ -10,11 +10,10 @@ use control::operate::calibration::{Outcome, SwingTimes, Swings};
 use control::settings::{Setting, Settings};
 use control::units::{Instant, Interval};
 use field::conditions::Conditions;
-use field::driving::drive;
+use field::driving::{LEG_MM, drive};
 use field::motion::{Motion, mm_s};
 use field::native::{self, Sensors};
 use field::stand::Stand;
-use field::trial::{Start, Trial};
 use link::set_up::{ManualStep, SetUp, Step, Task};
 use link::settings::name;
 use rand::{RngExt, SeedableRng};
@@ -33,9 +32,6 @@ const SPEED_KM_H: f64 = 2.5;
 
 /// Spacing of the plants along which a second beam measures the slip.
 const SPACING_MM: f64 = 500.0;
-
-/// Distance over which the wheel's slip is constant.
-const LEG_MM: std::ops::Range<f64> = 1000.0..2000.0;
 
 /// A user who sets the simulated machine up, step by step.
 #[derive(Clone, Debug)]
@@ -66,10 +62,7 @@ impl Novice {
             Task::Fit(part, value) => self.conditions.set(part, value)?,
             Task::Set(setting, value) => self.set(setting, value)?,
             Task::TimeServo => {
-                let [in_us, out_us] = [Setting::ServoInUs, Setting::ServoOutUs];
-                for pulse in [in_us, out_us] {
-                    self.measured.take_line(&format!("{}={}", name(pulse), self.settings().get(pulse)));
-                }
+                self.measured.settings = self.settings();
                 for timing in 0..TIMINGS {
                     let Some(SwingTimes { out_ms, in_ms }) = self.time_servo(timing) else { continue };
                     self.measured.take_line(&format!("calibrated lead_out_ms={out_ms} lead_in_ms={in_ms} set=yes"));
@@ -178,15 +171,7 @@ impl Novice {
         let mut rng = self.chance(TIMINGS + STRETCHES);
         let stand = Stand::grow(conditions, SPACING_MM, &mut rng)?;
         let driven = drive(conditions, &stand.span_mm, SPEED_KM_H, &mut rng);
-        let trial = Trial {
-            row: stand.row,
-            machine: conditions.machine(rng.random()),
-            motion: driven.motion,
-            timing: conditions.timing(),
-            start: Start::Command,
-            settings: conditions.firmware_settings(),
-            examples: Vec::new(),
-        };
+        let trial = conditions.trial(stand.row, driven.motion, rng.random());
         Ok(native::slips_permille(&trial, &Sensors::new(&trial, native::TURN_S))?)
     }
 }

@@ -1,6 +1,6 @@
 //! The real firmware in the simulated field: its ELF on the virtual Uno, in a machine that rolls along a row.
 //!
-//! - [`run()`] lets the firmware weed the row of a [`Trial`]; [`firmware`] builds it. [`report`], [`picture`] and
+//! - [`run()`] lets the firmware weed the row of a [`Trial`](field::trial::Trial); [`firmware`] builds it. [`report`], [`picture`] and
 //!   [`animation`] show the [`Outcome`]. [`replay`] plays a recording to the firmware instead of a row.
 //! - [`console`] operates it as an operator would, and makes it a port for the [`link`].
 //! - [`live`] runs it in real time, at a serial port for other programs. A satellite receiver on the machine
@@ -23,5 +23,4 @@ pub mod report;
 mod run;
 
 pub use console::UnoPort;
-pub use field::trial::{Start, Trial};
 pub use run::{Outcome, TrialError, boot, power_up, run, set_up};

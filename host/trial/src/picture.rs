@@ -3,7 +3,7 @@
 //! The row is divided into lanes, to be read like lines of a text.
 
 use drawing::{
-    DOUBTFUL, LEFT_ALONE, Legend, MARK_SIZE, NOTE, PALE_INK, PAPER, PLANT, WEED, WEEDED, WRONG, document, line, paper,
+    DOUBTFUL, LEFT_ALONE, Legend, MARK_SIZE, NOTE, PALE_INK, PAPER, PLANT, WEED, WEEDED, WRONG, document, line,
     rectangle, swatch, tenth, words,
 };
 use field::row::{Canopy, Kind, Row};
@@ -42,7 +42,7 @@ pub fn draw(row: &Row, judgement: &Judgement) -> Document {
     let span = row.span_mm();
     let lanes = ((span.end - span.start) / LANE_MM).ceil().max(1.0) as usize;
     let (width, height) = (LANE_WIDTH + 2.0 * SIDE, HEAD + lanes as f64 * LANE_HEIGHT + 8.0);
-    let mut document = document(width, height).add(paper(width, height)).add(legend());
+    let mut document = document(width, height).add(legend());
     for lane in 0..lanes {
         let start_mm = span.start + lane as f64 * LANE_MM;
         let ground = start_mm..(start_mm + LANE_MM).min(span.end);

@@ -156,11 +156,7 @@ mod tests {
     #[test]
     fn the_replay_pauses_at_the_extremes_and_at_the_end() {
         assert_eq!(pauses(&[], &edges(&[5, -12, 9])), [5, 17, 26]);
-    }
-
-    #[test]
-    fn a_recording_that_only_goes_forward_pauses_at_its_ends() {
-        assert_eq!(pauses(&[], &edges(&[7])), [0, 7]);
+        assert_eq!(pauses(&[], &edges(&[7])), [0, 7], "the extremes are the ends");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use field::machine::Machine;
 use field::motion::Motion;
 use field::row;
 use field::trial::Trial;
-use field::verdict::{PlantOutcome, Verdict, WeedOutcome};
+use field::verdict::{Judgement, PlantOutcome, Verdict, WeedOutcome};
 use serde::Serialize;
 use std::fmt::Write;
 use std::io;
@@ -127,7 +127,7 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     let strip_share = 1.0 - (1.0 - judgement.weeded_share) * trial.machine.tool_width_mm / WORKING_WIDTH_MM;
     let strip = format!("{:.1} % of the {WORKING_WIDTH_MM:.0} mm strip", strip_share * 100.0);
     line("", format!("({strip} that the inter-row tools weed along with it)"));
-    line("Swings", swing_words(&judgement.plants, &trial.machine));
+    line("Swings", swing_words(judgement, &trial.machine));
     if outcome.stray_pulses > 0 {
         let pulses = counted(outcome.stray_pulses, "pulse");
         line("", format!("{pulses} of a width that no servo knows: ignored"));
@@ -152,9 +152,8 @@ fn deepest_mm(plants: &[PlantOutcome]) -> Option<f64> {
         .max_by(f64::total_cmp)
 }
 
-fn swing_words(plants: &[PlantOutcome], machine: &Machine) -> String {
-    let errors: Vec<f64> =
-        plants.iter().flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks]).flatten().map(f64::abs).collect();
+fn swing_words(judgement: &Judgement, machine: &Machine) -> String {
+    let errors: Vec<f64> = judgement.swing_errors_ticks().into_iter().map(f64::abs).collect();
     if errors.is_empty() {
         return "none was commanded for a plant".to_owned();
     }

@@ -76,7 +76,7 @@ pub struct RowModel {
 }
 
 /// The state of the machine.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Model {
     /// Its rows, at least one.
     pub rows: Vec<RowModel>,
@@ -94,14 +94,7 @@ pub struct Model {
 impl Model {
     /// Rows in unknown state.
     pub fn new(names: Vec<String>) -> Self {
-        Self {
-            rows: names.into_iter().map(RowModel::new).collect(),
-            target: None,
-            hold: None,
-            lines: VecDeque::new(),
-            line: CommandLine::default(),
-            rings: false,
-        }
+        Self { rows: names.into_iter().map(RowModel::new).collect(), ..Self::default() }
     }
 
     /// Whether to ring the bell: since the last call an alarm was latched or a row was lost.
@@ -144,13 +137,8 @@ impl Model {
 
     /// Records a HOLD to all.
     pub fn held(&mut self, hold: Hold) {
+        self.sent(None, "hold");
         self.hold = Some(hold);
-        for row in &mut self.rows {
-            row.answer = Answer::Waiting;
-        }
-        if self.are_several() {
-            self.say("> all: hold".to_owned());
-        }
     }
 
     /// Takes an event of a row.
@@ -160,9 +148,6 @@ impl Model {
         }
         match heard.what {
             What::Happened(happening) => self.update(heard.row, happening),
-            What::Answered { refusal, .. } => {
-                self.rows[heard.row].answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
-            }
             What::NotTyped { command, why } => {
                 self.rows[heard.row].answer = Answer::Refused;
                 self.say_of(heard.row, &format!("-- `{command}` was not typed: {why}"));
@@ -183,7 +168,7 @@ impl Model {
             Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
             Happening::Command(line) => (!self.are_several()).then(|| format!("> {line}")),
             Happening::Answer(line) => Some(line.clone()),
-            Happening::Status(..) | Happening::Settings(..) | Happening::Examples(_) => None,
+            _ => None,
         };
         if let Happening::Answer(line) = &happening
             && let Some(head) = self.rows[number].heading.before(line)
@@ -286,6 +271,9 @@ impl RowModel {
             Happening::Status(status, _) => self.take_status(status),
             Happening::Event(event, _) => self.take_event(event),
             Happening::Settings(settings, _) => self.settings = settings,
+            Happening::Answered { refusal, .. } => {
+                self.answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
+            }
             Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
         }
     }

@@ -153,7 +153,7 @@ impl Talk<'_> {
                 }
                 print(line)?;
             }
-            What::Answered { refusal, .. } => {
+            What::Happened(Happening::Answered { refusal, .. }) => {
                 standing.unanswered = standing.unanswered.saturating_sub(1);
                 if refusal.is_some() {
                     self.finding = Finding::Bad;

@@ -31,7 +31,7 @@ pub fn table() -> Result<Table> {
             table.add_row([
                 number.clone(),
                 title.to_owned(),
-                format!("{:.1}", 100.0 * total.weeded_share),
+                format!("{:.1}", 100.0 * total.plots.weeded_share),
                 format!("{:.1}", total.plant_damage_percent()),
                 format!("{:.1}", total.zones_reached_percent()),
             ]);

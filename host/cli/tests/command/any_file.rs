@@ -15,7 +15,6 @@ use link::row_names::Names;
 use link::{log, replay, settings_file};
 use proptest::prelude::*;
 use std::error::Error;
-use std::fs;
 use std::path::Path;
 use uno::elf::Image;
 use uno::hex::{self, Bootloader};
@@ -44,7 +43,7 @@ const READERS: [Reader; 11] = [
     ),
     (
         "field.toml",
-        |path| Ok(Conditions::load(path.to_str().expect("it is text"), |file| fs::read_to_string(file)).map(drop)?),
+        |path| Ok(Conditions::load(path.to_str().expect("it is text")).map(drop)?),
         || b"[plot]\nrows = 2\nrow_m = 12.5\n[crop]\ncanopy_mm = 120\n[settings]\nlead_out_ms = 200\n".to_vec(),
     ),
     (

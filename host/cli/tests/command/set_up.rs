@@ -82,9 +82,9 @@ fn zones_after_each_step(seed: u64) -> (u32, u32) {
     for (conditions, done) in found.into_values() {
         let total = weeded(&conditions, 10, seed);
         let what = || format!("steps {done:?}: {:?} {:?}", conditions.settings, conditions.machine);
-        assert_eq!((total.effect.injured(), total.alarms), (0, 0), "{}", what());
-        assert!(total.effect.plants > 1000);
-        (all, reached) = (all + total.zones.all, reached + total.zones.reached);
+        assert_eq!((total.plots.effect.injured(), total.plots.alarms), (0, 0), "{}", what());
+        assert!(total.plots.effect.plants > 1000);
+        (all, reached) = (all + total.plots.zones.all, reached + total.plots.zones.reached);
     }
     (all, reached)
 }
@@ -109,7 +109,7 @@ fn a_lead_that_is_too_short_for_the_stroke_would_be_seen() {
     for (setting, value) in [("lead_out_ms", 180.0), ("ticks_per_m", 2010.0), ("margin_mm", 20.0)] {
         conditions.set(setting, value).expect("it is in its range");
     }
-    assert!(weeded(&conditions, 2, SEED).zones.reached > 0);
+    assert!(weeded(&conditions, 2, SEED).plots.zones.reached > 0);
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
         assert!(text.contains(&named), "{file} does not have {named:?}");
     }
     let [ours, theirs] =
-        [&novice.conditions, &set_up].map(|conditions| 100.0 * weeded(conditions, 20, SEED).weeded_share);
+        [&novice.conditions, &set_up].map(|conditions| 100.0 * weeded(conditions, 20, SEED).plots.weeded_share);
     assert!((ours - theirs).abs() < 2.0, "{ours:.1} and {theirs:.1} %: {:?}", novice.conditions.settings);
 }
 

@@ -3,38 +3,22 @@
 use super::{PlotOutcome, Treatment};
 use crate::evaluation::PlotRecord;
 use field::budget::Part;
+use serde_json::Value;
 use std::io;
 
-/// A line of [`write_csv`]: a plot's record, and what only a simulated field can tell; each cell behind its column's
-/// name.
-fn line(outcome: &PlotOutcome) -> Vec<(&'static str, String)> {
-    let PlotOutcome { record, zones, effect, .. } = outcome;
-    let percent = |share: f64| thousandth(100.0 * share).to_string();
-    let lost = |part| percent(outcome.budget[part]);
-    let mut line = vec![("controller", outcome.controller.title().to_owned())];
-    line.extend(PlotRecord { time_s: thousandth(record.time_s), ..*record }.columns());
-    line.extend([
-        ("zones", zones.all.to_string()),
-        ("zones_reached", zones.reached.to_string()),
-        ("margins_cut", zones.margins_cut.to_string()),
-        ("in_row_weeds_before", effect.in_row.before.to_string()),
-        ("in_row_weeds_after", effect.in_row.after.to_string()),
-        ("in_row_weeded_percent", percent(outcome.weeded_share)),
-        ("in_row_bound_percent", percent(outcome.weedable_share)),
-        ("undamaged_bound_percent", percent(outcome.undamaged_share)),
-        ("damaged_by_tool", effect.damaged.to_string()),
-        ("damaged_unseen", effect.unseen.to_string()),
-        ("damaged_by_sweeps", effect.swept.to_string()),
-        ("damaged_in_next_row", effect.neighbours.to_string()),
-        ("lost_to_plants_percent", lost(Part::Plants)),
-        ("lost_to_margins_percent", lost(Part::Margins)),
-        ("lost_to_weeds_percent", lost(Part::Weeds)),
-        ("lost_to_guarded_percent", lost(Part::Guarded)),
-        ("lost_to_swings_percent", lost(Part::Swings)),
-        ("lost_to_closed_percent", lost(Part::Closed)),
-        ("alarms", outcome.alarms.to_string()),
-    ]);
-    line
+/// A line of [`write_csv`]: a plot's record, figures and loss budget, each cell behind its column's name.
+fn line(outcome: &PlotOutcome) -> Vec<(String, String)> {
+    let record = PlotRecord { time_s: thousandth(outcome.record.time_s), ..outcome.record };
+    let figure = |(name, figure): (&'static str, Value)| match figure.as_f64() {
+        Some(number) if figure.is_f64() => (name, thousandth(number).to_string()),
+        _ => (name, figure.to_string()),
+    };
+    let cells = [("controller", outcome.controller.title().to_owned())];
+    let cells = cells.into_iter().chain(record.columns()).chain(outcome.figures().map(figure));
+    let lost = [Part::Plants, Part::Margins, Part::Weeds, Part::Guarded, Part::Swings, Part::Closed]
+        .map(|part| (format!("lost_to_{}_percent", part.key()), thousandth(100.0 * outcome.budget[part]).to_string()));
+    let alarms = ("alarms".to_owned(), outcome.alarms.to_string());
+    cells.map(|(name, cell)| (name.to_owned(), cell)).chain(lost).chain([alarms]).collect()
 }
 
 /// Writes the results of some controllers as CSV, one line a plot. [`crate::evaluation::read_csv`] can read a table of

@@ -38,12 +38,16 @@ fn the_firmware_damages_no_plant_and_weeds_up_to_the_bound_where_the_papers_dama
         // A mean swing's: the margin and the slip, which has the tool swing early, cover the slowest.
         experiment.conditions.set("lead_out_ms", 180.0).unwrap();
         let totals = totals(&run(&experiment));
-        let of = |controller| totals.iter().filter(move |total| total.controller == controller);
+        let of = |controller| totals.iter().filter(move |total| total.plots.controller == controller);
         for total in of(Treatment::Firmware) {
-            assert_eq!((total.effect.damaged, total.zones.reached, total.alarms), (0, 0, 0), "{total:?}");
-            assert!(total.weedable_share - total.weeded_share < 0.05, "{total:?}");
+            assert_eq!(
+                (total.plots.effect.damaged, total.plots.zones.reached, total.plots.alarms),
+                (0, 0, 0),
+                "{total:?}"
+            );
+            assert!(total.plots.weedable_share - total.plots.weeded_share < 0.05, "{total:?}");
         }
-        assert!(of(Treatment::Ideal).all(|total| total.effect.damaged == 0));
+        assert!(of(Treatment::Ideal).all(|total| total.plots.effect.damaged == 0));
         let damage: Vec<f64> = of(Treatment::Paper).map(Total::plant_damage_percent).collect();
         // A weed as wide as a plant takes the only slot at any speed. Late swings increase with speed.
         let (slow, fast) = damage.split_at(3);
@@ -58,7 +62,7 @@ fn the_ideal_controller_damages_no_plant_in_any_field_and_weeds_more_than_the_fi
     for preset in presets().filter(|preset| *preset != "paper") {
         let totals = totals(&run(&experiment(&[1.0, 2.5], preset)));
         for pair in totals.chunks(Treatment::ALL.len()) {
-            let (firmware, ideal) = (pair[0], pair[3]);
+            let (firmware, ideal) = (pair[0].plots, pair[3].plots);
             assert_eq!((firmware.controller, ideal.controller), (Treatment::Firmware, Treatment::Ideal));
             assert_eq!(ideal.effect.damaged, 0, "{preset}");
             assert!(ideal.weeded_share > firmware.weeded_share, "{preset}");
@@ -98,7 +102,7 @@ fn the_loss_budget_agrees_with_a_hand_calculation() {
         for (setting, value) in [("lead_out_ms", 180.0), ("stem_zone_mm", stem_zone_mm)] {
             experiment.conditions.set(setting, value).unwrap();
         }
-        let budget = totals(&run(&experiment))[0].budget;
+        let budget = totals(&run(&experiment))[0].plots.budget;
         // A margin of 50 mm on both sides, a plant every 500 mm, 694.4 mm/s.
         let mm_s = 2.5e6 / 3600.0;
         // Out: the command leads by 181 ms. Before the tool loses ground, 2 ms of pulse, 65 ms of dead time and 12 ms
@@ -125,7 +129,7 @@ fn each_part_of_the_loss_budget_has_its_expected_ground() {
     let budget = |preset: &str, speed_km_h: f64, changes: &[(&str, f64)]| {
         let mut experiment = Experiment { spacings_cm: vec![50.0], ..experiment(&[speed_km_h], preset) };
         changes.iter().for_each(|&(name, value)| experiment.conditions.set(name, value).unwrap());
-        totals(&run(&experiment))[0].budget
+        totals(&run(&experiment))[0].plots.budget
     };
     // Weeds as wide as plants get a zone; dust and narrow weeds do not.
     let (even, weedy) = (budget("even-stand", 1.0, &[]), budget("weedy", 1.0, &[]));
@@ -151,8 +155,8 @@ fn a_quick_tool_damages_no_plant_up_to_7_km_h() {
     let mut experiment = experiment(&[0.36, 1.0, 2.5, 4.0, 6.0, 7.0], "quick-tool");
     experiment.controllers = vec![Treatment::Firmware];
     for total in totals(&run(&experiment)) {
-        assert_eq!((total.effect.injured(), total.alarms), (0, 0), "{total:?}");
-        assert!(total.weeded_share > 0.42, "{total:?}");
+        assert_eq!((total.plots.effect.injured(), total.plots.alarms), (0, 0), "{total:?}");
+        assert!(total.plots.weeded_share > 0.42, "{total:?}");
     }
 }
 
@@ -165,8 +169,8 @@ fn a_machine_that_starts_again_every_two_metres_has_its_tool_out_in_time() {
     }
     for total in totals(&run(&experiment)) {
         // With leads for the measured speed, one zone in 110 would be reached: a machine that accelerates is faster.
-        assert!(total.zones.reached * 200 < total.zones.all, "{total:?}");
-        assert_eq!(total.effect.damaged, 0, "{total:?}");
+        assert!(total.plots.zones.reached * 200 < total.plots.zones.all, "{total:?}");
+        assert_eq!(total.plots.effect.damaged, 0, "{total:?}");
     }
 }
 
@@ -176,7 +180,7 @@ fn a_machine_steered_by_hand_spares_its_plants_once_it_is_set_up_for_that() {
         let experiment = Experiment { replications: 3, ..experiment(&[1.0], preset) };
         totals(&run(&experiment))[0]
     };
-    let (from_the_box, set_up) = (total("hand-steered").effect, total("hand-steered-set-up").effect);
+    let (from_the_box, set_up) = (total("hand-steered").plots.effect, total("hand-steered-set-up").plots.effect);
     let percent = |damaged: u32| 100.0 * f64::from(damaged) / f64::from(from_the_box.plants);
     assert!(percent(from_the_box.damaged) > 1.0 && percent(from_the_box.swept) > 5.0, "{from_the_box:?}");
     assert!(from_the_box.unseen > 0 && from_the_box.unseen <= from_the_box.damaged, "{from_the_box:?}");
@@ -186,17 +190,17 @@ fn a_machine_steered_by_hand_spares_its_plants_once_it_is_set_up_for_that() {
 #[test]
 fn a_configured_shorter_stroke_weeds_more_and_reaches_no_canopy() {
     let mut shorter = experiment(&[2.5], "transplanted");
-    let paper = totals(&run(&shorter))[0];
+    let paper = totals(&run(&shorter))[0].plots;
     for (setting, value) in [("servo_out_us", 1750.0), ("lead_out_ms", 150.0)] {
         shorter.conditions.set(setting, value).unwrap();
     }
-    let shorter = totals(&run(&shorter))[0];
+    let shorter = totals(&run(&shorter))[0].plots;
     assert_eq!((shorter.effect.damaged, shorter.zones.reached), (0, 0), "{shorter:?}");
     assert!(shorter.weeded_share > paper.weeded_share + 0.05, "{shorter:?}, {paper:?}");
     // The stroke is too short for the canopies, and the result says so.
     let mut stub = experiment(&[1.0], "transplanted");
     stub.conditions.set("servo_out_us", 1620.0).unwrap();
-    let stub = totals(&run(&stub))[0];
+    let stub = totals(&run(&stub))[0].plots;
     assert!(stub.zones.reached > stub.zones.all / 2, "{stub:?}");
 }
 

@@ -1,44 +1,26 @@
 //! Totals of each controller at each speed, over all plots.
 
-use super::{PlotOutcome, Treatment, Zones};
+use super::PlotOutcome;
 use crate::statistics::{Mean, Share, grouped, mean};
-use field::budget::Budget;
-use field::tool_path::Effect;
 
 /// The total of one controller at one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Total {
-    /// Who weeded them.
-    pub controller: Treatment,
-    /// The speed, km/h.
-    pub speed_km_h: f64,
-    /// Plants and weeds, counted.
-    pub effect: Effect,
-    /// Plants' zones, counted.
-    pub zones: Zones,
-    /// Share of the rows' ground that the tool weeded, from 0 to 1.
-    pub weeded_share: f64,
-    /// The largest share that this servo could weed with every canopy and margin kept.
-    pub weedable_share: f64,
-    /// Share that could be weeded at best without a plant damaged.
-    pub undamaged_share: f64,
-    /// The loss budget.
-    pub budget: Budget,
+    /// All plots as one: counts are sums, and shares are means.
+    pub plots: PlotOutcome,
     /// The weeded share, percent: the mean of the replications, each with all its spacings.
     pub weeded_percent: Mean,
-    /// Rows in which an alarm took the tool out.
-    pub alarms: u32,
 }
 
 impl Total {
-    /// Plants damaged by the tool or by sweeps, with the interval of their share.
-    pub fn damage(&self) -> Share {
-        Share::of(self.effect.injured(), self.effect.plants)
+    /// The speed.
+    pub fn speed_km_h(&self) -> f64 {
+        self.plots.record.speed_km_h
     }
 
-    /// Zones over which the tool was not fully out, with the interval of their share.
-    pub fn reached(&self) -> Share {
-        Share::of(self.zones.reached, self.zones.all)
+    /// Plants damaged by the tool or by sweeps, with the interval of their share.
+    pub fn damage(&self) -> Share {
+        Share::of(self.plots.effect.injured(), self.plots.effect.plants)
     }
 
     /// Plants damaged, % (Eq. 23).
@@ -48,12 +30,12 @@ impl Total {
 
     /// Zones over which the tool was not fully out, % of all.
     pub fn zones_reached_percent(&self) -> f64 {
-        self.reached().percent()
+        Share::of(self.plots.zones.reached, self.plots.zones.all).percent()
     }
 
     /// Other zones whose margin was cut, % of all.
     pub fn margins_cut_percent(&self) -> f64 {
-        Share::of(self.zones.margins_cut, self.zones.all).percent()
+        Share::of(self.plots.zones.margins_cut, self.plots.zones.all).percent()
     }
 }
 
@@ -63,27 +45,20 @@ pub fn totals(outcomes: &[PlotOutcome]) -> Vec<Total> {
     let of_total = |outcome: &PlotOutcome| (outcome.controller, outcome.record.speed_km_h);
     let groups = grouped(outcomes.iter().map(|outcome| (of_total(outcome), outcome)));
     let mut totals: Vec<Total> = groups.iter().map(|(_, plots)| total(plots)).collect();
-    totals.sort_by(|a, b| a.speed_km_h.total_cmp(&b.speed_km_h));
+    totals.sort_by(|a, b| a.speed_km_h().total_cmp(&b.speed_km_h()));
     totals
 }
 
 /// The total of some plots, at least one.
 fn total(plots: &[&PlotOutcome]) -> Total {
-    let mut sum = plots[0].clone();
+    let mut sum = *plots[0];
     plots[1..].iter().for_each(|plot| sum.add(plot));
     let count = plots.len() as f64;
-    Total {
-        controller: sum.controller,
-        speed_km_h: sum.record.speed_km_h,
-        effect: sum.effect,
-        zones: sum.zones,
-        weeded_share: sum.weeded_share / count,
-        weedable_share: sum.weedable_share / count,
-        undamaged_share: sum.undamaged_share / count,
-        budget: sum.budget / count,
-        weeded_percent: Mean::of(&by_replication(plots)),
-        alarms: sum.alarms,
-    }
+    sum.weeded_share /= count;
+    sum.weedable_share /= count;
+    sum.undamaged_share /= count;
+    sum.budget = sum.budget / count;
+    Total { plots: sum, weeded_percent: Mean::of(&by_replication(plots)) }
 }
 
 /// The weeded share of each replication in percent, its spacings together: a block each, so that they are independent.

@@ -81,16 +81,16 @@ impl BinomialModel {
     /// If there are more or fewer counts than plots.
     pub fn fit(design: &Design, counts: &[(u32, u32)]) -> Result<Self, NoModel> {
         assert_eq!(counts.len(), design.plots(), "a response has a count for each plot");
-        let (all, of) =
-            counts.iter().fold((0.0, 0.0), |(all, of), (count, n)| (all + f64::from(*count), of + f64::from(*n)));
+        let counts: Vec<Count> = counts.iter().map(|&(count, of)| (count.into(), of.into())).collect();
+        let (all, of) = counts.iter().fold((0.0, 0.0), |(all, of), (count, n)| (all + count, of + n));
         if all == 0.0 || all == of {
             return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
         }
         let (columns, mut remarks) = design.columns()?;
-        let fit = fit(&matrix(&columns), counts).ok_or(NoModel::OneSided)?;
+        let fit = fit(&matrix(&columns), &counts).ok_or(NoModel::OneSided)?;
         let share = all / of;
         let degrees_of_freedom = counts.len() - columns.len();
-        let dispersion = pearson(counts, &fit.fitted) / degrees_of_freedom as f64;
+        let dispersion = pearson(&counts, &fit.fitted) / degrees_of_freedom as f64;
         if dispersion > OVERDISPERSED {
             remarks.push(Remark::Overdispersed { factor: dispersion.sqrt() });
         }
@@ -102,7 +102,7 @@ impl BinomialModel {
         Ok(Self {
             terms: columns.iter().enumerate().map(term).collect(),
             deviance: fit.deviance,
-            null_deviance: deviance(counts, &vec![share; counts.len()]),
+            null_deviance: deviance(&counts, &vec![share; counts.len()]),
             degrees_of_freedom,
             dispersion,
             fitted: fit.fitted,
@@ -119,20 +119,18 @@ impl BinomialModel {
 /// A dispersion above this is reported: half as much again as the scatter of counting.
 const OVERDISPERSED: f64 = 1.5;
 
+/// A plot's count, and how many it is of.
+type Count = (f64, f64);
+
 /// Iteratively reweighted least squares. `None` if the coefficients diverge.
-fn fit(matrix: &DMatrix<f64>, counts: &[(u32, u32)]) -> Option<Fit> {
+fn fit(matrix: &DMatrix<f64>, counts: &[Count]) -> Option<Fit> {
     // R starts half a count inside, so that no plot is at 0 or 1.
-    let begin = |(count, of): &(u32, u32)| (f64::from(*count) + 0.5) / (f64::from(*of) + 1.0);
-    let mut fitted: Vec<f64> = counts.iter().map(begin).collect();
+    let mut fitted: Vec<f64> = counts.iter().map(|(count, of)| (count + 0.5) / (of + 1.0)).collect();
     let (mut last, mut is_settled) = (f64::INFINITY, false);
     for _ in 0..STEPS {
-        let share = |plot: usize| (f64::from(counts[plot].0), f64::from(counts[plot].1), fitted[plot]);
-        let root = |plot: usize| {
-            let (_, of, share) = share(plot);
-            (of * share * (1.0 - share)).sqrt()
-        };
+        let root = |plot: usize| (counts[plot].1 * fitted[plot] * (1.0 - fitted[plot])).sqrt();
         let working = DVector::from_fn(counts.len(), |plot, _| {
-            let (count, of, share) = share(plot);
+            let ((count, of), share) = (counts[plot], fitted[plot]);
             let observed = count / of.max(1.0);
             ((share / (1.0 - share)).ln() + (observed - share) / (share * (1.0 - share))) * root(plot)
         });
@@ -160,19 +158,16 @@ fn fit(matrix: &DMatrix<f64>, counts: &[(u32, u32)]) -> Option<Fit> {
 }
 
 /// Twice the logarithm of the likelihood that these shares fall short of the plots' own.
-fn deviance(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
+fn deviance(counts: &[Count], shares: &[f64]) -> f64 {
     let part = |count: f64, expected: f64| if count > 0.0 { count * (count / expected).ln() } else { 0.0 };
-    let of_plot = |((count, of), share): (&(u32, u32), &f64)| {
-        let (count, of) = (f64::from(*count), f64::from(*of));
-        2.0 * (part(count, of * share) + part(of - count, of * (1.0 - share)))
-    };
+    let of_plot =
+        |(&(count, of), share): (&Count, &f64)| 2.0 * (part(count, of * share) + part(of - count, of * (1.0 - share)));
     counts.iter().zip(shares).map(of_plot).sum()
 }
 
-fn pearson(counts: &[(u32, u32)], shares: &[f64]) -> f64 {
-    let of_plot = |((count, of), share): (&(u32, u32), &f64)| {
-        let of = f64::from(*of);
-        if of == 0.0 { 0.0 } else { (f64::from(*count) - of * share).powi(2) / (of * share * (1.0 - share)) }
+fn pearson(counts: &[Count], shares: &[f64]) -> f64 {
+    let of_plot = |(&(count, of), share): (&Count, &f64)| {
+        if of == 0.0 { 0.0 } else { (count - of * share).powi(2) / (of * share * (1.0 - share)) }
     };
     counts.iter().zip(shares).map(of_plot).sum()
 }

@@ -48,6 +48,22 @@ impl Share {
     pub fn percent(&self) -> f64 {
         100.0 * self.count as f64 / self.of.max(1) as f64
     }
+
+    /// The share itself as text, percent: `0.5`, or a small one as exactly as its interval, `0.009`.
+    pub fn shown(&self) -> String {
+        let is_small = self.count > 0 && self.percent() < 0.05;
+        format!("{:.*}", if is_small { self.digits() } else { 1 }, self.percent())
+    }
+
+    /// The decimal places in which the interval's ends differ.
+    fn digits(&self) -> usize {
+        match self.greatest_percent - self.least_percent {
+            ..0.005 => 4,
+            ..0.05 => 3,
+            ..2.0 => 2,
+            _ => 1,
+        }
+    }
 }
 
 /// Bisections that give the quantile of any count below 2^64 to the last digit of an `f64`.
@@ -80,7 +96,7 @@ fn beta_quantile(a: f64, b: f64, probability: f64) -> f64 {
 /// The interval as text behind a share: `below 0.07` if none was counted, else `0.53 to 1.68`.
 impl Display for Share {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let digits = if self.greatest_percent - self.least_percent < 2.0 { 2 } else { 1 };
+        let digits = self.digits();
         match (self.count, self.of) {
             (_, 0) => f.write_str("none counted"),
             (0, _) => write!(f, "below {:.digits$}", self.greatest_percent),

@@ -8,7 +8,7 @@ use super::model::Model;
 use super::{Labelled, Training};
 use control::ground::class::Class;
 use control::ground::features::{Features, SPEED_CLASSES_MM_S, speed_class};
-use drawing::{INK, Legend, MARK_SIZE, PALE_INK, document, line, paper, rectangle, swatch, tenth, words};
+use drawing::{INK, Legend, MARK_SIZE, PALE_INK, document, line, rectangle, swatch, tenth, words};
 use field::row::Kind;
 use std::ops::Range;
 use svg::Document;
@@ -46,7 +46,7 @@ pub fn draw(training: &Training, objects: &[Labelled]) -> Document {
     let (across, down) = (LEFT + PANEL_WIDTH + RIGHT, ABOVE + PANEL_HEIGHT + BELOW);
     let width = across * classes.len().min(PANELS_ABREAST) as f64;
     let height = HEAD + down * classes.len().div_ceil(PANELS_ABREAST) as f64;
-    let mut document = document(width, height).add(paper(width, height)).add(legend());
+    let mut document = document(width, height).add(legend());
     for (index, class) in classes.into_iter().enumerate() {
         let (column, line) = (index % PANELS_ABREAST, index / PANELS_ABREAST);
         let corner = (column as f64 * across + LEFT, HEAD + line as f64 * down + ABOVE);

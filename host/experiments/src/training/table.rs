@@ -55,7 +55,8 @@ pub fn read_labelled(paths: &[PathBuf]) -> Result<(Vec<Labelled>, usize), FileEr
     let missing = [Kind::Plant, Kind::Weed].into_iter().find(|&kind| !has(kind));
     match (missing, last) {
         (Some(kind), Some(line)) => {
-            Err(line.error(format!("up to here there is no {LABEL} {kind}: some detections of either class are needed")))
+            Err(line
+                .error(format!("up to here there is no {LABEL} {kind}: some detections of either class are needed")))
         }
         _ => Ok((labelled, unlabelled)),
     }

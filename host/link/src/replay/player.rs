@@ -351,7 +351,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
             Happened::Command(line) => {
                 // Later holds have the new margin.
                 if let Ok(Command::Set(setting, value)) = command::parse(line.as_bytes()) {
-                    let _ = settings.set(setting, value);
+                    let _ = settings.change(setting, value);
                 }
             }
             _ => {}

@@ -15,7 +15,7 @@ fn until(rows: &Rows, mut is_so: impl FnMut(&Heard) -> bool) {
 
 /// Whether this is the end of the answer to a command.
 fn answers(heard: &Heard, row: usize, line: &str) -> bool {
-    matches!(&heard.what, What::Answered { command, .. } if heard.row == row && command == line)
+    matches!(&heard.what, What::Happened(Happening::Answered { command, .. }) if heard.row == row && command == line)
 }
 
 /// Whether this line was typed.
@@ -43,7 +43,7 @@ fn missing_rows_are_reported_and_the_others_work() {
     rows.command(2, "hepl");
     until(
         &rows,
-        |heard| matches!(&heard.what, What::Answered { refusal: Some(why), .. } if heard.row == 2 && why.contains("no such")),
+        |heard| matches!(&heard.what, What::Happened(Happening::Answered { refusal: Some(why), .. }) if heard.row == 2 && why.contains("no such")),
     );
     boards[1].plug(true);
     until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Connected { .. }) if heard.row == 1));
@@ -105,7 +105,7 @@ fn a_hold_to_all_has_the_time_of_the_last_row_and_the_rows_that_have_not_obeyed(
     let obeyed = |row, ms| Heard {
         row,
         at: since + Duration::from_millis(ms),
-        what: What::Answered { command: "hold".to_owned(), refusal: None },
+        what: What::Happened(Happening::Answered { command: "hold".to_owned(), refusal: None }),
     };
     let mut hold = Hold::new(since, [true; 3]);
     assert_eq!(hold.summary(&names), "HOLD 0 of 3; no answer yet: 1, 2, 3");
@@ -122,7 +122,8 @@ fn a_hold_to_all_has_the_time_of_the_last_row_and_the_rows_that_have_not_obeyed(
     assert_eq!((lost.is_obeyed(), lost.summary(&names)), (true, "HOLD 3 of 3 in 4000 ms; 3 last".to_owned()));
     hold.take(&obeyed(2, 30));
     assert_eq!(hold.summary(&names), "HOLD 3 of 3 in 31 ms; 1 last");
-    let refusal = What::Answered { command: "hold".to_owned(), refusal: Some("error: no".to_owned()) };
+    let refusal =
+        What::Happened(Happening::Answered { command: "hold".to_owned(), refusal: Some("error: no".to_owned()) });
     let mut refused = Hold::new(since, [true]);
     refused.take(&Heard { row: 0, at: since, what: refusal });
     assert_eq!((refused.is_over(), refused.summary(&names)), (true, "HOLD 0 of 1; REFUSED: 1".to_owned()));

@@ -28,9 +28,11 @@ impl Talk {
         talk
     }
 
-    /// The next turn's events.
+    /// The next turn's events, without the ends of answers.
     fn turn(&mut self) -> Vec<Happening> {
-        self.session.turn(self.now)
+        let mut happened = self.session.turn(self.now);
+        happened.retain(|happening| !matches!(happening, Happening::Answered { .. }));
+        happened
     }
 
     /// The events of the next second, without statuses.
@@ -134,16 +136,19 @@ fn noise_between_the_lines_does_not_end_a_session() {
 }
 
 #[test]
-fn an_uno_that_is_unplugged_is_lost_and_found_again() {
-    let mut talk = Talk::connected();
-    talk.board.plug(false);
-    let lost = talk.second();
-    assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.contains("plug the Uno in again")), "{lost:?}");
-    assert!(!talk.session.is_connected());
-    assert_eq!(talk.second(), []);
-    talk.board.plug(true);
-    let found = [talk.second(), talk.second()].concat();
-    assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
+fn an_uno_that_is_unplugged_or_never_was_there_is_lost_once_and_found_later() {
+    let unplugged = Talk::connected();
+    unplugged.board.plug(false);
+    let absent = Talk::waiting(ScriptedBoard::default());
+    for (mut talk, problem) in [(unplugged, "plug the Uno in again"), (absent, "there is no port it")] {
+        let lost = talk.second();
+        assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.contains(problem)), "{lost:?}");
+        assert!(!talk.session.is_connected());
+        assert_eq!(talk.second(), []);
+        talk.board.plug(true);
+        let found = [talk.second(), talk.second()].concat();
+        assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
+    }
 }
 
 #[test]
@@ -153,6 +158,18 @@ fn an_answer_that_does_not_come_is_given_up() {
     let happened: Vec<_> = (0..4).flat_map(|_| talk.second()).collect();
     assert!(happened.iter().any(|happening| matches!(happening, Happening::Lost(_))), "{happened:?}");
     assert!(talk.session.is_idle());
+}
+
+#[test]
+fn a_computer_that_was_busy_reads_all_that_has_come_before_it_gives_an_answer_up() {
+    let mut talk = Talk::connected();
+    talk.board.say(&b"swing tool=out pos=9\r\n".repeat(4 * LINES));
+    assert!(talk.session.command("hold"));
+    talk.turn();
+    talk.now += 2 * PATIENCE;
+    let happened: Vec<_> = (0..5).flat_map(|_| talk.turn()).collect();
+    assert!(happened.contains(&answered("ok")), "{happened:?}");
+    assert!(talk.session.is_connected());
 }
 
 #[test]
@@ -185,15 +202,4 @@ fn after_a_reset_everything_is_asked_again_and_commands_from_before_it_are_not_e
     let happened = talk.second();
     assert!(matches!(happened.as_slice(), [Happening::Lost(_), Happening::Connected { .. }]), "{happened:?}");
     assert!(talk.session.is_idle());
-}
-
-#[test]
-fn a_session_without_an_uno_says_why_once_and_finds_it_later() {
-    let mut talk = Talk::waiting(ScriptedBoard::default());
-    let lost = talk.second();
-    assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.starts_with("there is no port it")), "{lost:?}");
-    assert_eq!(talk.second(), []);
-    talk.board.plug(true);
-    let found = [talk.second(), talk.second()].concat();
-    assert!(matches!(found.as_slice(), [Happening::Connected { .. }]), "{found:?}");
 }

@@ -92,7 +92,7 @@ impl Laptop {
         }
         let mut left = self.rows.count();
         self.until(command, |_, heard| {
-            if let What::Answered { refusal, .. } = &heard.what {
+            if let What::Happened(Happening::Answered { refusal, .. }) = &heard.what {
                 assert_eq!(refusal, &None, "row {} refuses {command}", heard.row);
                 left -= 1;
             }
