@@ -154,7 +154,7 @@ mod tests {
     fn narrow_is_half_the_width_of_the_narrowest_plant() {
         let plants = table::TRAINED.iter().filter(|(_, label)| *label == label::PLANT);
         let narrowest = plants.map(|([_, _, _, hold, _], _)| hold - features::HOLD_BEYOND_WIDTH_MM).min();
-        assert_eq!(narrowest.map(|width| width / 2), Some(NARROW_MM.into()));
+        assert_eq!(narrowest.map(|width| width / 2), Some(NARROW_MM));
         let [_, _, _, hold, _] = Features::describe(556, 500, 40).values();
         assert_eq!(hold - features::HOLD_BEYOND_WIDTH_MM, 40);
     }
