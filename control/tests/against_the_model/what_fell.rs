@@ -36,6 +36,12 @@ fn go(run: &Run) -> Drive {
 }
 
 #[test]
+fn the_tool_leaves_for_the_canopy_behind_dust() {
+    let row = [(1, 2), (1, 2), (1, 2), (1, 2), (442, 16), (134, 6)];
+    go(&run(&row, "set min_width_mm 16\nset merge_gap_mm 101\nstart\nroll 3136 mm at 1017 mm/s"));
+}
+
+#[test]
 fn the_rest_of_a_half_seen_plant_is_no_weed_after_an_alarm() {
     for seen_mm in (1..150).step_by(7).chain([132]) {
         for back_mm in [0, 20, 100, 200, 600] {

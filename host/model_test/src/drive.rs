@@ -116,6 +116,8 @@ pub struct Drive<M> {
     /// Ticks rolled in this row, and with the tool in the row.
     rolled: f64,
     weeded: f64,
+    /// The longest response that was set: the machine may expect that of a moment ago.
+    response_ms: u16,
     /// The least scatter and every spacing that were set: the machine may guard by values of a moment ago.
     guard_scatter: i64,
     guard_spacings: Vec<i64>,
@@ -178,6 +180,7 @@ impl<M: Machine> Drive<M> {
             guard_scatter: i64::MAX,
             guard_spacings: Vec::new(),
             had_second_beam: false,
+            response_ms: 0,
         };
         drive.say("clear")?;
         Ok(drive)
@@ -458,6 +461,7 @@ impl<M: Machine> Drive<M> {
         // A detection below the minimum width is dust, and causes no event.
         let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
         self.model.follow(self.here(), self.machine.settings(), narrow_mm);
+        self.response_ms = self.response_ms.max(self.machine.settings().get(Setting::BeamResponseMs));
         self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
         self.had_second_beam |= self.ticks(Setting::SecondBeamMm) > 0;
         let spacing = self.ticks(Setting::GuardSpacingMm);
@@ -541,8 +545,7 @@ impl<M: Machine> Drive<M> {
     /// Error of the machine's positions, in ticks, from the sensor response that it expects: this sensor answers at once.
     fn blur(&self) -> i64 {
         let (slowest, fastest) = self.speeds.extremes();
-        let response_ms = self.machine.settings().get(Setting::BeamResponseMs);
-        (fastest.max(-slowest) * f64::from(response_ms) / 1000.0) as i64 + 1
+        (fastest.max(-slowest) * f64::from(self.response_ms) / 1000.0) as i64 + 1
     }
 
     /// The position by the machine's count.

@@ -323,7 +323,7 @@ impl Model {
     }
 
     /// Whether a stretch belongs to a detection that is too wide for a weed, together with the stretches that merge with it.
-    fn is_wide(&self, stretch: &Stretch) -> bool {
+    pub fn is_wide(&self, stretch: &Stretch) -> bool {
         let is_one = |before: &Stretch, behind: &Stretch| {
             let shortest = self.merge_gaps_since(before.leading).min().unwrap_or(0);
             let least = shortest - self.slack - 2 * before.blur.max(behind.blur);
