@@ -42,6 +42,13 @@ fn the_tool_leaves_for_the_canopy_behind_dust() {
 }
 
 #[test]
+fn a_shorter_lead_in_lets_the_tool_out_again_behind_a_plant() {
+    for first_mm in (900..1400).step_by(7) {
+        go(&run(&ROW, &format!("start\nroll {first_mm} mm at 762 mm/s\nset lead_in_ms 0\nroll 600 mm at 762 mm/s")));
+    }
+}
+
+#[test]
 fn the_rest_of_a_half_seen_plant_is_no_weed_after_an_alarm() {
     for seen_mm in (1..150).step_by(7).chain([132]) {
         for back_mm in [0, 20, 100, 200, 600] {

@@ -118,6 +118,9 @@ pub struct Drive<M> {
     weeded: f64,
     /// The longest response that was set: the machine may expect that of a moment ago.
     response_ms: u16,
+    /// The leads out and in, ms, and the turns since they were set.
+    leads_ms: [u16; 2],
+    leads_turns: u32,
     /// The least scatter and every spacing that were set: the machine may guard by values of a moment ago.
     guard_scatter: i64,
     guard_spacings: Vec<i64>,
@@ -181,6 +184,8 @@ impl<M: Machine> Drive<M> {
             guard_spacings: Vec::new(),
             had_second_beam: false,
             response_ms: 0,
+            leads_ms: [0; 2],
+            leads_turns: 0,
         };
         drive.say("clear")?;
         Ok(drive)
@@ -462,6 +467,9 @@ impl<M: Machine> Drive<M> {
         let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
         self.model.follow(self.here(), self.machine.settings(), narrow_mm);
         self.response_ms = self.response_ms.max(self.machine.settings().get(Setting::BeamResponseMs));
+        let leads_ms = [Setting::LeadOutMs, Setting::LeadInMs].map(|lead| self.machine.settings().get(lead));
+        self.leads_turns = if leads_ms == self.leads_ms { self.leads_turns.saturating_add(1) } else { 0 };
+        self.leads_ms = leads_ms;
         self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
         self.had_second_beam |= self.ticks(Setting::SecondBeamMm) > 0;
         let spacing = self.ticks(Setting::GuardSpacingMm);

@@ -301,8 +301,15 @@ impl Model {
         self.bounds(stretch, margin).is_some_and(|(from, to)| from <= far && to >= near)
     }
 
-    /// Whether any canopy lies within `reach` of a position, weeds included.
+    /// Whether any canopy lies within `reach` of a position, weeds included. The ground behind a canopy counts while the
+    /// detection may go on, and so does a gap that may belong to it.
     pub fn has_canopy_near(&self, place: i64, reach: i64) -> bool {
+        let (before, behind) =
+            self.stretches.split_at(self.stretches.partition_point(|stretch| stretch.leading <= place));
+        let next = behind.first().copied().unwrap_or(Stretch::closed(self.frontier, self.frontier, 0));
+        if before.last().is_some_and(|before| self.may_be_one(before, &next)) {
+            return true;
+        }
         let is_near = |stretch: &Stretch| {
             let reach = reach + self.slack + 2 * stretch.blur;
             stretch.leading - reach <= place && place <= stretch.trailing + reach
@@ -366,13 +373,15 @@ impl Model {
         most.map_or(0, |most| if most > 0 { most + self.moved + 1 } else { 0 })
     }
 
+    /// Whether the machine may merge two neighbours.
+    fn may_be_one(&self, before: &Stretch, behind: &Stretch) -> bool {
+        let longest = self.merge_gaps_since(before.leading).max().unwrap_or(0);
+        behind.leading - before.trailing <= longest + self.slack + 2 * before.blur.max(behind.blur)
+    }
+
     /// The greatest width of the detection to which a stretch belongs.
     fn widest(&self, stretch: &Stretch) -> i64 {
-        let is_one = |before: &Stretch, behind: &Stretch| {
-            let longest = self.merge_gaps_since(before.leading).max().unwrap_or(0);
-            behind.leading - before.trailing <= longest + self.slack + 2 * before.blur.max(behind.blur)
-        };
-        let parts = self.detection_of(stretch, is_one);
+        let parts = self.detection_of(stretch, |before, behind| self.may_be_one(before, behind));
         let (Some(first), Some(last)) = (parts.first(), parts.last()) else { return 0 };
         last.trailing - first.leading + 1 + self.slack + 2 * first.blur.max(last.blur)
     }

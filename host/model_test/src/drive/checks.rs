@@ -52,14 +52,13 @@ impl<M: Machine> Drive<M> {
     /// Checks a position of the tool in the row.
     fn check_place(&mut self, Place { tool, slowest, fastest }: Place) -> Checked {
         // With two beams the machine corrects slip, which the model of the ground does not know.
-        if self.stand.is_some() && self.had_second_beam {
+        if self.stand.is_some() && self.had_second_beam || self.leads_turns <= RECALCULATION_TURNS {
             return Ok(());
         }
-        let settings = self.machine.settings();
         // The machine adds a millisecond to each lead, for the command's way to the pin.
         let lead = |milliseconds: u16| f64::from(milliseconds + u16::from(milliseconds > 0)) / 1000.0;
-        let lead_out = lead(settings.get(Setting::LeadOutMs));
-        let lead_in = (1.25 * lead(settings.get(Setting::LeadInMs))).min(lead_out);
+        let [lead_out, lead_in] = self.leads_ms.map(lead);
+        let lead_in = (1.25 * lead_in).min(lead_out);
         let ticks = |speed: f64, seconds: f64| (speed * seconds) as i64;
         // The order to come back leads in the direction of rolling. So does the order to leave, at least by the slowest speed.
         let near = tool + ticks(fastest.max(0.0), lead_in) + 1;
