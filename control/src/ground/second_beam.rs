@@ -71,10 +71,11 @@ impl SecondBeam {
         slip: Slip::NONE,
     };
 
-    /// Starts at a position. Forgets earlier detections, and the slip measured with them.
+    /// Starts at a position. Forgets earlier detections, and the slip measured with them. The beam's level stays: only its edges
+    /// are reported, and none may come.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn begin(&mut self, position: WrappedPosition) {
-        self.detector.begin(position, false);
+        self.detector.begin(position, self.detector.is_broken());
         (self.awaited, self.missed, self.is_crowded) = (0, 0, false);
         self.expected_to = position;
         self.slip = Slip::NONE;
@@ -238,6 +239,23 @@ mod tests {
 
     /// Where the first beam and the second see something, from and to, in ticks of the wheel.
     type Stretches = (Option<(i16, i16)>, Option<(i16, i16)>);
+
+    #[test]
+    fn a_plant_in_the_second_beam_is_seen_though_the_ground_is_forgotten() {
+        let at = WrappedPosition::new;
+        let mut second = SecondBeam::NONE;
+        second.begin(at(0));
+        second.take_level(at(10), true, APART, GAP, LEAST);
+        // The first beam is ahead.
+        second.begin(at(100));
+        let seen: Vec<Detection> = (11..300)
+            .filter_map(|position| {
+                let broken = second.is_broken() && position < 200;
+                second.take_level(at(position), broken, APART, GAP, LEAST)
+            })
+            .collect();
+        assert_eq!(seen, [Detection { cut: true, ..Detection::whole(100, 200) }]);
+    }
 
     /// Rolls past stretches, in this order. Returns the reports.
     fn compare(second: &mut SecondBeam, stretches: &[Stretches]) -> Vec<Report> {
