@@ -153,6 +153,6 @@ test("what a command has changed is asked for behind it", async () => {
     assert(settings?.is === "settings" && settings.settings.some(({ name, value }) => name === "k" && value === 5));
     const log = new Log();
     log.add(settings, 0);
-    assert.match(log.text(), /^0,answer,"k=5 from /m, "the log has them, whatever has changed them");
+    assert.match(log.text(), /^0,answer,"k=5 from /m, "the log has the changed settings");
     assert(examples?.is === "examples" && examples.examples.length > 0);
 });

@@ -20,7 +20,7 @@ pub fn scale() -> Scale<{ features::COUNT }> {
 /// Maps a feature's value to a byte.
 pub const SCALE: Scale<{ features::COUNT }> = Scale::new(table::RANGES);
 
-/// The ranges of [`SCALE`] as bytes, for the CRC of field examples.
+/// The ranges of [`SCALE`] as bytes of 32-bit numbers, for the CRC of field examples: boards have stored it so.
 pub const SCALE_BYTES: [u8; 8 * features::COUNT] = {
     let (mut bytes, mut place) = ([0; 8 * features::COUNT], 0);
     while place < bytes.len() {

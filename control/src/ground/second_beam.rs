@@ -240,23 +240,6 @@ mod tests {
     /// Where the first beam and the second see something, from and to, in ticks of the wheel.
     type Stretches = (Option<(i16, i16)>, Option<(i16, i16)>);
 
-    #[test]
-    fn a_plant_in_the_second_beam_is_seen_though_the_ground_is_forgotten() {
-        let at = WrappedPosition::new;
-        let mut second = SecondBeam::NONE;
-        second.begin(at(0));
-        second.take_level(at(10), true, APART, GAP, LEAST);
-        // The first beam is ahead.
-        second.begin(at(100));
-        let seen: Vec<Detection> = (11..300)
-            .filter_map(|position| {
-                let broken = second.is_broken() && position < 200;
-                second.take_level(at(position), broken, APART, GAP, LEAST)
-            })
-            .collect();
-        assert_eq!(seen, [Detection { cut: true, ..Detection::whole(100, 200) }]);
-    }
-
     /// Rolls past stretches, in this order. Returns the reports.
     fn compare(second: &mut SecondBeam, stretches: &[Stretches]) -> Vec<Report> {
         let mut reports = Vec::new();
@@ -301,6 +284,23 @@ mod tests {
     /// A plant that the second beam sees `travel` ticks after the first.
     fn plant(from: i16, travel: i16) -> Stretches {
         (Some((from, from + 300)), Some((from + travel, from + travel + 300)))
+    }
+
+    #[test]
+    fn a_plant_in_the_second_beam_is_seen_though_the_ground_is_forgotten() {
+        let at = WrappedPosition::new;
+        let mut second = SecondBeam::NONE;
+        second.begin(at(0));
+        second.take_level(at(10), true, APART, GAP, LEAST);
+        // The first beam is ahead.
+        second.begin(at(100));
+        let seen: Vec<Detection> = (11..300)
+            .filter_map(|position| {
+                let broken = second.is_broken() && position < 200;
+                second.take_level(at(position), broken, APART, GAP, LEAST)
+            })
+            .collect();
+        assert_eq!(seen, [Detection { cut: true, ..Detection::whole(100, 200) }]);
     }
 
     #[test]

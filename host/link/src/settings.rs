@@ -134,6 +134,14 @@ pub fn steps(from: &Settings, to: &Settings) -> Vec<(Setting, u16)> {
     }
 }
 
+/// Another wheel has no calibration yet: the firmware resets it by itself ([`Settings::change`]).
+pub fn follow_wheel(before: &Settings, after: &mut Settings) {
+    let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
+    if Setting::all().any(is_another) {
+        let _ = after.set(Setting::TicksPerM, 0);
+    }
+}
+
 /// A pulse width near the target of `setting` that differs from the present and target values of both pulses.
 fn beside(setting: Setting, now: &Settings, to: &Settings) -> u16 {
     let taken = [now, to].map(|settings| [settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs)]);
@@ -157,11 +165,8 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     for &(setting, value) in wanted {
         after.set(setting, value).map_err(|_| SettingsError::Unknown(name(setting)))?;
     }
-    let names = |wheel: Setting| wanted.iter().any(|&(setting, _)| setting == wheel);
-    let is_another = |setting: Setting| setting.is_of_the_wheel() && before.get(setting) != after.get(setting);
-    if Setting::all().any(is_another) && !names(Setting::TicksPerM) {
-        // The new wheel has no measured value yet.
-        let _ = after.set(Setting::TicksPerM, 0);
+    if !wanted.iter().any(|&(setting, _)| setting == Setting::TicksPerM) {
+        follow_wheel(&before, &mut after);
     }
     if let Some(contradiction) = after.contradiction() {
         return Err(SettingsError::Contradiction(explain(contradiction)));

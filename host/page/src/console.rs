@@ -2,7 +2,7 @@
 //! machine.
 
 use link::set_up::{self, SetUp, Step, Task};
-use link::settings::{Setting, Settings, explain, name, steps, unit};
+use link::settings::{Setting, Settings, explain, follow_wheel, name, steps, unit};
 use link::{ConsoleLine, Field, Values};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -75,10 +75,8 @@ impl Change {
     pub fn steps(&self) -> Value {
         let (from, _) = settings(Settings::new(), &self.from);
         let (mut to, unknown) = settings(from.clone(), &self.to);
-        let is_another = |setting: Setting| setting.is_of_the_wheel() && from.get(setting) != to.get(setting);
-        if Setting::all().any(is_another) && !self.to.contains_key(&name(Setting::TicksPerM)) {
-            // The new wheel has no measured value yet: the firmware resets it by itself.
-            let _ = to.set(Setting::TicksPerM, 0);
+        if !self.to.contains_key(&name(Setting::TicksPerM)) {
+            follow_wheel(&from, &mut to);
         }
         if let Some(contradiction) = to.contradiction() {
             return json!({ "contradiction": explain(contradiction), "steps": [] });

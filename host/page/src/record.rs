@@ -7,7 +7,7 @@
 //! another machine, the ground continues one metre farther. An event without a position has that of the line before.
 //!
 //! The picture follows the settings by the typed commands and all answers. After `revert` the values can be missing: a
-//! log of `weeder record` has them only if `save` was typed before. Then the picture stops, and says when. It goes on
+//! log of an earlier version has them only if `save` was typed before. Then the picture stops, and says when. It goes on
 //! where `get` has shown the values, or at the next connection.
 
 use control::say::command::{self, Command};
