@@ -131,7 +131,8 @@ const PLANT_DAMAGE: Published = Published {
     r_squared: 0.79,
     adjusted_r_squared: None,
     ranges: &[(0.0, 3.92)],
-    contradictions: &["Eq. 28 cannot be read in the copy at hand: the text gives its slopes, but not its constant."],
+    // Eq. 28 is illegible in the available copy, which contradicts nothing.
+    contradictions: &[],
 };
 
 const WEEDING_EFFICIENCY: Published = Published {
@@ -194,8 +195,11 @@ mod tests {
     /// The index of a plot with these counts out of 10,000: the paper prints two decimals.
     fn index(capacity_ha_h: f64, damaged: u32, weeds_after: u32, power_hp: f64) -> f64 {
         let (area_m2, time_s) = (capacity_ha_h * 10_000.0, 3600.0);
-        let record = PlotRecord { weeds_before: 10_000, weeds_after, plants: 10_000, damaged, ..PLOT };
-        PlotRecord { area_m2, time_s, power_hp, ..record }.performance().performance_index
+        let (weeds, plants) = (Some(10_000), Some(10_000));
+        let record =
+            PlotRecord { weeds_before: weeds, weeds_after: Some(weeds_after), plants, damaged: Some(damaged), ..PLOT };
+        let (area_m2, time_s, power_hp) = (Some(area_m2), Some(time_s), Some(power_hp));
+        PlotRecord { area_m2, time_s, power_hp, ..record }.performance().performance_index.unwrap()
     }
 
     #[test]
