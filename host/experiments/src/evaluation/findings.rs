@@ -122,15 +122,15 @@ impl Analysis {
         )
     }
 
-    /// Contradictions to the paper's text: a sentence for each measure whose 95 % interval of the slope excludes the
-    /// paper's slope. One sentence if there is none.
+    /// Differences from the paper's text: a sentence for each measure whose 95 % interval of the slope excludes the paper's
+    /// slope. One sentence if there is none.
     pub fn against_the_paper(&self) -> Vec<String> {
         let said: Vec<String> = self.responses.iter().filter_map(ResponseAnalysis::against_the_paper).collect();
         let compared =
             self.responses.iter().filter(|of| of.model.is_ok() && of.published.text.per_km_h.is_some()).count();
         match (said.is_empty(), compared) {
             (_, 0) => Vec::new(),
-            (true, _) => vec!["no slope by speed contradicts the paper's.".to_owned()],
+            (true, _) => vec!["No slope by speed differs from the paper's.".to_owned()],
             (false, _) => said,
         }
     }
@@ -152,7 +152,7 @@ impl ResponseAnalysis {
         }
     }
 
-    /// A contradiction to the paper's slope by speed.
+    /// A difference from the paper's slope by speed.
     fn against_the_paper(&self) -> Option<String> {
         let paper = self.published.text.per_km_h?;
         let model = self.model.as_ref().ok()?;
@@ -161,8 +161,8 @@ impl ResponseAnalysis {
         let within = distribution.inverse_cdf(1.0 - SIGNIFICANCE / 2.0) * term.standard_error;
         ((term.estimate - paper).abs() > within).then(|| {
             format!(
-                "{} changes by {:+.2} ± {within:.2} for each km/h, where the paper's text has {paper:+}: they contradict each other.",
-                self.response.title().to_lowercase(),
+                "{} changes by {:+.2} ± {within:.2} for each km/h, where the paper's text has {paper:+}.",
+                self.response.title(),
                 term.estimate
             )
         })

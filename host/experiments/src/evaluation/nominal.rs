@@ -11,10 +11,10 @@ use anyhow::{Result, ensure};
 /// Steps between nominal speeds, km/h.
 const STEPS_KM_H: [f64; 5] = [1.0, 0.5, 0.25, 0.2, 0.1];
 
-/// The share of a step by which a measured speed may be off.
+/// The greatest error of a measured speed, as a share of the step.
 const OFF_STEP: f64 = 0.3;
 
-/// The share of a nominal speed by which a measured speed may be off.
+/// The same, as a share of the nominal speed.
 const OFF_SPEED: f64 = 0.3;
 
 /// Plots of a treatment, on average, from which the treatments count as repeated.

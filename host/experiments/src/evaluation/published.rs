@@ -18,6 +18,9 @@ use serde::Serialize;
 /// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
 pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
 
+/// The least and greatest damage that it measured in a plot, percent of the plants.
+pub const DAMAGED_PERCENT: (f64, f64) = (0.0, 3.92);
+
 /// Machines that weed in the row, those with a beam first, as measured by their authors in a field or on a test track.
 /// Each source counts weeds in its own way.
 ///
@@ -130,7 +133,7 @@ const PLANT_DAMAGE: Published = Published {
     text: Coefficients { constant: None, per_km_h: Some(1.26), per_cm: Some(-0.081) },
     r_squared: 0.79,
     adjusted_r_squared: None,
-    ranges: &[(0.0, 3.92)],
+    ranges: &[DAMAGED_PERCENT],
     // Eq. 28 is illegible in the available copy, which contradicts nothing.
     contradictions: &[],
 };

@@ -17,7 +17,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 /// The most steps of a fit.
 const STEPS: usize = 100;
 
-/// The share by which the deviance may still change where the fit has converged, as in R. Rounding is smaller.
+/// The relative change of the deviance at which the fit has converged, as in R. Rounding is smaller.
 const SETTLED: f64 = 1e-8;
 
 /// The change of a plot's logarithm of odds at which the fit has converged. Slopes that diverge change by 1 a step.
