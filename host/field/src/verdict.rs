@@ -12,12 +12,12 @@
 //! the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing share its two commands:
 //! the first plant has the command out, the last one has the command back.
 
-use control::{ground::keep_out::trim, units::Length};
 use crate::ground::{share_of, union};
 use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
 use crate::row::{Canopy, Row};
 use crate::servo::{Command, OUT_DEGREES, Stroke};
+use control::{ground::keep_out::trim, units::Length};
 use serde::Serialize;
 use std::ops::Range;
 use strum::Display;
