@@ -41,7 +41,7 @@ pub struct Arguments {
 
 /// Records until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let chosen = arguments.ports.choose()?;
+    let chosen = arguments.ports.choose_beside(arguments.gps.port())?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
     let mut gps = match gps {

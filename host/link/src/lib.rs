@@ -40,7 +40,7 @@ pub use self::event_line::{
 };
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::port::{find_uno, listen, open_other, try_port};
+pub use self::port::{Claim, claim, converter_at, find_uno, is_same, listen, open_other, open_to_flash, try_port};
 pub use control::{ground::class::Class, say::names};
 
 use std::collections::VecDeque;
@@ -96,7 +96,7 @@ impl Link {
     /// If the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
-        let name = port.map_or_else(find_uno, |port| Ok(port.to_owned()))?;
+        let name = port.map_or_else(|| find_uno(None), |port| Ok(port.to_owned()))?;
         let (port, resets) = port::open(&name)?;
         Self::over(port, resets)
     }
@@ -284,6 +284,11 @@ impl Link {
 /// Whether this text can be typed into the console: one line of printable ASCII, and short enough.
 pub fn is_command(line: &str) -> bool {
     line.len() <= COMMAND_LENGTH && line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
+}
+
+/// Whether the operator means HOLD: the manual and the buttons write it in capitals, and a sentence ends with a dot.
+pub fn is_hold(line: &str) -> bool {
+    line.trim_end_matches(['.', '!']).eq_ignore_ascii_case(session::HOLD)
 }
 
 /// Whether a line is the firmware's greeting after a start.

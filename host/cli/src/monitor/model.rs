@@ -1,6 +1,7 @@
 //! The state of each row, and its changes by events.
 
 use super::command_line::CommandLine;
+use super::pager::Pager;
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, What};
@@ -86,6 +87,7 @@ pub struct Model {
     pub hold: Option<Hold>,
     /// Typed lines, answers and events, the newest last.
     pub lines: VecDeque<String>,
+    pub pager: Pager,
     pub line: CommandLine,
     /// Whether to ring the bell.
     rings: bool,
@@ -198,6 +200,7 @@ impl Model {
     pub fn say(&mut self, line: String) {
         if self.lines.len() == LINES {
             self.lines.pop_front();
+            self.pager.dropped();
         }
         self.lines.push_back(line);
     }
