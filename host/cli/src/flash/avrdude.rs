@@ -34,6 +34,8 @@ pub struct Written {
 /// # Errors
 /// If avrdude is not installed.
 pub fn write(image: &Path, port: &str, baud: u32) -> Result<Written> {
+    // A link may stay when its port goes. On some systems a port is no file.
+    let device: Option<PathBuf> = fs::canonicalize(port).ok();
     let mut avrdude = Command::new("avrdude")
         // Each page is erased before it is written: a bootloader cannot erase the chip.
         .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])
@@ -42,8 +44,6 @@ pub fn write(image: &Path, port: &str, baud: u32) -> Result<Written> {
         .stderr(Stdio::piped())
         .spawn()
         .context("avrdude cannot be started: ./setup.sh installs it")?;
-    // A link may stay when its port goes. On some systems a port is no file.
-    let device: Option<PathBuf> = fs::canonicalize(port).ok();
     let (heard, alive) = mpsc::channel();
     let words = avrdude.stderr.take();
     let reader = thread::spawn(move || {
@@ -74,7 +74,9 @@ pub fn write(image: &Path, port: &str, baud: u32) -> Result<Written> {
             break;
         }
     }
-    ended.port_is_gone = !ended.succeeded && device.is_some_and(|device| !device.exists());
+    // Also if it is there again: avrdude had the one that is gone.
+    let is_gone = gone_at.is_some() || device.is_some_and(|device| !device.exists());
+    ended.port_is_gone = is_gone && !ended.succeeded;
     // A process that avrdude has started may hold its output open: what was printed counts only if that has ended.
     if reader.is_finished() || ended.succeeded || !(ended.is_silent || ended.port_is_gone) {
         ended.signature = reader.join().ok().flatten();

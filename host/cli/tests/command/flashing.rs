@@ -420,7 +420,10 @@ fn two_flashes_of_one_port_are_kept_apart() {
 #[test]
 fn a_port_that_vanishes_while_it_is_written_ends_avrdude() {
     let folder = tempfile::tempdir().unwrap();
-    let mut pty = Pty::open().unwrap();
+    // The system gives the lowest free number: another test's terminal must not take this one's place.
+    let mut ptys: Vec<Pty> = (0..40).map(|_| Pty::open().unwrap()).collect();
+    let mut pty = ptys.pop().unwrap();
+    drop(ptys);
     let link = folder.path().join("uno");
     pty.link(&link).unwrap();
     // It prints its progress for ever, as if the port were there.
