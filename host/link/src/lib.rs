@@ -137,8 +137,10 @@ impl Link {
         link.wait_until_quiet()?;
         let mut answer = link.ask("version");
         let mut retries = 0;
-        // The Uno may be starting right now for another reason than this opening.
-        while retries < RETRIES && matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
+        // The Uno may be starting right now for another reason than this opening. Characters that came before are lost.
+        while retries < RETRIES
+            && matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. } | LinkError::Refused { .. }))
+        {
             answer = link.ask("version");
             retries += 1;
         }
@@ -191,8 +193,8 @@ impl Link {
                     return Err(LinkError::Refused { command: command.to_owned(), answer: line });
                 }
                 ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
-                // An event can come before an answer, never within it.
-                ConsoleLine::Event(_) if answer.is_empty() => self.events.push_back(line),
+                // The form of an event is no answer's. A newer firmware may send one at any time.
+                ConsoleLine::Event(_) => self.events.push_back(line),
                 _ => answer.push(line),
             }
         }

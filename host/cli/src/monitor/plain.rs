@@ -14,6 +14,7 @@ use anyhow::{Result, ensure};
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
 use link::session::Happening;
+use link::settings::other_version;
 use std::io::{self, ErrorKind, Write};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
@@ -150,7 +151,12 @@ impl Talk<'_> {
         }
         let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
         match &heard.what {
-            What::Happened(Happening::Connected { .. }) => standing.is_there = true,
+            What::Happened(Happening::Connected { version, shown, .. }) => {
+                standing.is_there = true;
+                if let Some(other) = other_version(version, shown) {
+                    tell!("{}", self.chosen.under_name(row, &other));
+                }
+            }
             What::Happened(
                 Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_) | Happening::Late(_),
             ) => {}
