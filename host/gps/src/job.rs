@@ -280,7 +280,7 @@ impl Job {
             read.fixes.iter().filter_map(|fix| Some((read.ticks_at(fix.time_ms)? * tick_m, *fix))).collect();
         // When a shorter delay is found, a later fix may get an earlier time.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
-        let track = Track::through(&fixes, self.antenna.error_m(), wanted.longest_outage_m);
+        let track = Track::through(&fixes, wanted.longest_outage_m);
         let find = |distance_m: f64, recorded_ms: u64, offset: Offset| match &track {
             Some(track) => track.find(distance_m, recorded_ms as f64, offset),
             None => Err(Missing::NoFixBefore),

@@ -117,20 +117,18 @@ pub struct Track {
 
 impl Track {
     /// The track through these fixes in order of time, each with the wheel's distance in metres. `None` without a fix.
-    /// The error is the standard deviation of a fix, if that is known.
-    pub fn through(fixes: &[(f64, Fix)], error_m: Option<f64>, longest_outage_m: f64) -> Option<Self> {
+    pub fn through(fixes: &[(f64, Fix)], longest_outage_m: f64) -> Option<Self> {
         let plane = Plane::around(fixes.first()?.1.place);
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
         let mut intervals = Vec::new();
         for &(distance_m, fix) in fixes {
             let at = plane.metres(fix.place);
-            let error_m = error_m.unwrap_or_else(|| fix.quality.usual_error_m());
             let station = Station {
                 time_ms: fix.time_ms,
                 utc_ms: fix.utc_ms,
                 distance_m,
                 at,
-                error_m,
+                error_m: fix.error_m,
                 track: fix.track,
                 fixes: 1.0,
                 until_ms: fix.time_ms,
@@ -143,7 +141,7 @@ impl Track {
             if last.track == fix.track && (distance_m - last.distance_m).abs() < STANDING_M {
                 last.fixes += 1.0;
                 last.at = last.at.plus(at.minus(last.at).times(1.0 / last.fixes));
-                last.error_m = last.error_m.max(error_m);
+                last.error_m = last.error_m.max(fix.error_m);
                 last.until_ms = fix.time_ms;
             } else {
                 stations.push(station);
@@ -268,7 +266,7 @@ mod tests {
         let plane = Plane::around(FIELD);
         let fix = |(second, distance_m): (usize, f64)| {
             let (time_ms, utc_ms) = (1000.0 * second as f64, 1000 * second as i64);
-            let fix = Fix { time_ms, utc_ms, place: plane.place(at(distance_m)), quality: Quality::Rtk, track: 0 };
+            let fix = Fix { time_ms, utc_ms, place: plane.place(at(distance_m)), quality: Quality::Rtk, error_m: 0.015, track: 0 };
             (distance_m, fix)
         };
         distances_m.into_iter().enumerate().map(fix).collect()
@@ -279,7 +277,7 @@ mod tests {
     }
 
     fn track(fixes: &[(f64, Fix)]) -> Track {
-        Track::through(fixes, None, 20.0).expect("there are fixes")
+        Track::through(fixes, 20.0).expect("there are fixes")
     }
 
     fn every_half_metre(count: u32) -> impl Iterator<Item = f64> {
@@ -324,7 +322,7 @@ mod tests {
             let fixes = driven(every_half_metre(60), eastward);
             let kept: Vec<_> =
                 fixes.iter().enumerate().filter(|(at, _)| !(lost..lost + length).contains(&(*at as u32))).map(|(_, it)| *it).collect();
-            let track = Track::through(&kept, None, 10.0).expect("there are fixes");
+            let track = Track::through(&kept, 10.0).expect("there are fixes");
             let found = track.find(distance_m, 2000.0 * distance_m, Offset::default());
             let end_m = 0.5 * f64::from(lost + length);
             let has_no_end = end_m > 29.5;
@@ -352,7 +350,7 @@ mod tests {
         assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
         assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
         assert_eq!(track.find(1.0, -1500.0, Offset::default()), Err(Missing::NoFixBefore));
-        assert!(Track::through(&[], None, 20.0).is_none());
+        assert!(Track::through(&[], 20.0).is_none());
     }
 
     #[test]
@@ -388,7 +386,8 @@ mod tests {
         for (at, north) in [(0, 0.3), (1, -0.3), (2, 0.6)] {
             fixes[at].1.place = plane.place(Metres { east: 0.0, north });
         }
-        let track = Track::through(&fixes, Some(0.5), 20.0).expect("there are fixes");
+        fixes.iter_mut().for_each(|(_, fix)| fix.error_m = 0.5);
+        let track = Track::through(&fixes, 20.0).expect("there are fixes");
         assert!(off_m(track.find(0.0, 4000.0, Offset::default()), Metres { east: 0.0, north: 0.2 }) < 1e-4);
         let beside = Offset { ahead_m: 1.0, right_m: 0.0 };
         assert_eq!(track.find(0.25, 4000.0, beside), Err(Missing::NoHeading));
