@@ -43,6 +43,9 @@ const DELAYS_MS: f64 = 10_000.0;
 /// right time.
 const LONGEST_DELAY_MS: f64 = 30_000.0;
 
+/// A longer time without a status of the wheel is a gap, in ms.
+pub(crate) const WHEEL_GAP_MS: f64 = 2000.0;
+
 /// The least rise of the delay that may be a step of the receiver's clock, and for how long it must stay, in ms.
 const LEAST_STEP_MS: f64 = 500.0;
 const STEP_STAYS_MS: f64 = 2000.0;
@@ -104,7 +107,9 @@ impl fmt::Display for Mark {
                 write!(formatter, "jumped {far_m:.2} m while the wheel rolled {rolled_m:.2} m: not used")
             }
             Self::Stayed => formatter.write_str("stays where it has jumped to: used from here on"),
-            Self::Stepped(seconds) => write!(formatter, "the receiver's clock went back by {seconds:.0} s: used as it is now"),
+            Self::Stepped(seconds) => {
+                write!(formatter, "the receiver's clock went back by {seconds:.0} s: used as it is now")
+            }
         }
     }
 }
@@ -387,7 +392,8 @@ impl Receiver {
         // A receiver may cut its digits instead of rounding them.
         let digits_m = moment.digit_m / 3_f64.sqrt();
         let error_m = self.error_m.unwrap_or_else(|| quality.usual_error_m()).hypot(digits_m);
-        let (utc_ms, track, wheel) = (moment.utc_ms, self.track, moment.wheel);
+        let (utc_ms, track) = (moment.utc_ms, self.track);
+        let wheel = moment.wheel.filter(|wheel| time_ms - wheel.time_ms <= WHEEL_GAP_MS);
         let fix = Fix { time_ms, utc_ms, place, quality, error_m, track };
         let rolled_m = wheel.map_or(0.0, |wheel| {
             // The wheel is reported ten times a second. A line that came much too late has a position that is no longer

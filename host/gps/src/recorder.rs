@@ -6,9 +6,9 @@
 //! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
-use crate::job::{LONGEST_DISTANCE, tick_mm};
 use crate::receiver::{Heard, Receiver};
 use crate::sentence::{Finder, Line};
+use link::follower::{Distance, tick_mm};
 use link::log::Kind;
 use link::session::Happening;
 
@@ -19,8 +19,8 @@ const SILENCE_MS: u64 = 5_000;
 const USELESS_MS: u64 = 5_000;
 
 /// Why a receiver or a file of its lines is of no use.
-pub const NO_POSITION: &str = "it sends neither RMC nor GGA of NMEA 0183: turn these sentences on in the receiver";
-const NO_SENTENCE: &str = "none of its lines is NMEA 0183: check --gps-baud and the cable";
+pub const NO_POSITION: &str = "no line has RMC or GGA of NMEA 0183: turn these sentences on in the receiver";
+const NO_SENTENCE: &str = "no line is NMEA 0183: check --gps-baud and the cable";
 
 /// Lines of the log: their kind and text.
 pub type Lines = Vec<(Kind, String)>;
@@ -36,9 +36,8 @@ pub struct Recorder {
     useless_since_ms: Option<u64>,
     /// Whether there was a good sentence since then.
     has_others: bool,
-    tick_m: f64,
-    /// The encoder's count, and ticks since the Uno began.
-    wheel: Option<(i32, i64)>,
+    tick_mm: f64,
+    distance: Distance,
 }
 
 impl Recorder {
@@ -52,28 +51,27 @@ impl Recorder {
     pub fn happened(&mut self, time_ms: u64, happening: &Happening) {
         match happening {
             Happening::Connected { settings, .. } | Happening::Settings(settings, _) => {
-                let tick_m = tick_mm(settings) / 1000.0;
-                if matches!(happening, Happening::Connected { .. }) || tick_m != self.tick_m {
+                let tick_mm = tick_mm(settings);
+                if matches!(happening, Happening::Connected { .. }) || tick_mm != self.tick_mm {
                     self.wheel_lost();
                 }
-                self.tick_m = tick_m;
+                self.tick_mm = tick_mm;
             }
             Happening::Lost(_) => self.wheel_lost(),
             Happening::Status(status, _) => {
-                let step = |last: i32| status.position.wrapping_sub(last);
-                if self.wheel.is_some_and(|(last, _)| step(last).unsigned_abs() > LONGEST_DISTANCE) {
+                if !self.distance.take(status.position, self.tick_mm) {
                     self.wheel_lost();
+                    self.distance.take(status.position, self.tick_mm);
                 }
-                let ticks = self.wheel.map_or(0, |(last, ticks)| ticks + i64::from(step(last)));
-                self.wheel = Some((status.position, ticks));
-                self.receiver.rolled(time_ms as f64, ticks as f64 * self.tick_m, f64::from(status.speed_mm_s));
+                let rolled_m = self.distance.at(status.position, self.tick_mm).unwrap_or_default() / 1000.0;
+                self.receiver.rolled(time_ms as f64, rolled_m, f64::from(status.speed_mm_s));
             }
             _ => {}
         }
     }
 
     fn wheel_lost(&mut self) {
-        self.wheel = None;
+        self.distance = Distance::default();
         self.receiver.wheel_lost();
     }
 
@@ -115,7 +113,8 @@ impl Recorder {
             lines.push((kind, sentence));
             lines.extend(marks(&heard));
         }
-        let is_past = |since_ms: Option<u64>, limit_ms| since_ms.is_some_and(|ms| time_ms.saturating_sub(ms) > limit_ms);
+        let is_past =
+            |since_ms: Option<u64>, limit_ms| since_ms.is_some_and(|ms| time_ms.saturating_sub(ms) > limit_ms);
         if !bytes.is_empty() && is_past(self.useless_since_ms, USELESS_MS) {
             self.useless_since_ms = None;
             let why = if self.has_others { NO_POSITION } else { NO_SENTENCE };
@@ -161,7 +160,7 @@ mod tests {
 
     #[test]
     fn bytes_without_a_position_are_reported_once_after_5_s() {
-        for (bytes, advice) in [(&b"\x80x\xFF\n"[..], "--gps-baud"), (&b"$GPGSV,1,1,00*79\r\n"[..], "neither RMC nor GGA")] {
+        for (bytes, advice) in [(&b"\x80x\xFF\n"[..], "--gps-baud"), (&b"$GPGSV,1,1,00*79\r\n"[..], "RMC or GGA")] {
             let (mut recorder, _) = Recorder::new(&Antenna::default());
             recorder.found(0, "a port");
             let lines: Lines = (0..200).flat_map(|tenth| recorder.take(100 * tenth, bytes)).collect();

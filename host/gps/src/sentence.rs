@@ -332,7 +332,9 @@ mod tests {
 
     /// The values that the crate `nmea` reads of a sentence.
     fn by_another(line: &str) -> (Option<f64>, Option<f64>, Option<i64>) {
-        let ms = |time: chrono::NaiveTime| i64::from(time.num_seconds_from_midnight()) * 1000 + i64::from(time.nanosecond()) / 1_000_000;
+        let ms = |time: chrono::NaiveTime| {
+            i64::from(time.num_seconds_from_midnight()) * 1000 + i64::from(time.nanosecond()) / 1_000_000
+        };
         match nmea::parse_str(line) {
             Ok(nmea::ParseResult::RMC(it)) => (it.lat, it.lon, it.fix_time.map(ms)),
             Ok(nmea::ParseResult::GGA(it)) => (it.latitude, it.longitude, it.fix_time.map(ms)),
@@ -347,7 +349,16 @@ mod tests {
             bytes.push(0xB5);
             bytes
         });
-        let text = prop::sample::select(vec!["", "\\s:GP0001*5F\\", "10:15:00.2 ", "gps: ", "\0\0", "$", "$GPXXX,", "\u{feff}"]);
+        let text = prop::sample::select(vec![
+            "",
+            "\\s:GP0001*5F\\",
+            "10:15:00.2 ",
+            "gps: ",
+            "\0\0",
+            "$",
+            "$GPXXX,",
+            "\u{feff}",
+        ]);
         prop_oneof![binary, text.prop_map(|text| text.as_bytes().to_vec())]
     }
 
