@@ -11,7 +11,7 @@ import { Session } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
-import { chosen, isStill, keep } from "./preferences.ts";
+import { chosen, isStill, keep, STILL_MS } from "./preferences.ts";
 import { RecordView } from "./record/record.ts";
 import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
@@ -37,8 +37,6 @@ import {
 const CHIP_SHARE = 0.8;
 /** Longest time that passes in a frame: a page that was hidden does not catch up. */
 const LONGEST_FRAME_S = 0.1;
-/** Time between two pictures of the row under reduced motion. */
-const STILL_MS = 1000;
 /** Time over which the pace is measured. */
 const PACE_S = 1;
 /** The views, by their sections and the address behind #. */
@@ -132,9 +130,9 @@ choose();
 
 keepFocus();
 
-void makeInstallable((load) => {
-    page.html("newer").hidden = false;
-    page.button("load-newer", load);
+// Loading another page closes the port, which resets a machine at work, and drops the log.
+globalThis.addEventListener("beforeunload", (event) => {
+    if (workPanels.some(({ isNeeded }) => isNeeded)) event.preventDefault();
 });
 
 /** The key for HOLD, for every shown machine. */
@@ -247,3 +245,11 @@ requestAnimationFrame(frame);
 
 // For tests, and for the browser's console.
 Object.assign(globalThis, { trial });
+
+let loadNewer = () => {};
+page.button("load-newer", () => loadNewer());
+// At the end, because it says that this page has started.
+void makeInstallable((load) => {
+    page.html("newer").hidden = false;
+    loadNewer = load;
+});
