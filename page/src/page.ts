@@ -73,8 +73,14 @@ trialPanel.onHappening = (happening) => {
     if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
     if (happening.is !== settleAt) return;
     settleAt = undefined;
-    for (const command of [...trial.machine.setUp, "save", "clear"]) trialPanel.ask(command).catch(() => {});
+    const asked = [...trial.machine.setUp, "save", "clear"].map((command) => trialPanel.ask(command));
+    void Promise.all(asked).then(startWork, () => {});
 };
+/** Throws the work switch, so that the first machine weeds at once. */
+function startWork(): void {
+    workSwitch.checked = true;
+    trial.work(true);
+}
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 

@@ -23,7 +23,8 @@ export const en = {
 
         // Try.
         tryIt: "Try it",
-        tryLead: "The real firmware weeds a row here, on a virtual Uno. Throw the work switch, and break something.",
+        tryLead:
+            "Watch the tool: it swings out at each plant, and weeds between the plants. The real firmware does that here, on a virtual Uno. Press HOLD, or break something.",
         theRow: "The row",
         drawing: "The row from above: plants, weeds, beam and tool",
         noPlantYet: "The tool has passed no plant yet.",

@@ -23,7 +23,7 @@ export const es: Language = {
 
         tryIt: "Pruébelo",
         tryLead:
-            "Aquí el firmware real desherba una hilera en un Uno virtual. Accione el interruptor de trabajo y estropee algo.",
+            "Mire la herramienta: sale en cada planta y desherba entre las plantas. Lo hace aquí el firmware real, en un Uno virtual. Pulse PAUSA o estropee algo.",
         theRow: "La hilera",
         drawing: "La hilera desde arriba: plantas, malezas, haz y herramienta",
         noPlantYet: "La herramienta aún no ha pasado ninguna planta.",

@@ -23,7 +23,7 @@ export const fr: Language = {
 
         tryIt: "L'essayer",
         tryLead:
-            "Le vrai micrologiciel désherbe ici un rang, sur un Uno virtuel. Actionnez l'interrupteur de travail, et cassez quelque chose.",
+            "Regardez l'outil : il s'écarte à chaque plante et désherbe entre les plantes. Le vrai micrologiciel le fait ici, sur un Uno virtuel. Appuyez sur PAUSE, ou cassez quelque chose.",
         theRow: "Le rang",
         drawing: "Le rang vu d'en haut : plantes, adventices, faisceau et outil",
         noPlantYet: "L'outil n'a encore passé aucune plante.",
