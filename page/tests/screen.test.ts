@@ -94,8 +94,8 @@ test("with large text or zoom the dock takes at most half of the screen, HOLD is
                 const part = (name: string) => document.querySelector(`#try-panel [data-part=${name}]`);
                 const isWhole = (name: string) => {
                     const { left, right, top, bottom } = part(name)?.getBoundingClientRect() ?? new DOMRect();
-                    const isOnTop = [left + 3, right - 3].every((x) =>
-                        [top + 3, bottom - 3].every((y) => {
+                    const isOnTop = [left + 12, right - 12].every((x) =>
+                        [top + 12, bottom - 12].every((y) => {
                             const found = document.elementFromPoint(x, y);
                             return found !== null && part(name)?.contains(found);
                         }),
