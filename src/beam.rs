@@ -49,21 +49,21 @@ impl<'a> Beam<'a> {
     pub fn new(interrupts: &'a EXINT, port: &'a PORTB) -> Self {
         let beam = Self { interrupts, port };
         beam.watch_second(false);
-        // SAFETY: bit 0 is PCIE0, and no other pin group's interrupt is used.
-        interrupts.pcicr().write(|w| unsafe { w.pcie().bits(1) });
+        // Bit 0 is PCIE0, and no other pin group's interrupt is used.
+        interrupts.pcicr.write(|w| w.pcie().bits(1));
         beam
     }
 
     /// Turns the second beam's interrupt on or off.
     pub fn watch_second(&self, is_there: bool) {
         let beams = if is_there { BEAM | SECOND_BEAM } else { BEAM };
-        // SAFETY: these are the mask bits of PCINT0 and PCINT2.
-        self.interrupts.pcmsk0().write(|w| unsafe { w.pcint().bits(beams) });
+        // The mask bits of PCINT0 and PCINT2.
+        self.interrupts.pcmsk0.write(|w| w.pcint().bits(beams));
     }
 
     /// Whether the first beam is broken now.
     pub fn is_broken(&self) -> bool {
-        self.port.pinb().read().bits() & BEAM == 0
+        self.port.pinb.read().bits() & BEAM == 0
     }
 
     /// The queued edges, and then [`Edge::Lost`] if edges were dropped.

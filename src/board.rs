@@ -26,8 +26,8 @@ pub struct Pins<'a> {
 
 /// Sets the pins up.
 pub fn pins<'a>(port_b: &'a PORTB, port_d: &'a PORTD) -> Pins<'a> {
-    port_b.ddrb().modify(|_, w| w.pb5().set_bit());
-    port_d.portd().modify(|_, w| w.pd4().set_bit().pd5().set_bit());
+    port_b.ddrb.modify(|_, w| w.pb5().set_bit());
+    port_d.portd.modify(|_, w| w.pd4().set_bit().pd5().set_bit());
     Pins { lamp: Lamp(port_b), work_switch: Switch(port_d), end_switch: Switch(port_d) }
 }
 
@@ -37,12 +37,12 @@ impl ErrorType for Lamp<'_> {
 
 impl OutputPin for Lamp<'_> {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        self.0.portb().modify(|_, w| w.pb5().clear_bit());
+        self.0.portb.modify(|_, w| w.pb5().clear_bit());
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.portb().modify(|_, w| w.pb5().set_bit());
+        self.0.portb.modify(|_, w| w.pb5().set_bit());
         Ok(())
     }
 }
@@ -57,6 +57,6 @@ impl<const BIT: u8> InputPin for Switch<'_, BIT> {
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
-        Ok(self.0.pind().read().bits() & (1 << BIT) == 0)
+        Ok(self.0.pind.read().bits() & (1 << BIT) == 0)
     }
 }

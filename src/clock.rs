@@ -21,15 +21,15 @@ pub struct Clock(TC0);
 impl Clock {
     /// Starts the clock.
     pub fn new(timer: TC0) -> Self {
-        timer.tccr0b().write(|w| w.cs0().prescale_64());
-        timer.timsk0().write(|w| w.toie0().set_bit());
+        timer.tccr0b.write(|w| w.cs0().prescale_64());
+        timer.timsk0.write(|w| w.toie0().set_bit());
         Self(timer)
     }
 
     /// The time.
     pub fn now(&self) -> Instant {
         let (high, low, steps, flags) = interrupt::free(|_| {
-            (OVERFLOWS_HIGH.get(), OVERFLOWS_LOW.get(), self.0.tcnt0().read().bits(), self.0.tifr0().read())
+            (OVERFLOWS_HIGH.get(), OVERFLOWS_LOW.get(), self.0.tcnt0.read().bits(), self.0.tifr0.read())
         });
         // An overflow during these reads is still pending. It counts if the steps were read after it, which a small number shows.
         let is_pending = flags.tov0().bit_is_set() && steps < 128;

@@ -21,7 +21,7 @@ pub type Upper = Half<{ SIZE as u16 }>;
 
 /// Waits at most 3.4 ms for a write that a reset interrupted: the chip completes it (data sheet, 8.4.3).
 pub fn finish(eeprom: &EEPROM) {
-    while eeprom.eecr().read().eepe().bit_is_set() {}
+    while eeprom.eecr.read().eepe().bit_is_set() {}
 }
 
 impl<const BASE: u16> Half<BASE> {
@@ -39,24 +39,24 @@ impl<const BASE: u16> Half<BASE> {
     }
 
     fn choose(&self, address: u16) {
-        self.registers().eear().write(|w| w.set(BASE + address));
+        self.registers().eear.write(|w| w.bits(BASE + address));
     }
 }
 
 impl<const BASE: u16> Memory for Half<BASE> {
     fn read(&self, address: u16) -> u8 {
         self.choose(address);
-        self.registers().eecr().modify(|_, w| w.eere().set_bit());
-        self.registers().eedr().read().bits()
+        self.registers().eecr.modify(|_, w| w.eere().set_bit());
+        self.registers().eedr.read().bits()
     }
 
     fn is_ready(&self) -> bool {
-        self.registers().eecr().read().eepe().bit_is_clear()
+        self.registers().eecr.read().eepe().bit_is_clear()
     }
 
     fn write(&mut self, address: u16, byte: u8) {
         self.choose(address);
-        self.registers().eedr().write(|w| w.set(byte));
+        self.registers().eedr.write(|w| w.bits(byte));
         interrupt::free(|_| {
             // SAFETY: only this file uses EECR (0x1f). EEPE is set right after EEMPE, within the four cycles that the chip allows.
             // Interrupts are off, so none can delay it (8.6.3).

@@ -98,10 +98,10 @@ const fn channels(levels: u8) -> u8 {
 
 /// Starts counting from the channels' present levels.
 pub fn watch(interrupts: &EXINT, port: &PORTD, cpu: &CPU) {
-    let levels = port.pind().read().bits() >> 2 & state::LEVELS;
-    cpu.gpior1().write(|w| w.set(levels));
-    interrupts.eicra().write(|w| w.isc0().val_0x01().isc1().val_0x01());
-    interrupts.eimsk().write(|w| w.int0().set_bit().int1().set_bit());
+    let levels = port.pind.read().bits() >> 2 & state::LEVELS;
+    cpu.gpior1.write(|w| w.bits(levels));
+    interrupts.eicra.write(|w| w.isc0().val_0x01().isc1().val_0x01());
+    interrupts.eimsk.write(|w| w.int0().set_bit().int1().set_bit());
 }
 
 /// The counters, for the loop.

@@ -9,7 +9,7 @@ use core::arch::asm;
 
 /// Allows sleep, in idle mode.
 pub fn allow(cpu: &CPU) {
-    cpu.smcr().write(|w| w.se().set_bit());
+    cpu.smcr.write(|w| w.se().set_bit());
 }
 
 /// Notes that a turn begins.

@@ -16,7 +16,7 @@ pub fn cause(cpu: &CPU) -> Cause {
     let left = MARK.get();
     leave_mark(mark::NONE);
     // GPIOR2 holds MCUSR: the start-up code saved it before clearing it.
-    Cause::of(cpu.gpior2().read().bits(), left)
+    Cause::of(cpu.gpior2.read().bits(), left)
 }
 
 /// Leaves a mark for the next start.

@@ -41,9 +41,9 @@ pub struct Serial {
 impl Serial {
     /// Opens the line.
     pub fn new(usart: USART0) -> Self {
-        usart.ubrr0().write(|w| w.set(BAUD_DIVISOR));
-        usart.ucsr0a().write(|w| w.u2x0().set_bit());
-        usart.ucsr0c().write(|w| w.ucsz0().chr8());
+        usart.ubrr0.write(|w| w.bits(BAUD_DIVISOR));
+        usart.ucsr0a.write(|w| w.u2x0().set_bit());
+        usart.ucsr0c.write(|w| w.ucsz0().chr8());
         let serial = Self { usart };
         serial.control(RECEIVING);
         serial
@@ -51,7 +51,7 @@ impl Serial {
 
     fn control(&self, bits: u8) {
         // SAFETY: both values only switch the line and its interrupts, and their handlers are below.
-        self.usart.ucsr0b().write(|w| unsafe { w.bits(bits) });
+        self.usart.ucsr0b.write(|w| unsafe { w.bits(bits) });
     }
 
     /// Bytes that can be written now.

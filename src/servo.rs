@@ -28,15 +28,15 @@ impl Servo {
     /// Starts the signal with pulses of `width`.
     pub fn new(timer: TC1, port: &PORTB, width: HalfMicros) -> Self {
         // The pin before the timer, so that the first pulse is complete.
-        port.ddrb().modify(|_, w| w.pb1().set_bit());
+        port.ddrb.modify(|_, w| w.pb1().set_bit());
         // ICR1 before the mode, so that the counter always has a top.
-        timer.icr1().write(|w| w.set(FRAME - 1));
-        timer.ocr1a().write(|w| w.set(compare(width)));
-        timer.tcnt1().write(|w| w.set(FRAME - 2));
-        // SAFETY: WGM11 and WGM10 of mode 14.
-        timer.tccr1a().write(|w| unsafe { w.com1a().match_clear().wgm1().bits(0b10) });
-        // SAFETY: WGM13 and WGM12 of mode 14.
-        timer.tccr1b().write(|w| unsafe { w.wgm1().bits(0b11).cs1().prescale_8() });
+        timer.icr1.write(|w| w.bits(FRAME - 1));
+        timer.ocr1a.write(|w| w.bits(compare(width)));
+        timer.tcnt1.write(|w| w.bits(FRAME - 2));
+        // WGM11 and WGM10 of mode 14.
+        timer.tccr1a.write(|w| w.com1a().match_clear().wgm1().bits(0b10));
+        // WGM13 and WGM12 of mode 14.
+        timer.tccr1b.write(|w| w.wgm1().bits(0b11).cs1().prescale_8());
         Self { timer, width }
     }
 
@@ -46,7 +46,7 @@ impl Servo {
         if width == self.width {
             return;
         }
-        let since_rise = self.timer.tcnt1().read().bits();
+        let since_rise = self.timer.tcnt1.read().bits();
         let action = servo::action(since_rise, self.width, gap_ms);
         if action == Action::Wait {
             return;
@@ -67,12 +67,12 @@ impl Servo {
 fn change(timer: &TC1, since_rise: HalfMicros, left: HalfMicros, compare: u16, restart: bool) -> bool {
     interrupt::free(|_| {
         // In a new frame the counter is much smaller, so this difference wraps to a large number.
-        if timer.tcnt1().read().bits().wrapping_sub(since_rise) >= left {
+        if timer.tcnt1.read().bits().wrapping_sub(since_rise) >= left {
             return false;
         }
-        timer.ocr1a().write(|w| w.set(compare));
+        timer.ocr1a.write(|w| w.bits(compare));
         if restart {
-            timer.tcnt1().write(|w| w.set(FRAME - 2));
+            timer.tcnt1.write(|w| w.bits(FRAME - 2));
         }
         true
     })
@@ -87,15 +87,15 @@ fn change(timer: &TC1, since_rise: HalfMicros, left: HalfMicros, compare: u16, r
 pub unsafe fn end_with(width: HalfMicros) {
     // SAFETY: the caller guarantees that no other code uses the timer any more.
     let timer = unsafe { &*TC1::ptr() };
-    timer.ocr1a().write(|w| w.set(compare(width)));
-    let since_rise = || timer.tcnt1().read().bits();
+    timer.ocr1a.write(|w| w.bits(compare(width)));
+    let since_rise = || timer.tcnt1.read().bits();
     // The running pulse, or the next one, may be the first of this width.
     for _ in 0..2 {
         while since_rise() >= width {}
         while since_rise() < width {}
     }
     // SAFETY: without a clock, timer and pin keep their state.
-    timer.tccr1b().write(|w| unsafe { w.bits(0) });
+    timer.tccr1b.write(|w| unsafe { w.bits(0) });
 }
 
 /// OCR1A for a pulse of `width`: the pin is high from 0 through the match.

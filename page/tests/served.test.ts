@@ -45,7 +45,9 @@ test("a phone is paired by the code, sees the machine, and holds it", async (tes
     assert.equal(opened.errors.join(), "");
     await end(uno);
     await part(page, "uno", "why").filter({ hasText: "The port is gone: plug the Uno in again." }).waitFor();
-    assert(await part(page, "uno", "hold").isDisabled());
+    // A HOLD is kept for it, and says so.
+    await part(page, "uno", "hold").click();
+    await part(page, "uno", "drive-said").filter({ hasText: "HOLD has not come through: the port is gone" }).waitFor();
     await plugIn(test, port);
     // It has lost its settings.
     await part(page, "uno", "alarm-name").filter({ hasText: "settings_lost" }).waitFor();
@@ -82,13 +84,17 @@ test("the address with the code pairs by itself, and machines side by side are s
     await part(here.page, "right", "state").filter({ hasText: "work" }).waitFor();
     assert(await part(here.page, "right", "tab-calibrate").isVisible());
     await inspect(here.page, "desk-served-two");
-    // A HOLD whose answer is lost says so, and the next one is obeyed.
-    await page.route("**/machines/1/command", (route) => route.abort(), { times: 1 });
+    // A HOLD that is lost says so, and is sent again until it is obeyed. Until then nothing starts.
+    let isLost = true;
+    await page.route("**/machines/1/command", (route) => (isLost ? route.abort() : route.continue()));
     await part(page, "right", "hold").click();
-    await part(page, "right", "drive-said").filter({ hasText: "does not answer" }).waitFor();
+    await part(page, "right", "drive-said").filter({ hasText: "HOLD has not come through" }).waitFor();
     assert.equal(await part(page, "right", "state").textContent(), "work");
-    await part(page, "right", "hold").click();
+    await part(page, "right", "start").click();
+    await part(page, "right", "drive-said").filter({ hasText: "so this was not sent" }).waitFor();
+    isLost = false;
     await part(here.page, "right", "state").filter({ hasText: "hold" }).waitFor();
+    await part(page, "right", "drive-said").filter({ hasText: /^$/ }).waitFor();
 
     // A change on one page is visible on another, and on a page opened later, with its help.
     await part(here.page, "right", "typed").fill("set k 5");

@@ -8,6 +8,7 @@ import { type Happening, NoMachine, Refused } from "../src/link/session.ts";
 /** A command on its way. */
 interface Sent {
     readonly line: string;
+    readonly seen: string | undefined;
     answer(text: string): void;
     /** Its answer is lost. */
     lose(): void;
@@ -24,19 +25,25 @@ const THERE = {
 
 let sent: Sent[] = [];
 let happened: Happening[] = [];
+let seen = "";
 let machine = new ServedMachine(0, "");
 
 beforeEach(() => {
-    [sent, happened, machine] = [[], [], new ServedMachine(1, "right")];
+    [sent, happened, machine] = [[], [], new ServedMachine(1, "right", () => seen)];
     machine.tell(THERE);
     machine.onHappening = (happening) => happened.push(happening);
     globalThis.fetch = (path, request) => {
         assert.equal(path, "/machines/1/command");
         return new Promise((done, failed) => {
-            const { body, signal } = request as { body: string; signal: AbortSignal };
+            const { body, signal, headers } = request as {
+                body: string;
+                signal: AbortSignal;
+                headers?: Record<string, string>;
+            };
             signal.addEventListener("abort", () => failed(signal.reason));
             sent.push({
                 line: body,
+                seen: headers?.["Weeder-Seen"],
                 answer: (text) => done(new Response(text)),
                 lose: () => failed(new TypeError("Failed to fetch")),
             });
@@ -85,6 +92,27 @@ test("HOLD is sent at once, and what was typed before it and is not sent yet is 
     await status;
 });
 
+test("a command says what its sender had seen when it was given, and HOLD needs to have seen nothing", async () => {
+    seen = "7";
+    const [status, start] = [machine.ask("status"), machine.ask("start")];
+    await goOn();
+    seen = "8";
+    const held = machine.hold();
+    await goOn();
+    sent[1]?.answer("ok\n");
+    sent[0]?.answer("ok\n");
+    await Promise.all([status, held, assert.rejects(start, Refused)]);
+    machine.ask("clear");
+    await goOn();
+    const told = sent.map(({ line, seen }) => [line, seen]);
+    assert.deepEqual(told, [
+        ["status", "7"],
+        ["hold", undefined],
+        ["clear", "8"],
+    ]);
+    seen = "";
+});
+
 test("a lost answer is an error, and neither that of HOLD nor another ends the page's machine", async () => {
     for (const type of [() => machine.ask("clear"), () => machine.hold()]) {
         const answer = type();
@@ -116,18 +144,24 @@ test("a machine that is lost answers no command, and says why", async () => {
     assert.deepEqual(happened.at(-1), { is: "lost", why: "the port is gone", forGood: true, isWanted: false });
     // A waiting command is not sent when the machine is back.
     await Promise.all([
-        assert.rejects(dump, new NoMachine("the port is gone")),
+        assert.rejects(
+            dump,
+            (error) => error instanceof NoMachine && /the port is gone\. This may have been done/.test(error.message),
+        ),
         assert.rejects(start, new NoMachine("the machine is not there")),
     ]);
-    for (const type of [() => machine.ask("status"), () => machine.hold()])
-        await assert.rejects(type(), new NoMachine("the machine is not there"));
+    await assert.rejects(machine.ask("status"), new NoMachine("the machine is not there"));
+    const held = machine.hold();
+    sent[1]?.answer("error: the port is gone\n");
+    await assert.rejects(held, new Refused("the port is gone"));
+    happened = [];
     machine.onAbsent = (why) => happened.push({ is: "command", line: why });
     machine.tell({ is: "lost", why: "there is no port" });
     assert.deepEqual(happened.at(-1), { is: "command", line: "there is no port" });
     machine.tell(THERE);
     machine.ask("clear");
     await goOn();
-    assert.deepEqual(lines(), ["dump", "clear"]);
+    assert.deepEqual(lines(), ["dump", "hold", "clear"]);
 });
 
 test("a machine that is there has told all at once, and tells what others change", () => {

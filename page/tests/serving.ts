@@ -67,13 +67,25 @@ export async function serve(test: TestContext, ports: string[], ...options: stri
             const address = `${origin}/machines/${machine}/command`;
             // A machine that was just plugged in is not there at once.
             for (let tries = 0; ; tries++) {
-                const answer = await fetch(address, { method: "POST", body: line, headers: { Origin: origin } });
+                const seen = await lastMessage(`${origin}/events`);
+                const headers = { Origin: origin, "Weeder-Seen": seen };
+                const answer = await fetch(address, { method: "POST", body: line, headers });
                 if (answer.ok) return;
-                assert(answer.status === 503 && tries < 600, `${line}: ${await answer.text()}`);
+                // Or a busy computer is too late.
+                assert([412, 503].includes(answer.status) && tries < 600, `${line}: ${await answer.text()}`);
                 await wait(100);
             }
         },
     };
+}
+
+/** The number of a message of an event stream. */
+async function lastMessage(address: string): Promise<string> {
+    const stream = new AbortController();
+    const { body } = await fetch(address, { signal: stream.signal });
+    const { value } = (await body?.getReader().read()) ?? {};
+    stream.abort();
+    return /^id: ?(\d+)$/m.exec(new TextDecoder().decode(value))?.[1] ?? "";
 }
 
 /** A folder that is deleted at the test's end. */

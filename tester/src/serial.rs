@@ -24,11 +24,11 @@ pub struct Serial(USART0);
 impl Serial {
     /// Opens the line.
     pub fn new(usart: USART0) -> Self {
-        usart.ubrr0().write(|w| w.set(BAUD_DIVISOR));
-        usart.ucsr0a().write(|w| w.u2x0().set_bit());
-        usart.ucsr0c().write(|w| w.ucsz0().chr8());
+        usart.ubrr0.write(|w| w.bits(BAUD_DIVISOR));
+        usart.ucsr0a.write(|w| w.u2x0().set_bit());
+        usart.ucsr0c.write(|w| w.ucsz0().chr8());
         // SAFETY: the bits switch the line and its interrupt, whose handler is below.
-        usart.ucsr0b().write(|w| unsafe { w.bits(CONTROL) });
+        usart.ucsr0b.write(|w| unsafe { w.bits(CONTROL) });
         Self(usart)
     }
 
@@ -39,9 +39,9 @@ impl Serial {
 
     /// Sends a byte, if the transmitter is free. Returns whether it was sent.
     pub fn write(&mut self, byte: u8) -> bool {
-        let is_free = self.0.ucsr0a().read().udre0().bit_is_set();
+        let is_free = self.0.ucsr0a.read().udre0().bit_is_set();
         if is_free {
-            self.0.udr0().write(|w| w.set(byte));
+            self.0.udr0.write(|w| w.bits(byte));
         }
         is_free
     }
@@ -51,7 +51,7 @@ impl Serial {
 #[avr_device::interrupt(atmega328p)]
 fn USART_RX() {
     // SAFETY: only this handler reads UDR0.
-    let byte = unsafe { (*USART0::ptr()).udr0().read().bits() };
+    let byte = unsafe { (*USART0::ptr()).udr0.read().bits() };
     interrupt::free(|cs| {
         let _ = RECEIVED.borrow(cs).borrow_mut().push_back(byte);
     });

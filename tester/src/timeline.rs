@@ -7,7 +7,7 @@
 use crate::burst;
 use crate::lines::{self, Lines};
 use avr_device::{
-    atmega328p::TC1,
+    atmega328p::{TC1, tc1::RegisterBlock as Timer},
     interrupt::{self, Mutex},
 };
 use core::cell::RefCell;
@@ -64,9 +64,9 @@ impl Tester {
     /// Starts the clock.
     pub fn new(timer: TC1, lines: Lines) -> Self {
         // SAFETY: normal mode, the next edge is rising.
-        timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
+        timer.tccr1b.write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
         // SAFETY: the handlers of all three interrupts are below.
-        timer.timsk1().write(|w| unsafe { w.bits(CAPTURE | COMPARE | OVERFLOW) });
+        timer.timsk1.write(|w| unsafe { w.bits(CAPTURE | COMPARE | OVERFLOW) });
         Self { lines }
     }
 
@@ -83,7 +83,7 @@ impl Tester {
 
 impl Board for Tester {
     fn now(&mut self) -> u32 {
-        with(|inner, timer| inner.time(timer, timer.tcnt1().read().bits()))
+        with(|inner, timer| inner.time(timer, timer.tcnt1.read().bits()))
     }
 
     fn player<R>(&mut self, access: impl FnOnce(&mut Player) -> R) -> R {
@@ -92,8 +92,8 @@ impl Board for Tester {
 
     fn start(&mut self) -> u32 {
         with(|inner, timer| {
-            let begin = timer.tcnt1().read().bits().wrapping_add(LEAD);
-            let time = inner.time(timer, timer.tcnt1().read().bits());
+            let begin = timer.tcnt1.read().bits().wrapping_add(LEAD);
+            let time = inner.time(timer, timer.tcnt1.read().bits());
             let time = time.wrapping_add(begin.wrapping_sub(time as u16).into());
             inner.armed = begin;
             let next = inner.player.start();
@@ -124,9 +124,9 @@ impl Board for Tester {
         with(|inner, timer| {
             inner.rise = None;
             // SAFETY: the next edge is rising, and a captured edge is dropped.
-            timer.tccr1b().write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
+            timer.tccr1b.write(|w| unsafe { w.bits(RISING | NO_PRESCALER) });
             // SAFETY: writing 1 clears the flag.
-            timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
+            timer.tifr1.write(|w| unsafe { w.bits(CAPTURE) });
         });
     }
 
@@ -140,15 +140,15 @@ impl Board for Tester {
 
 impl Inner {
     /// The time at which the counter's lower half was `low`, at most half of its range ago.
-    fn time(&self, timer: &TC1, low: u16) -> u32 {
+    fn time(&self, timer: &Timer, low: u16) -> u32 {
         // A pending overflow belongs to a small number, not to a large one.
-        let is_pending = timer.tifr1().read().bits() & OVERFLOW != 0 && low < 1 << 15;
+        let is_pending = timer.tifr1.read().bits() & OVERFLOW != 0 && low < 1 << 15;
         let high = self.overflows.wrapping_add(is_pending.into());
         u32::from(high) << 16 | u32::from(low)
     }
 
     /// Waits for the next event, or records the end.
-    fn follow(&mut self, next: Next, timer: &TC1) {
+    fn follow(&mut self, next: Next, timer: &Timer) {
         match next {
             Next::After(wait) => self.wait(wait, timer),
             Next::Ended => self.measure(Record::Ended(self.player.position())),
@@ -156,17 +156,17 @@ impl Inner {
         }
     }
 
-    fn wait(&mut self, wait: u32, timer: &TC1) {
+    fn wait(&mut self, wait: u32, timer: &Timer) {
         let now = if wait > STRIDE.into() { STRIDE } else { wait as u16 };
         self.left = wait - u32::from(now);
         self.armed = self.armed.wrapping_add(now);
-        timer.ocr1a().write(|w| w.set(self.armed));
+        timer.ocr1a.write(|w| w.bits(self.armed));
     }
 
     /// Fires all events that are due.
-    fn fire(&mut self, timer: &TC1) {
+    fn fire(&mut self, timer: &Timer) {
         while self.player.is_playing() {
-            let since = timer.tcnt1().read().bits().wrapping_sub(self.armed);
+            let since = timer.tcnt1.read().bits().wrapping_sub(self.armed);
             if (since as i16) < 0 {
                 return;
             }
@@ -181,18 +181,18 @@ impl Inner {
     }
 
     /// Takes an edge on the servo's line.
-    fn capture(&mut self, timer: &TC1) {
-        let time = self.time(timer, timer.icr1().read().bits());
+    fn capture(&mut self, timer: &Timer) {
+        let time = self.time(timer, timer.icr1.read().bits());
         let rise = self.rise.take();
         if rise.is_none() {
             self.rise = Some(time);
         }
         let edge = if self.rise.is_none() { RISING } else { 0 };
         // SAFETY: the next edge is the other one.
-        timer.tccr1b().write(|w| unsafe { w.bits(edge | NO_PRESCALER) });
+        timer.tccr1b.write(|w| unsafe { w.bits(edge | NO_PRESCALER) });
         // Changing the edge may set the flag (data sheet, 16.6.3).
         // SAFETY: writing 1 clears the flag.
-        timer.tifr1().write(|w| unsafe { w.bits(CAPTURE) });
+        timer.tifr1.write(|w| unsafe { w.bits(CAPTURE) });
         if let Some(start) = rise {
             self.measure(Record::Pulse { start, width: time.wrapping_sub(start) });
         }
@@ -206,10 +206,10 @@ impl Inner {
 }
 
 /// Runs a change from the loop or a handler, without an interrupt meanwhile.
-fn with<R>(change: impl FnOnce(&mut Inner, &TC1) -> R) -> R {
+fn with<R>(change: impl FnOnce(&mut Inner, &Timer) -> R) -> R {
     // SAFETY: once `Tester::new` has started the timer, only this critical section uses it.
-    let timer = unsafe { TC1::steal() };
-    interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), &timer))
+    let timer = unsafe { &*TC1::PTR };
+    interrupt::free(|cs| change(&mut INNER.borrow(cs).borrow_mut(), timer))
 }
 
 // An edge on the servo's line.

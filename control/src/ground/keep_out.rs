@@ -18,6 +18,23 @@ use heapless::Vec;
 /// closest spacing. The others allow rolling back over some six metres.
 pub const CAPACITY: usize = 16;
 
+/// Returns the width of the leaves on either side of a single plant under which the tool may work. A canopy of `width` is kept in
+/// `zone` around its middle, or in full if `zone` is 0 or wider.
+///
+/// A stem stands near the middle of its canopy. But two plants that have grown together, or a plant with a weed beside it, look the
+/// same to the beam. So at most 13/64 of the zone are cut off either end: no stem stands so near to an end.
+pub const fn trim(width: Length, zone: Length) -> Length {
+    let (most, beside) = ((zone.0 as u16 * 13) >> 6, width.0 - zone.0);
+    let half = beside as u16 >> 1;
+    Length(if beside <= 0 {
+        0
+    } else if half < most {
+        half as i16
+    } else {
+        most as i16
+    })
+}
+
 /// A canopy to keep out of: its full width, or the stem zone of a single plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Canopy {
@@ -34,13 +51,8 @@ impl Canopy {
     pub(super) const NONE: Self = Self { leading: WrappedPosition::new(0), trailing: WrappedPosition::new(0), trim: 0 };
 
     /// The canopy of a detection, if it is a plant: `zone` around its middle, or all of it if `zone` is 0 or wider.
-    ///
-    /// A stem stands near the middle of its canopy. But two plants that have grown together, or a plant with a weed beside it, look
-    /// the same to the beam. So at most a fifth of the zone is cut off either end: no stem stands so near to an end.
     pub(super) fn of(detection: &Detection, zone: Length) -> Self {
-        let beside = detection.width() - zone;
-        let most = (zone.0 as u16 * 13) >> 6;
-        let trim = if beside > Length::ZERO { (beside.0 as u16 >> 1).min(most) as u8 } else { 0 };
+        let trim = trim(detection.width(), zone).0 as u8;
         Self { leading: detection.leading, trailing: detection.trailing, trim }
     }
 

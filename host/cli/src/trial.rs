@@ -297,13 +297,20 @@ fn show(
     Ok(Finding::of(damaged == 0 && alarms == 0))
 }
 
-/// The differences between the paper's controller here and in the paper, at the paper's speeds.
+/// The differences between the paper's controller here and in the paper, at the paper's speeds, and their reason.
 fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     let (slowest, fastest) = published::SPEEDS_KM_H;
     let mut records = experiment::records(outcomes, Treatment::Paper);
     records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
     let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
-    said.into_iter().map(|said| format!("The paper's controller at {slowest} to {fastest} km/h: {said}")).collect()
+    if said.is_empty() {
+        return said;
+    }
+    let reason = format!(
+        "This is the paper's program at {slowest} to {fastest} km/h, on this report's machine and field. The paper prints no servo \
+         times, canopies or straying, so these are assumed. Its own slopes contradict each other too."
+    );
+    [said, vec![reason]].concat()
 }
 
 /// The totals of one controller, by speed.
@@ -394,6 +401,13 @@ fn gone(weeds: WeedCount) -> String {
 fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let mut sentences: Vec<String> =
         experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
+    if experiment.controllers.contains(&Treatment::Paper) {
+        let (lowest, highest) = published::DAMAGED_PERCENT;
+        sentences.push(format!(
+            "The paper's controller is the paper's program on this machine. On its own machine the paper measured {lowest} to {highest} %. \
+             `weeder trial --field paper` simulates that machine."
+        ));
+    }
     let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
     if alarms > 0 {
         sentences.push(format!(
@@ -449,15 +463,17 @@ fn damage(totals: &[Total], controller: Treatment) -> String {
     let (damaged, plants) = of(totals, controller).fold((0, 0), |(damaged, plants), total| {
         (damaged + total.plots.effect.injured(), plants + total.plots.effect.plants)
     });
+    let share = Share::of(damaged, plants);
     let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
     match worst {
         Some(worst) if damaged > 0 => format!(
-            "Plants damaged by {name}: {damaged} of {plants} ({} %), most of them at {} km/h, {} %.",
-            Share::of(damaged, plants),
+            "Plants damaged by {name}: {damaged} of {plants} ({} %, {}), most of them at {} km/h, {} %.",
+            share,
+            share.kind(),
             worst.speed_km_h(),
             worst.damage().shown()
         ),
-        _ => format!("Plants damaged by {name}: none of {plants} ({} %).", Share::of(damaged, plants)),
+        _ => format!("Plants damaged by {name}: none of {plants} ({share} %, {}).", share.kind()),
     }
 }
 

@@ -170,7 +170,8 @@ impl Experiment {
         let Conditions { plot: area, machine, .. } = &self.conditions;
         let width_m = area.row_spacing_mm / 1000.0;
         let area_m2 = f64::from(area.rows) * area.row_m * width_m;
-        let before = PlotRecord { area_m2, width_m, power_hp: machine.power_hp, ..PlotRecord::default() };
+        let (area_m2, width_m, power_hp) = (Some(area_m2), Some(width_m), Some(machine.power_hp));
+        let before = PlotRecord { area_m2, width_m, power_hp, ..PlotRecord::default() };
         let mut plots = Vec::new();
         for &speed_km_h in &self.speeds_km_h {
             for &spacing_cm in &self.spacings_cm {
@@ -277,7 +278,7 @@ impl Experiment {
         let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
         let Conditions { plot: area, machine: mechanism, .. } = &self.conditions;
         let rows = f64::from(area.rows);
-        let record = PlotRecord { time_s: drive.row_s + drive.turn_s, ..*plot.1 };
+        let record = PlotRecord { time_s: Some(drive.row_s + drive.turn_s), ..*plot.1 };
         let outcome = |&controller: &Treatment| {
             let weeded = weed(&trial, &sensors, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
@@ -378,7 +379,7 @@ impl PlotOutcome {
         self.budget += other.budget;
         self.alarms += other.alarms;
         self.moved_s += other.moved_s;
-        self.record.time_s += other.record.time_s;
+        self.record.time_s = self.record.time_s.zip(other.record.time_s).map(|(time_s, other_s)| time_s + other_s);
     }
 
     /// What only a simulated field can tell of a plot, by its column's name. Shares are in percent.
@@ -408,10 +409,10 @@ impl PlotOutcome {
         // If no weed stands on the counted ground, the whole plot is counted.
         let weeds = if counted.before > 0 { counted } else { in_plot };
         self.record = PlotRecord {
-            weeds_before: in_a_plot(weeds.before),
-            weeds_after: in_a_plot(weeds.after),
-            plants,
-            damaged: self.effect.injured(),
+            weeds_before: Some(in_a_plot(weeds.before)),
+            weeds_after: Some(in_a_plot(weeds.after)),
+            plants: Some(plants),
+            damaged: Some(self.effect.injured()),
             ..self.record
         };
     }

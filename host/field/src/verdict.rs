@@ -17,6 +17,7 @@ use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
 use crate::row::{Canopy, Row};
 use crate::servo::{Command, OUT_DEGREES, Stroke};
+use control::{ground::keep_out::trim, units::Length};
 use serde::Serialize;
 use std::ops::Range;
 use strum::Display;
@@ -55,7 +56,9 @@ impl Timing {
     /// part that the firmware keeps of a plant seen whole.
     fn kept_mm(&self, plant: &Canopy) -> Range<f64> {
         let (span, zone_mm) = (plant.span_mm(), f64::from(self.stem_zone_mm));
-        let trim_mm = ((span.end - span.start - zone_mm) / 2.0).clamp(0.0, 3.0 / 16.0 * zone_mm);
+        // In steps of 0.1 mm, which is finer than the wheel's.
+        let steps = |mm: f64| Length((10.0 * mm) as i16);
+        let trim_mm = f64::from(trim(steps(span.end - span.start), steps(zone_mm)).0) / 10.0;
         span.start + trim_mm..span.end - trim_mm
     }
 

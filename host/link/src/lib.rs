@@ -21,6 +21,7 @@ mod event_line;
 pub mod examples;
 mod lines;
 pub mod log;
+pub mod moment;
 #[cfg(not(target_arch = "wasm32"))]
 mod port;
 pub mod replay;
@@ -49,6 +50,15 @@ use std::time::{Duration, Instant};
 
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
+
+/// Backspaces, which delete a line of any length.
+const ERASE: &str = {
+    const BACKSPACES: [u8; COMMAND_LENGTH] = [0x08; COMMAND_LENGTH];
+    match str::from_utf8(&BACKSPACES) {
+        Ok(text) => text,
+        Err(_) => panic!("a backspace is ASCII"),
+    }
+};
 
 /// Silent reads in a row after which the link gives up an answer: two seconds.
 const SILENT_READS: usize = 100;
@@ -87,6 +97,9 @@ pub struct Link {
     /// Lines that came before an answer and do not belong to it.
     events: VecDeque<String>,
     version: String,
+    /// The serial port again, to discard what it has not sent.
+    #[cfg(not(target_arch = "wasm32"))]
+    serial: Option<Box<dyn serialport::SerialPort>>,
 }
 
 impl Link {
@@ -98,7 +111,9 @@ impl Link {
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
         let name = port.map_or_else(find_uno, |port| Ok(port.to_owned()))?;
         let (port, resets) = port::open(&name)?;
-        Self::over(port, resets)
+        // Without a second handle, a stalled port may send its bytes later.
+        let serial = port.try_clone().ok();
+        Ok(Self { serial, ..Self::over(port, resets)? })
     }
 
     /// A link over a port that is open already; `resets` says whether opening it has reset the Uno.
@@ -111,12 +126,14 @@ impl Link {
             lines: LineReader::default(),
             events: VecDeque::new(),
             version: String::new(),
+            #[cfg(not(target_arch = "wasm32"))]
+            serial: None,
         };
         if resets {
             link.greeting()?;
         }
-        // Ends a line that was typed before. Its answer is ignored.
-        link.type_line("")?;
+        // Deletes the beginning of a line that could not be typed whole: ended now, it would be a late command.
+        link.type_line(ERASE)?;
         link.wait_until_quiet()?;
         let mut answer = link.ask("version");
         let mut retries = 0;
@@ -228,6 +245,11 @@ impl Link {
         }
     }
 
+    /// The next of the lines that have come with earlier ones.
+    pub(crate) fn buffered_line(&mut self) -> Option<String> {
+        self.events.pop_front().or_else(|| self.lines.next_line())
+    }
+
     /// Waits for the greeting of a firmware that starts. Returns whether it has come.
     ///
     /// # Errors
@@ -241,9 +263,22 @@ impl Link {
         Ok(false)
     }
 
+    /// Discards what the port has not sent yet: the machine must not get a command after its sender has given it up.
+    pub(crate) fn discard_unsent(&self) {
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Some(serial) = &self.serial {
+            // The port is given up in any case.
+            let _ = serial.clear(serialport::ClearBuffer::Output);
+        }
+    }
+
     /// Closes the port, so that it can be opened again. The link behaves as if the port were gone.
     pub fn close(&mut self) {
         self.port = Box::new(io::empty());
+        #[cfg(not(target_arch = "wasm32"))]
+        {
+            self.serial = None;
+        }
     }
 
     fn type_line(&mut self, line: &str) -> Result<(), LinkError> {
@@ -284,6 +319,11 @@ impl Link {
 /// Whether this text can be typed into the console: one line of printable ASCII, and short enough.
 pub fn is_command(line: &str) -> bool {
     line.len() <= COMMAND_LENGTH && line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
+}
+
+/// Whether a line means `hold`: in any case, with any punctuation at its end. An operator in a hurry types it.
+pub fn is_hold(line: &str) -> bool {
+    line.trim().trim_end_matches(|last: char| last.is_ascii_punctuation()).trim_end().eq_ignore_ascii_case("hold")
 }
 
 /// Whether a line is the firmware's greeting after a start.

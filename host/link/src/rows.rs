@@ -7,9 +7,10 @@
 //! [`Hold`] follows a HOLD to all rows: which rows have obeyed, and how long the last one took. It has no clock: events
 //! carry their times.
 
+use super::moment::Moment;
 use super::session::{HOLD, Happening, Session};
 use super::settings::SettingsError;
-use super::{Link, LinkError};
+use super::{Link, LinkError, is_hold};
 use std::cmp::Reverse;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread;
@@ -43,9 +44,13 @@ pub enum What {
     },
 }
 
+/// Time in which a command must be typed.
+const WAIT: Duration = Duration::from_secs(3);
+
 /// An order to a row's thread.
 enum Order {
-    Type(String),
+    /// A command and its deadline.
+    Type(String, Moment),
     Hold,
 }
 
@@ -70,7 +75,7 @@ impl Rows {
                 thread::spawn(move || {
                     let mut session = Session::waiting_for(open);
                     session.keeps_hold = true;
-                    let missing = session.try_now(Instant::now()).err();
+                    let missing = session.try_now().err();
                     if let Some(why) = &missing {
                         talk.tell(What::Happened(Happening::Lost(why.to_string())));
                     }
@@ -91,9 +96,14 @@ impl Rows {
         self.orders.len()
     }
 
-    /// Types a command to a row after its previous commands have been answered.
+    /// Types a command to a row after its previous commands have been answered, within some seconds. A `hold` is typed
+    /// before them, as by [`hold`](Self::hold).
     pub fn command(&self, row: usize, command: &str) {
-        self.order(row, Order::Type(command.to_owned()));
+        if is_hold(command) {
+            self.hold(row);
+        } else {
+            self.order(row, Order::Type(command.to_owned(), Moment::now().after(WAIT)));
+        }
     }
 
     /// Holds a row before all waiting commands, and drops these.
@@ -121,6 +131,9 @@ impl Rows {
     }
 }
 
+/// Why a command was not typed.
+const LATE: &str = "it has waited too long, type it again";
+
 /// A row's thread.
 struct Talk {
     row: usize,
@@ -141,23 +154,27 @@ impl Talk {
                             self.tell(What::NotTyped { command, why: "hold came first".to_owned() });
                         }
                     }
-                    Ok(Order::Type(command)) => self.type_or_report(&mut session, command),
+                    Ok(Order::Type(command, deadline)) => self.type_or_report(&mut session, command, deadline),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            for happening in session.turn(Instant::now()) {
-                if !self.tell(What::Happened(happening)) {
+            for happening in session.turn(Moment::now()) {
+                let what = match happening {
+                    Happening::Late(command) => What::NotTyped { command, why: LATE.to_owned() },
+                    happening => What::Happened(happening),
+                };
+                if !self.tell(what) {
                     return;
                 }
             }
         }
     }
 
-    fn type_or_report(&self, session: &mut Session, command: String) {
+    fn type_or_report(&self, session: &mut Session, command: String, deadline: Moment) {
         if !session.is_connected() {
             self.tell(What::NotTyped { command, why: "the row is not there".to_owned() });
-        } else if !session.command(&command) {
+        } else if !session.command(&command, deadline) {
             self.tell(What::NotTyped { command, why: "it is no command, or too many wait".to_owned() });
         }
     }

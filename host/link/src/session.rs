@@ -4,12 +4,17 @@
 //! and returns what happened. It waits for one read at most; only opening a port also waits for the Uno to start. After
 //! every start it asks for settings and examples, and turns the events on. After a command that changes either, it asks
 //! for them again. [`Session::hold`] does not wait. If the Uno is lost, unanswered commands are lost too.
+//!
+//! A command has a deadline: it is typed before that, or not at all. A machine must not start because a command was
+//! delayed behind others, by a port that stalled, or by a computer that slept. Such a sleep does not count as silence of
+//! the machine.
 
+use super::moment::Moment;
 use super::settings::{self, Settings, SettingsError};
 use super::{ConsoleLine, EventLine, Link, LinkError, Status, is_greeting};
 use control::say::command::{Command, parse};
 use std::collections::{BTreeSet, VecDeque};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Time between two polls of the status.
 const POLL: Duration = Duration::from_millis(100);
@@ -20,6 +25,9 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Time between two tries to open the port again.
 const RETRY: Duration = Duration::from_secs(1);
 
+/// Longest time that counts as waiting between two turns. In a longer one the computer was busy, or has slept.
+const LONGEST_TURN: Duration = Duration::from_millis(200);
+
 /// The command that takes the tool out.
 pub const HOLD: &str = "hold";
 
@@ -28,9 +36,6 @@ const STATUS: &str = "status";
 const SETTINGS: &str = "get";
 const EXAMPLES: &str = "examples";
 const EVENTS: &str = "events on";
-
-/// Most lines that one turn reads, so that a machine that sends without pause cannot block it.
-const LINES: usize = 64;
 
 /// Most commands that may wait.
 const WAITING: usize = 256;
@@ -59,6 +64,8 @@ pub enum Happening {
     Command(String),
     /// A line of the answer to it. The last one is `ok` or begins with `error:`.
     Answer(String),
+    /// A command was not typed: its deadline had passed. It was the first of those that waited.
+    Late(String),
     /// That was the last line of the answer.
     Answered {
         /// The command.
@@ -77,7 +84,8 @@ struct Asked {
     line: String,
     /// The received lines, if the session itself asked; `None` for the caller's commands.
     own: Option<Vec<String>>,
-    since: Instant,
+    /// The waiting time when it was typed.
+    since: Duration,
 }
 
 /// Opens a link.
@@ -91,13 +99,17 @@ pub struct Session {
     link: Option<Link>,
     /// Lines without an answer, in the order of the answers: one command, and each `hold` typed after it.
     asked: VecDeque<Asked>,
-    waiting: VecDeque<String>,
+    /// Commands and their deadlines.
+    waiting: VecDeque<(String, Moment)>,
     /// Whether to type `hold` before anything else.
     is_to_hold: bool,
     /// The session's own questions, typed when no command waits. `hold` does not drop them.
     own: BTreeSet<String>,
-    poll_at: Option<Instant>,
-    retry_at: Option<Instant>,
+    poll_at: Option<Duration>,
+    retry_at: Option<Duration>,
+    /// The waiting time in all turns so far, and the moment of the last turn.
+    waited: Duration,
+    turned: Option<Moment>,
     /// Whether the reason for the missing Uno was not reported yet.
     is_loss_unreported: bool,
     happened: VecDeque<Happening>,
@@ -116,6 +128,8 @@ impl Session {
             own: BTreeSet::new(),
             poll_at: None,
             retry_at: None,
+            waited: Duration::ZERO,
+            turned: None,
             is_loss_unreported: true,
             happened: VecDeque::new(),
         }
@@ -125,16 +139,17 @@ impl Session {
     ///
     /// # Errors
     /// If the link fails.
-    pub fn try_now(&mut self, now: Instant) -> Result<(), SettingsError> {
-        (self.retry_at, self.is_loss_unreported) = (Some(now + RETRY), false);
+    pub fn try_now(&mut self) -> Result<(), SettingsError> {
+        (self.retry_at, self.is_loss_unreported) = (Some(self.waited + RETRY), false);
         (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link))
     }
 
-    /// Types a command after the commands before it have been answered. False if it is no command or too many wait.
-    pub fn command(&mut self, command: &str) -> bool {
+    /// Types a command after the commands before it have been answered, or not at all if that is after the deadline.
+    /// False if it is no command or too many wait.
+    pub fn command(&mut self, command: &str, deadline: Moment) -> bool {
         let fits = super::is_command(command) && self.waiting.len() < WAITING;
         if fits {
-            self.waiting.push_back(command.to_owned());
+            self.waiting.push_back((command.to_owned(), deadline));
         }
         fits
     }
@@ -163,12 +178,14 @@ impl Session {
     }
 
     /// Types, reads, and returns what happened since the last turn.
-    pub fn turn(&mut self, now: Instant) -> Vec<Happening> {
+    pub fn turn(&mut self, now: Moment) -> Vec<Happening> {
+        let turned = self.turned.replace(now).unwrap_or(now);
+        self.waited += now.ticking.saturating_sub(turned.ticking).min(LONGEST_TURN);
         let result = match self.link.take() {
             Some(link) => self.listen(link, now),
-            None if self.retry_at.is_none_or(|at| now >= at) => {
+            None if self.retry_at.is_none_or(|at| self.waited >= at) => {
                 let is_loss_reported = !self.is_loss_unreported;
-                let opened = self.try_now(now);
+                let opened = self.try_now();
                 // The reason was reported when it was lost.
                 if is_loss_reported { Ok(()) } else { opened }
             }
@@ -178,7 +195,7 @@ impl Session {
             }
         };
         if let Err(error) = result {
-            self.retry_at = Some(now + RETRY);
+            self.retry_at = Some(self.waited + RETRY);
             self.lose(error.to_string());
         }
         self.happened.drain(..).collect()
@@ -208,32 +225,37 @@ impl Session {
         Ok(())
     }
 
-    fn listen(&mut self, mut link: Link, now: Instant) -> Result<(), SettingsError> {
-        let mut is_more_to_read = true;
-        for _ in 0..LINES {
-            let Some(line) = link.next_line()? else {
-                is_more_to_read = false;
-                break;
-            };
-            if is_greeting(&line) {
+    fn listen(&mut self, mut link: Link, now: Moment) -> Result<(), SettingsError> {
+        // One read at most waits, so that `hold` does not.
+        let mut line = link.next_line()?;
+        let is_more_to_read = line.is_some();
+        while let Some(read) = line {
+            if is_greeting(&read) {
                 self.lose("the Uno was reset".to_owned());
                 return self.connect(link);
             }
-            self.take(line);
+            self.take(read);
+            line = link.buffered_line();
         }
         // The answer may be behind lines that came while the computer was busy.
-        let is_old = |asked: &&Asked| !is_more_to_read && now.saturating_duration_since(asked.since) > PATIENCE;
+        let is_old = |asked: &&Asked| !is_more_to_read && self.waited.saturating_sub(asked.since) > PATIENCE;
         if let Some(Asked { line, .. }) = self.asked.front().filter(is_old) {
+            link.discard_unsent();
             return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
         }
         let next = if std::mem::take(&mut self.is_to_hold) {
             Some((HOLD.to_owned(), None))
         } else if !self.asked.is_empty() {
             None
-        } else if let Some(command) = self.waiting.pop_front() {
+        } else if let Some((command, deadline)) = self.waiting.pop_front() {
+            if now.is_after(deadline) {
+                self.happened.push_back(Happening::Late(command));
+                self.link = Some(link);
+                return Ok(());
+            }
             Some((command, None))
-        } else if self.poll_at.is_none_or(|at| now >= at) {
-            self.poll_at = Some(now + POLL);
+        } else if self.poll_at.is_none_or(|at| self.waited >= at) {
+            self.poll_at = Some(self.waited + POLL);
             Some((STATUS.to_owned(), Some(Vec::new())))
         } else {
             self.own.pop_first().map(|own| (own, Some(Vec::new())))
@@ -242,8 +264,8 @@ impl Session {
             if own.is_none() {
                 self.happened.push_back(Happening::Command(line.clone()));
             }
-            link.send(&line)?;
-            self.asked.push_back(Asked { line, own, since: now });
+            link.send(&line).inspect_err(|_| link.discard_unsent())?;
+            self.asked.push_back(Asked { line, own, since: self.waited });
         }
         self.link = Some(link);
         Ok(())

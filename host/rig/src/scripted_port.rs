@@ -40,9 +40,16 @@ impl<F: FnMut(Option<&str>) -> Option<Vec<u8>>> Read for ScriptedPort<F> {
 impl<F: FnMut(Option<&str>) -> Option<Vec<u8>>> Write for ScriptedPort<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         for &byte in bytes {
-            if byte != b'\n' {
-                self.typed.push(byte);
-                continue;
+            match byte {
+                b'\n' => {}
+                0x08 => {
+                    self.typed.pop();
+                    continue;
+                }
+                _ => {
+                    self.typed.push(byte);
+                    continue;
+                }
             }
             let line = String::from_utf8(std::mem::take(&mut self.typed)).map_err(io::Error::other)?;
             self.to_read.extend((self.script)(Some(&line)).unwrap_or_default());

@@ -3,6 +3,8 @@
 //! Machines write and pages read. No page makes a machine wait: a page that is too slow misses messages, and gets a notice.
 //! The memory does not grow with the number of pages.
 
+use super::knowledge::{Knowledge, Stale};
+use link::moment::Moment;
 use link::settings::{Setting, help, name};
 use parking_lot::Mutex;
 use serde_json::{Value, json};
@@ -13,23 +15,46 @@ use tokio::sync::broadcast::{self, Receiver};
 /// Most messages of a machine that a page may be behind: some ten seconds of work.
 const BEHIND: usize = 128;
 
-/// A message to the pages, as JSON.
-pub type Message = Arc<str>;
+/// A message to the pages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// Its number, for [`Knowledge`].
+    pub number: u64,
+    /// As JSON.
+    pub text: Arc<str>,
+}
+
+/// Returns the present moment.
+pub type Clock = Box<dyn Fn() -> Moment + Send + Sync>;
 
 /// Connects machines and pages.
 pub struct Hub {
-    /// Each machine's state, as the first message to a new page.
-    machines: Mutex<Vec<Value>>,
+    clock: Clock,
+    state: Mutex<State>,
     pages: broadcast::Sender<Message>,
 }
 
+struct State {
+    /// Each machine's state, as the first message to a new page.
+    machines: Vec<Value>,
+    knowledge: Knowledge,
+}
+
 impl Hub {
-    /// This number of machines, before any message.
-    pub fn new(machines: usize) -> Self {
+    /// This number of machines, before the message with the number `first`.
+    pub fn new(machines: usize, first: u64, clock: Clock) -> Self {
+        let knowledge = Knowledge::new(first, machines);
+        let lost = (0..machines).map(|machine| lost(machine, "its port is being opened")).collect();
         Self {
-            machines: Mutex::new((0..machines).map(|machine| lost(machine, "its port is being opened")).collect()),
+            clock,
+            state: Mutex::new(State { machines: lost, knowledge }),
             pages: broadcast::channel(BEHIND * machines.max(2)).0,
         }
+    }
+
+    /// The present moment.
+    pub fn now(&self) -> Moment {
+        (self.clock)()
     }
 
     /// The machine is connected: the firmware's version, and the lines that show its settings and examples.
@@ -54,22 +79,41 @@ impl Hub {
 
     /// The machine has sent its status as a line, or has new settings or examples, as lines.
     pub fn know(&self, machine: usize, what: &str, said: Value) {
-        let mut machines = self.machines.lock();
-        self.send(&json!({ "machine": machine, "is": what, "said": said }));
-        if let Some(known) = machines.get_mut(machine).filter(|known| known["is"] == "there") {
+        let mut state = self.state.lock();
+        self.send(&mut state, &json!({ "machine": machine, "is": what, "said": said }));
+        if let Some(known) = state.machines.get_mut(machine).filter(|known| known["is"] == "there") {
             known[what] = said;
         }
     }
 
     /// The machine has sent an event line.
     pub fn event(&self, machine: usize, line: &str) {
-        let _machines = self.machines.lock();
-        self.send(&json!({ "machine": machine, "is": "event", "said": line }));
+        self.send(&mut self.state.lock(), &json!({ "machine": machine, "is": "event", "said": line }));
+    }
+
+    /// The machine is to hold, or holds: commands of senders that do not know this yet are refused.
+    pub fn hold(&self, machine: usize) {
+        let mut state = self.state.lock();
+        let number = state.knowledge.hold(machine, self.now());
+        self.publish(number, &json!({ "machine": machine, "is": "held" }));
+    }
+
+    /// Until when a command to a machine may be typed, if its sender has seen the message of this number.
+    ///
+    /// # Errors
+    /// If a HOLD has come since, or the message is too old.
+    pub fn deadline(&self, machine: usize, seen: u64) -> Result<Moment, Stale> {
+        self.state.lock().knowledge.deadline(machine, seen, self.now())
+    }
+
+    /// A message for one page.
+    pub fn tell(&self, text: &str) -> Message {
+        Message { number: self.state.lock().knowledge.number(self.now()), text: text.into() }
     }
 
     /// Why a machine is lost; `None` if it is connected.
     pub fn why_lost(&self, machine: usize) -> Option<String> {
-        match self.machines.lock().get(machine) {
+        match self.state.lock().machines.get(machine) {
             Some(known) => known["why"].as_str().map(str::to_owned),
             None => Some("there is no such machine".to_owned()),
         }
@@ -77,22 +121,29 @@ impl Hub {
 
     /// The present state of all machines, and the receiver of later messages.
     pub fn listen(&self) -> (Vec<Message>, Receiver<Message>) {
-        let machines = self.machines.lock();
-        (machines.iter().map(|known| known.to_string().into()).collect(), self.pages.subscribe())
+        let mut state = self.state.lock();
+        let State { machines, knowledge } = &mut *state;
+        let now = self.now();
+        let message = |known: &Value| Message { number: knowledge.number(now), text: known.to_string().into() };
+        (machines.iter().map(message).collect(), self.pages.subscribe())
     }
 
     fn change(&self, machine: usize, message: Value) {
-        let mut machines = self.machines.lock();
-        self.send(&message);
-        if let Some(known) = machines.get_mut(machine) {
+        let mut state = self.state.lock();
+        self.send(&mut state, &message);
+        if let Some(known) = state.machines.get_mut(machine) {
             *known = message;
         }
     }
 
     /// Sends while the lock is held, so that a page does not get a change twice: its first state may already include it.
-    fn send(&self, message: &Value) {
+    fn send(&self, state: &mut State, message: &Value) {
+        self.publish(state.knowledge.number(self.now()), message);
+    }
+
+    fn publish(&self, number: u64, message: &Value) {
         // An error means that no page listens.
-        let _ = self.pages.send(message.to_string().into());
+        let _ = self.pages.send(Message { number, text: message.to_string().into() });
     }
 }
 
@@ -105,19 +156,21 @@ mod tests {
     use super::*;
 
     fn heard(pages: &mut Receiver<Message>) -> Vec<Value> {
-        std::iter::from_fn(|| pages.try_recv().ok()).map(|message| serde_json::from_str(&message).unwrap()).collect()
+        std::iter::from_fn(|| pages.try_recv().ok())
+            .map(|message| serde_json::from_str(&message.text).unwrap())
+            .collect()
     }
 
     #[test]
     fn a_new_page_gets_the_state_of_all_machines_and_then_the_changes() {
-        let hub = Hub::new(2);
+        let hub = Hub::new(2, 5000, Box::new(Moment::now));
         hub.there(0, "0.2.0", &["k=5".to_owned()], &["field 0".to_owned()]);
         hub.know(0, "status", "state=hold".into());
         hub.know(0, "settings", json!(["k=3"]));
         // A lost machine has no status.
         hub.know(1, "status", "state=work".into());
         let (now, mut later) = hub.listen();
-        let mut now: Vec<Value> = now.iter().map(|message| serde_json::from_str(message).unwrap()).collect();
+        let mut now: Vec<Value> = now.iter().map(|message| serde_json::from_str(&message.text).unwrap()).collect();
         let help = now[0].as_object_mut().unwrap().remove("help").unwrap();
         assert_eq!(help["wheel_mm"], "wheel diameter");
         let expected = [

@@ -3,14 +3,15 @@
 //! [`Server::open`] binds the addresses and starts the machines. [`Server::run`] serves until it is stopped. The
 //! decisions are in modules without sockets and clocks. `door` decides which requests come in. `pairing` decides
 //! which phones may use the network. `rules` decides which commands may be typed from where. `machine` talks to one
-//! machine in its own thread. `hub` sends the machines' output to all pages. `routes` and this file connect these
-//! modules to the network.
+//! machine in its own thread. `hub` sends the machines' output to all pages. `knowledge` refuses commands that come too
+//! late. `routes` and this file connect these modules to the network.
 //!
 //! http is not encrypted: use it only in a network in which others may read. The server flashes nothing, and serves no
 //! files except the page's own.
 
 mod door;
 mod hub;
+mod knowledge;
 mod machine;
 pub mod page;
 mod pairing;
@@ -31,6 +32,7 @@ use futures_util::future::select;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use link::moment::Moment;
 use parking_lot::Mutex;
 #[cfg(any(target_os = "linux", target_os = "android"))]
 use socket2::SockRef;
@@ -131,7 +133,11 @@ impl Server {
             let _inside = runtime.enter();
             listen(setup.lan, setup.port, setup.may_start)?
         };
-        let hub = Arc::new(Hub::new(setup.machines.len()));
+        // A page keeps these numbers as text, so they may have any size.
+        let mut first = [0; 4];
+        getrandom::fill(&mut first).map_err(|error| ServeError::System("randomness", error.into()))?;
+        let hub =
+            Arc::new(Hub::new(setup.machines.len(), u64::from(u32::from_ne_bytes(first)) << 20, Box::new(Moment::now)));
         let start =
             |(number, (name, open))| Machine::start(number, name, open, Arc::clone(&hub), Arc::clone(&setup.tell));
         let machines = setup.machines.into_iter().enumerate().map(start).collect();

@@ -2,13 +2,16 @@
 //! gets all other output. It makes no decisions: [`rules`](super::rules) decides which lines may be typed.
 
 use super::hub::Hub;
+use super::knowledge::Stale;
 use control::say::command::{Command, parse};
+use link::moment::Moment;
 use link::rows::Opener;
 use link::session::{HOLD, Happening, Session};
+use link::{EventLine, Mode};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use thiserror::Error;
 use tokio::sync::mpsc::error::TryRecvError;
 use tokio::sync::{mpsc, oneshot};
@@ -32,19 +35,28 @@ pub type Answer = Result<Vec<String>, NoAnswer>;
 /// Why there is no answer to a line.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum NoAnswer {
-    #[error("hold came first, so this was not sent")]
-    Dropped,
+    /// It was not typed.
+    #[error(transparent)]
+    Stale(#[from] Stale),
+    /// It was not typed, because the machine is lost.
     #[error("{0}")]
     Lost(String),
+    /// It was not typed.
     #[error("too much waits for the machine: try again")]
     Busy,
-    #[error("the machine does not answer")]
+    /// It was typed, and the machine is lost.
+    #[error("{0}. The machine may have done this, or may still do it: look at it")]
+    Unknown(String),
+    #[error("the machine does not answer. It may have done this, or may still do it: look at it")]
     Silent,
 }
 
 /// A line to type, the clients that wait for it, and its answer.
 struct Asked {
     line: String,
+    /// The last moment at which it may be typed. It does not hold for `hold`.
+    deadline: Moment,
+    is_typed: bool,
     askers: Vec<oneshot::Sender<Answer>>,
     answer: Vec<String>,
 }
@@ -65,29 +77,36 @@ impl Machine {
         let named = name.clone();
         thread::spawn(move || {
             let talk = Talk { number, name: named, hub, tell, asked: VecDeque::new() };
-            talk.run(Session::waiting_for(open), commands_to_type, holds_to_type);
+            let mut session = Session::waiting_for(open);
+            session.keeps_hold = true;
+            talk.run(session, commands_to_type, holds_to_type);
         });
         Self { name, commands, holds }
     }
 
-    /// Types a command after the commands before it have been answered.
-    pub async fn command(&self, line: String) -> Answer {
-        ask(&self.commands, line).await
+    /// Types a command after the commands before it have been answered, if that is before a deadline.
+    pub async fn command(&self, line: String, deadline: Moment) -> Answer {
+        ask(&self.commands, line, deadline).await
     }
 
-    /// Types `hold` before all waiting commands.
+    /// Types `hold` before all waiting commands. A lost machine gets it when it is back.
     pub async fn hold(&self) -> Answer {
-        ask(&self.holds, HOLD.to_owned()).await
+        ask(&self.holds, HOLD.to_owned(), Moment::default()).await
     }
 }
 
-async fn ask(lines: &mpsc::Sender<Asked>, line: String) -> Answer {
+async fn ask(lines: &mpsc::Sender<Asked>, line: String, deadline: Moment) -> Answer {
     let (asker, answer) = oneshot::channel();
-    lines.try_send(Asked { line, askers: vec![asker], answer: Vec::new() }).map_err(|_| NoAnswer::Busy)?;
+    let asked = Asked { deadline, askers: vec![asker], ..Asked::new(line) };
+    lines.try_send(asked).map_err(|_| NoAnswer::Busy)?;
     timeout(ANSWER_TIME, answer).await.map_err(|_| NoAnswer::Silent)?.unwrap_or(Err(NoAnswer::Busy))
 }
 
 impl Asked {
+    fn new(line: String) -> Self {
+        Self { line, deadline: Moment::default(), is_typed: false, askers: Vec::new(), answer: Vec::new() }
+    }
+
     fn end(self, answer: &Answer) {
         for asker in self.askers {
             // The client may have gone.
@@ -107,46 +126,75 @@ struct Talk {
 
 impl Talk {
     fn run(mut self, mut session: Session, mut commands: mpsc::Receiver<Asked>, mut holds: mpsc::Receiver<Asked>) {
+        while self.turn(&mut session, &mut commands, &mut holds) {}
+    }
+
+    /// Returns false when the machine is dropped.
+    fn turn(
+        &mut self,
+        session: &mut Session,
+        commands: &mut mpsc::Receiver<Asked>,
+        holds: &mut mpsc::Receiver<Asked>,
+    ) -> bool {
+        // Holds are read before commands. So all commands sent before a hold are dropped by it.
+        let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
         loop {
-            // Holds are read before commands. So all commands sent before a hold are dropped by it.
-            let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
-            loop {
-                match commands.try_recv() {
-                    Ok(asked) => self.order(&mut session, asked),
-                    Err(TryRecvError::Empty) => break,
-                    Err(TryRecvError::Disconnected) => return,
-                }
-            }
-            for asked in to_hold {
-                self.order(&mut session, asked);
-            }
-            for happening in session.turn(Instant::now()) {
-                self.take(&mut session, happening);
+            match commands.try_recv() {
+                Ok(asked) => self.order(session, asked),
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return false,
             }
         }
+        for asked in to_hold {
+            self.hold(session, asked);
+        }
+        for happening in session.turn(self.hub.now()) {
+            self.take(session, happening);
+        }
+        true
     }
 
     fn order(&mut self, session: &mut Session, asked: Asked) {
-        // A command to a lost machine must not wait for it.
         if !session.is_connected() {
-            let why = self.hub.why_lost(self.number);
-            asked.end(&Err(NoAnswer::Lost(why.unwrap_or_else(|| "the machine is not there".to_owned()))));
-        } else if asked.line == HOLD {
-            for _ in 0..session.hold() {
-                if let Some(dropped) = self.asked.pop_back() {
-                    dropped.end(&Err(NoAnswer::Dropped));
-                }
-            }
-            match self.asked.back_mut() {
-                // A hold in progress counts for this one too, as in the session.
-                Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
-                _ => self.asked.push_back(asked),
-            }
-        } else if session.command(&asked.line) {
+            // A command to a lost machine must not wait for it.
+            asked.end(&Err(NoAnswer::Lost(self.why_lost())));
+        } else if session.command(&asked.line, asked.deadline) {
             self.asked.push_back(asked);
         } else {
             asked.end(&Err(NoAnswer::Busy));
         }
+    }
+
+    fn hold(&mut self, session: &mut Session, mut asked: Asked) {
+        for _ in 0..session.hold() {
+            if let Some(dropped) = self.asked.pop_back() {
+                dropped.end(&Err(Stale::Held.into()));
+            }
+        }
+        if !session.is_connected() {
+            // It is typed when the machine is back. Its senders do not wait for that.
+            let askers = std::mem::take(&mut asked.askers);
+            Asked { askers, ..Asked::new(HOLD.to_owned()) }.end(&Err(NoAnswer::Lost(self.why_lost())));
+        }
+        match self.asked.back_mut() {
+            // A hold in progress counts for this one too, as in the session.
+            Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
+            _ => self.asked.push_back(asked),
+        }
+    }
+
+    fn why_lost(&self) -> String {
+        self.hub.why_lost(self.number).unwrap_or_else(|| "the machine is not there".to_owned())
+    }
+
+    /// Ends the commands to a machine that is lost. The session keeps `hold`.
+    fn lose(&mut self, why: &str) {
+        let is_to_hold = self.asked.iter().any(|asked| asked.line == HOLD);
+        for asked in self.asked.drain(..) {
+            let no_answer = if asked.is_typed { NoAnswer::Unknown } else { NoAnswer::Lost };
+            asked.end(&Err(no_answer(why.to_owned())));
+        }
+        self.asked.extend(is_to_hold.then(|| Asked::new(HOLD.to_owned())));
     }
 
     fn take(&mut self, session: &mut Session, happening: Happening) {
@@ -158,12 +206,26 @@ impl Talk {
             Happening::Lost(why) => {
                 self.hub.lost(self.number, &why);
                 (self.tell)(&format!("{}: {why}.", self.name));
-                for asked in self.asked.drain(..) {
-                    asked.end(&Err(NoAnswer::Lost(why.clone())));
-                }
+                self.lose(&why);
             }
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
-            Happening::Event(_, line) => self.hub.event(self.number, &line),
+            Happening::Event(event, line) => {
+                // Its switch and its alarms are HOLDs too.
+                if let EventLine::State { mode: Mode::Hold | Mode::Alarm } | EventLine::Alarm { .. } = event {
+                    self.hub.hold(self.number);
+                }
+                self.hub.event(self.number, &line);
+            }
+            Happening::Late(_) => {
+                if let Some(asked) = self.asked.pop_front() {
+                    asked.end(&Err(Stale::Late.into()));
+                }
+            }
+            Happening::Command(_) => {
+                if let Some(asked) = self.asked.iter_mut().find(|asked| !asked.is_typed) {
+                    asked.is_typed = true;
+                }
+            }
             Happening::Answer(line) => {
                 let Some(asked) = self.asked.front_mut() else { return };
                 asked.answer.truncate(LINES - 1);
@@ -180,7 +242,6 @@ impl Talk {
             }
             Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
             Happening::Examples(lines) => self.hub.know(self.number, "examples", lines.into()),
-            Happening::Command(_) => {}
         }
     }
 }
@@ -196,7 +257,7 @@ mod tests {
 
     /// A connected machine.
     async fn machine() -> (Machine, Arc<Hub>, ScriptedBoard) {
-        let (hub, board) = (Arc::new(Hub::new(1)), ScriptedBoard::plugged_in());
+        let (hub, board) = (Arc::new(Hub::new(1, 0, Box::new(Moment::now))), ScriptedBoard::plugged_in());
         let port = board.clone();
         let open = move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false);
         let machine = Machine::start(0, "uno".to_owned(), Box::new(open), Arc::clone(&hub), Arc::new(|_| {}));
@@ -214,6 +275,11 @@ mod tests {
         timeout(Duration::from_secs(60), look).await.expect("it comes to be so");
     }
 
+    /// Types a command with a deadline that a busy computer meets.
+    async fn type_soon(machine: &Machine, line: &str) -> Answer {
+        machine.command(line.to_owned(), Moment::now().after(Duration::from_secs(60))).await
+    }
+
     fn ok() -> Answer {
         Ok(vec!["ok".to_owned()])
     }
@@ -228,15 +294,15 @@ mod tests {
             let (machine, _, board) = machine().await;
             let others = async {
                 until(|| board.typed() == ["events on", "silence"]).await;
-                let answers = tokio::join!(machine.command("start".to_owned()), machine.hold(), machine.hold());
-                assert_eq!(answers, (Err(NoAnswer::Dropped), ok(), ok()));
+                let answers = tokio::join!(type_soon(&machine, "start"), machine.hold(), machine.hold());
+                assert_eq!(answers, (Err(Stale::Held.into()), ok(), ok()));
             };
             // It does not wait for the answer in progress. The first `ok` is taken for that.
             let answered_later = async {
                 until(|| board.typed() == ["events on", "silence", "hold"]).await;
                 board.say(b"ok\n");
             };
-            let (before, (), ()) = tokio::join!(machine.command("silence".to_owned()), others, answered_later);
+            let (before, (), ()) = tokio::join!(type_soon(&machine, "silence"), others, answered_later);
             assert_eq!(before, ok());
             assert_eq!(board.typed(), ["events on", "silence", "hold"]);
         });
@@ -246,39 +312,42 @@ mod tests {
     fn a_page_gets_everything_when_it_connects_and_then_the_changes_also_if_a_client_turns_the_events_off() {
         run(async {
             let (machine, hub, board) = machine().await;
-            let there = || serde_json::from_str::<Value>(&hub.listen().0[0]).unwrap();
+            let there = || serde_json::from_str::<Value>(&hub.listen().0[0].text).unwrap();
             until(|| there()["status"].is_string()).await;
             let known = there();
             assert!(known["is"] == "there" && known["version"].is_string() && known["examples"].is_array(), "{known}");
             let shows = |known: &Value, value: &str| known["settings"].to_string().contains(value);
             assert!(shows(&known, "k=3 "));
             let (_, mut early) = hub.listen();
-            assert_eq!(machine.command("set k 5".to_owned()).await, ok());
+            assert_eq!(type_soon(&machine, "set k 5").await, ok());
             until(|| shows(&there(), "k=5 ")).await;
             let told = std::iter::from_fn(|| early.try_recv().ok());
-            assert!(told.into_iter().any(|message| message.contains(r#""is":"settings""#) && message.contains("k=5 ")));
-            assert_eq!(machine.command("events off".to_owned()).await, ok());
+            assert!(
+                told.into_iter()
+                    .any(|message| message.text.contains(r#""is":"settings""#) && message.text.contains("k=5 "))
+            );
+            assert_eq!(type_soon(&machine, "events off").await, ok());
             until(|| board.typed() == ["events on", "set k 5", "events off", "events on"]).await;
         });
     }
 
     #[test]
-    fn commands_to_a_lost_machine_are_not_typed_when_it_is_back() {
+    fn of_the_commands_to_a_lost_machine_only_hold_is_typed_when_it_is_back() {
         run(async {
             let (machine, hub, board) = machine().await;
             let pulled = async {
                 until(|| board.typed() == ["events on", "silence"]).await;
                 board.plug(false);
             };
-            let (before, ()) = tokio::join!(machine.command("silence".to_owned()), pulled);
-            assert!(matches!(&before, Err(NoAnswer::Lost(why)) if why.contains("the port is gone")), "{before:?}");
-            for typed in [machine.command("start".to_owned()).await, machine.hold().await] {
+            let (before, ()) = tokio::join!(type_soon(&machine, "silence"), pulled);
+            assert!(matches!(&before, Err(NoAnswer::Unknown(why)) if why.contains("the port is gone")), "{before:?}");
+            for typed in [type_soon(&machine, "start").await, machine.hold().await] {
                 assert!(matches!(typed, Err(NoAnswer::Lost(_))), "{typed:?}");
             }
             board.plug(true);
             until(|| hub.why_lost(0).is_none()).await;
-            assert_eq!(machine.command("clear".to_owned()).await, ok());
-            assert_eq!(board.typed(), ["events on", "silence", "events on", "clear"]);
+            assert_eq!(type_soon(&machine, "clear").await, ok());
+            assert_eq!(board.typed(), ["events on", "silence", "events on", "hold", "clear"]);
         });
     }
 }

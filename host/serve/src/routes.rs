@@ -8,7 +8,7 @@
 //! | `/machines` | the machines' names, and the allowed commands, as JSON |
 //! | `/events` | the state and output of all machines, as server-sent events |
 //! | `POST /machines/hold` | the result of a HOLD to all machines at once, and the time until the last one had obeyed, as JSON |
-//! | `POST /machines/N/command` | the answer to the line in the body, line by line |
+//! | `POST /machines/N/command` | the answer to the line in the body, line by line; `Weeder-Seen` has the number of the last message that its sender has seen |
 //!
 //! No path leads to any other file, and no path flashes a board.
 
@@ -58,6 +58,9 @@ const BEAT: Duration = Duration::from_millis(500);
 /// (`blob:`).
 const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src blob:; style-src 'self'; \
     img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// The header of a command with the `id` of the last message that its sender has seen.
+const SEEN: &str = "weeder-seen";
 
 /// All ports of an address share cookies.
 const COOKIE_NAME: &str = "weeder";
@@ -231,6 +234,7 @@ async fn command(
     State(served): State<Arc<Served>>,
     Extension(visitor): Extension<Visitor>,
     Path(number): Path<usize>,
+    headers: HeaderMap,
     body: Bytes,
 ) -> Response {
     let Some(machine) = served.machines.get(number) else {
@@ -242,29 +246,38 @@ async fn command(
         Err(Forbidden::NoLine) => return no_line(),
         Err(why) => return refused(StatusCode::FORBIDDEN, why),
     };
-    if let Some(why) = served.hub.why_lost(number) {
-        return refused(StatusCode::SERVICE_UNAVAILABLE, why);
-    }
     let answer = match order {
         Order::Hold => {
             visitor.enter(Stage::Holding);
+            served.hub.hold(number);
             machine.hold().await
         }
-        Order::Type => machine.command(line).await,
+        Order::Type => {
+            let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
+            let Some(seen) = seen else { return refused(StatusCode::PRECONDITION_REQUIRED, NO_KNOWLEDGE) };
+            match served.hub.deadline(number, seen) {
+                Ok(deadline) => machine.command(line, deadline).await,
+                Err(stale) => Err(stale.into()),
+            }
+        }
     };
     match answer {
         Ok(lines) => (lines.join("\n") + "\n").into_response(),
-        Err(why @ NoAnswer::Dropped) => refused(StatusCode::CONFLICT, why),
+        Err(why @ NoAnswer::Stale(_)) => refused(StatusCode::PRECONDITION_FAILED, why),
         Err(why @ (NoAnswer::Lost(_) | NoAnswer::Busy)) => refused(StatusCode::SERVICE_UNAVAILABLE, why),
-        Err(why @ NoAnswer::Silent) => refused(StatusCode::GATEWAY_TIMEOUT, why),
+        Err(why @ (NoAnswer::Unknown(_) | NoAnswer::Silent)) => refused(StatusCode::GATEWAY_TIMEOUT, why),
     }
 }
+
+/// The error for a command from a client that does not say what it has seen.
+const NO_KNOWLEDGE: &str = "send the `id` of the last message of /events as the header Weeder-Seen, or send `hold`";
 
 /// Holds all machines at once. Every client that is let in may do this. Returns for each machine why it has not obeyed,
 /// or nothing, and the time of the last one that has.
 async fn hold_all(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>) -> impl IntoResponse {
     visitor.enter(Stage::Holding);
     let since = Instant::now();
+    (0..served.machines.len()).for_each(|number| served.hub.hold(number));
     let holds = served.machines.iter().map(|machine| async move { (machine.hold().await, since.elapsed()) });
     let (mut machines, mut last_ms) = (Vec::new(), None);
     for (Machine { name, .. }, (answer, time)) in served.machines.iter().zip(join_all(holds).await) {
@@ -320,20 +333,21 @@ async fn events(
     Extension(visitor): Extension<Visitor>,
 ) -> Sse<impl Stream<Item = Result<Event, Infallible>> + use<>> {
     visitor.enter(Stage::Listening);
-    Sse::new(heard(&served.hub).map(|message| Ok(Event::default().data(&*message))))
+    let event = |message: Message| Event::default().id(message.number.to_string()).data(&*message.text);
+    Sse::new(heard(&served.hub).map(move |message| Ok(event(message))))
 }
 
 /// The messages to a page: the state of all machines, then changes, and a heartbeat while nothing changes. A page that
 /// falls too far behind gets a last message that says so. It may connect again.
-fn heard(hub: &Hub) -> impl Stream<Item = Message> + use<> {
+fn heard(hub: &Arc<Hub>) -> impl Stream<Item = Message> + use<> {
     let (first, later) = hub.listen();
-    let later = stream::unfold(Some(later), |later| async move {
+    let later = stream::unfold((Arc::clone(hub), Some(later)), |(hub, later)| async move {
         let mut later = later?;
         match timeout(BEAT, later.recv()).await {
-            Ok(Ok(message)) => Some((message, Some(later))),
-            Ok(Err(RecvError::Lagged(_))) => Some((Message::from(r#"{"is":"dropped"}"#), None)),
+            Ok(Ok(message)) => Some((message, (hub, Some(later)))),
+            Ok(Err(RecvError::Lagged(_))) => Some((hub.tell(r#"{"is":"dropped"}"#), (hub, None))),
             Ok(Err(RecvError::Closed)) => None,
-            Err(_) => Some((Message::from(r#"{"is":"beat"}"#), Some(later))),
+            Err(_) => Some((hub.tell(r#"{"is":"beat"}"#), (hub, Some(later)))),
         }
     });
     stream::iter(first).chain(later)
@@ -349,15 +363,15 @@ mod tests {
     fn a_page_that_is_too_far_behind_gets_a_last_message_and_may_connect_again() {
         let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
         runtime.block_on(async {
-            let hub = Hub::new(1);
-            let mut page = pin!(heard(&hub));
+            let hub = Arc::new(Hub::new(1, 5000, Box::new(link::moment::Moment::now)));
+            let mut page = pin!(heard(&hub).map(|message| message.text));
             for number in 0..1000 {
                 hub.event(0, &number.to_string());
             }
             assert!(page.next().await.unwrap().contains("lost"));
             assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"dropped"}"#));
             assert_eq!(page.next().await, None);
-            let mut page = pin!(heard(&hub));
+            let mut page = pin!(heard(&hub).map(|message| message.text));
             assert!(page.next().await.unwrap().contains("lost"));
             assert_eq!(page.next().await.as_deref(), Some(r#"{"is":"beat"}"#));
             hub.there(0, "0.2.0", &[], &[]);

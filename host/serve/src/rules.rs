@@ -64,11 +64,10 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
     if !link::is_command(line) || line.trim().is_empty() {
         return Err(Forbidden::NoLine);
     }
-    let command = parse(line.as_bytes());
-    if command == Ok(Command::Hold) {
+    if link::is_hold(line) {
         return Ok(Order::Hold);
     }
-    match (reach, command) {
+    match (reach, parse(line.as_bytes())) {
         // The machine itself reports errors in the line.
         (Reach::Here, _) => Ok(Order::Type),
         (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),
@@ -173,7 +172,7 @@ mod tests {
                 assert_eq!(allow(line, reach), why.map_or(Ok(Order::Type), Err), "{line:?} from {reach:?}");
             }
         }
-        for line in ["hold", " hold", "hold   "] {
+        for line in ["hold", " hold", "hold   ", "HOLD", "Hold", "hold.", "HOLD !"] {
             for reach in [Reach::Here, WATCHING, STARTING] {
                 assert_eq!(allow(line, reach), Ok(Order::Hold), "{line:?} from {reach:?}");
             }

@@ -2,7 +2,10 @@
 // their state as server-sent events, and answers a request for each command.
 //
 // The computer decides which commands this page may type. If it falls silent, its machines are reported as lost, and the
-// page asks again until it answers.
+// page asks again until it answers. Every request has a time limit, because a network may forget a connection.
+//
+// A network may also deliver a command late, or after a later HOLD. So a command carries the number of the last message
+// that the page had received when the operator gave it. The computer refuses it if that is too old.
 
 import { english } from "../words/words.ts";
 import { isEvent, linesOf, read } from "./grammar.ts";
@@ -12,6 +15,10 @@ import { type Happening, type Link, NoMachine, Refused } from "./session.ts";
 const SILENCE_MS = 3000;
 /** Time between two tries to reach it. */
 const RETRY_MS = 2000;
+/** Time limit of a HOLD, and of a question about the computer. The page then tries again. */
+const SHORT_MS = 1500;
+/** Time limit of a command, and of a HOLD to all: the computer gives a silent machine up after 3 s. */
+const LONG_MS = 10_000;
 
 const SILENT = english("servedSilent");
 
@@ -50,18 +57,36 @@ type About =
     | { is: "settings" | "examples"; said: string[] }
     | { is: "status" | "event"; said: string };
 
-type Message = (About & { machine: number }) | { is: "beat" | "dropped" };
+type Message = (About & { machine: number }) | { is: "beat" | "dropped" | "held" };
+
+/** Sends a request. It fails with `NoMachine` at its time limit, or when `gone` aborts. Returns the status and the body. */
+async function send(path: string, limitMs: number, request: RequestInit = {}, gone?: AbortSignal) {
+    const limit = new AbortController();
+    const give = () => limit.abort();
+    const timer = setTimeout(give, limitMs);
+    gone?.addEventListener("abort", give);
+    try {
+        const answer = await fetch(path, { ...request, signal: limit.signal });
+        return { status: answer.status, isOk: answer.ok, text: await answer.text() };
+    } catch {
+        throw gone?.aborted ? gone.reason : new NoMachine(SILENT);
+    } finally {
+        clearTimeout(timer);
+        gone?.removeEventListener("abort", give);
+    }
+}
 
 export class Served {
     readonly machines: readonly ServedMachine[];
     #events: EventSource | undefined;
     #heardMs = 0;
+    /** The number of the last message. */
+    #seen = "";
 
     /** Asks the computer for its machines. */
     static async open(): Promise<Served> {
-        const answer = await fetch("/machines");
-        const text = await answer.text();
-        if (!answer.ok) throw new Error(text);
+        const { isOk, text } = await send("/machines", LONG_MS);
+        if (!isOk) throw new Error(text);
         return new Served(text, JSON.parse(text));
     }
 
@@ -70,15 +95,16 @@ export class Served {
         private readonly text: string,
         readonly allowed: Allowed & { machines: string[] },
     ) {
-        this.machines = allowed.machines.map((name, number) => new ServedMachine(number, name));
+        this.machines = allowed.machines.map((name, number) => new ServedMachine(number, name, () => this.#seen));
     }
 
     listen(): void {
         this.#heardMs = performance.now();
         const events = new EventSource("/events");
         this.#events = events;
-        events.addEventListener("message", ({ data }) => {
+        events.addEventListener("message", ({ data, lastEventId }) => {
             this.#heardMs = performance.now();
+            this.#seen = lastEventId;
             this.#take(JSON.parse(data) as Message);
         });
         events.addEventListener("error", () => this.#lose(SILENT));
@@ -86,11 +112,9 @@ export class Served {
 
     /** Holds all machines, before all waiting commands. */
     async holdAll(): Promise<HeldAll> {
-        const answer = await fetch("/machines/hold", { method: "POST" }).catch(() => {
-            throw new Error(SILENT);
-        });
-        if (!answer.ok) throw new Error(await answer.text());
-        return (await answer.json()) as HeldAll;
+        const { isOk, text } = await send("/machines/hold", LONG_MS, { method: "POST" });
+        if (!isOk) throw new Error(text);
+        return JSON.parse(text) as HeldAll;
     }
 
     /** Checks whether the computer has fallen silent. */
@@ -100,7 +124,7 @@ export class Served {
 
     #take(message: Message): void {
         if (message.is === "dropped") this.#lose(english("servedDropped"));
-        else if ("machine" in message) this.machines[message.machine]?.tell(message);
+        else if (message.is !== "held" && "machine" in message) this.machines[message.machine]?.tell(message);
     }
 
     #lose(why: string): void {
@@ -112,10 +136,10 @@ export class Served {
     }
 
     async #again(): Promise<void> {
-        const answer = await fetch("/machines").catch(() => undefined);
+        const answer = await send("/machines", SHORT_MS).catch(() => undefined);
         // A new start of `weeder serve` has another code, so it answers with the form. It may have other machines.
-        if (answer?.status === 401 || (answer?.ok && (await answer.text()) !== this.text)) location.reload();
-        else if (answer?.ok) this.listen();
+        if (answer?.status === 401 || (answer?.isOk && answer.text !== this.text)) location.reload();
+        else if (answer?.isOk) this.listen();
         else setTimeout(() => void this.#again(), RETRY_MS);
     }
 }
@@ -131,24 +155,31 @@ export class ServedMachine implements Link {
     #answered: Promise<unknown> = Promise.resolve();
     #holds = 0;
 
+    /** `seen` returns the number of the last message from the computer. */
     constructor(
         private readonly number: number,
         readonly name: string,
+        private readonly seen: () => string = () => "",
     ) {}
 
     ask(command: string): Promise<string[]> {
         const holds = this.#holds;
+        // What the operator has seen, and not what is seen when the command's turn comes.
+        const seen = this.seen();
         const answer = this.#answered.then(() => {
             if (holds !== this.#holds) throw new Refused(english("holdFirst"));
-            return this.#type(command);
+            const gone = this.#there?.signal;
+            if (!gone) throw new NoMachine(english("servedNotThere"));
+            return this.#type(command, LONG_MS, { headers: { "Weeder-Seen": seen } }, gone);
         });
         this.#answered = answer.catch(() => {});
         return answer;
     }
 
+    /** Goes out at once, also if the machine seems to be lost. */
     async hold(): Promise<void> {
         this.#holds++;
-        await this.#type("hold");
+        await this.#type("hold", SHORT_MS);
     }
 
     /** Takes the computer's news of it. */
@@ -177,7 +208,7 @@ export class ServedMachine implements Link {
     }
 
     #lose(why: string): void {
-        this.#there?.abort(new NoMachine(why));
+        this.#there?.abort(new NoMachine(english("mayBeDone", { why })));
         if (this.#there) this.onHappening({ is: "lost", why, forGood: true, isWanted: false });
         else this.onAbsent(why);
         this.#there = undefined;
@@ -190,19 +221,16 @@ export class ServedMachine implements Link {
         else if (isEvent(said)) this.onHappening({ is: "event", event: said, line });
     }
 
-    async #type(line: string): Promise<string[]> {
-        const signal = this.#there?.signal;
-        if (!signal) throw new NoMachine(english("servedNotThere"));
+    async #type(line: string, limitMs: number, request?: RequestInit, gone?: AbortSignal): Promise<string[]> {
         this.onHappening({ is: "command", line });
-        const request = { method: "POST", body: line, signal };
-        const answer = await fetch(`/machines/${this.number}/command`, request)
-            .then((response) => response.text())
-            .catch((error) => {
-                throw error instanceof NoMachine ? error : new NoMachine(SILENT);
-            });
-        const lines = answer.trim().split("\n");
+        const path = `/machines/${this.number}/command`;
+        const { text } = await send(path, limitMs, { ...request, method: "POST", body: line }, gone).catch((error) => {
+            const isUnknown = gone !== undefined && !gone.aborted;
+            throw isUnknown ? new NoMachine(english("mayBeDone", { why: SILENT })) : error;
+        });
+        const lines = text.trim().split("\n");
         const end = read(lines.at(-1) ?? "");
-        if (end.is !== "end") throw new NoMachine(answer.trim());
+        if (end.is !== "end") throw new NoMachine(text.trim());
         for (const line of lines) this.onHappening({ is: "answer", line });
         if (end.error !== undefined) throw new Refused(end.error);
         return lines.slice(0, -1);

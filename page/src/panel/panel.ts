@@ -6,7 +6,7 @@
 import { download, Parts } from "../dom.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
-import { type Ask, type Happening, type Link, NoMachine } from "../link/session.ts";
+import { type Ask, type Happening, type Link, NoMachine, Refused } from "../link/session.ts";
 import { isStill, STILL_MS } from "../preferences.ts";
 import { signal } from "../signals.ts";
 import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
@@ -23,6 +23,9 @@ const EVERYTHING: Allowed = { mayStart: true, mayChange: true };
 
 /** Time between two turns of a real machine's panel. */
 export const TURN_MS = 20;
+
+/** Time between a HOLD that has not come through and the next one. */
+const HOLD_AGAIN_MS = 500;
 
 /** How long a reason must last before a screen reader says it. A state is said at once. */
 const LASTING_MS = 1000;
@@ -48,6 +51,8 @@ export class Panel {
     #heard = { text: "", state: "", sinceMs: 0 };
     /** Whether the next state follows this page's own HOLD, whose answer is already signalled. */
     #isHolding = false;
+    /** A HOLD that has not come through: when it is sent again, or undefined while it is on its way. */
+    #holdPending: { againMs: number | undefined } | undefined;
     #link: Link | undefined;
     #now = 0;
     /** When the strip was last drawn. */
@@ -104,17 +109,43 @@ export class Panel {
         return (version !== undefined && mode === "work") || this.#log.isUnsaved;
     }
 
-    /** Holds the machine, before all waiting commands. */
+    /**
+     * Holds the machine, before all waiting commands. It is sent again until the machine has obeyed, also by the next
+     * connection.
+     */
     hold(): void {
-        const link = this.#link;
-        if (!link || this.machine.version === undefined) return;
+        if (!this.#link) {
+            this.#parts.say("drive-said", () => sentence(told(english("noneConnected"))));
+            return;
+        }
         this.#isHolding = this.machine.mode === "work";
-        this.#drive(link.hold().then(() => signal("held")));
+        this.#holdPending = { againMs: undefined };
+        void this.#sendHold(this.#holdPending);
+    }
+
+    async #sendHold(pending: { againMs: number | undefined }): Promise<void> {
+        pending.againMs = undefined;
+        const said = this.#parts.html("drive-said");
+        try {
+            await this.#link?.hold();
+            signal("held");
+            if (this.#holdPending === pending) {
+                this.#holdPending = undefined;
+                said.classList.remove("problem");
+                this.#parts.write("drive-said", "");
+            }
+        } catch (error) {
+            pending.againMs = this.#now + HOLD_AGAIN_MS;
+            if (this.#holdPending !== pending) return;
+            said.classList.add("problem");
+            this.#parts.say("drive-said", () => say("holdFailed", { why: told(error).replace(/\.$/, "") }));
+        }
     }
 
     /** Talks to this machine from now on. */
     connect(link: Link, nowMs: number): void {
         this.#now = nowMs;
+        if (this.#holdPending) this.#holdPending.againMs = nowMs;
         this.machine.lost = english("waitingForMachine");
         link.onHappening = (happening) => {
             if (link === this.#link) this.#take(happening);
@@ -125,10 +156,13 @@ export class Panel {
     async disconnect(): Promise<void> {
         await this.#link?.close?.();
         this.#link = undefined;
+        this.#holdPending = undefined;
     }
 
     ask(command: string): Promise<string[]> {
         if (!this.#link) return Promise.reject(new NoMachine(english("noneConnected")));
+        if (this.#holdPending && command.startsWith("start"))
+            return Promise.reject(new Refused(english("holdPending")));
         return this.#link.ask(command);
     }
 
@@ -142,6 +176,8 @@ export class Panel {
     /** Goes on, at the machine's time. */
     turn(nowMs: number): void {
         this.#now = nowMs;
+        const pending = this.#holdPending;
+        if (pending?.againMs !== undefined && nowMs >= pending.againMs) void this.#sendHold(pending);
         this.#link?.turn?.(nowMs);
     }
 
@@ -186,7 +222,7 @@ export class Panel {
         this.#log.add(happening, this.#now);
         this.#setUp.take(happening);
         const { is } = happening;
-        if (is === "connected" || (is === "event" && happening.event.is === "state"))
+        if (!this.#holdPending && (is === "connected" || (is === "event" && happening.event.is === "state")))
             this.#parts.write("drive-said", "");
         if (is === "event") this.#calibration.take(happening.event);
         if (is === "connected" || is === "lost") this.#showConnected();

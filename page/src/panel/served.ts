@@ -15,9 +15,19 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         all.ariaLabel = say("allRows");
     });
     const names = served.machines.map(({ name }) => name);
-    const showAll = names.length > 1 ? overview(all, names, () => served.holdAll()) : undefined;
+    const panels: Panel[] = [];
+    // A machine that has not obeyed gets HOLD again until it has.
+    const holdAll = async () => {
+        const held = await served.holdAll().catch((error) => {
+            for (const panel of panels) panel.hold();
+            throw error;
+        });
+        for (const [row, { error }] of held.machines.entries()) if (error !== null) panels[row]?.hold();
+        return held;
+    };
+    const showAll = names.length > 1 ? overview(all, names, holdAll) : undefined;
     if (showAll) into.append(all);
-    const panels = served.machines.map((machine, number) => {
+    const shown = served.machines.map((machine, number) => {
         const { name } = machine;
         const element = make("div", showAll ? "panel stack" : "panel stack alone");
         const section = make("section", "served stack", make("h2", "", name), element);
@@ -34,6 +44,7 @@ export async function showServed(into: HTMLElement): Promise<Panel[]> {
         };
         return panel;
     });
+    panels.push(...shown);
     setInterval(() => {
         served.watch();
         for (const panel of panels) panel.turn(performance.now());

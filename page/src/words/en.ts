@@ -153,7 +153,7 @@ export const en = {
         // All rows.
         allRows: "all rows",
         waitingForAll: "HOLD: waiting for all to obey.",
-        holdFailed: "HOLD has not come through: {why}",
+        holdFailed: "HOLD has not come through: {why}. It is sent again until the machine holds.",
         notObeyed: "{name} NOT: {why}",
         obeyed: "HOLD obeyed by {obeyed} of {all}.",
         obeyedAfter: "HOLD obeyed by {obeyed} of {all}, the last after {time}.",
@@ -345,6 +345,10 @@ export const en = {
         // Texts of the session, as in session.ts and `weeder serve`.
         waitingForMachine: "Waiting for the machine to answer.",
         noneConnected: "no machine is connected",
+        mayBeDone: "{why}. This may have been done, or may still be done: look at the machine",
+        servedLate: "this came more than a second late, so it was not sent: look at the machine, then try again",
+        servedUnknown: "{why}. The machine may have done this, or may still do it: look at it",
+        holdPending: "HOLD has not come through yet, so this was not sent",
         holdFirst: "hold came first, so this was not sent",
         wasReset: "the Uno was reset",
         resetWhileAsked: "the Uno was reset while it was asked",

@@ -152,7 +152,7 @@ export const fr: Language = {
 
         allRows: "tous les rangs",
         waitingForAll: "PAUSE : en attente que toutes obéissent.",
-        holdFailed: "La PAUSE n'est pas passée : {why}",
+        holdFailed: "La PAUSE n'est pas passée : {why}. Elle est renvoyée jusqu'à ce que la machine s'arrête.",
         notObeyed: "{name} NON : {why}",
         obeyed: "PAUSE obéie par {obeyed} sur {all}.",
         obeyedAfter: "PAUSE obéie par {obeyed} sur {all}, la dernière après {time}.",
@@ -339,6 +339,11 @@ export const fr: Language = {
             "Sinon, avrdude écrit le HEX, et tout moniteur série à 115200 bauds parle à la machine.",
         waitingForMachine: "En attente de la réponse de la machine.",
         noneConnected: "aucune machine n'est connectée",
+        mayBeDone: "{why}. Ceci a peut-être été fait, ou le sera peut-être encore : regardez la machine",
+        servedLate:
+            "ceci est arrivé avec plus d'une seconde de retard et n'a pas été envoyé : regardez la machine, puis réessayez",
+        servedUnknown: "{why}. La machine l'a peut-être fait, ou le fera peut-être encore : regardez-la",
+        holdPending: "la PAUSE n'est pas encore passée, ceci n'a donc pas été envoyé",
         holdFirst: "la pause est passée avant, ceci n'a donc pas été envoyé",
         wasReset: "l'Uno a redémarré",
         resetWhileAsked: "l'Uno a redémarré pendant la question",

@@ -274,7 +274,7 @@ impl RowModel {
             Happening::Answered { refusal, .. } => {
                 self.answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
             }
-            Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
+            Happening::Late(_) | Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
         }
     }
 

@@ -135,7 +135,9 @@ impl Talk<'_> {
         let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
         match &heard.what {
             What::Happened(Happening::Connected { .. }) => standing.is_there = true,
-            What::Happened(Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_)) => {}
+            What::Happened(
+                Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_) | Happening::Late(_),
+            ) => {}
             What::Happened(Happening::Status(..)) => standing.statuses += 1,
             What::Happened(Happening::Lost(why)) => {
                 let was_idle = standing.unanswered == 0;

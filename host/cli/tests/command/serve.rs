@@ -19,6 +19,7 @@ use trial::firmware;
 use ureq::Agent;
 
 mod attacks;
+mod late;
 
 /// Timeout of an answer: a hundred times the time on a busy PC.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -95,8 +96,14 @@ struct Served {
 
 /// Serves these ports, also in the network.
 fn serve(folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
-    let mut serve = weeder();
-    serve.arg("serve").args(["--http-port", "0", "--page"]).arg(folder.path().join("page")).args(LAN).args(options);
+    let mut command = weeder();
+    command.arg("serve");
+    serve_with(command, folder, ports, &[&LAN, options].concat())
+}
+
+/// The same by a command that ends with `serve`.
+fn serve_with(mut serve: Command, folder: &TempDir, ports: &[&Path], options: &[&str]) -> Served {
+    serve.args(["--http-port", "0", "--page"]).arg(folder.path().join("page")).args(options);
     for port in ports {
         serve.arg("--port").arg(port);
     }
@@ -143,9 +150,25 @@ impl Served {
         (answer.status().as_u16(), answer.body_mut().read_to_string().expect("it is text"))
     }
 
-    /// Sends a POST request as the host's own page does.
+    /// Sends a POST request as the host's own page does. A busy computer is too late at times, so it tries again.
     fn post(&self, host: &str, path: &str, cookie: &str, body: &str) -> (u16, String) {
-        let request = self.agent.post(format!("http://{host}{path}"));
+        loop {
+            let answer = self.post_after(&self.seen(host, cookie), host, path, cookie, body);
+            if answer.0 != 412 {
+                return answer;
+            }
+        }
+    }
+
+    /// The number of a message that is sent now; empty if this client gets none.
+    fn seen(&self, host: &str, cookie: &str) -> String {
+        let mut events = Events::open(host, cookie, 0);
+        events.next().map(|_| events.number).unwrap_or_default()
+    }
+
+    /// Sends a POST request of a client that has seen this message last.
+    fn post_after(&self, seen: &str, host: &str, path: &str, cookie: &str, body: &str) -> (u16, String) {
+        let request = self.agent.post(format!("http://{host}{path}")).header("Weeder-Seen", seen);
         let request = request.header("Origin", format!("http://{host}")).header("Cookie", cookie);
         let mut answer = request.send(body).expect("it answers");
         (answer.status().as_u16(), answer.body_mut().read_to_string().expect("it is text"))
@@ -193,22 +216,29 @@ fn has(message: &Value, field: &str, words: &str) -> bool {
 }
 
 /// Server-sent events, over a socket of their own.
-struct Events(BufReader<TcpStream>);
+struct Events {
+    stream: BufReader<TcpStream>,
+    /// The number of the last message.
+    number: String,
+}
 
 impl Events {
     /// Opens the event stream. `room` is the size of the receive buffer; 0 is the system's default.
     fn open(host: &str, cookie: &str, room: usize) -> Self {
         let mut stream = connect(host, room);
         write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\n\r\n").expect("it listens");
-        Self(BufReader::new(stream))
+        Self { stream: BufReader::new(stream), number: String::new() }
     }
 
     /// The next message. `None` at the end.
     fn next(&mut self) -> Option<Value> {
         loop {
             let mut line = String::new();
-            if self.0.read_line(&mut line).expect("something comes") == 0 {
+            if self.stream.read_line(&mut line).expect("something comes") == 0 || line.starts_with("HTTP/1.1 4") {
                 return None;
+            }
+            if let Some(number) = line.strip_prefix("id: ") {
+                number.trim_end().clone_into(&mut self.number);
             }
             if let Some(message) = line.strip_prefix("data: ") {
                 return Some(serde_json::from_str(message).expect("it is JSON"));
@@ -465,7 +495,7 @@ fn clients_that_never_read_are_let_go_of_and_hold_up_neither_the_machine_nor_the
     let more_kb = memory_kb(&served.process).saturating_sub(before_kb);
     assert!(more_kb < 8 << 10, "{more_kb} KB more");
     for listener in listeners {
-        let bytes = bytes_to_the_end(listener.0);
+        let bytes = bytes_to_the_end(listener.stream);
         assert!(bytes < heard / 2, "{bytes} bytes came late");
     }
     let bytes = bytes_to_the_end(asking);

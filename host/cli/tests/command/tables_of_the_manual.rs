@@ -6,6 +6,7 @@
 use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
 use expect_test::{ExpectFile, expect_file};
+use experiments::evaluation::published;
 use field::conditions::{Conditions, Parameter};
 use field::wiring;
 use link::settings::{help, name, unit};
@@ -195,9 +196,9 @@ fn the_page_of_the_blinking_led_has_every_code_with_advice() {
 #[test]
 fn the_result_in_the_readme_is_that_of_the_figures() {
     let figures = expect_file!["../../../../docs/figures.md"].data();
-    let (_, trial) = figures
-        .split_once("<!-- figures: weeder trial --speeds 1,1.5,2,2.5,3,4 --replications 60 -->")
-        .expect("a trial of the set-up machine");
+    let command = "weeder trial --speeds 1,1.5,2,2.5,3,4 --replications 60";
+    let (_, trial) =
+        figures.split_once(&format!("<!-- figures: {command} -->")).expect("a trial of the set-up machine");
     // The first line of this speed and controller is of plants, the second of ground.
     let cells = |controller: &str, table: usize| -> Vec<&str> {
         let lines = trial.lines().map(|line| line.trim_matches(['│', ' ']));
@@ -214,9 +215,11 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
         (share.to_owned(), interval.to_owned())
     };
     let ((damaged, interval), (damaged_there, _)) = (split(damaged), split(damaged_there));
+    let (lowest, highest) = published::DAMAGED_PERCENT;
     let sentence = format!(
         "In simulated rows at 2.5 km/h, this firmware weeded {weeded} % of the row's ground and damaged {damaged} % of the plants \
-         ({interval} %).\nThe paper's controller weeded {weeded_there} % and damaged {damaged_there} %.\n"
+         ({interval} %, a one-sided\n95 % bound). The paper's program on the same machine weeded {weeded_there} % and damaged {damaged_there} %. \
+         On its own machine\nthe paper measured {lowest} to {highest} %. `{command}` prints these figures.\n"
     );
     let page = expect_file!["../../../../README.md"];
     page.assert_eq(&with_part(&page, "result", &sentence));

@@ -211,7 +211,7 @@ fn field_efficiency_falls_with_speed_as_the_paper_s_equation_has_it() {
     let slope = analysis.responses[3].model.as_ref().unwrap().term("speed").unwrap().clone();
     assert!((slope.estimate - -2.06).abs() < 3.0 * slope.standard_error + 0.5, "{slope:?}");
     for treatment in analysis.treatments() {
-        let percent = treatment.mean.field_efficiency_percent;
+        let percent = treatment.mean.field_efficiency_percent.unwrap();
         assert!((77.0..91.0).contains(&percent), "{percent} % at {} km/h", treatment.speed_km_h);
     }
 }

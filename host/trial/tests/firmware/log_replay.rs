@@ -5,6 +5,7 @@ use field::motion::Motion;
 use field::planting::Planting;
 use field::row::{Canopy, Row};
 use link::log::{self, Entry, Kind, LogWriter};
+use link::moment::Moment;
 use link::replay::{Replayed, replay};
 use link::session::{Happening, Session};
 use link::{EventLine, Link, LinkError, Status};
@@ -15,7 +16,7 @@ use rayon::prelude::*;
 use std::io::{self, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use trial::{UnoPort, firmware};
 use uno::CYCLES_PER_SECOND;
 use uno::Uno;
@@ -65,23 +66,22 @@ fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], e
     };
     let mut session = Session::waiting_for(open);
     for command in commands {
-        assert!(session.command(command), "{command}");
+        assert!(session.command(command, Moment::NEVER), "{command}");
     }
     let folder = tempfile::tempdir().expect("there is room for a log");
     let path = folder.path().join("log.csv");
     let mut log = LogWriter::open(&path).expect("the log can be written");
-    let began = Instant::now();
     let mut standing = 0;
     while standing < 10 {
         if let Some(typed) = &mut typed
             && typed.random_ratio(1, 100)
         {
             match typed.random_range(0..5) {
-                place @ 0..3 => assert!(session.command(["start", "start now", "clear"][place])),
+                place @ 0..3 => assert!(session.command(["start", "start now", "clear"][place], Moment::NEVER)),
                 _ => _ = session.hold(),
             }
         }
-        let now = began + Duration::from_millis(ms.load(Ordering::Relaxed));
+        let now = Moment::default().after(Duration::from_millis(ms.load(Ordering::Relaxed)));
         for happening in session.turn(now) {
             assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
             if let Happening::Status(status, _) = &happening {

@@ -10,13 +10,14 @@ use gps::summary::{Stand, Summary};
 use gps::track::{Basis, Missing, Offset};
 use gps::{Antenna, Recorder, Wanted};
 use link::log::{self, Entry, Kind, LogWriter};
+use link::moment::Moment;
 use link::replay::replay;
 use link::session::{Happening, Session};
 use link::{Class, Link, LinkError};
 use std::cell::Cell;
 use std::io::{self, Read, Write};
 use std::rc::Rc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use trial::{UnoPort, firmware};
 use uno::CYCLES_PER_SECOND;
 
@@ -90,20 +91,20 @@ fn recorded(
     };
     let mut session = Session::waiting_for(open);
     // The simulated servo has no load, and the tool swings in between any two plants.
-    assert!(session.command("set lead_out_ms 180") && session.command("start"));
+    assert!(session.command("set lead_out_ms 180", Moment::NEVER) && session.command("start", Moment::NEVER));
     let folder = tempfile::tempdir().expect("there is room for a log");
     let path = folder.path().join("log.csv");
     let mut log = LogWriter::open(&path).expect("the log can be written");
     let mut simulated = SimulatedReceiver::new(setup.clone());
     let (mut recorder, lines) = Recorder::new(antenna);
     let time_s = || cycle.get() as f64 / CYCLES_PER_SECOND as f64;
-    let (began, began_s) = (Instant::now(), time_s());
+    let began_s = time_s();
     let end_s = (sets_off as f64 / CYCLES_PER_SECOND as f64) + motion.duration_s() + 1.0;
     let mut is_plugged = true;
     log.lines_at(0, &lines).expect("the log can be written");
     log.lines_at(0, &recorder.found(0, "simulated")).expect("the log can be written");
     while time_s() < end_s {
-        let happened = session.turn(began + Duration::from_secs_f64(time_s() - began_s));
+        let happened = session.turn(Moment::default().after(Duration::from_secs_f64(time_s() - began_s)));
         let since_s = time_s() - began_s;
         let time_ms = (since_s * 1000.0) as u64;
         for happening in happened {
@@ -115,7 +116,7 @@ fn recorded(
                 && line.starts_with("weed ")
                 && since_s > 30.0
             {
-                assert!(session.command("label weed force"));
+                assert!(session.command("label weed force", Moment::NEVER));
             }
         }
         let bytes = simulated.bytes_until(time_s(), distance_m);

@@ -65,12 +65,12 @@ impl<'a> Client<'a> {
 }
 
 /// A request's head up to `rest`.
-fn request(host: &str, cookie: &str, method: &str, path: &str, rest: &str) -> String {
+pub(super) fn request(host: &str, cookie: &str, method: &str, path: &str, rest: &str) -> String {
     format!("{method} {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nCookie: {cookie}\r\n{rest}")
 }
 
 /// An answer's status and body.
-fn answer(stream: &mut impl BufRead) -> (u16, String) {
+pub(super) fn answer(stream: &mut impl BufRead) -> (u16, String) {
     let (mut status, mut length) = (0, 0);
     loop {
         let mut line = String::new();

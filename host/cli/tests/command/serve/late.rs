@@ -1,0 +1,273 @@
+//! Commands that come late, or after a later HOLD: from a phone at the edge of the network, to a computer that slept, and
+//! through a port that stalled. The machine must not start by any of them.
+//!
+//! The network is the kernel's own, in two namespaces whose packets vanish for a while. Without the rights for
+//! namespaces, that test prints so and tries nothing.
+
+use super::*;
+
+/// The computer's and the phone's address, and the addresses of their network cards.
+const COMPUTER: &str = "10.77.0.1";
+const PHONE: &str = "10.77.0.2";
+const CARDS: [&str; 2] = ["02:00:00:00:77:01", "02:00:00:00:77:02"];
+/// A card that does not exist: packets to it vanish.
+const NO_CARD: &str = "02:00:00:00:77:99";
+
+/// The variable with the names of the namespaces, for the test that runs in the phone's.
+const NAMES: &str = "WEEDER_TEST_NAMESPACES";
+
+/// A phone's connection for one command at a time.
+struct Phone<'a> {
+    host: &'a str,
+    cookie: &'a str,
+    stream: BufReader<TcpStream>,
+}
+
+impl<'a> Phone<'a> {
+    fn open(host: &'a str, cookie: &'a str) -> Self {
+        Self { host, cookie, stream: BufReader::new(connect(host, 0)) }
+    }
+
+    /// Sends a command of a phone that has seen this message. Does not wait for the answer.
+    fn send(&mut self, line: &str, seen: &str) {
+        let seen = format!("Weeder-Seen: {seen}\r\nContent-Length: {}\r\n\r\n{line}", line.len());
+        let text = attacks::request(self.host, self.cookie, "POST", "/machines/0/command", &seen);
+        self.stream.get_mut().write_all(text.as_bytes()).expect("it is open");
+    }
+
+    fn answer(&mut self) -> (u16, String) {
+        attacks::answer(&mut self.stream)
+    }
+}
+
+/// The state of the machine, by a status that is sent after now.
+fn state(host: &str, cookie: &str) -> String {
+    let mut events = Events::open(host, cookie, 0);
+    let mut statuses = std::iter::from_fn(|| events.next()).filter(|message| message["is"] == "status");
+    let status = statuses.nth(1).expect("the machine tells its status")["said"].as_str().unwrap_or_default().to_owned();
+    status.split(' ').next().unwrap_or_default().to_owned()
+}
+
+#[track_caller]
+fn assert_is_late(answer: &(u16, String)) {
+    assert!(answer.0 == 412 && answer.1.contains("more than a second late, so it was not sent"), "{answer:?}");
+}
+
+#[track_caller]
+fn assert_came_after_hold(answer: &(u16, String)) {
+    assert!(answer.0 == 412 && answer.1.contains("hold came first, so this was not sent"), "{answer:?}");
+}
+
+#[test]
+fn a_command_says_what_its_sender_has_seen_and_hold_needs_to_have_seen_nothing() {
+    let folder = folder();
+    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
+    let served = serve(&folder, &[&port], &["--allow-start"]);
+    served.make_ready(0);
+    let phone = served.pair();
+    let command = |seen: &str, line: &str| served.post_after(seen, &served.lan, "/machines/0/command", &phone, line);
+    for seen in ["", "x", "-1"] {
+        let (status, said) = command(seen, "start");
+        assert!(status == 428 && said.contains("as the header Weeder-Seen"), "{status} {said}");
+        assert_eq!(command(seen, "hold"), (200, "ok\n".to_owned()));
+    }
+    let seen = served.seen(&served.lan, &phone);
+    assert_eq!(command(&seen, "HOLD!"), (200, "ok\n".to_owned()));
+    assert_came_after_hold(&command(&seen, "start"));
+    for seen in ["0", &"9".repeat(19)] {
+        assert_is_late(&command(seen, "start"));
+    }
+    assert_eq!(state(&served.lan, &phone), "state=hold");
+    assert_eq!(served.command(&served.lan, &phone, "start"), (200, "ok\n".to_owned()));
+    assert_eq!(state(&served.lan, &phone), "state=work");
+}
+
+/// Sends a signal to a process.
+fn signal(process: &Running, name: &str) {
+    assert!(Command::new("kill").args([name, &process.0.id().to_string()]).status().expect("kill is there").success());
+}
+
+#[test]
+fn a_start_that_waited_while_the_computer_slept_is_refused() {
+    let folder = folder();
+    let (_uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
+    let served = serve(&folder, &[&port], &["--allow-start"]);
+    served.make_ready(0);
+    let cookie = served.pair();
+    let mut phone = Phone::open(&served.lan, &cookie);
+    let seen = served.seen(&served.lan, &cookie);
+    signal(&served.process, "-STOP");
+    phone.send("start", &seen);
+    thread::sleep(Duration::from_millis(1500));
+    signal(&served.process, "-CONT");
+    assert_is_late(&phone.answer());
+    assert_eq!(state(&served.lan, &cookie), "state=hold");
+}
+
+#[test]
+fn a_sleep_of_the_computer_is_no_silence_of_the_machine() {
+    let folder = folder();
+    // A second connection would reset it, and its answers wait while the computer sleeps.
+    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
+    let served = serve(&folder, &[&port], &["--allow-start"]);
+    served.make_ready(0);
+    assert_eq!(served.command(&served.here, "", "start"), (200, "ok\n".to_owned()));
+    let mut events = Events::open(&served.here, "", 0);
+    for _ in 0..3 {
+        signal(&served.process, "-STOP");
+        thread::sleep(Duration::from_millis(4000));
+        signal(&served.process, "-CONT");
+        for _ in 0..20 {
+            let message = events.next().expect("it goes on");
+            assert_ne!(message["is"], "lost", "{message}");
+        }
+    }
+    assert_eq!(state(&served.here, ""), "state=work");
+}
+
+#[test]
+fn a_start_through_a_port_that_stalls_may_be_done_but_not_after_it_is_given_up() {
+    let folder = folder();
+    let (uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
+    let served = serve(&folder, &[&port], &["--allow-start"]);
+    served.make_ready(0);
+    let mut events = Events::open(&served.here, "", 0);
+    signal(&uno, "-STOP");
+    // The machine's silence ends it, or the server's loss of the machine before.
+    let (status, said) = served.command(&served.here, "", "start");
+    assert!(matches!(status, 503 | 504), "{status} {said}");
+    assert!(status == 503 || said.contains("may still do it"), "{status} {said}");
+    signal(&uno, "-CONT");
+    events.wait_for(|message| {
+        assert!(!has(message, "said", "work"), "{message}");
+        message["is"] == "there"
+    });
+    assert_eq!(state(&served.here, ""), "state=hold");
+}
+
+/// Runs `ip`. Returns whether it has succeeded, and why not.
+fn ip(words: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(words.split(' ')).output().map_err(|error| format!("ip: {error}"))?;
+    match output.status.success() {
+        true => Ok(()),
+        false => Err(format!("ip {words}: {}", String::from_utf8_lossy(&output.stderr).trim())),
+    }
+}
+
+/// Two namespaces with a cable between them, deleted at the end.
+struct Namespaces([String; 2]);
+
+impl Namespaces {
+    fn new() -> Result<Self, String> {
+        let id = std::process::id();
+        let names = Self([format!("weeder-c-{id}"), format!("weeder-p-{id}")]);
+        let [computer, phone] = &names.0;
+        ip(&format!("netns add {computer}"))?;
+        ip(&format!("netns add {phone}"))?;
+        ip(&format!("-n {computer} link add cable type veth peer name cable netns {phone}"))?;
+        for ((name, address), card) in names.0.iter().zip([COMPUTER, PHONE]).zip(CARDS) {
+            ip(&format!("-n {name} link set cable address {card}"))?;
+            ip(&format!("-n {name} address add {address}/24 dev cable"))?;
+            ip(&format!("-n {name} link set lo up"))?;
+            ip(&format!("-n {name} link set cable up"))?;
+        }
+        Ok(names)
+    }
+}
+
+impl Drop for Namespaces {
+    fn drop(&mut self) {
+        for name in &self.0 {
+            // It may not exist.
+            let _ = ip(&format!("netns delete {name}"));
+        }
+    }
+}
+
+/// Lets all packets through, or lets all vanish.
+fn connect_cable(names: [&str; 2], is_whole: bool) {
+    for (name, (other, card)) in names.into_iter().zip([(PHONE, CARDS[1]), (COMPUTER, CARDS[0])]) {
+        let card = if is_whole { card } else { NO_CARD };
+        ip(&format!("-n {name} neigh replace {other} lladdr {card} dev cable nud permanent")).expect("it is ours");
+    }
+}
+
+#[test]
+fn no_packets_for_a_while_neither_start_a_machine_late_nor_after_a_hold() {
+    let names = match Namespaces::new() {
+        Ok(names) => names,
+        Err(why) => return println!("skipped, because this computer allows no namespace: {why}"),
+    };
+    let own = std::env::current_exe().expect("it runs");
+    let mut inside = Command::new("ip");
+    inside.args(["netns", "exec", &names.0[1]]).arg(own).args(["--exact", INSIDE, "--ignored", "--nocapture"]);
+    let output = inside.env(NAMES, names.0.join(" ")).output().expect("ip is there");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// The name of the test in the phone's namespace.
+const INSIDE: &str = "serve::late::inside_the_namespace_of_the_phone";
+
+#[test]
+#[ignore = "runs in the namespaces that another test makes"]
+fn inside_the_namespace_of_the_phone() {
+    let names = std::env::var(NAMES).expect("the other test runs it");
+    let names: [&str; 2] = names.split(' ').collect::<Vec<_>>().try_into().expect("they are two");
+    let folder = folder();
+    let (_uno, port) = uno(&folder, "uno", &["--stand", "--no-reset"]);
+    let mut monitor = weeder();
+    monitor.args(["monitor", "--plain", "--port"]).arg(&port).stdin(Stdio::piped()).stdout(Stdio::null());
+    let mut monitor = monitor.spawn().expect("cargo has built it");
+    monitor.stdin.take().expect("it is piped").write_all(b"save\nclear\n").expect("it reads");
+    assert!(monitor.wait().expect("it ends").success());
+    let mut command = Command::new("ip");
+    command.args(["netns", "exec", names[0], env!("CARGO_BIN_EXE_weeder"), "serve"]);
+    let served = serve_with(command, &folder, &[&port], &["--lan", COMPUTER, "--allow-start"]);
+    connect_cable(names, true);
+    let cookie = served.pair();
+    let host = served.lan.as_str();
+    assert_eq!(state(host, &cookie), "state=hold");
+
+    // A start that comes seconds late, on a connection that its phone has given up or not.
+    for gives_up in [false, true] {
+        let mut phone = Phone::open(host, &cookie);
+        let seen = served.seen(host, &cookie);
+        connect_cable(names, false);
+        phone.send("start", &seen);
+        if gives_up {
+            phone.stream.get_mut().shutdown(std::net::Shutdown::Write).expect("it is open");
+        }
+        thread::sleep(Duration::from_millis(2500));
+        connect_cable(names, true);
+        if !gives_up {
+            assert_is_late(&phone.answer());
+        }
+        assert_eq!(state(host, &cookie), "state=hold", "{gives_up}");
+    }
+
+    // A start, then HOLD on another connection. The start is sent again by the kernel, behind HOLD.
+    for after_ms in [0, 100, 300, 600] {
+        let mut phones = [(); 2].map(|()| Phone::open(host, &cookie));
+        let seen = served.seen(host, &cookie);
+        connect_cable(names, false);
+        phones[0].send("start", &seen);
+        thread::sleep(Duration::from_millis(after_ms));
+        connect_cable(names, true);
+        phones[1].send("hold", "");
+        assert_eq!(phones[1].answer(), (200, "ok\n".to_owned()));
+        let (status, said) = phones[0].answer();
+        // Before HOLD, or not at all.
+        assert!(matches!(status, 200 | 412), "{status} {said}");
+        assert_eq!(state(host, &cookie), "state=hold", "{after_ms} ms: {status} {said}");
+    }
+
+    // The network forgets connections, and HOLD comes through on a new one.
+    assert_eq!(served.command(host, &cookie, "start"), (200, "ok\n".to_owned()));
+    connect_cable(names, false);
+    thread::sleep(Duration::from_millis(300));
+    connect_cable(names, true);
+    assert_eq!(served.command(host, &cookie, "hold"), (200, "ok\n".to_owned()));
+    assert_eq!(state(host, &cookie), "state=hold");
+    served.process.interrupt();
+}
