@@ -4,9 +4,15 @@
 use std::path::Path;
 use std::{env, fs};
 
-/// The files, in the order that `firmware.rs` expects.
-const FILES: [&str; 5] =
-    ["weeder-firmware.elf", "knn-bench.elf", "tester-firmware.elf", "budgets.toml", "tester/budgets.toml"];
+/// The files, by the names that `firmware.rs` expects.
+const FILES: [&str; 6] = [
+    "weeder-firmware.elf",
+    "knn-bench.elf",
+    "tester-firmware.elf",
+    "budgets.toml",
+    "tester/budgets.toml",
+    "optiboot.hex",
+];
 
 fn main() {
     println!("cargo:rerun-if-env-changed=WEEDER_FIRMWARE");

@@ -80,7 +80,7 @@ pub struct Arguments {
     /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
-    /// Run this ELF instead of building the firmware of this repository.
+    /// Run this ELF instead of this weeder's own firmware.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
     /// Write report.html, trial.csv and controllers.csv into this folder, and create it if needed; with --shard, the
