@@ -91,7 +91,8 @@ cp host/cli/60-weeder.rules "$folder/"
 
 # The manual, with the sources that docs/ links. Other links to sources do not work here.
 mkdir "$folder/manual"
-cp -r README.md CHANGELOG.md CONTRIBUTING.md docs "$folder/manual/"
+cp -r README.md CHANGELOG.md CONTRIBUTING.md CITATION.cff LICENSE-MIT LICENSE-APACHE docs "$folder/manual/"
+cp --parents avr-bounds/README.md "$folder/manual/"
 grep -oh '](\.\./[^)#]*' docs/*.md | sed 's|^](\.\./||' | LC_ALL=C sort -u | xargs cp --parents --target-directory="$folder/manual"
 cargo install --quiet --locked mdbook --version 0.5.4 --no-default-features --features search --root "$target/mdbook"
 "$target/mdbook/bin/mdbook" build --dest-dir "$folder/book"

@@ -100,6 +100,8 @@ pub struct Sweep {
     pub controller: Treatment,
     /// The fixed conditions.
     pub conditions: Conditions,
+    /// Their name.
+    pub field: String,
     /// Speed if no axis has it, km/h.
     pub speed_km_h: f64,
     /// Plant spacing if no axis has it, cm.
@@ -232,6 +234,7 @@ mod tests {
             y: y.map(|y| y.parse().unwrap()),
             controller: Treatment::Firmware,
             conditions,
+            field: "transplanted".to_owned(),
             speed_km_h: 2.5,
             spacing_cm: 50.0,
             seed: 1,

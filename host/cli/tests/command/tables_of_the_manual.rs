@@ -206,8 +206,10 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
         let line = line.unwrap_or_else(|| panic!("no line of {controller}"));
         line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).skip(2).collect()
     };
+    // The first share with an interval is that of the plants that a beam sees.
     let of = |controller: &str| {
-        (cells(controller, 0)[0], cells(controller, 1)[0].split_whitespace().next().unwrap_or_default())
+        let damaged = cells(controller, 0).into_iter().find(|cell| cell.contains(" (")).expect("a share of the plants");
+        (damaged, cells(controller, 1)[0].split_whitespace().next().unwrap_or_default())
     };
     let ((damaged, weeded), (damaged_there, weeded_there)) = (of("this firmware"), of("paper's controller"));
     let split = |damaged: &str| -> (String, String) {
@@ -217,9 +219,9 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
     let ((damaged, interval), (damaged_there, _)) = (split(damaged), split(damaged_there));
     let (lowest, highest) = published::DAMAGED_PERCENT;
     let sentence = format!(
-        "In simulated rows at 2.5 km/h, this firmware weeded {weeded} % of the row's ground and damaged {damaged} % of the plants \
-         ({interval} %, a one-sided\n95 % bound). The paper's program on the same machine weeded {weeded_there} % and damaged {damaged_there} %. \
-         On its own machine\nthe paper measured {lowest} to {highest} %. `{command}` prints these figures.\n"
+        "In simulated rows at 2.5 km/h, this firmware weeded {weeded} % of the row's ground. Of the plants that its beam sees, it \
+         damaged {damaged} %\n({interval} %, a one-sided 95 % bound). The paper's program on the same machine weeded {weeded_there} % and \
+         damaged {damaged_there} %. On its own machine\nthe paper measured {lowest} to {highest} %. `{command}` prints these figures.\n"
     );
     let page = expect_file!["../../../../README.md"];
     page.assert_eq(&with_part(&page, "result", &sentence));
@@ -228,8 +230,10 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
 /// Every parameter of the simulated field as a list in Markdown.
 fn parameters() -> String {
     let mut list = String::new();
-    for (Parameter { name, meaning, source, least, greatest }, default) in Conditions::default().values() {
-        writeln!(list, "- `{name}` = {default} ({least} to {greatest}): {meaning}. Source: {source}.")
+    for (parameter, default) in Conditions::default().values() {
+        let Parameter { name, meaning, source, .. } = parameter;
+        let (default, range) = (parameter.written(default), parameter.range());
+        writeln!(list, "- `{name}` = {default} ({range}): {meaning}. Source: {source}.")
             .expect("a string takes everything");
     }
     list
