@@ -286,6 +286,7 @@ export const en = {
         cancelled: "Cancelled.",
         notRead: "{file} cannot be read: {why}",
         openLog: "Open a log",
+        logExample: "An example: the log of Try",
         logFile: "A log file",
         noLog: "{file} is no log: {why}",
         emptyLog: "{file} has no machine in it.",

@@ -282,6 +282,7 @@ export const es: Language = {
         cancelled: "Cancelado.",
         notRead: "{file} no se puede leer: {why}",
         openLog: "Abrir un registro",
+        logExample: "Un ejemplo: el registro de Probar",
         logFile: "Un archivo de registro",
         noLog: "{file} no es un registro: {why}",
         emptyLog: "{file} no tiene ninguna máquina.",

@@ -282,6 +282,7 @@ export const fr: Language = {
         cancelled: "Arrêté.",
         notRead: "{file} ne peut pas être lu : {why}",
         openLog: "Ouvrir un journal",
+        logExample: "Un exemple : le journal d'Essayer",
         logFile: "Un fichier de journal",
         noLog: "{file} n'est pas un journal : {why}",
         emptyLog: "{file} n'a aucune machine.",

@@ -275,6 +275,7 @@ export const hi: Language = {
         cancelled: "रोक दिया गया।",
         notRead: "{file} पढ़ी नहीं जा सकती: {why}",
         openLog: "लॉग खोलें",
+        logExample: "उदाहरण: “आज़माएँ” का लॉग",
         logFile: "लॉग की फ़ाइल",
         noLog: "{file} लॉग नहीं है: {why}",
         emptyLog: "{file} में कोई मशीन नहीं है।",
