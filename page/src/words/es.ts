@@ -195,8 +195,8 @@ export const es: Language = {
             "{file}: {count} es distinto del de la máquina. Mírelo y envíelo.|{file}: {count} son distintos de los de la máquina. Mírelos y envíelos.",
 
         steps: "Los pasos",
-        stepsLead:
-            "En cualquier orden, y el margen al final. Los valores son de la máquina simulada: escriba lo que mida.",
+        stepsLead: "Paso a paso: escriba lo que mida en su máquina. El margen va al final.",
+        setAndSave: "Fijar y guardar",
         beforeMargin: "Antes de bajar el margen: {steps}",
         next: "Ahora: {step}.",
         setMargin: "Poner el margen en {margin} y guardar",
