@@ -19,6 +19,7 @@ mod console_line;
 mod error;
 mod event_line;
 pub mod examples;
+pub mod follower;
 mod lines;
 pub mod log;
 pub mod moment;
