@@ -224,7 +224,7 @@ test("a device that is no weeder is told by what it says, and the port is let go
 test("a port that another program has is told with the way out", async () => {
     const refuses = { name: "NetworkError", message: "Failed to open serial port." };
     const opened = await connect(new Foreign(() => [], "", refuses));
-    await opened.page.getByText(/Not connected: .*close the serial monitor/).waitFor();
+    await opened.page.getByText(/Not connected: .*close the other tab first, then the serial monitor/).waitFor();
     await close(opened);
 });
 
