@@ -11,7 +11,7 @@ import { Session } from "./link/session.ts";
 import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
-import { chosen, isStill, keep } from "./preferences.ts";
+import { chosen, isStill, keep, STILL_MS } from "./preferences.ts";
 import { RecordView } from "./record/record.ts";
 import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
@@ -37,8 +37,6 @@ import {
 const CHIP_SHARE = 0.8;
 /** Longest time that passes in a frame: a page that was hidden does not catch up. */
 const LONGEST_FRAME_S = 0.1;
-/** Time between two pictures of the row under reduced motion. */
-const STILL_MS = 1000;
 /** Time over which the pace is measured. */
 const PACE_S = 1;
 /** The views, by their sections and the address behind #. */
@@ -75,8 +73,14 @@ trialPanel.onHappening = (happening) => {
     if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
     if (happening.is !== settleAt) return;
     settleAt = undefined;
-    for (const command of [...trial.machine.setUp, "save", "clear"]) trialPanel.ask(command).catch(() => {});
+    const asked = [...trial.machine.setUp, "save", "clear"].map((command) => trialPanel.ask(command));
+    void Promise.all(asked).then(startWork, () => {});
 };
+/** Throws the work switch, so that the first machine weeds at once. */
+function startWork(): void {
+    workSwitch.checked = true;
+    trial.work(true);
+}
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
@@ -132,9 +136,9 @@ choose();
 
 keepFocus();
 
-void makeInstallable((load) => {
-    page.html("newer").hidden = false;
-    page.button("load-newer", load);
+// Loading another page closes the port, which resets a machine at work, and drops the log.
+globalThis.addEventListener("beforeunload", (event) => {
+    if (workPanels.some(({ isNeeded }) => isNeeded)) event.preventDefault();
 });
 
 /** The key for HOLD, for every shown machine. */
@@ -247,3 +251,11 @@ requestAnimationFrame(frame);
 
 // For tests, and for the browser's console.
 Object.assign(globalThis, { trial });
+
+let loadNewer = () => {};
+page.button("load-newer", () => loadNewer());
+// At the end, because it says that this page has started.
+void makeInstallable((load) => {
+    page.html("newer").hidden = false;
+    loadNewer = load;
+});

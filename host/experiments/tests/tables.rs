@@ -213,3 +213,20 @@ fn of_two_equally_bad_plots_both_are_named() {
     let analysis = Analysis::of(mirrored.collect()).unwrap();
     assert_found(&analysis, "Plots 3 and 4 are equally far from the model");
 }
+
+#[test]
+fn what_a_spreadsheet_adds_changes_nothing() {
+    for name in [
+        "rows-of-commas",
+        "padding-stops-after-16",
+        "sep-line",
+        "quoted-note",
+        "whole-numbers-with-point",
+        "semicolons-and-decimal-commas",
+        "tabs",
+    ] {
+        assert_eq!(plots(&format!("{name}.csv")), example(), "{name}");
+    }
+    let error = read_csv(&table("cp1252-in-line-7.csv")).unwrap_err().to_string();
+    assert!(error.contains("line 7: the byte 0xDF is not UTF-8"), "{error}");
+}

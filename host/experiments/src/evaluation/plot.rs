@@ -257,8 +257,7 @@ pub(super) fn is_not_counted(cell: &str) -> bool {
 
 /// Parses a whole number.
 pub(super) fn whole(line: Line, column: &str) -> Result<u32, FileError> {
-    let Whole(value) = line.value(column, "a whole number, 0 or more")?;
-    Ok(value)
+    line.value(column, "a whole number, 0 or more")
 }
 
 fn number(line: Line, column: &str) -> Result<f64, FileError> {
@@ -268,7 +267,7 @@ fn number(line: Line, column: &str) -> Result<f64, FileError> {
 
 fn count(line: Line, column: &str) -> Result<Option<u32>, FileError> {
     let right = "a whole number, 0 or more, or empty if it was not counted";
-    (!is_not_counted(line.text(column))).then(|| line.value(column, right).map(|Whole(value)| value)).transpose()
+    (!is_not_counted(line.text(column))).then(|| line.value(column, right)).transpose()
 }
 
 fn measured(line: Line, column: &str) -> Result<Option<f64>, FileError> {
@@ -284,17 +283,5 @@ impl FromStr for Number {
 
     fn from_str(text: &str) -> Result<Self, ()> {
         text.parse().ok().filter(|value: &f64| value.is_finite()).map(Self).ok_or(())
-    }
-}
-
-/// A whole number. Spreadsheets also write it as `200.0`.
-struct Whole(u32);
-
-impl FromStr for Whole {
-    type Err = ();
-
-    fn from_str(text: &str) -> Result<Self, ()> {
-        let (whole, zeros) = text.split_once('.').unwrap_or((text, ""));
-        if zeros.bytes().any(|digit| digit != b'0') { Err(()) } else { whole.parse().map(Self).map_err(|_| ()) }
     }
 }
