@@ -245,7 +245,7 @@ impl Job {
                         }
                     }
                 }
-                Kind::Example | Kind::Antenna | Kind::GpsFound | Kind::GpsMark => {}
+                Kind::Started | Kind::Example | Kind::Antenna | Kind::GpsFound | Kind::GpsMark => {}
             }
             reading.seen(entry.time_ms);
         }
