@@ -16,6 +16,8 @@ use std::path::Path;
 pub struct Budgets {
     /// The chip, if the ELF does not name it.
     pub chip: Option<String>,
+    /// The address of the interrupt vectors, if it is not where the program begins.
+    pub vectors: Option<u32>,
     /// The deepest stack, in bytes.
     pub stack_bytes: Option<u64>,
     /// The longest handler.

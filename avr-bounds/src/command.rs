@@ -1,5 +1,6 @@
 //! The command line: its arguments, and its output.
 
+use crate::error::printable;
 use crate::{Bounds, BoundsError, Budgets, Frame, FunctionBounds, Held, Longest, Program, order, prove};
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Parser};
@@ -77,7 +78,7 @@ pub fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", printable(&format!("{error:#}")));
             ExitCode::from(2)
         }
     }
@@ -128,7 +129,8 @@ pub fn report(elf: &Path, options: &Options) -> Result<Report> {
     } else {
         in_words(&bounds, &held, options.loops)
     };
-    Ok(Report { text, keeps })
+    // Names come from the file.
+    Ok(Report { text: printable(&text), keeps })
 }
 
 /// The bounds in words and tables.

@@ -37,7 +37,42 @@ pub(crate) fn turns(nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Op
     };
     let exits = ordered.iter().copied().filter(|&node| leaves(node) && runs_once(node));
     let counted = Loop { nodes, circle, ordered: &ordered, entries: &entries, runs_once: &runs_once };
-    exits.filter_map(|exit| counted.turns_by(exit)).min()
+    exits.filter_map(|exit| Some(counted.by(exit)?.0)).min()
+}
+
+/// The edges out of a loop behind which this register is zero, because the loop counts with it. `circle` may have several
+/// entries, but no loop within it.
+pub(crate) fn exits_with_zero(nodes: &[Node], circle: &BTreeSet<usize>, register: usize) -> Vec<(usize, usize)> {
+    let edges = |node: usize| -> Vec<usize> { nodes[node].edges.iter().map(|edge| edge.to).collect() };
+    let entries: Vec<&Edge> = entering(nodes, circle).collect();
+    let of_exit = |&exit: &usize| {
+        let out = edges(exit).into_iter().find(|to| !circle.contains(to))?;
+        let back = edges(exit).into_iter().find(|to| circle.contains(to))?;
+        let others: BTreeSet<usize> = circle.iter().copied().filter(|&node| node != exit).collect();
+        if circle.contains(&0) || edges(exit).len() != 2 || !loops(&others, &edges).is_empty() {
+            return None;
+        }
+        // Every path from a beginning of a turn to the exit passes the place.
+        let passes = |place: usize| {
+            let mut to_do: Vec<usize> = entries.iter().map(|edge| edge.to).chain([back]).collect();
+            let mut seen = BTreeSet::from([place]);
+            while let Some(node) = to_do.pop() {
+                if node == exit && place != exit {
+                    return false;
+                }
+                if circle.contains(&node) && seen.insert(node) {
+                    to_do.extend(edges(node));
+                }
+            }
+            true
+        };
+        let ordered: Vec<usize> = circles(&others, &edges).into_iter().flatten().chain([exit]).collect();
+        let counted = Loop { nodes, circle, ordered: &ordered, entries: &entries, runs_once: &passes };
+        let (_, needed, ends) = counted.by(exit)?;
+        let is_zero = needed.contains(register) && ends.iter().all(|end| end.registers[register] == 0);
+        is_zero.then_some((exit, out))
+    };
+    circle.iter().filter_map(of_exit).collect()
 }
 
 struct Loop<'a> {
@@ -51,16 +86,18 @@ struct Loop<'a> {
 }
 
 impl Loop<'_> {
-    /// The place from which a path comes to this one, if there is only one and this is not the loop's first place.
+    /// The place from which a path comes to this one, if there is only one and no path enters the loop here.
     fn only_before(&self, node: usize) -> Option<usize> {
         let leads = |other: &usize| self.nodes[*other].edges.iter().any(|edge| edge.to == node);
         let mut before = self.circle.iter().copied().filter(leads);
         let only = before.next()?;
-        (node != self.ordered[0] && before.next().is_none()).then_some(only)
+        let is_entry = self.entries.iter().any(|edge| edge.to == node);
+        (!is_entry && before.next().is_none()).then_some(only)
     }
 
-    /// The number of returns to the loop's head, by the branch at `exit`.
-    fn turns_by(&self, exit: usize) -> Option<u64> {
+    /// The number of returns to the loop's head by the branch at `exit`, the registers that decide it, and their values
+    /// at the end for each entry.
+    fn by(&self, exit: usize) -> Option<(u64, Registers, Vec<Concrete>)> {
         let branch = self.nodes[exit].instruction;
         if !matches!(branch.operation, Brbs | Brbc | Cpse | Sbrc | Sbrs) {
             return None;
@@ -109,20 +146,29 @@ impl Loop<'_> {
         let steps: Vec<Instruction> = steps.map(|&node| self.nodes[node].instruction).collect();
         let stays = self.nodes[exit].edges.iter().find(|edge| self.circle.contains(&edge.to))?;
         let stays_when_next = self.nodes[stays.to].place.address == branch.next();
-        let mut most = 0;
+        let (mut most, mut ends) = (0, Vec::new());
         for Edge { constants, .. } in self.entries {
             if !needed.iter().all(|register| constants[register].is_some()) {
                 return None;
             }
             let registers = constants.map(Option::unwrap_or_default);
-            most = most.max(run(&steps, branch.address, stays_when_next, Concrete { registers, status: 0 }, needed)?);
+            let start = Concrete { registers, status: 0 };
+            let (turns, end) = run(&steps, branch.address, stays_when_next, start, needed)?;
+            most = most.max(turns);
+            ends.push(end);
         }
-        Some(most)
+        Some((most, needed, ends))
     }
 }
 
-/// Carries the steps of a turn out until the branch leaves; how many turns went on.
-fn run(steps: &[Instruction], exit: u32, stays_when_next: bool, mut held: Concrete, needed: Registers) -> Option<u64> {
+/// Carries the steps of a turn out until the branch leaves; how many turns went on, and the registers then.
+fn run(
+    steps: &[Instruction],
+    exit: u32,
+    stays_when_next: bool,
+    mut held: Concrete,
+    needed: Registers,
+) -> Option<(u64, Concrete)> {
     let mut before = held.clone();
     for turn in 0..MOST_TURNS {
         // If a state repeats, the loop never ends.
@@ -141,7 +187,7 @@ fn run(steps: &[Instruction], exit: u32, stays_when_next: bool, mut held: Concre
                     _ => (held.status >> step.operand('s') & 1 == 1) != (step.operation == Brbs),
                 };
                 if goes_next != stays_when_next {
-                    return Some(turn);
+                    return Some((turn, held));
                 }
             } else if !held.carry_out(step) && !moves_pointer(step, &mut held, needed) {
                 return None;

@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 /// Addresses of SRAM and EEPROM in the single address space of AVR ELF files.
 const SRAM_ORIGIN: u32 = 0x80_0000;
 const EEPROM_ORIGIN: u32 = 0x81_0000;
+const EEPROM_END: u32 = 0x82_0000;
 
 /// The section in which avr-gcc names the chip.
 const DEVICE_INFO: &str = ".note.gnu.avr.deviceinfo";
@@ -30,6 +31,26 @@ pub struct Symbol {
     pub name: String,
     /// Its size in bytes; 0 if the file does not have it.
     pub bytes: u32,
+}
+
+/// Relocations that can hold an address of code.
+#[derive(Default)]
+pub(crate) struct Relocations {
+    /// Where each stands, and the address that it holds.
+    pub(crate) all: Vec<Relocation>,
+    /// Places in flash with a relocation of any kind.
+    pub(crate) in_code: BTreeSet<u32>,
+    /// Whether the initial values of variables have any.
+    pub(crate) in_data: bool,
+}
+
+/// A relocation that can hold an address of code.
+pub(crate) struct Relocation {
+    /// Its address in flash, or in the data space from [`SRAM_ORIGIN`] on.
+    pub(crate) place: u32,
+    pub(crate) address: u32,
+    /// Whether it holds an address in bytes, which calls do not take.
+    pub(crate) is_of_bytes: bool,
 }
 
 /// An ELF, taken apart.
@@ -48,16 +69,19 @@ pub struct Program {
     pub records: BTreeMap<u32, u64>,
     /// Every symbol in flash by its raw name.
     pub(crate) labels: BTreeMap<String, u32>,
-    /// The first address of code after the vectors, and the end of flash without the initial values of variables.
-    pub(crate) code_start: u32,
-    code_end: u32,
-    /// Initial values of variables.
+    /// Addresses of symbols in a section of code, of any type but data's.
+    pub(crate) marked: BTreeSet<u32>,
+    /// Data in flash, by symbols that have its type and size.
+    pub(crate) objects: Vec<Range<u32>>,
+    /// The end of flash without the initial values of variables.
+    pub(crate) code_end: u32,
+    /// Initial values of variables, from this address on, then the EEPROM's content.
     pub(crate) data: Vec<u8>,
+    pub(crate) data_start: u32,
     /// Which of these bytes are virtual tables.
     pub(crate) virtual_tables: Vec<Range<usize>>,
-    /// Functions whose address is taken outside virtual tables and the tables of constructors, if the ELF has
-    /// relocations.
-    pub(crate) taken: Option<BTreeSet<u32>>,
+    /// The relocations that `--emit-relocs` keeps.
+    pub(crate) relocations: Relocations,
     path: PathBuf,
     /// Its debug information, which is read when the first line is asked for.
     debug_information: OnceCell<Option<Loader>>,
@@ -78,7 +102,13 @@ impl Program {
         }
         let file: ElfFile32<LittleEndian> = ElfFile32::parse(&*bytes).map_err(not_elf)?;
         let chips = CHIPS.map(|chip| chip.name).join(", ");
-        let name = chip.map(str::to_owned).or_else(|| device(&file)).ok_or_else(|| {
+        let of_file = device(&file);
+        if let (Some(named), Some(of_file)) = (chip, &of_file)
+            && !named.eq_ignore_ascii_case(of_file)
+        {
+            return Err(error(format!("was made for the {of_file}, not for the {named}: name no other chip")));
+        }
+        let name = chip.map(str::to_owned).or(of_file).ok_or_else(|| {
             error(format!(
                 "does not name its chip: name it with --chip or `chip = ..` in the budgets, as one of {chips}"
             ))
@@ -86,67 +116,89 @@ impl Program {
         let unknown = || BoundsError(format!("the chip {name} is not known: the known ones are {chips}"));
         let chip = Chip::named(&name).ok_or_else(unknown)?;
 
-        let (mut flash, mut data, mut data_start) = (Vec::new(), Vec::new(), 0);
+        let (mut flash, mut variables, mut eeprom) = (Vec::new(), Vec::new(), Vec::new());
         let (mut start, mut code_end) = (u32::MAX, 0);
         for header in file.elf_program_headers() {
             let content = header.data(LittleEndian, &*bytes).unwrap_or_default();
-            let address = header.p_paddr(LittleEndian);
-            if header.p_type(LittleEndian) != elf::PT_LOAD || content.is_empty() || address >= SRAM_ORIGIN {
+            let (address, runs_at) = (header.p_paddr(LittleEndian), header.p_vaddr(LittleEndian));
+            if header.p_type(LittleEndian) != elf::PT_LOAD || content.is_empty() {
                 continue;
             }
-            let end = address + content.len() as u32;
-            if end > chip.flash_bytes {
+            if address >= SRAM_ORIGIN {
+                if (EEPROM_ORIGIN..EEPROM_END).contains(&address) {
+                    eeprom.extend_from_slice(content);
+                }
+                continue;
+            }
+            let end = u64::from(address) + content.len() as u64;
+            if end > chip.flash_bytes.into() {
                 let Chip { name, flash_bytes, .. } = chip;
                 return Err(error(format!(
                     "has {end} bytes for the flash: the {name} holds {flash_bytes}; --chip names another chip"
                 )));
             }
+            let end = end as u32;
             start = start.min(address);
             if flash.len() < end as usize {
                 // Erased flash reads as 0xFF.
                 flash.resize(end as usize, 0xFF);
             }
             flash[address as usize..end as usize].copy_from_slice(content);
-            if (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&header.p_vaddr(LittleEndian)) {
-                data_start = header.p_vaddr(LittleEndian).into();
-                data = content.to_vec();
+            if (SRAM_ORIGIN..EEPROM_ORIGIN).contains(&runs_at) {
+                variables.push((runs_at, content));
             } else {
                 code_end = code_end.max(end);
             }
         }
-        let labels: BTreeMap<String, u32> = (file.symbols())
-            .filter(|symbol| symbol.address() < u64::from(SRAM_ORIGIN))
-            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
-            .collect();
-        let tables: Vec<Range<u64>> = (file.symbols())
+        // All variables as one memory, from the first one on. The EEPROM's content comes behind it.
+        let data_start = variables.iter().map(|(runs_at, _)| *runs_at).min().unwrap_or(SRAM_ORIGIN);
+        let mut data = Vec::new();
+        for (runs_at, content) in variables {
+            let first = (runs_at - data_start) as usize;
+            data.resize(data.len().max(first + content.len()), 0);
+            data[first..first + content.len()].copy_from_slice(content);
+        }
+        data.extend(eeprom);
+        let in_flash = || file.symbols().filter(|symbol| symbol.address() < u64::from(SRAM_ORIGIN));
+        let labels: BTreeMap<String, u32> =
+            in_flash().filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32))).collect();
+        let of_code = || in_flash().filter(|symbol| is_in_code(&file, symbol));
+        let is_mark =
+            |symbol: &ElfSymbol32<LittleEndian>| matches!(symbol.kind(), SymbolKind::Text | SymbolKind::Unknown);
+        let marked = of_code().filter(is_mark).map(|symbol| symbol.address() as u32).collect();
+        let objects = of_code().filter(|symbol| symbol.kind() == SymbolKind::Data).map(|symbol| {
+            let first = symbol.address() as u32;
+            first..first + size_of(&symbol, code_end)
+        });
+        let objects = objects.collect();
+        let tables: Vec<Range<usize>> = (file.symbols())
             .filter(|symbol| symbol.name().is_ok_and(|name| name.starts_with("_ZTV")))
-            .map(|symbol| symbol.address()..symbol.address() + symbol.size())
+            .filter_map(|symbol| {
+                let first = symbol.address().checked_sub(data_start.into())?;
+                let table = first as usize..first.checked_add(symbol.size())? as usize;
+                data.get(table.clone()).map(|_| table)
+            })
             .collect();
-        let in_data = |table: &Range<u64>| {
-            let first = table.start.checked_sub(data_start)? as usize;
-            let table = first..first + (table.end - table.start) as usize;
-            data.get(table.clone()).map(|_| table)
-        };
-        let virtual_tables = tables.iter().filter_map(in_data).collect();
         // A program at a higher address than 0 is a bootloader; some have no vectors.
         let start = if start == u32::MAX { 0 } else { start };
         let has_vectors = start == 0 || labels.get("__vectors") == Some(&start);
         let records = loops::records_of(&file).map_err(not_elf)?;
-        let functions = functions(&file);
-        let taken = taken(&file, &functions, &labels, &tables);
-        let vectors = if has_vectors { u32::from(chip.vectors) * chip.vector_bytes } else { 0 };
+        let functions = functions(&file, code_end);
+        let relocations = relocations(&file);
         Ok(Program {
             chip,
             flash,
             start,
             has_vectors,
             functions,
-            taken,
+            relocations,
             labels,
-            code_start: start + vectors,
+            marked,
+            objects,
             code_end,
+            data_start,
             data,
-            virtual_tables,
+            virtual_tables: tables,
             records,
             path: path.into(),
             debug_information: OnceCell::new(),
@@ -171,18 +223,18 @@ impl Program {
         all.map(|(address, _)| *address).collect()
     }
 
-    /// Flash in front of the first function, and between functions, in which constants can lie.
-    pub(crate) fn gaps(&self) -> impl Iterator<Item = Range<u32>> {
-        let ends = self.functions.keys().filter_map(|&function| Some(self.extent(function)?.1));
-        let begins = self.functions.keys().copied().chain([self.code_end]);
-        [self.code_start].into_iter().chain(ends).zip(begins).map(|(end, begin)| end..begin)
-    }
-
-    /// The function that contains an address: its beginning and end.
+    /// The last function up to an address: its beginning and end. A function without a size ends at the next one.
     pub(crate) fn extent(&self, address: u32) -> Option<(u32, u32)> {
         let (&first, symbol) = self.functions.range(..=address).next_back()?;
         let next = self.functions.range(address + 1..).next().map_or(self.flash.len() as u32, |(&next, _)| next);
-        Some((first, if symbol.bytes > 0 { (first + symbol.bytes).max(address + 2) } else { next }))
+        Some((first, if symbol.bytes > 0 { first + symbol.bytes } else { next }))
+    }
+
+    /// The function that an address lies in, if its symbol has a size.
+    pub(crate) fn sized(&self, address: u32) -> Option<Range<u32>> {
+        // A function can lie within another one, as in assembly with two entries.
+        let before = self.functions.range(..=address).rev().filter(|(_, symbol)| symbol.bytes > 0);
+        before.map(|(&first, symbol)| first..first + symbol.bytes).take(8).find(|function| function.contains(&address))
     }
 }
 
@@ -202,21 +254,29 @@ fn device(file: &ElfFile32<LittleEndian>) -> Option<String> {
     Some(String::from_utf8_lossy(name).into_owned()).filter(|name| !name.is_empty())
 }
 
-fn functions(file: &ElfFile32<LittleEndian>) -> BTreeMap<u32, Symbol> {
+/// Whether a symbol is in a section of code.
+fn is_in_code(file: &ElfFile32<LittleEndian>, symbol: &ElfSymbol32<LittleEndian>) -> bool {
+    let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
+    section.is_some_and(|section| section.kind() == SectionKind::Text)
+}
+
+/// A symbol's size; 0 if it has none, or one that leads beyond the code.
+fn size_of(symbol: &ElfSymbol32<LittleEndian>, code_end: u32) -> u32 {
+    let is_within = symbol.address().saturating_add(symbol.size()) <= u64::from(code_end);
+    if is_within { symbol.size() as u32 } else { 0 }
+}
+
+fn functions(file: &ElfFile32<LittleEndian>, code_end: u32) -> BTreeMap<u32, Symbol> {
     // Symbols of libgcc have a size and no type.
-    let is_code = |symbol: &ElfSymbol32<LittleEndian>| {
-        let section = symbol.section_index().and_then(|index| file.section_by_index(index).ok());
-        section.is_some_and(|section| section.kind() == SectionKind::Text)
-    };
     let is_function = |symbol: &ElfSymbol32<LittleEndian>| match symbol.kind() {
         SymbolKind::Text => true,
-        SymbolKind::Unknown => is_code(symbol) && symbol.size() > 0,
+        SymbolKind::Unknown => is_in_code(file, symbol) && symbol.size() > 0,
         _ => false,
     };
     let mut functions: Vec<(u32, Symbol)> = (file.symbols())
         .filter(|symbol| is_function(symbol) && symbol.address() < u64::from(SRAM_ORIGIN))
         .filter_map(|symbol| {
-            let named = Symbol { name: demangled(symbol.name().ok()?), bytes: symbol.size() as u32 };
+            let named = Symbol { name: demangled(symbol.name().ok()?), bytes: size_of(&symbol, code_end) };
             Some((symbol.address() as u32, named))
         })
         .filter(|(_, symbol)| !symbol.name.is_empty())
@@ -226,38 +286,39 @@ fn functions(file: &ElfFile32<LittleEndian>) -> BTreeMap<u32, Symbol> {
     functions.into_iter().rev().collect()
 }
 
-/// The functions whose address is taken, by the relocations that `--emit-relocs` keeps; `None` without relocations.
-/// Virtual tables and the tables of constructors are left out.
-fn taken(
-    file: &ElfFile32<LittleEndian>,
-    functions: &BTreeMap<u32, Symbol>,
-    labels: &BTreeMap<String, u32>,
-    tables: &[Range<u64>],
-) -> Option<BTreeSet<u32>> {
-    /// Word addresses: in memory, and in `ldi`, directly and by a trampoline (binutils, elf/avr.h).
+/// The relocations that `--emit-relocs` keeps, and that can hold an address of code.
+fn relocations(file: &ElfFile32<LittleEndian>) -> Relocations {
+    // Kinds by their number (binutils, elf/avr.h): word addresses, in memory and in `ldi`, directly and by a trampoline;
+    // and byte addresses in the same places.
+    const NO_RELOCATION: u32 = 0;
     const OF_WORDS: [u32; 6] = [5, 12, 13, 14, 24, 25];
+    const OF_BYTES: [u32; 6] = [1, 4, 6, 7, 27, 28];
 
-    let label = |name: &str| labels.get(name).copied().unwrap_or_default();
-    let constructors =
-        label("__ctors_start").min(label("__dtors_start"))..label("__ctors_end").max(label("__dtors_end"));
-    let mut taken = BTreeSet::new();
-    let mut is_kept = false;
-    for section in file.sections().filter(|section| section.kind() != SectionKind::Other && section.size() > 0) {
+    let mut relocations = Relocations::default();
+    let is_loaded = |kind| matches!(kind, SectionKind::Text | SectionKind::Data | SectionKind::ReadOnlyData);
+    for section in file.sections().filter(|section| is_loaded(section.kind()) && section.size() > 0) {
         for (place, relocation) in section.relocations() {
-            is_kept |= section.kind() == SectionKind::Text;
+            // In a linked file a relocation's place is an address.
+            let place = place as u32;
             let RelocationFlags::Elf { r_type } = relocation.flags() else { continue };
+            if r_type.0 == NO_RELOCATION {
+                continue;
+            }
+            if section.kind() == SectionKind::Text {
+                relocations.in_code.insert(place);
+            } else {
+                relocations.in_data = true;
+            }
             let RelocationTarget::Symbol(symbol) = relocation.target() else { continue };
             let Ok(symbol) = file.symbol_by_index(symbol) else { continue };
-            // In a linked file a relocation's place is an address.
-            let is_elsewhere = tables.iter().any(|table| table.contains(&place))
-                || u32::try_from(place).is_ok_and(|place| constructors.contains(&place));
             let address = symbol.address().wrapping_add_signed(relocation.addend()) as u32;
-            if OF_WORDS.contains(&r_type.0) && !is_elsewhere && functions.contains_key(&address) {
-                taken.insert(address);
+            let is_of_bytes = OF_BYTES.contains(&r_type.0);
+            if OF_WORDS.contains(&r_type.0) || is_of_bytes {
+                relocations.all.push(Relocation { place, address, is_of_bytes });
             }
         }
     }
-    is_kept.then_some(taken)
+    relocations
 }
 
 /// A symbol's name in its source: a Rust path without type parameters, or a C++ name without parameters.

@@ -1,11 +1,28 @@
 //! The error of the analysis: the reason why no proof was possible, the address, and what to write in the budgets.
 
 use crate::proved::Place;
+use std::fmt;
 
 /// Why no proof was possible, in words for the user.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
+#[derive(Debug)]
 pub struct BoundsError(pub(crate) String);
+
+impl std::error::Error for BoundsError {}
+
+/// Names and lines come from files, so their control characters are not printed as such.
+impl fmt::Display for BoundsError {
+    fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
+        to.write_str(&printable(&self.0))
+    }
+}
+
+/// A text whose control characters, except line ends, are written as escapes.
+pub(crate) fn printable(text: &str) -> String {
+    let is_printed = |letter: char| letter == '\n' || !letter.is_control();
+    let letter =
+        |letter: char| if is_printed(letter) { letter.to_string() } else { letter.escape_default().to_string() };
+    text.chars().map(letter).collect()
+}
 
 impl BoundsError {
     /// An instruction that cannot be followed.
@@ -15,6 +32,10 @@ impl BoundsError {
             Problem::Indirect => format!(": list the functions in the budgets, as in [calls] {function:?} = [\"..\"]"),
             Problem::UnknownStack => {
                 ": alloca and arrays of unknown length have no bound, take an array of fixed length".into()
+            }
+            Problem::StartsDeeper => {
+                ": set the stack pointer in the start-up code, or list the functions that calls by pointer lead to, in [calls]"
+                    .into()
             }
             Problem::NoInstruction => ": check that the program was built for the chip of --chip".into(),
             _ => String::new(),
@@ -46,4 +67,10 @@ pub(crate) enum Problem {
     WrongReturn,
     #[error("sets EIND to something else than 0")]
     LongIndirect,
+    #[error("writes to a register by its address in memory")]
+    RegisterInMemory,
+    #[error("starts the program again, by address 0 or a null pointer, with what is on the stack")]
+    StartsDeeper,
+    #[error("goes on after a jump to address 0 in another state than after a reset")]
+    StartsDifferently,
 }

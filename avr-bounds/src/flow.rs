@@ -8,21 +8,25 @@
 //! knows the register contents that matter (`values`). It derives the registers that a call preserves from the called
 //! function, not from a convention.
 //!
-//! A jump into another function is followed like any jump: compilers make it from a call at the end (tail call). The
-//! program starts again at the reset vector's address, so a path ends there. Computed calls and jumps lead to all their
-//! targets (`targets`).
+//! A jump into another function is followed like any jump: compilers make it from a call at the end (tail call). A jump
+//! or call to the reset vector's address, also by a null pointer, starts the program again, with the stack and the
+//! interrupts as they are. Such a path ends where the start-up code has turned interrupts off and set the stack pointer:
+//! the state is then that after a reset. Computed calls and jumps lead to all their targets (`targets`).
 //!
 //! The analysis refuses what it cannot follow: indirect calls without targets, recursion without a bound in the
 //! budgets, and a stack pointer or a handler's interrupt flag with an unknown value. It assumes that no store through a
 //! pointer hits a return address or a saved register.
 
 use crate::budget::Budgets;
+use crate::counted;
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
 use crate::effects::Registers;
 use crate::elf;
 use crate::error::{BoundsError, Problem};
-use crate::proved::{self, Frame};
+use crate::paths;
+use crate::proved::{self, Found, Frame};
+use crate::reach::Reach;
 use crate::targets::{Targets, Where};
 use crate::values::{Constants, DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -140,6 +144,9 @@ pub(crate) fn bytes(frames: &[Frame]) -> usize {
 pub(crate) struct Code<'a> {
     pub(crate) elf: &'a elf::Program,
     budgets: &'a Budgets,
+    /// The address of the interrupt vectors, if the program has some.
+    pub(crate) vectors: Option<u32>,
+    reach: Reach,
     targets: Targets,
     /// Which calls of functions with bounded recursion can be active at once: each by its function's address.
     active: Vec<Vec<u32>>,
@@ -148,18 +155,27 @@ pub(crate) struct Code<'a> {
     routines: BTreeMap<Entry, Rc<Routine>>,
     /// The routines that are being followed, the outermost first.
     open: Vec<Entry>,
+    /// Where start-up code that runs again has set the stack pointer.
+    restarts: BTreeSet<Place>,
 }
 
 impl<'a> Code<'a> {
     pub(crate) fn new(elf: &'a elf::Program, budgets: &'a Budgets) -> Code<'a> {
+        let vectors = budgets.vectors.or(elf.has_vectors.then_some(elf.start));
+        let reach = Reach::of(elf, vectors);
+        let of_vectors = vectors.map(|first| first + u32::from(elf.chip.vectors) * elf.chip.vector_bytes);
+        let targets = Targets::new(elf, budgets, &reach, of_vectors.unwrap_or(elf.start));
         Code {
             elf,
             budgets,
-            targets: Targets::new(elf, budgets),
+            vectors,
+            reach,
+            targets,
             active: vec![Vec::new()],
             indirect: BTreeMap::new(),
             routines: BTreeMap::new(),
             open: Vec::new(),
+            restarts: BTreeSet::new(),
         }
     }
 
@@ -202,10 +218,29 @@ impl<'a> Code<'a> {
         self.routines.values()
     }
 
-    /// The function that an address lies in.
+    /// The function that an address lies in, for readers: of functions without a size the last one before it.
     pub(crate) fn name(&self, address: u32) -> String {
-        let before = self.elf.functions.range(..=address).next_back();
-        before.map_or_else(|| format!("{address:#06x}"), |(_, symbol)| symbol.name.clone())
+        let unknown = || format!("{address:#06x}");
+        let Some((first, end)) = self.elf.extent(address) else { return unknown() };
+        if address < end { self.elf.functions[&first].name.clone() } else { unknown() }
+    }
+
+    /// The name of the function that an address surely lies in: by its size, or by a path from its beginning. Only such
+    /// a name may bring facts from the budgets.
+    pub(crate) fn name_for_facts(&self, address: u32) -> Option<&str> {
+        let (first, end) = self.elf.extent(address)?;
+        let symbol = &self.elf.functions[&first];
+        let is_within = if symbol.bytes > 0 { address < end } else { self.reach.passes(first, address) };
+        is_within.then_some(symbol.name.as_str())
+    }
+
+    /// Refuses a program that starts itself again in another state than a reset leaves.
+    pub(crate) fn check_restarts(&self, main: &Routine) -> Result<(), BoundsError> {
+        let is_of_main = |place: &&Place| main.nodes.iter().any(|node| node.place == **place);
+        match self.restarts.iter().find(|place| !is_of_main(place)) {
+            None => Ok(()),
+            Some(place) => Err(self.refuse(place.address, Problem::StartsDifferently)),
+        }
     }
 
     /// A routine's name. A handler has the name of the function that its vector leads to.
@@ -284,7 +319,37 @@ impl Follower<'_, '_> {
         let deepest = self.deepest(|_| true, |routine| Some(&routine.deepest)).unwrap_or_default();
         let is_on = |place: &Place| place.interrupts == Interrupts::On;
         let deepest_interrupted = self.deepest(is_on, |routine| routine.deepest_interrupted.as_ref());
-        Ok(Routine { deepest, deepest_interrupted, ..self.routine })
+        let leaves_zero = self.routine.leaves_zero || kind == Kind::Function && self.returns_zero();
+        Ok(Routine { deepest, deepest_interrupted, leaves_zero, ..self.routine })
+    }
+
+    /// Whether R1 is zero at every return, also where a loop counts it down to zero.
+    fn returns_zero(&self) -> bool {
+        const ZERO: usize = 1;
+
+        let nodes = &self.routine.nodes;
+        let edges = |node: usize| -> Vec<usize> { nodes[node].edges.iter().map(|edge| edge.to).collect() };
+        let loops = paths::loops(&(0..nodes.len()).collect(), &edges);
+        let exits: BTreeSet<(usize, usize)> =
+            loops.iter().flat_map(|circle| counted::exits_with_zero(nodes, circle, ZERO)).collect();
+        // Zero until a path shows otherwise.
+        let mut is_zero = vec![true; nodes.len()];
+        let mut to_do: Vec<usize> = (0..nodes.len()).collect();
+        while let Some(number) = to_do.pop() {
+            let node = &nodes[number];
+            for edge in &node.edges {
+                let keeps = match &edge.through {
+                    Some(called) => called.keeps.contains(ZERO) || called.leaves_zero,
+                    None => !node.instruction.effects().changes.contains(ZERO),
+                };
+                let comes_zero =
+                    edge.constants[ZERO] == Some(0) || is_zero[number] && keeps || exits.contains(&(number, edge.to));
+                if !comes_zero && std::mem::replace(&mut is_zero[edge.to], false) {
+                    to_do.push(edge.to);
+                }
+            }
+        }
+        nodes.iter().zip(is_zero).all(|(node, is_zero)| node.returns.is_none() || is_zero)
     }
 
     /// The number of a place that a path reaches with these facts. If they are new, the place is to be followed.
@@ -328,7 +393,8 @@ impl Follower<'_, '_> {
         let at = place.address;
         let chip = self.program.elf.chip;
         if place.depth > DEEPEST.min(usize::from(chip.ram_last)) {
-            return Err(self.program.refuse(at, Problem::GrowsForEver));
+            let problem = if known.restarts { Problem::StartsDeeper } else { Problem::GrowsForEver };
+            return Err(self.program.refuse(at, problem));
         }
         if known.upper_half.is_some() && place.interrupts == Interrupts::On {
             return Err(self.program.refuse(at, Problem::HalfAStackPointer));
@@ -356,8 +422,8 @@ impl Follower<'_, '_> {
                 self.lead(number, targets, after)?;
             }
             Icall | Eicall | Ijmp | Eijmp => {
-                let caller = self.program.name(at);
-                let targets = self.program.targets.of_pointer(self.program.elf, &caller, &instruction, &after.known);
+                let caller = self.program.name_for_facts(at);
+                let targets = self.program.targets.of_pointer(self.program.elf, caller, &instruction, &after.known);
                 let targets = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
                 self.lead(number, targets, after)?;
             }
@@ -416,6 +482,11 @@ impl Follower<'_, '_> {
             _ => {
                 let Entry { kind, interrupts: at_entry, .. } = self.routine.entry;
                 let After { known, interrupts: now, .. } = &mut after;
+                if let Some(depth) = known.starts_again(&instruction, &chip) {
+                    let place = Place { address: next, depth, interrupts: *now };
+                    self.program.restarts.insert(place);
+                    return Ok(());
+                }
                 match known.carry_out(&instruction, &chip, place.interrupts, now, kind == Kind::Reset) {
                     // The value is unknown, so interrupts can be on or off.
                     Err(Problem::UnknownStatus) if kind != Kind::Handler => {
@@ -441,26 +512,28 @@ impl Follower<'_, '_> {
 
     /// Continues at an address.
     fn go(&mut self, from: usize, address: u32, after: After, through: Option<Rc<Routine>>) -> Result<(), BoundsError> {
-        if self.is_start(address) {
+        if self.is_other_program(address) {
             return Ok(());
         }
-        let After { known, interrupts, cycles } = after;
+        let After { mut known, interrupts, cycles } = after;
+        known.restarts |= address == self.program.elf.start;
         let (length, constants) = (self.known[from].pair(20), known.constants());
         let to = self.reach(Place { address, depth: known.stack.len(), interrupts }, known)?;
         self.routine.nodes[from].edges.push(Edge { to, cycles, through, length, constants });
         Ok(())
     }
 
-    /// Whether a path ends at this address: the reset vector starts the program again, and from a bootloader address 0
-    /// starts another.
-    fn is_start(&self, address: u32) -> bool {
-        address == 0 || address == self.program.elf.start
+    /// Whether another program starts at this address: from a bootloader at address 0.
+    fn is_other_program(&self, address: u32) -> bool {
+        address == 0 && self.program.elf.start > 0
     }
 
     /// Continues at every target of an indirect call or jump.
     fn lead(&mut self, from: usize, targets: Where, after: After) -> Result<(), BoundsError> {
         let Node { place, instruction, .. } = self.routine.nodes[from];
-        for &target in &targets.addresses {
+        // A pointer that the program has not set is null.
+        let null = (targets.found == Found::Taken).then_some(&0);
+        for &target in targets.addresses.iter().chain(null) {
             if matches!(instruction.operation, Rcall | Call | Icall | Eicall) {
                 self.call(from, target, after.clone())?;
             } else {
@@ -475,8 +548,12 @@ impl Follower<'_, '_> {
     fn call(&mut self, from: usize, address: u32, mut after: After) -> Result<(), BoundsError> {
         let Entry { interrupts: at_entry, active, .. } = self.routine.entry;
         let interrupts = after.interrupts;
-        if self.is_start(address) {
+        if self.is_other_program(address) {
             return Ok(());
+        }
+        if address == self.program.elf.start {
+            after.known.stack.extend(vec![Value::Unknown; self.program.elf.chip.return_address_bytes()]);
+            return self.go(from, address, after, None);
         }
         let Some(active) = self.program.enter(address, active) else { return Ok(()) };
         let called = self.program.follow(Entry { address, interrupts, kind: Kind::Function, active })?;

@@ -14,10 +14,9 @@
 //! # Ok::<(), avr_bounds::BoundsError>(())
 //! ```
 //!
-//! The proof makes three assumptions. Handlers do not turn interrupts on; the analysis checks this and refuses a
-//! program that does. Stores through pointers do not touch return addresses and saved registers. The program takes
-//! function addresses only from the places that the README lists. The analysis also follows paths that the program
-//! never takes. So a bound can be larger than any real value, but never smaller.
+//! Handlers do not turn interrupts on; the analysis checks this and refuses a program that does. The README lists what is
+//! taken for granted. The analysis also follows paths that the program never takes. So a bound can be larger than any
+//! real value, but never smaller.
 //!
 //! # The response of a handler
 //!
@@ -56,6 +55,7 @@ mod loops;
 mod order;
 mod paths;
 mod proved;
+mod reach;
 mod registers;
 mod targets;
 mod values;
@@ -63,7 +63,7 @@ mod values;
 pub use self::budget::{Budgets, Depth, Held, RegisterRule};
 pub use self::chip::{CHIPS, Chip};
 use self::cycles::{Passes, Stretch, Time, Timer, longer};
-use self::decode::Operation;
+use self::decode::{Instruction, Operation};
 pub use self::elf::{Program, Symbol};
 pub use self::error::BoundsError;
 use self::flow::{Code, Entry, Kind, Node, Routine, bytes};
@@ -108,7 +108,8 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     let entry = |address, kind| Entry { address, interrupts: Interrupts::Off, kind, active: 0 };
     let main = code.follow(entry(elf.start, Kind::Reset))?;
     let mut handlers = BTreeMap::new();
-    for vector in (1..elf.chip.vectors).filter(|_| elf.has_vectors) {
+    let vectors = if code.vectors.is_some() { elf.chip.vectors } else { 0 };
+    for vector in 1..vectors {
         if let Some(address) = handler_of(&code, vector)? {
             let handler = code.follow(entry(address, Kind::Handler))?;
             if let Some(address) = handler.enables {
@@ -122,7 +123,16 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
             handlers.insert(vector, handler);
         }
     }
+    code.check_restarts(&main)?;
     let code = code;
+    if let Some(open) = main.deepest_interrupted.as_ref().filter(|_| code.vectors.is_none()) {
+        let function = open.last().map_or("the program", |frame| frame.function.as_str());
+        return Err(BoundsError(format!(
+            "{function} runs with interrupts on, and no interrupt vectors were found: nothing at {:#06x}, where the program begins, is \
+             called __vectors; tell the vectors' address in the budgets, as in `vectors = {:#06x}`",
+            elf.start, elf.start
+        )));
+    }
     let mut timer = Timer::new(passes(&code, budgets));
     let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
         .map(|kind| timer.longest_stretch(&main, kind).map(|time| time.longest(&code)))
@@ -165,7 +175,8 @@ fn passes(code: &Code, budgets: &Budgets) -> Passes {
     let by_length = functions.filter(|(_, symbol)| loops.get(&symbol.name).is_some_and(|bound| bound.by_length));
     let by_length = by_length.map(|(address, _)| *address).collect();
     let places = code.routines().flat_map(|routine| &routine.nodes).map(|node| node.place.address);
-    let of_heads = places.filter_map(|place| Some((place, loops.get(&code.name(place))?.passes.clone()))).collect();
+    let of_heads =
+        places.filter_map(|place| Some((place, loops.get(code.name_for_facts(place)?)?.passes.clone()))).collect();
     Passes { stated: code.elf.records.clone(), of_heads, by_length }
 }
 
@@ -309,17 +320,23 @@ impl Time {
     }
 }
 
-/// The entry of a vector's handler: the vector itself. `None` if the vector's jumps lead to the reset, as for unused
-/// vectors.
+/// The entry of a vector's handler: the vector itself. `None` if the vector's jumps lead to the reset, or where the
+/// reset's own jump leads, as for unused vectors.
 fn handler_of(code: &Code, vector: u8) -> Result<Option<u32>, BoundsError> {
-    let start = code.elf.start + u32::from(vector) * code.elf.chip.vector_bytes;
+    let first = code.vectors.unwrap_or(code.elf.start);
+    let start = first + u32::from(vector) * code.elf.chip.vector_bytes;
+    let flash_bytes = code.elf.chip.flash_bytes;
+    let of_reset = code.instruction(code.elf.start)?;
+    let is_jump = |instruction: &Instruction| matches!(instruction.operation, Operation::Jmp | Operation::Rjmp);
+    let of_reset = Some(of_reset).filter(is_jump).and_then(|jump| jump.target(flash_bytes));
+    let is_reset = |target: u32| target == code.elf.start || target == 0 || Some(target) == of_reset;
     let mut address = start;
     // Two jumps, and the one in the vector.
     for _ in 0..3 {
         let instruction = code.instruction(address)?;
-        match instruction.target(code.elf.chip.flash_bytes) {
-            Some(target) if target == code.elf.start || target == 0 => return Ok(None),
-            Some(target) if matches!(instruction.operation, Operation::Jmp | Operation::Rjmp) => address = target,
+        match instruction.target(flash_bytes) {
+            Some(target) if is_reset(target) => return Ok(None),
+            Some(target) if is_jump(&instruction) => address = target,
             _ => break,
         }
     }

@@ -1,7 +1,8 @@
 //! Checks that every function keeps the calling convention, and that handlers change nothing.
 //!
 //! Every function preserves R2 to R17, R28 and R29, and leaves zero in R1. This also finds a missing push or pop in
-//! assembly. A handler leaves every register and every flag as it found them. This proof does not check that handlers
+//! assembly. Assembly also calls parts of a function that have no symbol of a function; only the function around them is
+//! held to the convention. A handler leaves every register and every flag as it found them. This proof does not check that handlers
 //! and main program share memory correctly. Rust ensures that.
 
 use crate::effects::Registers;
@@ -16,14 +17,16 @@ const ZERO: usize = 1;
 /// Proves that every function of this program keeps the calling convention, and that handlers restore all registers and
 /// flags.
 pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Result<(), BoundsError> {
-    let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function);
+    let is_named = |routine: &Routine| program.elf.functions.contains_key(&routine.entry.address);
+    let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function && is_named(routine));
     for routine in functions.filter(|routine| !routine.returns.is_empty()) {
         let broken = |routine: &Routine| {
             let zero = if routine.leaves_zero { Registers::NONE } else { Registers::one(ZERO) };
             (Registers::PRESERVED - routine.keeps) | zero
         };
         // An error names the function itself, not its caller.
-        let called = routine.nodes.iter().flat_map(Node::called).filter(|called| !called.returns.is_empty());
+        let called = routine.nodes.iter().flat_map(Node::called);
+        let called = called.filter(|called| !called.returns.is_empty() && is_named(called));
         let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
         if !broken.is_empty() {
             let function = program.name_of(routine.entry);

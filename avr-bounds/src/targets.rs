@@ -6,25 +6,31 @@
 //!   one.
 //! - **Constructors and destructors** of global objects: every entry of their tables.
 //! - **Listed** in the budgets' `[calls]`: these functions, and no others.
-//! - **Any other call**: every function whose address the program takes. The relocations list these functions, if the
-//!   program was linked with `-Wl,--emit-relocs`. Else the analysis searches for word addresses of functions, which can
-//!   give too many. It searches the initial values of variables, flash outside functions, and pairs of registers that a
-//!   function loads with constants. A virtual call loads its pointer from a slot behind another loaded pointer. It
-//!   leads to this slot of every virtual table, and to functions whose address is taken elsewhere.
+//! - **Any other call**: every address of code that the program takes. The relocations list these addresses, if the
+//!   program was linked with `-Wl,--emit-relocs`. Else the analysis searches for word addresses of code, which can give
+//!   too many. It searches the initial values of variables, every word of flash that is no reached instruction
+//!   (`reach`), and pairs of registers that a function loads with constants. A virtual call loads its pointer from a slot
+//!   behind another loaded pointer. It leads to this slot of every virtual table, and to addresses that are taken
+//!   elsewhere. A pointer may also be null (`flow`).
 //!
 //! A jump could be a computed `goto` if its pointer comes from no virtual table and no variable at a fixed address.
 //! Such a jump is refused. So is a call without any target.
 //!
-//! Assumption: a program gets a function's address only from one of these places. A program that calculates an address
+//! An address of code is the beginning of a function, any other symbol, the target of a direct call, or a place outside
+//! all functions whose size is known. Relocations can also name a place within a function.
+//!
+//! Assumption: a program gets an address of code only from one of these places. A program that calculates an address
 //! must list its calls.
 
 use crate::budget::Budgets;
 use crate::decode::Operation::*;
 use crate::decode::{Instruction, word_at};
-use crate::elf::Program;
+use crate::elf::{Program, Relocation};
 use crate::proved::Found;
+use crate::reach::Reach;
 use crate::values::{Known, Value};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// The targets of an indirect call or jump.
 #[derive(Clone, Debug)]
@@ -37,37 +43,42 @@ pub(crate) struct Where {
 pub(crate) struct Targets {
     /// Entries of libgcc's routines that jump through a table.
     table_jumps: BTreeSet<u32>,
-    /// Functions whose address is taken outside virtual tables, and whether this set is certain.
+    /// Addresses of code that are taken outside virtual tables, and whether this set is certain.
     taken: BTreeSet<u32>,
     is_exact: bool,
-    /// Virtual tables: for each, its words as functions, if they are some.
-    virtual_tables: Vec<Vec<Option<u32>>>,
+    virtual_tables: Vec<VirtualTable>,
     /// By the caller's name.
     listed: BTreeMap<String, BTreeSet<u32>>,
+}
+
+/// A virtual table: its words as addresses of code, if they are some.
+struct VirtualTable {
+    words: Vec<Option<u32>>,
+    /// Whether it points to information of its type, which is data.
+    has_type: bool,
 }
 
 /// The lower register of the pointer.
 const Z: usize = 30;
 
 impl Targets {
-    pub(crate) fn new(elf: &Program, budgets: &Budgets) -> Targets {
+    /// The targets of a program whose code begins at `code_start`, behind its vectors.
+    pub(crate) fn new(elf: &Program, budgets: &Budgets, reach: &Reach, code_start: u32) -> Targets {
+        let search = Search { elf, reach, code_start };
         let table_jumps = elf.labels.iter().filter(|(name, _)| name.starts_with("__tablejump"));
         let table_jumps = table_jumps.map(|(_, address)| *address).collect();
         let virtual_tables = elf.virtual_tables.iter().map(|table| {
-            let words = elf.data[table.clone()].chunks_exact(2);
-            words.map(|word| function_at(elf, u16::from_le_bytes([word[0], word[1]]))).collect()
+            let words: Vec<u16> =
+                elf.data[table.clone()].chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]])).collect();
+            // In front of its functions a table has an offset and the address of its type.
+            let has_type = words.get(1).is_some_and(|word| *word != 0);
+            VirtualTable { words: words.into_iter().map(|word| search.of_word(word)).collect(), has_type }
         });
         let listed = budgets.calls.iter().map(|(caller, called)| {
             (caller.clone(), called.iter().flat_map(|name| elf.functions_called(name)).collect())
         });
-        let taken = elf.taken.clone();
-        Targets {
-            table_jumps,
-            is_exact: taken.is_some(),
-            taken: taken.unwrap_or_else(|| found_taken(elf)),
-            virtual_tables: virtual_tables.collect(),
-            listed: listed.collect(),
-        }
+        let (taken, is_exact) = search.taken();
+        Targets { table_jumps, is_exact, taken, virtual_tables: virtual_tables.collect(), listed: listed.collect() }
     }
 
     /// Whether a routine at this address jumps through a table.
@@ -105,18 +116,18 @@ impl Targets {
             (_, Value::Less(low), Value::Less(high)) => u16::from_le_bytes([low, high]).wrapping_neg(),
             _ => return None,
         };
-        let (first, end) = elf.extent(at)?;
+        let (first, end) = elf.extent(at).filter(|(_, end)| at < *end)?;
         let entries = (u32::from(base) * 2..).step_by(2).map(word);
         let addresses: BTreeSet<u32> =
             entries.map_while(|entry| entry.filter(|entry| (first..end).contains(entry))).collect();
         (!addresses.is_empty()).then_some((Where { found: Found::Table, addresses }, cycles))
     }
 
-    /// The targets of a call or jump by the pointer.
+    /// The targets of a call or jump by the pointer, in this function, if it is known.
     pub(crate) fn of_pointer(
         &self,
         elf: &Program,
-        caller: &str,
+        caller: Option<&str>,
         instruction: &Instruction,
         known: &Known,
     ) -> Option<Where> {
@@ -124,7 +135,7 @@ impl Targets {
             let address = u32::from(word) * 2 % elf.chip.flash_bytes;
             return Some(Where { found: Found::Followed, addresses: [beyond_trampoline(elf, address)].into() });
         }
-        if let Some(listed) = self.listed.get(caller) {
+        if let Some(listed) = caller.and_then(|caller| self.listed.get(caller)) {
             return Some(Where { found: Found::Listed, addresses: listed.clone() });
         }
         let (low, high) = (known.registers[Z], known.registers[Z + 1]);
@@ -140,28 +151,22 @@ impl Targets {
             return None;
         }
         let mut addresses = self.taken.clone();
-        for table in self.virtual_tables.iter().filter(|_| !is_variable) {
+        for VirtualTable { words, has_type } in self.virtual_tables.iter().filter(|_| !is_variable) {
             match slot {
-                // A pointer to a table points after two words that are no functions.
+                // A pointer to a table points after two words that are no functions. A type's address can look like one.
                 Some(slot) => {
-                    let is_start = |&start: &usize| table[start - 1].is_none() && table[start].is_some();
-                    let starts = (1..table.len()).filter(is_start);
-                    addresses.extend(starts.filter_map(|start| *table.get(start + slot / 2)?));
+                    let is_start = |start: usize| start == 2 || words[start - 1].is_none() && words[start].is_some();
+                    let starts = (1..words.len())
+                        .filter(|&start| is_start(start) || *has_type && start > 1 && is_start(start - 1));
+                    addresses.extend(starts.filter_map(|start| *words.get(start + slot / 2)?));
                 }
-                None => addresses.extend(table.iter().flatten()),
+                None => addresses.extend(words.iter().flatten()),
             }
         }
         let found = if slot.is_some() { Found::Slot } else { Found::Taken };
         // A pointer that no function can be in is never called by.
         (self.is_exact || !addresses.is_empty()).then_some(Where { found, addresses })
     }
-}
-
-/// The function that begins at a word address, if there is one.
-fn function_at(elf: &Program, word: u16) -> Option<u32> {
-    let address = beyond_trampoline(elf, u32::from(word) * 2);
-    let is_function = elf.functions.contains_key(&address) && address >= elf.code_start;
-    (is_function && word != 0).then_some(address)
 }
 
 /// The target of a jump in the trampolines, which stand for functions that a word address cannot reach.
@@ -172,39 +177,131 @@ fn beyond_trampoline(elf: &Program, address: u32) -> u32 {
     if is_trampoline { target().unwrap_or(address) } else { address }
 }
 
-/// The functions whose address the program seems to take outside virtual tables. This includes all real ones, and
-/// others whose address equals a number in the program.
-fn found_taken(elf: &Program) -> BTreeSet<u32> {
-    let mut taken = BTreeSet::new();
-    let word = |bytes: &[u8], address| word_at(bytes, address).and_then(|word| function_at(elf, word));
-    // Variables lie at any address.
-    let variables = (0..elf.data.len()).filter(|place| !elf.virtual_tables.iter().any(|table| table.contains(place)));
-    taken.extend(variables.filter_map(|place| word(&elf.data, place as u32)));
-    // Constants in flash, before the code and between functions. Only start-up code calls the tables of constructors.
-    let label = |name: &str| elf.label(name).unwrap_or_default();
-    let constructors = label("__ctors_start")..label("__dtors_end").max(label("__ctors_end"));
-    let constants = elf.gaps().flatten().filter(|address| !constructors.contains(address));
-    taken.extend(constants.filter_map(|address| word(&elf.flash, address)));
-    // Pairs of registers that a function loads with constants, in either order.
-    for &first in elf.functions.keys() {
-        let Some((_, end)) = elf.extent(first) else { continue };
-        let mut loaded: BTreeMap<usize, BTreeSet<u8>> = BTreeMap::new();
-        let mut address = first;
-        while address < end {
-            let Some(instruction) = Instruction::at(&elf.flash, address) else {
-                address += 2;
-                continue;
-            };
-            if instruction.operation == Ldi {
-                loaded.entry(instruction.destination).or_default().insert(instruction.constant);
-            }
-            address = instruction.next();
-        }
-        for lower in (16..31).step_by(2) {
-            let (Some(low), Some(high)) = (loaded.get(&lower), loaded.get(&(lower + 1))) else { continue };
-            let words = low.iter().flat_map(|low| high.iter().map(|high| u16::from_le_bytes([*low, *high])));
-            taken.extend(words.filter_map(|word| function_at(elf, word)));
+/// The search for addresses of code that a program takes.
+struct Search<'a> {
+    elf: &'a Program,
+    reach: &'a Reach,
+    code_start: u32,
+}
+
+impl Search<'_> {
+    /// The address of code that a word can be, if it can be one.
+    fn of_word(&self, word: u16) -> Option<u32> {
+        let address = beyond_trampoline(self.elf, u32::from(word) * 2);
+        self.is_entry(address).then_some(address)
+    }
+
+    /// Whether there is code at an address, behind the vectors and outside the tables of constructors.
+    fn is_code(&self, address: u32) -> bool {
+        let elf = self.elf;
+        (self.code_start..elf.code_end).contains(&address)
+            && address.is_multiple_of(2)
+            && address != 0
+            && !self.constructors().contains(&address)
+            && Instruction::at(&elf.flash, address).is_some_and(|found| elf.chip.has(found.operation))
+    }
+
+    /// Whether code at an address can be called that the program takes.
+    fn is_entry(&self, address: u32) -> bool {
+        let Search { elf, reach, .. } = self;
+        let is_named = elf.functions.contains_key(&address) || reach.called.contains(&address);
+        let is_start_up = reach.start_up.contains(&address);
+        let is_data = elf.objects.iter().any(|object| object.contains(&address));
+        let is_free = || elf.marked.contains(&address) || elf.sized(address).is_none();
+        self.is_code(address) && (is_named || !is_start_up && !is_data && is_free())
+    }
+
+    /// The tables of constructors, which only the start-up code calls.
+    fn constructors(&self) -> Range<u32> {
+        let label = |name: &str| self.elf.label(name);
+        let ends = ["__ctors_start", "__ctors_end", "__dtors_start", "__dtors_end"].map(label);
+        match ends {
+            [Some(first), Some(end), Some(other_first), Some(other_end)] => first.min(other_first)..end.max(other_end),
+            _ => 0..0,
         }
     }
-    taken
+
+    fn is_in_virtual_table(&self, place: usize) -> bool {
+        self.elf.virtual_tables.iter().any(|table| table.contains(&place))
+    }
+
+    /// The addresses of code that the program takes outside virtual tables, and whether relocations list all.
+    fn taken(&self) -> (BTreeSet<u32>, bool) {
+        let Search { elf, reach, .. } = self;
+        let mut taken: BTreeSet<u32> =
+            elf.relocations.all.iter().filter_map(|found| self.of_relocation(found)).collect();
+        // Calls, jumps and branches have one each, unless relocations were removed.
+        let is_direct = |found: &Instruction| matches!(found.operation, Call | Jmp | Rcall | Rjmp | Brbs | Brbc);
+        let direct = reach
+            .instructions()
+            .filter(|place| Instruction::at(&elf.flash, **place).is_some_and(|found| is_direct(&found)));
+        let mut lack_one = direct.filter(|place| !elf.relocations.in_code.contains(place));
+        let is_code_exact = !elf.relocations.in_code.is_empty() && lack_one.next().is_none();
+        let is_data_exact = is_code_exact && (elf.relocations.in_data || elf.data.is_empty());
+        if !is_data_exact {
+            // Variables lie at any address.
+            let variables = (0..elf.data.len()).filter(|place| !self.is_in_virtual_table(*place));
+            let words = variables.filter_map(|place| word_at(&elf.data, place as u32));
+            taken.extend(words.filter_map(|word| self.of_word(word)));
+        }
+        if !is_code_exact {
+            let places = || (self.code_start..elf.code_end).step_by(2);
+            let constructors = self.constructors();
+            let is_constant = |place: &u32| {
+                !reach.code.contains(place) && !reach.tables.contains(place) && !constructors.contains(place)
+            };
+            let constants = places().filter(is_constant).filter_map(|place| word_at(&elf.flash, place));
+            taken.extend(constants.filter_map(|word| self.of_word(word)));
+            taken.extend(self.loaded_pairs(places()));
+        }
+        (taken, is_data_exact)
+    }
+
+    /// The address of code that a relocation holds, if it is one that can be called.
+    fn of_relocation(&self, &Relocation { place, address, is_of_bytes }: &Relocation) -> Option<u32> {
+        let Search { elf, reach, .. } = self;
+        let is_variable =
+            place.checked_sub(elf.data_start).is_some_and(|place| self.is_in_virtual_table(place as usize));
+        let is_table = is_variable || reach.tables.contains(&place) || self.constructors().contains(&place);
+        let is_named = elf.functions.contains_key(&address);
+        let is_start_up = reach.start_up.contains(&address) && !is_named;
+        // `-mcall-prologues` puts the address behind a jump into the pointer, and the prologue jumps there.
+        let behind = |back: &u32| address.checked_sub(*back).and_then(|jump| Instruction::at(&elf.flash, jump));
+        let is_return = (address.saturating_sub(8)..address).contains(&place)
+            && [2, 4]
+                .iter()
+                .filter_map(behind)
+                .any(|jump| matches!(jump.operation, Jmp | Rjmp) && jump.next() == address);
+        let is_data = elf.objects.iter().any(|object| object.contains(&address));
+        let is_taken = self.is_code(address) && !is_table && !is_start_up && !is_return && !is_data;
+        (is_taken && (is_named || !is_of_bytes)).then_some(address)
+    }
+
+    /// The addresses of code in pairs of registers that a function loads with constants, in either order. Every word is
+    /// looked at, also where no path leads.
+    fn loaded_pairs(&self, places: impl Iterator<Item = u32>) -> BTreeSet<u32> {
+        let elf = self.elf;
+        let mut loaded: BTreeMap<(u32, bool), BTreeMap<usize, BTreeSet<u8>>> = BTreeMap::new();
+        for place in places {
+            let Some(instruction) = Instruction::at(&elf.flash, place).filter(|found| found.operation == Ldi) else {
+                continue;
+            };
+            let function = match (elf.sized(place), elf.extent(place)) {
+                (Some(function), _) => (function.start, true),
+                (None, Some((first, _))) => (first, false),
+                (None, None) => (0, false),
+            };
+            let registers = loaded.entry(function).or_default();
+            registers.entry(instruction.destination).or_default().insert(instruction.constant);
+        }
+        let mut taken = BTreeSet::new();
+        for registers in loaded.values() {
+            for lower in (16..31).step_by(2) {
+                let (Some(low), Some(high)) = (registers.get(&lower), registers.get(&(lower + 1))) else { continue };
+                let words = low.iter().flat_map(|low| high.iter().map(|high| u16::from_le_bytes([*low, *high])));
+                taken.extend(words.filter_map(|word| self.of_word(word)));
+            }
+        }
+        taken
+    }
 }

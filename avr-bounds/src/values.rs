@@ -89,8 +89,10 @@ pub(crate) struct Known {
     borrow: Option<(u8, u8, bool)>,
     /// The stack pointer's upper byte was written, and the lower one not yet.
     pub(crate) upper_half: Option<Value>,
-    /// The register that was just decremented, while the zero flag still belongs to it.
+    /// The register that the zero flag is about.
     counted: Option<usize>,
+    /// Whether every path here has started the program again.
+    pub(crate) restarts: bool,
 }
 
 /// The registers with known constants.
@@ -109,6 +111,7 @@ impl Known {
             borrow: None,
             upper_half: None,
             counted: None,
+            restarts: false,
         }
     }
 
@@ -160,6 +163,7 @@ impl Known {
         if self.counted != other.counted {
             self.counted = None;
         }
+        self.restarts &= other.restarts;
         if self.upper_half != other.upper_half {
             self.upper_half = Some(Value::Unknown);
         }
@@ -261,6 +265,85 @@ impl Known {
         true
     }
 
+    /// The address that a load or a store accesses, if its pointer is a constant.
+    fn pointed_at(&self, instruction: &Instruction) -> Option<u16> {
+        let (pointer, by) = instruction.pointer()?;
+        let address = self.pair(pointer)?.wrapping_add(instruction.displacement().into());
+        Some(if by < 0 { address.wrapping_add_signed(by.into()) } else { address })
+    }
+
+    /// The stack's depth below the last address of SRAM if this instruction sets the stack pointer to a constant, on a
+    /// path that has started the program again.
+    pub(crate) fn starts_again(&self, instruction: &Instruction, chip: &Chip) -> Option<usize> {
+        let writes = match instruction.operation {
+            Out | Sts => instruction.data_address(),
+            St | Std => self.pointed_at(instruction),
+            _ => None,
+        };
+        let Some(Value::Constant(high)) = self.upper_half.filter(|_| self.restarts && writes == Some(SPL)) else {
+            return None;
+        };
+        let address = u16::from_be_bytes([high, self.constant(instruction.source)?]);
+        chip.ram_last.checked_sub(address).map(usize::from)
+    }
+
+    /// Writes a register's value to an address in the data space. Only start-up code may set the stack pointer to a
+    /// constant.
+    fn write(
+        &mut self,
+        address: u16,
+        register: usize,
+        chip: &Chip,
+        interrupts: &mut Interrupts,
+        is_start_up: bool,
+    ) -> Result<(), Problem> {
+        use Value::{Constant, StackHigh, StackLow, Status, Unknown};
+
+        let value = self.constant(register).map_or(self.registers[register], Constant);
+        match address {
+            SREG => {
+                self.flags = (0, 0);
+                self.unchanged = Registers::NONE;
+                self.counted = None;
+                match value {
+                    Status(on, is_of_entry) => {
+                        turn(interrupts, on);
+                        if is_of_entry {
+                            self.unchanged = Registers::FLAGS;
+                        }
+                    }
+                    Constant(status) => turn(interrupts, status >> INTERRUPT_FLAG & 1 == 1),
+                    _ => return Err(Problem::UnknownStatus),
+                }
+            }
+            EIND if chip.return_address_bytes() > 2 => {
+                if value != Constant(0) {
+                    return Err(Problem::LongIndirect);
+                }
+            }
+            SPH => self.upper_half = Some(value),
+            SPL => {
+                let upper = self.upper_half.take();
+                let depth = match (upper, value) {
+                    (Some(StackHigh(high)), StackLow(low)) if low == high as u8 => usize::try_from(high).ok(),
+                    // The start-up code repeats the reset's value.
+                    (Some(Constant(high)), Constant(low)) if is_start_up => {
+                        chip.ram_last.checked_sub(u16::from_be_bytes([high, low])).map(usize::from)
+                    }
+                    _ => None,
+                };
+                let depth = depth.ok_or(Problem::UnknownStack)?;
+                self.stack.resize(depth.min(DEEPEST + 1), Unknown);
+            }
+            _ => {
+                if let Some(kept) = chip.gpior.iter().position(|gpior| *gpior == address) {
+                    self.kept[kept] = value;
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Executes an instruction that continues at the next one. Only start-up code may set the stack pointer to a
     /// constant.
     pub(crate) fn carry_out(
@@ -278,7 +361,12 @@ impl Known {
             instruction.data_address().and_then(|address| chip.gpior.iter().position(|gpior| *gpior == address));
         let changes = instruction.effects().changes;
         let tells = |counted: &usize| (changes & (Registers::ZERO_FLAG | Registers::one(*counted))).is_empty();
-        self.counted = if instruction.operation == Dec { Some(d) } else { self.counted.filter(tells) };
+        // With a carry from before, the flag is about all bytes of a number.
+        let is_of_one = matches!(
+            instruction.operation,
+            Add | Adc | Sub | Subi | And | Andi | Or | Ori | Eor | Com | Neg | Inc | Dec | Lsr | Ror | Asr
+        );
+        self.counted = if is_of_one { Some(d) } else { self.counted.filter(tells) };
         self.unchanged = self.unchanged - changes;
         let moves = self.moves_stack_pointer(instruction);
         if !moves && !(changes & Registers::CARRY_FLAG).is_empty() {
@@ -315,50 +403,22 @@ impl Known {
                 };
             }
             Out | Sts => {
-                let value = self.registers[r];
-                match instruction.data_address() {
-                    Some(SREG) => {
-                        self.flags = (0, 0);
-                        self.unchanged = Registers::NONE;
-                        self.counted = None;
-                        match value {
-                            Status(on, is_of_entry) => {
-                                turn(interrupts, on);
-                                if is_of_entry {
-                                    self.unchanged = Registers::FLAGS;
-                                }
-                            }
-                            Constant(status) => turn(interrupts, status >> INTERRUPT_FLAG & 1 == 1),
-                            _ => return Err(Problem::UnknownStatus),
-                        }
-                    }
-                    Some(EIND) if chip.return_address_bytes() > 2 => {
-                        if matches!(value, Constant(1..)) {
-                            return Err(Problem::LongIndirect);
-                        }
-                    }
-                    Some(SPH) => self.upper_half = Some(value),
-                    Some(SPL) => {
-                        let upper = self.upper_half.take();
-                        let depth = match (upper, value) {
-                            (Some(StackHigh(high)), StackLow(low)) if low == high as u8 => usize::try_from(high).ok(),
-                            // The start-up code repeats the reset's value.
-                            (Some(Constant(high)), Constant(low)) if is_start_up => {
-                                chip.ram_last.checked_sub(u16::from_be_bytes([high, low])).map(usize::from)
-                            }
-                            _ => None,
-                        };
-                        let depth = depth.ok_or(Problem::UnknownStack)?;
-                        self.stack.resize(depth.min(DEEPEST + 1), Unknown);
-                    }
-                    _ => gpior.into_iter().for_each(|gpior| self.kept[gpior] = value),
+                let address = instruction.data_address().unwrap_or_default();
+                if address < 0x20 {
+                    return Err(Problem::RegisterInMemory);
                 }
+                self.write(address, r, chip, interrupts, is_start_up)?;
             }
             Sbi | Cbi => gpior.into_iter().for_each(|gpior| self.kept[gpior] = Unknown),
             Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.registers[..2].fill(Unknown),
             Ld | Ldd | Lpm | Elpm | St | Std => {
                 let (pointer, by) = instruction.pointer().unwrap_or_default();
                 let place = self.on_stack(instruction);
+                if matches!(instruction.operation, St | Std)
+                    && let Some(address) = self.pointed_at(instruction)
+                {
+                    self.write(address, r, chip, interrupts, is_start_up)?;
+                }
                 match instruction.operation {
                     Lpm | Elpm => self.registers[d] = Unknown,
                     St | Std => {

@@ -563,7 +563,7 @@ fn a_call_by_a_constant_address_is_followed_and_one_by_an_unknown_address_leads_
  {
     let main = |body: &str| {
         format!(
-            "start:\n clr r1\n1: {body}\n rjmp 1b\none:\n push r2\n pop r2\n ret\ntwo:\n push r2\n push r3\n pop r3\n pop r2\n ret"
+            "start:\n clr r1\n ldi r16, 0x08\n out 0x3e, r16\n ldi r16, 0xff\n out 0x3d, r16\n1: {body}\n rjmp 1b\none:\n push r2\n pop r2\n ret\ntwo:\n push r2\n push r3\n pop r3\n pop r2\n ret"
         )
     };
     let known = proved(&main("ldi r30, lo8(gs(one))\n ldi r31, hi8(gs(one))\n icall"));
@@ -648,4 +648,27 @@ fn a_chip_with_more_flash_puts_longer_addresses_onto_the_stack() {
     );
     let error = Program::read(assembled(program).path(), Some("atmega4")).expect_err("there is none").to_string();
     assert!(error.contains("atmega328p"), "{error}");
+}
+
+#[test]
+fn a_store_through_a_known_pointer_sets_flags_and_stack_pointer_as_out_does() {
+    let handler = "handler:\n push r2\n pop r2\n reti";
+    // SREG at 0x5F: interrupts are on while a byte is on the stack.
+    let on = "ldi r30, 0x5f\n ldi r31, 0\n ldi r24, 0x80\n st Z, r24";
+    let bounds = proved(&format!("start:\n {on}\n1: push r2\n pop r2\n rjmp 1b\n{handler}"));
+    assert_eq!(bounds.stack_bytes, 1 + 2 + 1);
+    let displaced = "ldi r28, 0x50\n ldi r29, 0\n ldi r24, 0x80\n std Y+15, r24";
+    assert_eq!(proved(&format!("start:\n {displaced}\n1: push r2\n pop r2\n rjmp 1b\n{handler}")).stack_bytes, 4);
+    // SPL at 0x5D.
+    let sets = "ldi r26, 0x5e\n ldi r27, 0\n mov r24, r5\n st -X, r24\n ret";
+    assert_refused(&calling("rcall called", sets), "sets the stack pointer to an unknown value");
+    assert_refused(&calling("rcall called", "sts 0x0010, r24"), "writes to a register by its address in memory");
+}
+
+#[test]
+fn control_characters_of_a_file_are_not_printed_as_such() {
+    let file = tempfile::NamedTempFile::new().expect("there is room for a file");
+    std::fs::write(file.path(), "stack_bytes = \"\u{1b}[2J\"").expect("it can be written");
+    let error = Budgets::read(file.path()).expect_err("it is no number").to_string();
+    assert!(error.contains("\\u{1b}[2J") && !error.contains('\u{1b}'), "{error}");
 }

@@ -25,6 +25,6 @@ test("the board check passes the firmware on avr8js too", () => {
     assert.deepEqual([wires, failed], [[], []]);
     // The limits of each of these exclude a simulator without any output.
     const ids = lines.map(({ id }) => id);
-    for (const id of ["pulse_out_us", "highest_forward_busy", "beam_flickers_code", "row_2.5_damaged"])
+    for (const id of ["pulse_out_us", "highest_forward_busy", "beam_flickers_code", "row_2.5_reached"])
         assert(ids.includes(id), `${id} is not in the report`);
 });

@@ -52,7 +52,7 @@ function weed(speedKmH: number, seed: number, commands: readonly string[] = []):
     return {
         operator,
         machine,
-        touched: fates.filter((fate) => fate === "damaged").length,
+        touched: fates.filter((fate) => fate === "damaged" || fate === "reached").length,
         clear: fates.filter((fate) => fate === "kept").length,
         worked: weededMm / (toMm - FIRST_MM - canopiesMm),
         swings,

@@ -23,8 +23,8 @@ fn the_firmware_damages_no_plant_at_any_of_the_papers_speeds_and_spacings_and_we
     let outcomes = experiment.run(&Engine::Uno(firmware::build().unwrap()), |_| ()).unwrap();
     assert_eq!(outcomes.len(), 8);
     for outcome in &outcomes {
-        assert!(outcome.record.plants >= 10, "{outcome:?}");
-        assert_eq!((outcome.record.damaged, outcome.alarms), (0, 0), "{outcome:?}");
+        assert!(outcome.effect.plants >= 10, "{outcome:?}");
+        assert_eq!((outcome.effect.injured(), outcome.alarms), (0, 0), "{outcome:?}");
     }
     let short: f64 = outcomes.iter().map(|outcome| outcome.weedable_share - outcome.weeded_share).sum();
     assert!(short / (outcomes.len() as f64) < SHORT_OF_BOUND, "{outcomes:?}");

@@ -17,7 +17,7 @@ const MEAN_MS: f64 = MEAN_TICKS * 0.754;
 #[track_caller]
 fn lateness_without_damage(rows: &Rows) -> Lateness {
     let lateness = lateness(&elf(), rows, |_| {}).expect("the firmware runs");
-    assert_eq!((lateness.damaged, lateness.wrong_positions), (0, 0), "of {} plants", lateness.plants);
+    assert_eq!((lateness.reached, lateness.wrong_positions), (0, 0), "of {} plants", lateness.plants);
     let swings = lateness.errors_ticks.len();
     assert!(swings >= 5 * rows.seeds.clone().count(), "{swings} swings");
     lateness

@@ -13,8 +13,8 @@ use link::settings::name;
 use tester_core::player::Action;
 use uno::{CYCLES_PER_SECOND, Pulse};
 
-/// The preset of `weeder sim`.
-const FIELD: &str = "set-up";
+/// The machine on the boards: guided, and set up.
+const FIELD: &str = "straight";
 
 /// The seed of row and machine.
 const SEED: u64 = 1;
@@ -31,7 +31,7 @@ pub struct Outcome {
     pub lost_counts: i64,
 }
 
-/// The row of `weeder sim` with this number of plants and tall weeds, at a speed.
+/// A row as of `weeder sim`, with this number of plants and tall weeds, at a speed.
 ///
 /// # Errors
 /// If it cannot be grown.

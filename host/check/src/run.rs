@@ -8,7 +8,6 @@ use crate::row::{self, Outcome};
 use crate::servo::{self, Steady};
 use crate::{Boards, CheckError};
 use control::alarm::Alarm;
-use field::verdict::Verdict;
 use tester_core::pins::Line;
 use uno::CYCLES_PER_SECOND;
 
@@ -218,7 +217,7 @@ fn of_row(outcome: &Outcome, plants: usize, weeds: usize, speed: f64) -> Vec<Fig
     let what = |what: &str| format!("row of {plants} plants and {weeds} weeds at {speed} km/h: {what}");
     let count = |id_part, words, value| Figure::count(id(id_part), what(words), value);
     vec![
-        count("damaged", "plants damaged", judgement.count(Verdict::Damaged) as f64).within(..=0.0),
+        count("reached", "zones reached", judgement.reached() as f64).within(..=0.0),
         count("cut", "tall weeds cut", judgement.weeds.iter().filter(|weed| weed.cut).count() as f64),
         count("lost", "counts lost", lost_counts.abs() as f64).within(..=0.0),
         Figure::new(id("swing_mean"), what("mean error of a swing"), "counts", mean, SWING_MEAN_TOLERANCE),

@@ -1,6 +1,7 @@
 //! `weeder evaluate`: evaluates a field trial from the counts and measurements of its plots.
 
 use crate::destination::{OutFolder, OutName, Replace};
+use crate::numbers::number_within;
 use crate::output::{self, say};
 use crate::source;
 use anyhow::{Context, Result};
@@ -17,12 +18,16 @@ const REPORT: &str = "report.html";
 #[command(after_help = "Examples:\n  \
     weeder evaluate trial.csv                   the results, and what they depend on\n  \
     weeder evaluate trial.csv --out report      also write report/report.html, with plots\n  \
+    weeder evaluate trial.csv --speeds 1,1.5,2,2.5   the table has measured speeds\n  \
     weeder evaluate trial.csv --json | jq .responses[0].model.terms")]
 pub struct Arguments {
     /// CSV file with a line for each plot: replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged,
     /// area_m2, time_s, width_m, power_hp; - for standard input.
     #[arg(value_name = "FILE.csv", value_parser = source::file)]
     file: PathBuf,
+    /// Nominal speeds in km/h, where the table has measured ones: means and analysis of variance take the nearest.
+    #[arg(long, value_delimiter = ',', value_parser = number_within(0.1..=15.0))]
+    speeds: Vec<f64>,
     /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -37,7 +42,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.folder([REPORT], arguments.replace)).transpose()?;
     let records = evaluation::read_csv(&arguments.file)?;
-    let analysis = Analysis::of(records).with_context(|| arguments.file.display().to_string())?;
+    let analysis =
+        Analysis::at_speeds(records, &arguments.speeds).with_context(|| arguments.file.display().to_string())?;
     let printed = match arguments.json {
         true => say!("{:#}", in_json(&analysis)),
         false => output::print(format_args!("{analysis}")),
@@ -83,11 +89,12 @@ fn in_json(analysis: &Analysis) -> Value {
 }
 
 fn response_in_json(analysis: &ResponseAnalysis) -> Value {
-    let ResponseAnalysis { response, range, model, checks, binomial, variance, published } = analysis;
+    let ResponseAnalysis { response, numbers, range, model, checks, binomial, variance, published, .. } = analysis;
     let counts = binomial.as_ref();
     json!({
         "response": response,
         "unit": response.unit(),
+        "plots": numbers,
         "range": range,
         "model": model.as_ref().ok(),
         "no_model": model.as_ref().err().map(ToString::to_string),

@@ -55,7 +55,7 @@ const ROLLED_TICKS: u32 = 500;
 /// Leads through the steps.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.simulated {
-        return say!("{}", simulated::table()?);
+        return say!("{}\n{}", simulated::table()?, simulated::about());
     }
     let path = &arguments.state;
     let kept = match fs::read_to_string(path) {

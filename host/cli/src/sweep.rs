@@ -2,7 +2,7 @@
 
 use crate::destination::{OutFile, OutName, Replace};
 use crate::numbers::{number_within, whole_within};
-use crate::output::{print, say};
+use crate::output::{print, say, tell};
 use crate::part::{Part, Shown};
 use crate::progress::with_bar;
 use crate::source::{self, offering};
@@ -13,7 +13,7 @@ use comfy_table::Table;
 use experiments::experiment::{PlotOutcome, Treatment};
 use experiments::shard::Shard;
 use experiments::sweep::{Axis, Point, RESULTS, SPACINGS_CM, SPEEDS_KM_H, Sweep};
-use field::conditions::{Conditions, PARAMETERS};
+use field::conditions::{self, Conditions, PARAMETERS};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -99,7 +99,7 @@ pub struct Arguments {
     #[arg(long, value_parser = controller(), default_value = "firmware")]
     controller: Treatment,
     /// The field: a preset or a TOML file, as for `weeder trial`.
-    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = "transplanted")]
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = conditions::DEFAULT)]
     field: String,
     /// Forward speed in km/h, 0.1 to 8, if no axis has it.
     #[arg(long, default_value = "2.5", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
@@ -131,10 +131,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         y: arguments.y.clone(),
         controller: arguments.controller,
         conditions: Conditions::load(&arguments.field)?,
+        field: arguments.field.clone(),
         speed_km_h: arguments.speed,
         spacing_cm: arguments.spacing,
         seed: arguments.seed,
     };
+    sweep.conditions.warnings().iter().for_each(|warning| tell!("Warning: {warning}"));
     if let Some(part) = Part::asked(arguments.shard, out.as_ref(), replace)? {
         let outcomes = with_bar("sweeping", |show| sweep.run_shard(part.shard, show))?;
         return part.write(COMMAND, sweep.size(), &sweep, outcomes);
@@ -177,10 +179,24 @@ fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
         ),
         None => format!("{}\n", list(sweep, points)),
     };
+    let _ = writeln!(text, "{}", about(sweep));
     if points.iter().any(|point| point.has_alarm) {
         text += "! an alarm took the tool out in some of the rows: --result alarms shows in how many\n";
     }
     text
+}
+
+/// The field, seed, speed, spacing and controller of a sweep.
+fn about(sweep: &Sweep) -> String {
+    let axes = [Some(&sweep.x), sweep.y.as_ref()].into_iter().flatten();
+    let swept: Vec<&str> = axes.map(|axis| axis.parameter.as_str()).collect();
+    let mut text = format!("Field {}, seed {}", sweep.field, sweep.seed);
+    for (name, value, unit) in [("speed", sweep.speed_km_h, "km/h"), ("spacing", sweep.spacing_cm, "cm")] {
+        if !swept.contains(&name) {
+            let _ = write!(text, ", {value} {unit}");
+        }
+    }
+    format!("{text}, {}.", sweep.controller.title())
 }
 
 /// All results of all points, by the names of the file's columns. A missing result is null.

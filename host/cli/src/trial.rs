@@ -19,7 +19,7 @@ use experiments::statistics::Share;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use experiments::table::{distinct, in_two_lines};
 use field::budget;
-use field::conditions::{Conditions, presets};
+use field::conditions::{self, Conditions, presets};
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -45,7 +45,7 @@ Examples:
   weeder trial --engine uno --replications 1         with the real firmware on the virtual Uno
   weeder trial --field my-field.toml --speeds 1,3 --spacings 30,40,50
   weeder trial --replications 1000 --shard 2/4 --out 2.part    the second of four parts, for `weeder merge`
-The status is 1 if the firmware damaged a plant, or an alarm stopped it; with --shard, `weeder merge` has it.")]
+The status is 1 if the firmware damaged a plant that a beam sees, or an alarm stopped it; with --shard, `weeder merge` has it.")]
 pub struct Arguments {
     /// The firmware's code compiled for this computer, or its ELF on the virtual Uno, hundreds of times slower.
     #[arg(long, value_enum, default_value = "native")]
@@ -64,7 +64,7 @@ pub struct Arguments {
         value_name = "PRESET|FILE.toml",
         value_parser = source::preset_or_file(),
         hide_possible_values = true,
-        default_value = "set-up",
+        default_value = conditions::DEFAULT,
         help = format!(
             "The field: a preset, or a TOML file with the differences from the first preset; - for standard input. Presets: {}.",
             presets().collect::<Vec<_>>().join(", ")
@@ -80,6 +80,9 @@ pub struct Arguments {
     /// Random seed, 0 to 18446744073709551615.
     #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
     seed: u64,
+    /// Number of seeds, from that one on, each with all replications: for rare events. 1 to 1000.
+    #[arg(long, default_value = "1", value_parser = whole_within(1..=1000_u32))]
+    seeds: u32,
     /// Run this ELF instead of building the firmware of this repository.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
@@ -149,7 +152,7 @@ impl Arguments {
     }
 
     /// The options that decide the result, as typed.
-    fn options(&self) -> [(&'static str, Option<String>); 9] {
+    fn options(&self) -> [(&'static str, Option<String>); 10] {
         fn list<T>(values: &[T], word: impl Fn(&T) -> String) -> Option<String> {
             Some(values.iter().map(word).collect::<Vec<_>>().join(","))
         }
@@ -166,6 +169,7 @@ impl Arguments {
             ("--examples", path(&self.examples)),
             ("--baselines", list(&self.baselines, name)),
             ("--seed", Some(self.seed.to_string())),
+            ("--seeds", Some(self.seeds.to_string())),
             ("--elf", path(&self.elf)),
         ]
     }
@@ -213,7 +217,9 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         conditions: Conditions::load(&arguments.field)?,
         examples: examples.into_iter().map(|example| (example.features, example.label)).collect(),
         seed: arguments.seed,
+        seeds: arguments.seeds,
     };
+    experiment.conditions.warnings().iter().for_each(|warning| tell!("Warning: {warning}"));
     let plants = experiment.plants();
     ensure!(
         plants <= MOST_PLANTS,
@@ -278,13 +284,14 @@ fn show(
     let printed = if json {
         say!("{:#}", json!({ "summary": summary, "plots": outcomes.iter().map(in_json).collect::<Vec<_>>() }))
     } else if brief {
-        say!("{}", by_speed(&totals, Brief))
+        say!("{}\n{}", by_speed(&totals, Brief), about(study))
     } else {
         let [plants, ground] = [Plants, Ground].map(|contents| by_speed(&totals, contents));
-        say!("{plants}\n{ground}\n\n{LOSS_BUDGET}\n{}\n\n{}", loss_budget(&totals), summary.join("\n"))
+        let (budget, about, summary) = (loss_budget(&totals), about(study), summary.join("\n"));
+        say!("{plants}\n{ground}\n\n{LOSS_BUDGET}\n{budget}\n{about}\n\n{summary}")
     };
     let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
-    let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.effect.injured()).sum();
+    let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.effect.injured_of_seen().0).sum();
     if let Some(folder) = folder {
         // Only the report has the comparison with the paper.
         let summary = [summary, against_the_paper(outcomes)].concat();
@@ -297,13 +304,20 @@ fn show(
     Ok(Finding::of(damaged == 0 && alarms == 0))
 }
 
-/// The differences between the paper's controller here and in the paper, at the paper's speeds.
+/// The differences between the paper's controller here and in the paper, at the paper's speeds, and their reason.
 fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
     let (slowest, fastest) = published::SPEEDS_KM_H;
     let mut records = experiment::records(outcomes, Treatment::Paper);
     records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
     let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
-    said.into_iter().map(|said| format!("The paper's controller at {slowest} to {fastest} km/h: {said}")).collect()
+    if said.is_empty() {
+        return said;
+    }
+    let reason = format!(
+        "This is the paper's program at {slowest} to {fastest} km/h, on this report's machine and field. The paper prints no servo \
+         times, canopies or straying, so these are assumed. Its own slopes contradict each other too."
+    );
+    [said, vec![reason]].concat()
 }
 
 /// The totals of one controller, by speed.
@@ -327,10 +341,12 @@ enum Contents {
 
 use Contents::{Brief, Ground, Plants};
 
-const COLUMNS: [Column; 12] = [
+const COLUMNS: [Column; 14] = [
     ("km/h", |total| total.speed_km_h().to_string(), &[Brief, Plants, Ground]),
     ("controller", |total| name(total.plots.controller).to_owned(), &[Brief, Plants, Ground]),
-    ("plants\ndamaged, %", |total| format!("{} ({})", total.damage().shown(), total.damage()), &[Brief, Plants]),
+    ("plants\ndamaged, %", |total| total.damage().shown(), &[Brief, Plants]),
+    ("of those that\na beam sees, %", |total| interval(total.damage_of_seen()), &[Brief, Plants]),
+    ("of the\nothers, %", |total| interval(total.damage_of_unseen()), &[Plants]),
     ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
     ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
     ("rows with\nan alarm", |total| total.plots.alarms.to_string(), &[Plants]),
@@ -394,6 +410,13 @@ fn gone(weeds: WeedCount) -> String {
 fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
     let mut sentences: Vec<String> =
         experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
+    if experiment.controllers.contains(&Treatment::Paper) {
+        let (lowest, highest) = published::DAMAGED_PERCENT;
+        sentences.push(format!(
+            "The paper's controller is the paper's program on this machine. On its own machine the paper measured {lowest} to {highest} %. \
+             `weeder trial --field paper` simulates that machine."
+        ));
+    }
     let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
     if alarms > 0 {
         sentences.push(format!(
@@ -434,13 +457,29 @@ fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
              {in_plot:.0} % were gone."
         ));
     }
-    sentences.push(format!(
-        "Field: {} rows of {} m for each controller, seed {}.",
-        experiment.rows(),
-        experiment.conditions.plot.row_m,
-        experiment.seed
-    ));
     sentences
+}
+
+/// The field, its seeds and its rows, for the tables. Their lines have the speeds.
+fn about(study: &Study) -> String {
+    let Study { experiment: Experiment { seed, seeds, conditions, spacings_cm, .. }, field, .. } = study;
+    let seeds = if *seeds > 1 {
+        format!("seeds {seed} to {}", seed.wrapping_add((seeds - 1).into()))
+    } else {
+        format!("seed {seed}")
+    };
+    let spacings: Vec<String> = spacings_cm.iter().map(f64::to_string).collect();
+    let rows = study.experiment.rows();
+    format!(
+        "Field {field}, {seeds}: {rows} rows of {} m for each controller, plants {} cm apart.",
+        conditions.plot.row_m,
+        spacings.join(" and ")
+    )
+}
+
+/// A share and its interval.
+fn interval(share: Share) -> String {
+    if share.of == 0 { "-".to_owned() } else { format!("{} ({share})", share.shown()) }
 }
 
 /// How many plants a controller damaged, and where it damaged most.
@@ -449,15 +488,17 @@ fn damage(totals: &[Total], controller: Treatment) -> String {
     let (damaged, plants) = of(totals, controller).fold((0, 0), |(damaged, plants), total| {
         (damaged + total.plots.effect.injured(), plants + total.plots.effect.plants)
     });
+    let share = Share::of(damaged, plants);
     let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
     match worst {
         Some(worst) if damaged > 0 => format!(
-            "Plants damaged by {name}: {damaged} of {plants} ({} %), most of them at {} km/h, {} %.",
-            Share::of(damaged, plants),
+            "Plants damaged by {name}: {damaged} of {plants} ({} %, {}), most of them at {} km/h, {} %.",
+            share,
+            share.kind(),
             worst.speed_km_h(),
             worst.damage().shown()
         ),
-        _ => format!("Plants damaged by {name}: none of {plants} ({} %).", Share::of(damaged, plants)),
+        _ => format!("Plants damaged by {name}: none of {plants} ({share} %, {}).", share.kind()),
     }
 }
 

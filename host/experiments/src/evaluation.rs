@@ -7,6 +7,7 @@
 //! plots.
 
 mod findings;
+mod nominal;
 mod plot;
 pub mod published;
 pub(crate) mod report;
@@ -29,6 +30,8 @@ pub struct Analysis {
     pub records: Vec<PlotRecord>,
     /// The measures of each plot, in the same order.
     pub performances: Vec<Performance>,
+    /// The nominal speed of each plot, km/h. It is the plot's own if no nominal speeds were given.
+    pub levels_km_h: Vec<f64>,
     /// The analysis of each measure, in the order of [`Response::ALL`].
     pub responses: Vec<ResponseAnalysis>,
 }
@@ -38,8 +41,12 @@ pub struct Analysis {
 pub struct ResponseAnalysis {
     /// The measure.
     pub response: Response,
-    /// Its lowest and its highest value in a plot, in its unit.
-    pub range: (f64, f64),
+    /// The plots that have it, numbered from 0. All vectors below are in this order.
+    pub plots: Vec<usize>,
+    /// The number of each of them in the field.
+    pub numbers: Vec<u32>,
+    /// Its lowest and its highest value in a plot, in its unit. `None` if no plot has it.
+    pub range: Option<(f64, f64)>,
     /// The measure as a linear function of speed in km/h and spacing in cm.
     pub model: Result<LinearModel, NoModel>,
     /// The checks of that model's residuals; `None` without a model.
@@ -55,18 +62,18 @@ pub struct ResponseAnalysis {
 /// The plots of one speed and spacing together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Treatment {
-    /// Forward speed, km/h.
+    /// Forward speed, nominal, km/h.
     pub speed_km_h: f64,
     /// Plant spacing, cm.
     pub spacing_cm: f64,
     /// How many plots there are.
     pub plots: usize,
-    /// The mean of each measure over them.
+    /// The mean of each measure over the plots that have it.
     pub mean: Performance,
     /// Damaged plants of all these plots together.
     pub damaged: Share,
-    /// Their mean weeding efficiency in %, with its interval.
-    pub weeding_efficiency: Mean,
+    /// Their mean weeding efficiency in %, with its interval. `None` if no plot has it.
+    pub weeding_efficiency: Option<Mean>,
 }
 
 impl Analysis {
@@ -75,50 +82,83 @@ impl Analysis {
     /// # Errors
     /// If there is no plot, or an invalid one. A measure without a model has a [`NoModel`] instead.
     pub fn of(records: Vec<PlotRecord>) -> Result<Self> {
+        Self::at_speeds(records, &[])
+    }
+
+    /// Analyses the plots of a trial whose speeds were measured, each at the nearest of these nominal speeds. The
+    /// linear and binomial models keep the measured speeds. Without nominal speeds, each plot has its own.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of), and if a plot is far from each nominal speed.
+    pub fn at_speeds(mut records: Vec<PlotRecord>, nominal_km_h: &[f64]) -> Result<Self> {
         ensure!(!records.is_empty(), "a trial has at least one plot");
-        for (index, record) in records.iter().enumerate() {
-            record.check().map_err(|problem| anyhow!("plot {}: {problem}", index + 1))?;
-        }
-        let performances: Vec<Performance> = records.iter().map(PlotRecord::performance).collect();
-        let design = Design::new(records.iter().map(|record| (record.speed_km_h, record.spacing_cm)))
-            .in_blocks(records.iter().map(|record| record.replication).collect());
-        let analyse = |response: Response| {
-            let values: Vec<f64> = performances.iter().map(|performance| response.value(performance)).collect();
-            let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or_default();
-            let model = LinearModel::fit(&design, &values);
-            let counts: Option<Vec<(u32, u32)>> = records.iter().map(|record| response.count(record)).collect();
-            ResponseAnalysis {
-                response,
-                range: (extreme(f64::min), extreme(f64::max)),
-                checks: model.as_ref().ok().map(|model| Checks::of(&design, &values, model)),
-                model,
-                binomial: counts.map(|counts| BinomialModel::fit(&design, &counts)),
-                variance: AnalysisOfVariance::of(&design, &values),
-                published: Published::of(response),
+        for (record, number) in records.iter_mut().zip(1..) {
+            if record.plot == 0 {
+                record.plot = number;
             }
+            record.check().map_err(|problem| anyhow!("plot {}: {problem}", record.plot))?;
+        }
+        let levels_km_h = match nominal_km_h {
+            [] => records.iter().map(|record| record.speed_km_h).collect(),
+            nominal_km_h => nominal::nearest(&records, nominal_km_h)?,
         };
-        let responses = Response::ALL.map(analyse).to_vec();
-        Ok(Self { records, performances, responses })
+        let performances: Vec<Performance> = records.iter().map(PlotRecord::performance).collect();
+        let mut analysis = Self { records, performances, levels_km_h, responses: Vec::new() };
+        analysis.responses = Response::ALL.map(|response| ResponseAnalysis::of(response, &analysis)).to_vec();
+        Ok(analysis)
     }
 
     /// The plots by treatment, slow and narrow first.
     pub fn treatments(&self) -> Vec<Treatment> {
-        let plots = self.records.iter().zip(&self.performances);
-        let mut of_treatments = grouped(plots.map(|plot| ((plot.0.speed_km_h, plot.0.spacing_cm), plot)));
+        let plots = self.records.iter().zip(&self.performances).zip(&self.levels_km_h);
+        let mut of_treatments = grouped(plots.map(|(plot, level)| ((*level, plot.0.spacing_cm), plot)));
         of_treatments.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        of_treatments.into_iter().map(|(_, plots)| Treatment::of(plots)).collect()
+        of_treatments.into_iter().map(|(treatment, plots)| Treatment::of(treatment, plots)).collect()
+    }
+}
+
+impl ResponseAnalysis {
+    /// The analysis of one measure over the plots that have it.
+    fn of(response: Response, Analysis { records, performances, levels_km_h, .. }: &Analysis) -> Self {
+        let with_value = (0..).zip(performances).filter_map(|(plot, of)| Some((plot, response.value(of)?)));
+        let (plots, values): (Vec<usize>, Vec<f64>) = with_value.unzip();
+        let records = || plots.iter().map(|&plot| &records[plot]);
+        let design = Design::new(records().map(|record| (record.speed_km_h, record.spacing_cm)))
+            .at_levels(plots.iter().map(|&plot| levels_km_h[plot]).collect())
+            .in_blocks(records().map(|record| record.replication).collect());
+        let is_measured = if plots.is_empty() { Err(NoModel::NotMeasured) } else { Ok(()) };
+        let model = is_measured.and_then(|()| LinearModel::fit(&design, &values));
+        let counts: Vec<(u32, u32)> = records().filter_map(|record| response.count(record)).collect();
+        let binomial = || is_measured.and_then(|()| BinomialModel::fit(&design, &counts));
+        let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
+        Self {
+            response,
+            numbers: records().map(|record| record.plot).collect(),
+            range: extreme(f64::min).zip(extreme(f64::max)),
+            checks: model.as_ref().ok().map(|model| Checks::of(&design, &values, model)),
+            model,
+            binomial: response.is_counted().then(binomial),
+            variance: is_measured.and_then(|()| AnalysisOfVariance::of(&design, &values)),
+            published: Published::of(response),
+            plots,
+        }
     }
 }
 
 impl Treatment {
     /// The treatment of these plots, at least one.
-    fn of(plots: Vec<(&PlotRecord, &Performance)>) -> Self {
+    fn of((speed_km_h, spacing_cm): (f64, f64), plots: Vec<(&PlotRecord, &Performance)>) -> Self {
         let (records, performances): (Vec<&PlotRecord>, Vec<&Performance>) = plots.into_iter().unzip();
-        let values = |quantity: fn(&Performance) -> f64| performances.iter().copied().map(quantity).collect::<Vec<_>>();
-        let mean_of = |quantity| mean(&values(quantity));
+        let values =
+            |quantity: fn(&Performance) -> Option<f64>| performances.iter().copied().filter_map(quantity).collect();
+        let mean_of = |quantity| {
+            let values: Vec<f64> = values(quantity);
+            (!values.is_empty()).then(|| mean(&values))
+        };
+        let efficiencies: Vec<f64> = values(|plot| plot.weeding_efficiency_percent);
         Self {
-            speed_km_h: records[0].speed_km_h,
-            spacing_cm: records[0].spacing_cm,
+            speed_km_h,
+            spacing_cm,
             plots: records.len(),
             mean: Performance {
                 plant_damage_percent: mean_of(|plot| plot.plant_damage_percent),
@@ -129,16 +169,16 @@ impl Treatment {
                 performance_index: mean_of(|plot| plot.performance_index),
             },
             damaged: damaged(records),
-            weeding_efficiency: Mean::of(&values(|plot| plot.weeding_efficiency_percent)),
+            weeding_efficiency: (!efficiencies.is_empty()).then(|| Mean::of(&efficiencies)),
         }
     }
 }
 
 /// The plants of some plots that were damaged.
 fn damaged<'a>(records: impl IntoIterator<Item = &'a PlotRecord>) -> Share {
-    let (damaged, plants) = records
-        .into_iter()
-        .fold((0, 0), |(damaged, plants), plot| (damaged + u64::from(plot.damaged), plants + u64::from(plot.plants)));
+    let counts = records.into_iter().filter_map(|record| Response::PlantDamage.count(record));
+    let (damaged, plants) =
+        counts.fold((0, 0), |(all, of), (damaged, plants)| (all + u64::from(damaged), of + u64::from(plants)));
     Share::of(damaged, plants)
 }
 

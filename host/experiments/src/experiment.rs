@@ -95,6 +95,8 @@ pub struct Experiment {
     pub examples: Vec<([u8; features::COUNT], u8)>,
     /// Selects the random fields.
     pub seed: u64,
+    /// So many seeds, from that one on, each with all replications.
+    pub seeds: u32,
 }
 
 /// One plot, weeded by one controller.
@@ -162,6 +164,7 @@ impl Experiment {
             conditions,
             examples: Vec::new(),
             seed,
+            seeds: 1,
         }
     }
 
@@ -170,12 +173,13 @@ impl Experiment {
         let Conditions { plot: area, machine, .. } = &self.conditions;
         let width_m = area.row_spacing_mm / 1000.0;
         let area_m2 = f64::from(area.rows) * area.row_m * width_m;
-        let before = PlotRecord { area_m2, width_m, power_hp: machine.power_hp, ..PlotRecord::default() };
+        let (area_m2, width_m, power_hp) = (Some(area_m2), Some(width_m), Some(machine.power_hp));
+        let before = PlotRecord { area_m2, width_m, power_hp, ..PlotRecord::default() };
         let mut plots = Vec::new();
         for &speed_km_h in &self.speeds_km_h {
             for &spacing_cm in &self.spacings_cm {
                 let plot = |replication| PlotRecord { replication, speed_km_h, spacing_cm, ..before };
-                plots.extend((1..=self.replications).map(plot));
+                plots.extend((1..=self.replications * self.seeds).map(plot));
             }
         }
         plots
@@ -238,7 +242,8 @@ impl Experiment {
         let plots = (0..).zip(self.plots());
         let fastest = plots.reduce(|a, b| if b.1.speed_km_h > a.1.speed_km_h { b } else { a });
         let Some((number, plot)) = fastest else { return Ok(None) };
-        let (stand, _, trial) = self.grow((number, &plot), 0)?;
+        let (stand, _, mut trial) = self.grow((number, &plot), 0)?;
+        trial.row = trial.row.with_stems(stand.stems.clone());
         let weeded = weed(&trial, &sensors(&trial), &stand, Treatment::Firmware, engine)?;
         let Trial { row, machine, motion, timing, .. } = &trial;
         let judgement = judge(row, machine, motion, *timing, &weeded.pulses, weeded.start_cycle);
@@ -277,7 +282,7 @@ impl Experiment {
         let undamaged_share = undamaged_share(&stand, &trial.machine, &drive.motion, &drive.steering);
         let Conditions { plot: area, machine: mechanism, .. } = &self.conditions;
         let rows = f64::from(area.rows);
-        let record = PlotRecord { time_s: drive.row_s + drive.turn_s, ..*plot.1 };
+        let record = PlotRecord { time_s: Some(drive.row_s + drive.turn_s), ..*plot.1 };
         let outcome = |&controller: &Treatment| {
             let weeded = weed(&trial, &sensors, &stand, controller, engine)?;
             let Trial { row, machine, motion, timing, .. } = &trial;
@@ -290,7 +295,7 @@ impl Experiment {
                 effect: effect(&stand, machine, mechanism, (motion, &drive.steering), pulses, start_cycle),
                 zones: Zones {
                     all: judgement.plants.len() as u32,
-                    reached: judgement.count(Verdict::Damaged) as u32,
+                    reached: judgement.reached() as u32,
                     margins_cut: judgement.count(Verdict::MarginCut) as u32,
                 },
                 weeded_share: judgement.weeded_share / rows,
@@ -308,7 +313,8 @@ impl Experiment {
     fn grow(&self, (number, plot): Plot, row: u32) -> Result<(Stand, Drive, Trial)> {
         // Stand, driving and machine each have their own random numbers.
         let chance = |of: u64| {
-            let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+            let nth_seed = (plot.replication - 1) / self.replications;
+            let mut rng = ChaCha8Rng::seed_from_u64(self.seed.wrapping_add(nth_seed.into()));
             rng.set_stream(number << 34 | u64::from(row) << 2 | of);
             rng
         };
@@ -378,11 +384,11 @@ impl PlotOutcome {
         self.budget += other.budget;
         self.alarms += other.alarms;
         self.moved_s += other.moved_s;
-        self.record.time_s += other.record.time_s;
+        self.record.time_s = self.record.time_s.zip(other.record.time_s).map(|(time_s, other_s)| time_s + other_s);
     }
 
     /// What only a simulated field can tell of a plot, by its column's name. Shares are in percent.
-    pub fn figures(&self) -> [(&'static str, Value); 12] {
+    pub fn figures(&self) -> [(&'static str, Value); 13] {
         let Self { zones, effect, .. } = self;
         [
             ("zones", zones.all.into()),
@@ -394,6 +400,7 @@ impl PlotOutcome {
             ("in_row_bound_percent", (100.0 * self.weedable_share).into()),
             ("undamaged_bound_percent", (100.0 * self.undamaged_share).into()),
             ("damaged_by_tool", effect.damaged.into()),
+            ("unseen", effect.all_unseen.into()),
             ("damaged_unseen", effect.unseen.into()),
             ("damaged_by_sweeps", effect.swept.into()),
             ("damaged_in_next_row", effect.neighbours.into()),
@@ -408,10 +415,10 @@ impl PlotOutcome {
         // If no weed stands on the counted ground, the whole plot is counted.
         let weeds = if counted.before > 0 { counted } else { in_plot };
         self.record = PlotRecord {
-            weeds_before: in_a_plot(weeds.before),
-            weeds_after: in_a_plot(weeds.after),
-            plants,
-            damaged: self.effect.injured(),
+            weeds_before: Some(in_a_plot(weeds.before)),
+            weeds_after: Some(in_a_plot(weeds.after)),
+            plants: Some(plants),
+            damaged: Some(self.effect.injured()),
             ..self.record
         };
     }

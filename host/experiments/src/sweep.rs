@@ -74,14 +74,16 @@ pub const RESULTS: [&str; 8] = [
 fn results(outcome: &PlotOutcome, rows: u32) -> [f64; RESULTS.len()] {
     let performance = outcome.record.performance();
     // From all weeds: the scatter of a square metre would hide the effect.
-    let weeding = outcome.effect.in_plot.efficiency_percent();
+    let weeding = outcome.effect.in_plot.efficiency_percent().or(performance.weeding_efficiency_percent);
+    // A plot without a plant or a weed has no such figure.
+    let known = |measure: Option<f64>| measure.unwrap_or(f64::NAN);
     [
-        performance.plant_damage_percent,
-        weeding.unwrap_or(performance.weeding_efficiency_percent),
+        known(performance.plant_damage_percent),
+        known(weeding),
         100.0 * outcome.weeded_share,
         100.0 * outcome.weedable_share,
-        performance.field_efficiency_percent,
-        performance.performance_index,
+        known(performance.field_efficiency_percent),
+        known(performance.performance_index),
         100.0 * f64::from(outcome.alarms) / f64::from(rows),
         Share::of(outcome.zones.reached, outcome.zones.all).percent(),
     ]
@@ -98,6 +100,8 @@ pub struct Sweep {
     pub controller: Treatment,
     /// The fixed conditions.
     pub conditions: Conditions,
+    /// Their name.
+    pub field: String,
     /// Speed if no axis has it, km/h.
     pub speed_km_h: f64,
     /// Plant spacing if no axis has it, cm.
@@ -230,6 +234,7 @@ mod tests {
             y: y.map(|y| y.parse().unwrap()),
             controller: Treatment::Firmware,
             conditions,
+            field: "transplanted".to_owned(),
             speed_km_h: 2.5,
             spacing_cm: 50.0,
             seed: 1,

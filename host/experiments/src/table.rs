@@ -56,6 +56,20 @@ pub fn distinct(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     values
 }
 
+/// Numbers as in a sentence: `1, 1.5 and 2`.
+pub(crate) fn list(numbers: &[f64]) -> String {
+    let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
+    in_words(&words)
+}
+
+/// Words as in a sentence.
+pub(crate) fn in_words(words: &[String]) -> String {
+    match words {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        words => words.concat(),
+    }
+}
+
 /// The text of a missing number.
 pub const NOTHING: &str = "\u{2013}";
 

@@ -137,7 +137,7 @@ mod tests {
     use crate::machine::Machine;
     use crate::motion::mm_s;
     use crate::row::{Canopy, Row};
-    use crate::verdict::{Timing, Verdict, judge};
+    use crate::verdict::{Timing, judge};
 
     const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
 
@@ -148,7 +148,7 @@ mod tests {
         let Weeded { pulses, .. } = controller(&trial);
         let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
         assert!(judgement.weeded_share > 0.1);
-        judgement.count(Verdict::Damaged)
+        judgement.reached()
     }
 
     #[test]

@@ -35,8 +35,8 @@ const PRESETS: &[(&str, &str)] = &[
     ("heavy-soil", include_str!("../presets/heavy-soil.toml")),
     ("dusty", include_str!("../presets/dusty.toml")),
     ("hand-steered", include_str!("../presets/hand-steered.toml")),
-    ("hand-steered-set-up", include_str!("../presets/hand-steered-set-up.toml")),
-    ("set-up", include_str!("../presets/set-up.toml")),
+    ("walked", include_str!("../presets/walked.toml")),
+    ("straight", include_str!("../presets/straight.toml")),
     ("quick-tool", include_str!("../presets/quick-tool.toml")),
     ("chilli", include_str!("../presets/chilli.toml")),
     ("broccoli", include_str!("../presets/broccoli.toml")),
@@ -46,6 +46,9 @@ const PRESETS: &[(&str, &str)] = &[
     ("from-the-box", ""),
     ("paper", include_str!("../presets/paper.toml")),
 ];
+
+/// The preset that every study takes if the user names no other: a machine that a person walks behind.
+pub const DEFAULT: &str = "straight";
 
 /// The presets' names.
 pub fn presets() -> impl Iterator<Item = &'static str> {
@@ -133,6 +136,28 @@ impl Conditions {
         Err(WrongValue::out_of_range("machine.second_beam_mm", second_beam_mm, (least, greatest), meaning))
     }
 
+    /// What is likely wrong with these conditions, in sentences.
+    pub fn warnings(&self) -> Vec<String> {
+        let room_mm = self.machine.sweep_from_mm - self.crop.protected_mm / 2.0 - self.crop.across_scatter_mm;
+        let strays_mm = self.driving.steering_mm;
+        let strays_too_far = self.machine.sweeps_a_side > 0 && strays_mm > room_mm;
+        let warning = strays_too_far.then(|| {
+            format!(
+                "driving.steering_mm is {strays_mm}, but the sweeps leave {room_mm:.1} mm: they cut plants. \
+                 Set machine.sweep_from_mm to {:.0} or more.",
+                (self.machine.sweep_from_mm + strays_mm - room_mm).ceil()
+            )
+        });
+        warning.into_iter().collect()
+    }
+
+    /// The same field and machine before anything is fitted, set or measured.
+    pub fn from_the_box(&self) -> Self {
+        let Mechanism { tool_width_mm, second_beam_mm, .. } = Mechanism::default();
+        let machine = Mechanism { tool_width_mm, second_beam_mm, ..self.machine.clone() };
+        Self { machine, settings: Default::default(), ..self.clone() }
+    }
+
     /// Changes a parameter, named `table.key`, or a setting of the firmware, by the firmware's name.
     ///
     /// # Errors
@@ -148,12 +173,16 @@ impl Conditions {
         } else {
             let unknown = || WrongValue::unknown(parameter);
             let mut tables = toml::Table::try_from(&*self).map_err(|_| unknown())?;
+            let known = PARAMETERS.iter().find(|known| known.name == parameter).ok_or_else(unknown)?;
             let entry = parameter
                 .split_once('.')
                 .and_then(|(table, key)| tables.get_mut(table)?.as_table_mut()?.get_mut(key))
-                .filter(|_| PARAMETERS.iter().any(|known| known.name == parameter))
                 .ok_or_else(unknown)?;
-            *entry = if entry.is_integer() { toml::Value::Integer(whole()?) } else { toml::Value::Float(value) };
+            *entry = match entry {
+                toml::Value::Integer(_) => toml::Value::Integer(whole()?),
+                toml::Value::String(_) => toml::Value::String(known.written(whole()? as f64)),
+                _ => toml::Value::Float(value),
+            };
             changed = tables.try_into().map_err(|_| WrongValue::not_whole(parameter, value))?;
         }
         changed.check()?;
@@ -163,7 +192,7 @@ impl Conditions {
 
     /// The machine. The seed selects its servo's and encoder's random deviations.
     pub fn machine(&self, seed: u64) -> Machine {
-        let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, tool_width_mm, .. } = self.machine;
+        let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, arm, tool_width_mm, .. } = self.machine;
         let Mechanism { dead_time_ms, dead_time_scatter_ms, travel_ms, load_kg_cm, stall_kg_cm, .. } = self.machine;
         let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
         // The stroke follows from the firmware's settings.
@@ -174,6 +203,7 @@ impl Conditions {
             beam_to_tool_mm,
             second_beam_mm,
             arm_mm,
+            arm,
             tool_width_mm,
             servo: Servo { in_us, out_us, dead_time_ms, travel_ms, scatter },
             beam_mm: self.sensors.beam_mm,
@@ -265,6 +295,10 @@ fn explain(text: &str, byte: usize, error: &toml::de::Error) -> String {
     let wrong = entry.and_then(|Entry { name, value, .. }| {
         let (least, greatest, meaning) = range(&name)?;
         let written = &text[value];
+        if let Some(known) = PARAMETERS.iter().find(|known| known.name == name && !known.words.is_empty()) {
+            let words: Vec<String> = known.words.iter().map(|word| format!("\"{word}\"")).collect();
+            return Some(format!("{name} is {written}, but has to be {}: {meaning}", words.join(" or ")));
+        }
         Some(format!("{name} is {written}, but has to be a number from {least} to {greatest}: {meaning}"))
     });
     wrong.unwrap_or_else(|| error.message().trim().replace('\n', ", "))

@@ -83,37 +83,73 @@ pub fn drive(conditions: &Conditions, span_mm: &Range<f64>, speed_km_h: f64, rng
     let row_s = passed_s(span_mm.end) - passed_s(span_mm.start);
     let turn_s = driving.turn_m * 1000.0 / mm_s(speed_km_h) + driving.turn_s * (1.0 + scatter(rng, STOP_SCATTER));
     let strays_mm = span_mm.start - RUN_OUT_MM..end_mm;
-    let steering = Steering::within(driving.steering_mm, strays_mm, rng);
+    let steering = Steering::within(driving.steering_mm, strays_mm.clone(), rng);
+    let steering = steering.with_play(machine.side_play_mm, strays_mm, rng);
     Drive { motion, row_s, turn_s, steering }
 }
 
-/// The machine's position across the row, at each position along it.
+/// The machine's position across the row, at each position along it, and its tool's.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Steering {
-    /// Positions, and the deviation from the line there, positive to the left. Empty for a machine that stays on the
-    /// line.
-    knots: Vec<(f64, f64)>,
-    /// The farthest that it strays.
-    pub(crate) within_mm: f64,
+    machine: Strays,
+    /// The tool's play on the machine.
+    tool: Strays,
 }
+
+/// A deviation to the left, at each position along the row.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Strays {
+    /// Positions, and the deviation there. Empty without one.
+    knots: Vec<(f64, f64)>,
+    /// The largest.
+    within_mm: f64,
+}
+
+/// The tool's play changes over this distance: about from plant to plant.
+const PLAY_MM: Range<f64> = 200.0..600.0;
 
 impl Steering {
     /// A machine that strays by up to `within_mm` on this ground.
     pub fn within(within_mm: f64, ground_mm: Range<f64>, rng: &mut impl Rng) -> Self {
+        Self { machine: Strays::within(within_mm, ground_mm, LEG_MM, rng), ..Self::default() }
+    }
+
+    /// The same, with a tool that has up to `play_mm` of play to either side.
+    pub fn with_play(self, play_mm: f64, ground_mm: Range<f64>, rng: &mut impl Rng) -> Self {
+        Self { tool: Strays::within(play_mm, ground_mm, PLAY_MM, rng), ..self }
+    }
+
+    /// Deviation of the machine's middle from the row's line, when its tool works this ground.
+    pub fn across_mm(&self, place_mm: f64) -> f64 {
+        self.machine.at_mm(place_mm)
+    }
+
+    /// Deviation of the tool from its position on a machine that keeps the row's line.
+    pub(crate) fn tool_across_mm(&self, place_mm: f64) -> f64 {
+        self.machine.at_mm(place_mm) + self.tool.at_mm(place_mm)
+    }
+
+    /// The largest deviation of the tool.
+    pub(crate) fn tool_within_mm(&self) -> f64 {
+        self.machine.within_mm + self.tool.within_mm
+    }
+}
+
+impl Strays {
+    fn within(within_mm: f64, ground_mm: Range<f64>, leg_mm: Range<f64>, rng: &mut impl Rng) -> Self {
         if within_mm <= 0.0 {
             return Self::default();
         }
         let mut knots = vec![(ground_mm.start, scatter(rng, within_mm))];
         let mut place_mm = ground_mm.start;
         while place_mm < ground_mm.end {
-            place_mm += rng.random_range(LEG_MM);
+            place_mm += rng.random_range(leg_mm.clone());
             knots.push((place_mm, scatter(rng, within_mm)));
         }
         Self { knots, within_mm }
     }
 
-    /// Deviation of the machine's middle from the row's line, when its tool works this ground.
-    pub fn across_mm(&self, place_mm: f64) -> f64 {
+    fn at_mm(&self, place_mm: f64) -> f64 {
         interpolated(&self.knots, place_mm).unwrap_or(0.0)
     }
 }

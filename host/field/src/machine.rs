@@ -5,9 +5,10 @@
 //! firmware the levels of encoder and beam as a list of [`PinChange`]s. The motion does not depend on the firmware, so
 //! the list is complete before the firmware runs.
 //!
-//! The arm swings sideways about a pivot beside the row. At an angle `a` the tool's middle is `arm * sin(a)` beside the
-//! row's line. So the tool works the line while that is less than half its width. It is *clear* of the row only when it
-//! is fully out. A trial uses this strict measure for plants, because canopies also reach sideways.
+//! At an angle `a` of its arm the tool's middle is `arm * sin(a)` beside the row's line. So the tool works the line while
+//! that is less than half its width. It is *clear* of the row only when it is fully out. The arm is a pendulum, which
+//! lifts the tool by `arm * (1 - cos(a))`, or it trails behind its pivot and carries the tool forward by as much. The
+//! tool stays square to the row.
 //!
 //! The encoder has no jitter. If its disc is dirty, pulses of its channel A are missing.
 
@@ -18,9 +19,32 @@ use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::ops::Range;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange};
+
+/// How the arm hangs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Arm {
+    /// It hangs from the servo's shaft, which lies along the row. A stroke lifts the tool.
+    #[default]
+    Pendulum,
+    /// It lies along the row behind an upright shaft. A stroke carries the tool forward.
+    Trailing,
+}
+
+impl Arm {
+    /// The arms' names, by number.
+    pub const NAMES: [&str; 2] = ["pendulum", "trailing"];
+}
+
+impl From<Arm> for f64 {
+    fn from(arm: Arm) -> Self {
+        Self::from(arm as u8)
+    }
+}
 
 /// Dimensions of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +65,8 @@ pub struct Machine {
     pub servo: Servo,
     /// Length of the arm from its pivot to the tool.
     pub arm_mm: f64,
+    /// How it hangs.
+    pub arm: Arm,
     /// Width of the tool, across the row.
     pub tool_width_mm: f64,
     /// An arm within this angle of fully out is fully out.
@@ -82,6 +108,7 @@ impl Default for Machine {
             beam_mm: 0.0,
             servo: Servo::default(),
             arm_mm: 350.0,
+            arm: Arm::Pendulum,
             tool_width_mm: 55.0,
             // A tenth of a millimetre at the tool's end.
             clear_within_degrees: 0.02,
@@ -128,6 +155,14 @@ impl Machine {
         self.arm_mm * degrees.to_radians().sin()
     }
 
+    /// How far the arm has carried the tool forward at an angle.
+    pub fn forward_mm(&self, degrees: f64) -> f64 {
+        match self.arm {
+            Arm::Pendulum => 0.0,
+            Arm::Trailing => self.arm_mm * (1.0 - degrees.to_radians().cos()),
+        }
+    }
+
     /// The angle beyond which the tool no longer works the row's line.
     pub fn line_degrees(&self) -> f64 {
         (self.tool_width_mm / 2.0 / self.arm_mm).min(1.0).asin().to_degrees()
@@ -158,18 +193,24 @@ impl Machine {
     /// The level of each beam's line at power-up, before the motion begins: the first beam's, and the second one's if
     /// there is one.
     pub fn beams_before(&self, row: &Row, motion: &Motion) -> Vec<PinChange> {
-        self.beams(&self.seen_mm(row.blocks_mm()), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
+        let leaves_mm = self.leaves_mm(row);
+        self.beams(leaves_mm.each_ref().map(Vec::as_slice), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
     }
 
-    /// The sensors of the beams of a machine at `start_mm`, over these leaves.
-    pub(crate) fn beams(&self, leaves_mm: &[Range<f64>], start_mm: f64, start_cycle: u64) -> Vec<Sensor> {
+    /// The stretches over which each beam's sensor reports it as broken.
+    fn leaves_mm(&self, row: &Row) -> [Vec<Range<f64>>; 2] {
+        [0, 1].map(|beam| self.seen_mm(row.blocks_of_beam_mm(beam)))
+    }
+
+    /// The sensors of the beams of a machine at `start_mm`, each over its leaves.
+    pub(crate) fn beams(&self, leaves_mm: [&[Range<f64>]; 2], start_mm: f64, start_cycle: u64) -> Vec<Sensor> {
         let second = self.has_second_beam().then_some((wiring::SECOND_BEAM, self.second_beam_mm));
-        let beam = |(pin, behind_mm): (Pin, f64)| {
+        let beam = |((pin, behind_mm), leaves_mm): ((Pin, f64), &[Range<f64>])| {
             let is_broken = leaves_mm.iter().any(|leaf| leaf.contains(&(start_mm - behind_mm)));
             let last = PinChange { cycle: start_cycle, pin, high: !is_broken };
             Sensor { last, behind_mm, response_s: self.beam_response_ms / 1000.0, changed_s: None }
         };
-        [(wiring::BEAM, 0.0)].into_iter().chain(second).map(beam).collect()
+        [(wiring::BEAM, 0.0)].into_iter().chain(second).zip(leaves_mm).map(beam).collect()
     }
 
     /// Whether there is a second beam.
@@ -219,9 +260,12 @@ impl Machine {
     /// The beams' lines, low while a beam is broken, later than the leaves by the sensor's response: first all changes
     /// of the first beam, then those of the second.
     pub fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
-        let leaves_mm = self.seen_mm(row.blocks_mm());
-        let beams = self.beams(&leaves_mm, motion.start_mm(), 0).into_iter();
-        beams.flat_map(|mut beam| beam.changes(&leaves_mm, motion, 0.0..f64::INFINITY, start_cycle)).collect()
+        let leaves_mm = self.leaves_mm(row);
+        let beams = self.beams(leaves_mm.each_ref().map(Vec::as_slice), motion.start_mm(), 0).into_iter();
+        let changes = |(mut beam, leaves_mm): (Sensor, &Vec<Range<f64>>)| {
+            beam.changes(leaves_mm, motion, 0.0..f64::INFINITY, start_cycle)
+        };
+        beams.zip(&leaves_mm).flat_map(changes).collect()
     }
 }
 

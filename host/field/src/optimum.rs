@@ -34,7 +34,7 @@ pub fn undamaged_share(stand: &Stand, machine: &Machine, motion: &Motion, steeri
             let place_mm = stem.along_mm - stem.protected_mm + f64::from(step) * STEP_MM;
             let beside_mm = place_mm - stem.along_mm;
             let chord_mm = stem.half_chord_mm(beside_mm);
-            let across_mm = stem.across_mm - steering.across_mm(place_mm);
+            let across_mm = stem.across_mm - steering.tool_across_mm(place_mm);
             // A tool in the row that passes to the right of the zone, or to the left of one on the far side.
             if half_mm <= across_mm - chord_mm || across_mm + chord_mm <= -half_mm {
                 before = None;

@@ -55,7 +55,7 @@ impl Rolling {
     pub fn new(machine: Machine, row: Vec<Canopy>, start_mm: f64, start_cycle: u64) -> Self {
         let leaves_mm = machine.seen_mm(union(row.iter().flat_map(Canopy::blocks_mm).collect()));
         Self {
-            beams: machine.beams(&leaves_mm, start_mm, start_cycle),
+            beams: machine.beams([&leaves_mm; 2], start_mm, start_cycle),
             row,
             commands: 0,
             motion: Motion::starting_at(start_mm),

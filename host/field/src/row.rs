@@ -9,6 +9,7 @@
 //! All positions are millimetres along the ground, from an origin of the row's own.
 
 use crate::ground::union;
+use crate::stand::Stem;
 use files::CsvTable;
 use serde::Serialize;
 use std::io;
@@ -136,6 +137,10 @@ const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 pub struct Row {
     canopies: Vec<Canopy>,
     dust_mm: Vec<Range<f64>>,
+    /// The stretches where each beam is broken, if the leaves move between the beams.
+    swayed_mm: Option<[Vec<Range<f64>>; 2]>,
+    /// The crop's stems, if they do not stand in the middle of their canopies.
+    stems: Option<Vec<Stem>>,
     /// Its ends, if they are known.
     ground_mm: Option<Range<f64>>,
 }
@@ -176,6 +181,8 @@ impl Row {
         Ok(Self {
             canopies: canopies.into_iter().map(|(_, canopy)| canopy).collect(),
             dust_mm: Vec::new(),
+            swayed_mm: None,
+            stems: None,
             ground_mm: None,
         })
     }
@@ -190,9 +197,33 @@ impl Row {
         Self { dust_mm, ..self }
     }
 
-    /// The stretches over which the beam is broken, in ascending order and without overlaps.
+    /// The same row, with leaves that break each beam over other stretches, because they move.
+    pub(crate) fn swayed(self, swayed_mm: [Vec<Range<f64>>; 2]) -> Self {
+        Self { swayed_mm: Some(swayed_mm), ..self }
+    }
+
+    /// The same row, with these stems.
+    pub fn with_stems(self, stems: Vec<Stem>) -> Self {
+        Self { stems: Some(stems), ..self }
+    }
+
+    /// The stems of its plants. If none are known, one stands in the middle of each canopy.
+    pub fn stems(&self) -> Vec<Stem> {
+        self.stems.clone().unwrap_or_else(|| self.plants().map(|plant| Stem::at(plant.position_mm)).collect())
+    }
+
+    /// The stretches over which the first beam is broken, in ascending order and without overlaps.
     pub fn blocks_mm(&self) -> Vec<Range<f64>> {
-        union(self.canopies.iter().flat_map(Canopy::blocks_mm).chain(self.dust_mm.iter().cloned()).collect())
+        self.blocks_of_beam_mm(0)
+    }
+
+    /// The stretches over which a beam is broken: 0 is the first, 1 the second.
+    pub(crate) fn blocks_of_beam_mm(&self, beam: usize) -> Vec<Range<f64>> {
+        let leaves_mm = match &self.swayed_mm {
+            Some(swayed_mm) => swayed_mm[beam].clone(),
+            None => self.canopies.iter().flat_map(Canopy::blocks_mm).collect(),
+        };
+        union(leaves_mm.into_iter().chain(self.dust_mm.iter().cloned()).collect())
     }
 
     /// The canopies in the first `length_mm` of the row's ground. `None` if there are none.
@@ -203,6 +234,8 @@ impl Row {
         (!canopies.is_empty()).then_some(Self {
             canopies,
             dust_mm: Vec::new(),
+            swayed_mm: None,
+            stems: None,
             ground_mm: Some(self.span_mm().start..end_mm),
         })
     }

@@ -8,7 +8,7 @@
 //! Positions are millimetres along the row, and across it from its line, positive to the left. The stand does not
 //! depend on the machine or on its work.
 
-use crate::conditions::Conditions;
+use crate::conditions::{Conditions, Crop};
 use crate::ground::union;
 use crate::planting::{leaves, scatter};
 use crate::row::{Canopy, Kind, Problem, Row};
@@ -33,6 +33,12 @@ pub struct Stem {
 }
 
 impl Stem {
+    /// A stem on the row's line, with the default field's zone.
+    pub(crate) fn at(along_mm: f64) -> Self {
+        let protected_mm = Crop::default().protected_mm / 2.0;
+        Self { along_mm, across_mm: 0.0, protected_mm, is_seen: true }
+    }
+
     /// Half of the zone's width across the row, at this distance from the stem along it; 0 beyond the zone.
     pub(crate) fn half_chord_mm(&self, beside_mm: f64) -> f64 {
         (self.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt()
@@ -90,7 +96,7 @@ impl Stand {
             rng
         };
         let [mut height_rng, mut stem_rng, mut size_rng, mut next_rng] = [1, 2, 3, 4].map(of_stream);
-        let [mut sown_rng, mut sown_next_rng] = [5, 6].map(of_stream);
+        let [mut sown_rng, mut sown_next_rng, mut sway_rng] = [5, 6, 7].map(of_stream);
         // The distance between two plants has the deviation of both positions.
         let sown = |rng: &mut ChaCha8Rng, at_mm: f64| match Normal::new(at_mm, crop.spacing_sd_mm / SQRT_2) {
             Ok(normal) if crop.spacing_sd_mm > 0.0 => normal.sample(rng).clamp(span_mm.start, span_mm.end),
@@ -98,6 +104,7 @@ impl Stand {
         };
         let mut stems = Vec::new();
         let mut canopies = Vec::new();
+        let mut swayed: [Vec<Range<f64>>; 2] = Default::default();
         let places = (span_mm.end / spacing_mm).floor() as u32;
         for place in 0..places {
             let at_mm = sown(&mut sown_rng, (f64::from(place) + 0.5) * spacing_mm);
@@ -114,7 +121,11 @@ impl Stand {
                     plant.leaves = leaves(&mut leaf_rng, plant.span_mm());
                 }
                 let is_seen = !chance(rng, sensors.unseen_percent) && seen_mm.is_some();
+                let sway_mm = [(); 2].map(|()| scatter(&mut sway_rng, crop.sway_mm));
                 if is_seen {
+                    for (leaves_mm, sway_mm) in swayed.iter_mut().zip(sway_mm) {
+                        leaves_mm.extend(plant.blocks_mm().iter().map(|leaf| leaf.start + sway_mm..leaf.end + sway_mm));
+                    }
                     canopies.push(plant);
                 }
                 let across_mm = scatter(rng, crop.across_scatter_mm);
@@ -132,6 +143,7 @@ impl Stand {
             })
             .collect();
         // A weed in the row that is tall enough breaks the beam.
+        let first_weed = canopies.len();
         for weed in grown.iter().filter(|weed| weed.across_mm.abs() < machine.sweep_from_mm) {
             let height_mm = about(&mut size_rng, weeds.height_mm, weeds.height_factor);
             let widest_mm = about(&mut size_rng, weeds.width_mm, weeds.width_factor);
@@ -152,7 +164,14 @@ impl Stand {
             })
             .collect();
         stems.sort_by(|a, b| a.along_mm.total_cmp(&b.along_mm));
+        // Weeds are stiff: only the crop's leaves move.
+        for leaves_mm in &mut swayed {
+            leaves_mm.extend(canopies[first_weed..].iter().flat_map(Canopy::blocks_mm));
+        }
+        // The tools' effect on the stems is counted by itself.
         let row = Row::new(grown_together(canopies))?.with_dust(dust_mm).on_ground(span_mm.clone());
+        let row = row.with_stems(Vec::new());
+        let row = if crop.sway_mm > 0.0 { row.swayed(swayed) } else { row };
         // The next row is planted separately: it has the same planting positions, and its own random numbers.
         let next_to = |place: u32| {
             let at_mm = sown(&mut sown_next_rng, (f64::from(place) + 0.5) * spacing_mm)

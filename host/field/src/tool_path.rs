@@ -1,9 +1,8 @@
 //! Damage and weeding as geometry: the ground that the tools pass through, seen from above.
 //!
-//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. The tool is
-//! `tool_width` wide across the row, and is treated as a line along it. (An arm that lies along the row also carries
-//! the tool along it, by 10 mm where it leaves a stem zone. The model leaves that out.) A plant is *damaged* if the
-//! tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
+//! The arm swings sideways, so the tool's middle is `arm * sin(angle)` to the left of the row's line. An arm that trails
+//! behind its pivot also carries the tool forward. The tool is `tool_width` wide across the row, and is treated as a line
+//! across it. A plant is *damaged* if the tool passes through the protected zone round its stem. A weed is *removed* if the tool or a sweep passes it. The
 //! sweeps run between the rows, do not swing, and stay clear of the zones while the machine keeps its line. If the
 //! machine strays, they cut plants as well. So does a tool that swings as far as the next row. Each kind of damage is
 //! counted by itself. A strip that no tool weeds may remain between the tool in the row and the nearest sweep
@@ -62,6 +61,8 @@ pub struct Effect {
     pub damaged: u32,
     /// Damaged plants that the beam cannot see: too low, bent, eaten, or planted late.
     pub unseen: u32,
+    /// All plants that the beam cannot see.
+    pub all_unseen: u32,
     /// Crop plants through whose protected zone a sweep passed, but not the tool.
     pub swept: u32,
     /// Crop plants of the next row whose protected zone the tool entered while it was out.
@@ -79,6 +80,12 @@ impl Effect {
     pub fn injured(&self) -> u32 {
         (self.damaged + self.swept + self.neighbours).min(self.plants)
     }
+
+    /// Injured plants that the beam can see, and all of these. A beam's machine has no means to spare the others.
+    pub fn injured_of_seen(&self) -> (u32, u32) {
+        let seen = self.plants - self.all_unseen;
+        ((self.damaged - self.unseen + self.swept + self.neighbours).min(seen), seen)
+    }
 }
 
 impl AddAssign for Effect {
@@ -86,6 +93,7 @@ impl AddAssign for Effect {
         self.plants += other.plants;
         self.damaged += other.damaged;
         self.unseen += other.unseen;
+        self.all_unseen += other.all_unseen;
         self.swept += other.swept;
         self.neighbours += other.neighbours;
         self.in_row += other.in_row;
@@ -96,11 +104,16 @@ impl AddAssign for Effect {
 
 /// The tools of a machine, with its motion.
 struct Tools<'a> {
-    machine: &'a Machine,
     mechanism: &'a Mechanism,
-    motion: &'a Motion,
-    steering: &'a Steering,
-    stroke: Stroke,
+    swinging: Swinging<'a>,
+}
+
+/// The tool in the row, on its way.
+pub(crate) struct Swinging<'a> {
+    pub machine: &'a Machine,
+    pub motion: &'a Motion,
+    pub steering: &'a Steering,
+    pub stroke: &'a Stroke,
 }
 
 /// Width of the strip, on each side of the row, between the tool in the row and the nearest sweep. No tool weeds it.
@@ -119,17 +132,21 @@ pub fn effect(
 ) -> Effect {
     let stroke = machine.servo.stroke(&machine.servo.commands(pulses), start_cycle);
     let (motion, steering) = drive;
-    let tools = Tools { machine, mechanism, motion, steering, stroke };
-    let mut effect = Effect { plants: stand.stems.len() as u32, ..Effect::default() };
+    let swinging = Swinging { machine, motion, steering, stroke: &stroke };
+    let tools = Tools { mechanism, swinging };
+    let all_unseen = stand.stems.iter().filter(|stem| !stem.is_seen).count() as u32;
+    let mut effect = Effect { plants: stand.stems.len() as u32, all_unseen, ..Effect::default() };
     for stem in &stand.stems {
-        if tools.damage(stem) {
+        if tools.swinging.damages(stem) {
             effect.damaged += 1;
             effect.unseen += u32::from(!stem.is_seen);
         } else if tools.sweep_cuts(stem) {
             effect.swept += 1;
         }
     }
-    effect.neighbours = stand.neighbours.iter().filter(|stem| tools.reaches(stem) && tools.damage(stem)).count() as u32;
+    effect.neighbours =
+        stand.neighbours.iter().filter(|stem| tools.swinging.reaches(stem) && tools.swinging.damages(stem)).count()
+            as u32;
     for weed in &stand.weeds {
         let counted = WeedCount { before: 1, after: u64::from(!tools.remove(weed)) };
         effect.in_plot += counted;
@@ -146,13 +163,7 @@ pub fn effect(
 impl Tools<'_> {
     /// Distance of a position from the machine's middle, across the row.
     fn across_mm(&self, place_mm: f64, across_mm: f64) -> f64 {
-        across_mm - self.steering.across_mm(place_mm)
-    }
-
-    /// Whether the tool can swing as far aside as the zone of a stem in the next row.
-    fn reaches(&self, stem: &Stem) -> bool {
-        let tip_mm = self.machine.room_mm() + self.machine.tool_width_mm + self.steering.within_mm;
-        tip_mm > stem.across_mm - stem.protected_mm
+        across_mm - self.swinging.steering.across_mm(place_mm)
     }
 
     /// Whether a sweep passes through the zone round a stem.
@@ -169,32 +180,62 @@ impl Tools<'_> {
         })
     }
 
-    /// The ground across the row that the tool covers at a time, from the machine's middle.
-    fn covered_mm(&self, time_s: f64) -> Range<f64> {
-        let middle_mm = self.machine.across_mm(self.stroke.degrees(time_s));
+    fn remove(&self, weed: &Weed) -> bool {
+        let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
+        self.mechanism.swept_mm().contains(&across_mm.abs()) || self.swinging.removes(weed)
+    }
+}
+
+impl Swinging<'_> {
+    /// Distance of a position from the tool's neutral position, across the row.
+    fn across_mm(&self, place_mm: f64, across_mm: f64) -> f64 {
+        across_mm - self.steering.tool_across_mm(place_mm)
+    }
+
+    /// Whether the tool can swing as far aside as the zone of a stem in the next row.
+    fn reaches(&self, stem: &Stem) -> bool {
+        let tip_mm = self.machine.room_mm() + self.machine.tool_width_mm + self.steering.tool_within_mm();
+        tip_mm > stem.across_mm - stem.protected_mm
+    }
+
+    /// The ground across the row that the tool covers at an angle, from its neutral position.
+    fn covered_mm(&self, degrees: f64) -> Range<f64> {
+        let middle_mm = self.machine.across_mm(degrees);
         let half_mm = self.machine.tool_width_mm / 2.0;
         middle_mm - half_mm..middle_mm + half_mm
     }
 
-    fn damage(&self, stem: &Stem) -> bool {
+    /// The ground below the tool at a time, with its angle then.
+    fn place_mm(&self, time_s: f64) -> (f64, f64) {
+        let degrees = self.stroke.degrees(time_s);
+        (self.machine.tool_mm(self.motion.position_mm(time_s)) + self.machine.forward_mm(degrees), degrees)
+    }
+
+    /// The farthest that the arm carries the tool forward.
+    fn farthest_forward_mm(&self) -> f64 {
+        self.machine.forward_mm(self.machine.servo.stroke_degrees())
+    }
+
+    /// Whether the tool passes through the zone round a stem.
+    pub fn damages(&self, stem: &Stem) -> bool {
         let Stem { along_mm, across_mm, protected_mm, .. } = *stem;
-        let zone = along_mm - protected_mm..along_mm + protected_mm;
         let x_mm = self.machine.beam_to_tool_mm;
+        let zone = along_mm - protected_mm + x_mm - self.farthest_forward_mm()..along_mm + protected_mm + x_mm;
         let enters = |time_s: f64| {
-            let place_mm = self.machine.tool_mm(self.motion.position_mm(time_s));
+            let (place_mm, degrees) = self.place_mm(time_s);
             let across_mm = self.across_mm(place_mm, across_mm);
-            let beside_mm = place_mm - along_mm;
-            let half_chord_mm = stem.half_chord_mm(beside_mm);
-            let covered = self.covered_mm(time_s);
-            covered.start < across_mm + half_chord_mm && across_mm - half_chord_mm < covered.end
+            let half_chord_mm = stem.half_chord_mm(place_mm - along_mm);
+            let covered = self.covered_mm(degrees);
+            half_chord_mm > 0.0 && covered.start < across_mm + half_chord_mm && across_mm - half_chord_mm < covered.end
         };
-        self.motion.times_within_s(&(zone.start + x_mm..zone.end + x_mm)).into_iter().any(|times| {
+        self.motion.times_within_s(&zone).into_iter().any(|times| {
             let samples = ((times.end - times.start) / SAMPLE_S).ceil() as u32;
             // Between two ends of the servo's turning, the tool stays between its positions at them. Often that is
             // clear of the zone.
             self.between_turns_s(&times).any(|stretch| {
-                let [from, to] = [stretch.start, stretch.end].map(|time_s| self.covered_mm(time_s));
-                let near_mm = protected_mm + self.steering.within_mm;
+                let [from, to] =
+                    [stretch.start, stretch.end].map(|time_s| self.covered_mm(self.stroke.degrees(time_s)));
+                let near_mm = protected_mm + self.steering.tool_within_mm();
                 let comes_near =
                     from.start.min(to.start) < across_mm + near_mm && across_mm - near_mm < from.end.max(to.end);
                 let sample = |time_s: f64| (time_s - times.start) / SAMPLE_S;
@@ -213,11 +254,25 @@ impl Tools<'_> {
         turns_s.chain([times.end]).map(move |end_s| std::mem::replace(&mut start_s, end_s)..end_s)
     }
 
-    fn remove(&self, weed: &Weed) -> bool {
-        let passings = || self.motion.passings(weed.along_mm + self.machine.beam_to_tool_mm);
+    /// Whether the tool passes a weed.
+    fn removes(&self, weed: &Weed) -> bool {
         let across_mm = self.across_mm(weed.along_mm, weed.across_mm);
-        self.mechanism.swept_mm().contains(&across_mm.abs())
-            || passings().any(|passing| self.covered_mm(passing.time_s).contains(&across_mm))
+        let covers = |degrees: f64| self.covered_mm(degrees).contains(&across_mm);
+        let at_mm = weed.along_mm + self.machine.beam_to_tool_mm;
+        let forward_mm = self.farthest_forward_mm();
+        if forward_mm == 0.0 {
+            return self.motion.passings(at_mm).any(|passing| covers(self.stroke.degrees(passing.time_s)));
+        }
+        // The arm moves the tool along the row as well, so it may pass the weed several times.
+        self.motion.times_within_s(&(at_mm - forward_mm..at_mm)).into_iter().any(|times| {
+            let samples = ((times.end - times.start) / SAMPLE_S).ceil() as u32;
+            let mut before = self.place_mm(times.start).0 >= weed.along_mm;
+            (1..=samples).any(|sample| {
+                let (place_mm, degrees) = self.place_mm((times.start + f64::from(sample) * SAMPLE_S).min(times.end));
+                let is_past = place_mm >= weed.along_mm;
+                std::mem::replace(&mut before, is_past) != is_past && covers(degrees)
+            })
+        })
     }
 }
 

@@ -1,24 +1,29 @@
 //! The verdict on each plant: from the servo's pulses to the tool's effect on the row.
 //!
 //! Pulses become commands and the tool's angle over time ([`crate::servo`]). With the machine's motion this becomes an
-//! angle over the ground. A plant is damaged if the tool was not fully out at any time over its canopy. It is also
-//! damaged if the stroke is too short for the canopy, which is taken to be as wide across the row as along it. Its
-//! margin is cut if the tool's distance from the canopy was less than the margin by more than [`MARGIN_TOLERANCE_MM`].
-//! With a stem zone, the tool is over it while its edge is nearer to the row's line than half of the zone. Both rules
-//! are strict. For most of its stroke the tool is already beside the row's line. A canopy has the width that the beam
-//! saw only at the beam's height.
+//! angle over the ground. A plant is *damaged* if the tool entered the protected zone round its stem
+//! ([`crate::tool_path`]). Its keep-out zone, which is larger, is *reached* if the tool entered that. A margin is *cut*
+//! if the tool came nearer to the keep-out zone than the margin, by more than [`MARGIN_TOLERANCE_MM`].
+//!
+//! A keep-out zone is the plant's canopy, as wide across the row as along it. The tool has to be fully out over it. With
+//! a stem zone, the keep-out zone is the part of the canopy that the firmware keeps, and each of its ends is half of the
+//! stem zone's circle. Only the part of the tool that reaches the circle counts. A canopy has the width that the beam saw
+//! only at the beam's height.
 //!
 //! A swing is also compared with its ideal position. The ideal follows from the true ends of the canopy, the margin,
 //! the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing share its two commands:
 //! the first plant has the command out, the last one has the command back.
 
+use crate::driving::Steering;
 use crate::ground::{share_of, union};
 use crate::machine::{Machine, time_at_s};
 use crate::motion::Motion;
 use crate::row::{Canopy, Row};
 use crate::servo::{Command, OUT_DEGREES, Stroke};
+use crate::tool_path::Swinging;
 use control::{ground::keep_out::trim, units::Length};
 use serde::Serialize;
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use strum::Display;
 use uno::Pulse;
@@ -72,6 +77,39 @@ impl Timing {
     fn kept_across_mm(&self, plant: &Canopy) -> f64 {
         if self.stem_zone_mm == 0 { plant.across_mm } else { plant.across_mm.min(self.stem_zone_mm.into()) }
     }
+
+    /// The outline of a keep-out zone, from its ends on the row's line to its widest: how far the tool's edge has to be
+    /// from the line, and how far inside the zone's end, as a share of half its length. A canopy is a rectangle.
+    fn outline(&self) -> Vec<Level> {
+        let half_mm = f64::from(self.stem_zone_mm) / 2.0;
+        let level = |step: u32| {
+            let (sin, cos) = (FRAC_PI_2 * f64::from(step) / f64::from(LEVELS)).sin_cos();
+            Level { aside_mm: half_mm * sin, inside_mm: half_mm * (1.0 - cos) }
+        };
+        if self.stem_zone_mm == 0 {
+            return vec![Level { aside_mm: f64::INFINITY, inside_mm: 0.0 }];
+        }
+        (0..=LEVELS).map(level).collect()
+    }
+}
+
+/// Points of a quarter of a circle. Between two of them the circle is within 0.1 mm of a straight line.
+const LEVELS: u32 = 16;
+
+/// A point of a zone's outline.
+#[derive(Clone, Copy)]
+struct Level {
+    /// From the row's line.
+    aside_mm: f64,
+    /// From the zone's end, along the row.
+    inside_mm: f64,
+}
+
+impl Level {
+    /// The same in a plant's kept ground, which may be shorter than the circle.
+    fn inside_mm(self, kept: &Range<f64>, zone_mm: u32) -> f64 {
+        self.inside_mm * ((kept.end - kept.start) / f64::from(zone_mm.max(1))).min(1.0)
+    }
 }
 
 /// The result for a plant, from good to bad.
@@ -81,10 +119,13 @@ pub enum Verdict {
     /// The tool kept away from it by the margin.
     #[strum(to_string = "kept")]
     Kept,
-    /// The tool came nearer than the margin allows, but not to the canopy.
+    /// The tool came nearer than the margin allows, but did not enter the keep-out zone.
     #[strum(to_string = "margin cut")]
     MarginCut,
-    /// The tool was not out of the row over its canopy.
+    /// The tool entered its keep-out zone, but not the protected zone round its stem.
+    #[strum(to_string = "zone reached")]
+    Reached,
+    /// The tool entered the protected zone round its stem.
     #[strum(to_string = "DAMAGED")]
     Damaged,
 }
@@ -96,12 +137,16 @@ pub struct PlantOutcome {
     pub plant: Canopy,
     /// The protected stretch: its canopy, or the zone round its stem.
     pub kept_mm: Range<f64>,
-    /// Distance from the position where the tool was fully out to the leading end of `kept_mm`; negative inside it.
-    /// `None` if the tool was out from the beginning.
+    /// How much farther ahead the keep-out zone could have begun without being reached; negative if it was. `None` if
+    /// the tool was out from the beginning.
     pub clearance_before_mm: Option<f64>,
-    /// Distance from its trailing end to the position where the tool began to come back; negative inside it. `None` if
-    /// it stayed out to the end.
+    /// How much farther behind it could have ended; negative if it was reached. `None` if the tool stayed out to the
+    /// end.
     pub clearance_behind_mm: Option<f64>,
+    /// The position along the row at which the tool was fully out before the plant.
+    pub clear_mm: Option<f64>,
+    /// The position along the row at which the tool began to come back behind the plant.
+    pub back_mm: Option<f64>,
     /// How often the tool was swung out over it.
     pub swings: usize,
     /// How late the command to swing out for this plant was, in ticks; negative if early. `None` if the plant had no
@@ -111,18 +156,6 @@ pub struct PlantOutcome {
     pub in_error_ticks: Option<f64>,
     /// The verdict.
     pub verdict: Verdict,
-}
-
-impl PlantOutcome {
-    /// The position along the row at which the tool was fully out before the plant.
-    pub fn clear_mm(&self) -> Option<f64> {
-        self.clearance_before_mm.map(|clearance| self.kept_mm.start - clearance)
-    }
-
-    /// The position along the row at which the tool began to come back behind the plant.
-    pub fn back_mm(&self) -> Option<f64> {
-        self.clearance_behind_mm.map(|clearance| self.kept_mm.end + clearance)
-    }
 }
 
 /// The result for a tall weed.
@@ -163,6 +196,11 @@ impl Judgement {
         self.plants.iter().filter(|plant| plant.verdict == verdict).count()
     }
 
+    /// Number of plants whose keep-out zone was reached, damaged ones included.
+    pub fn reached(&self) -> usize {
+        self.plants.iter().filter(|plant| plant.verdict >= Verdict::Reached).count()
+    }
+
     /// The error of each swing in ticks, positive if late.
     pub fn swing_errors_ticks(&self) -> Vec<f64> {
         self.plants.iter().flat_map(|plant| [plant.out_error_ticks, plant.in_error_ticks]).flatten().collect()
@@ -171,19 +209,29 @@ impl Judgement {
 
 /// The largest share of the row's length that this machine can weed at this motion without cutting a margin.
 ///
-/// Around each plant a length `U = w + 2 m + k v (T_out + T_in)` is left: the canopy, both margins, and the distance
+/// Around each plant a length `U = w + 2 m + k v (T_out + T_in)` is left: the kept ground, both margins, and the distance
 /// travelled while the tool swings and does not work the row's line. `T` is the servo's travel. Its dead time costs
-/// nothing with the right leads. The inter-row tools are not part of this figure.
+/// nothing with the right leads. At the ends of a stem zone's circle, the tool may still swing. The inter-row tools are
+/// not part of this figure.
 pub fn weedable_share(row: &Row, machine: &Machine, motion: &Motion, timing: Timing) -> f64 {
-    let stroke_s = machine.servo.travel_ms / 1000.0 * machine.servo.stroke_degrees() / OUT_DEGREES;
-    let swing_s = machine.idle_share_of_stroke() * stroke_s;
+    let degrees_a_s = OUT_DEGREES / (machine.servo.travel_ms / 1000.0);
+    let levels: Vec<(Level, f64)> = timing
+        .outline()
+        .into_iter()
+        .map(|level| (level, (machine.degrees_beside(level.aside_mm) - machine.line_degrees()).max(0.0) / degrees_a_s))
+        .collect();
     let lost = row.plants().map(|plant| {
-        let swing_mm = |ground_mm: f64| {
+        let speed_mm_s = |ground_mm: f64| {
             let first = motion.passings(ground_mm + machine.beam_to_tool_mm).next();
-            first.map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs()) * swing_s
+            first.map_or(0.0, |passing| motion.speed_mm_s(passing.time_s).abs())
         };
-        let window = timing.window_mm(plant);
-        window.start - swing_mm(window.start)..window.end + swing_mm(window.end)
+        let (window, kept) = (timing.window_mm(plant), timing.kept_mm(plant));
+        let farthest_mm = |speed_mm_s: f64| {
+            let of_level =
+                |&(level, swing_s): &(Level, f64)| speed_mm_s * swing_s - level.inside_mm(&kept, timing.stem_zone_mm);
+            levels.iter().map(of_level).fold(f64::NEG_INFINITY, f64::max)
+        };
+        window.start - farthest_mm(speed_mm_s(window.start))..window.end + farthest_mm(speed_mm_s(window.end))
     });
     1.0 - share_of(&row.span_mm(), &union(lost.collect()))
 }
@@ -201,14 +249,22 @@ pub fn judge(
     let stroke = machine.servo.stroke(&commands, start_cycle);
     let whole_s = 0.0..motion.duration_s();
     let ground_below = |degrees: f64| {
-        let times_s = stroke.times_below_s(degrees, &whole_s);
-        union(times_s.iter().map(|times_s| machine.worked_mm(motion, times_s)).collect())
+        let forward_mm = machine.forward_mm(degrees);
+        let worked_mm = |times_s: &Range<f64>| {
+            let ground = machine.worked_mm(motion, times_s);
+            // A tool that comes back into the row is carried back along it.
+            let back_mm =
+                if forward_mm > 0.0 { carried_back_mm(machine, motion, &stroke, times_s) } else { ground.start };
+            back_mm..ground.end + forward_mm
+        };
+        union(stroke.times_below_s(degrees, &whole_s).iter().map(worked_mm).collect())
     };
     let closed = ground_below(machine.clear_degrees());
-    let over_zone = match timing.stem_zone_mm {
-        0 => closed.clone(),
-        zone_mm => ground_below(machine.degrees_beside(f64::from(zone_mm) / 2.0)),
-    };
+    let over_zone: Vec<(Level, Vec<Range<f64>>)> = timing
+        .outline()
+        .into_iter()
+        .map(|level| (level, ground_below(machine.degrees_beside(level.aside_mm))))
+        .collect();
     let weeded = ground_below(machine.line_degrees());
     let run = machine.worked_mm(motion, &whole_s);
     // How late a command was against its ideal position, in ticks. `None` unless the machine rolls forward.
@@ -224,7 +280,15 @@ pub fn judge(
     let swings = Swing::all(&commands, motion, start_cycle);
 
     let mut plants: Vec<PlantOutcome> =
-        row.plants().map(|plant| plant_outcome(plant, &over_zone, machine, timing)).collect();
+        row.plants().map(|plant| plant_outcome(plant, &closed, &over_zone, machine, timing)).collect();
+    let steering = Steering::default();
+    let swinging = Swinging { machine, motion, steering: &steering, stroke: &stroke };
+    for stem in row.stems().iter().filter(|stem| swinging.damages(stem)) {
+        let after = plants.partition_point(|plant| plant.plant.span_mm().end < stem.along_mm);
+        if let Some(plant) = plants.get_mut(after) {
+            plant.verdict = Verdict::Damaged;
+        }
+    }
     let mut idle_swings = 0;
     for swing in &swings {
         let passed = machine.worked_mm(motion, &swing.during_s);
@@ -288,28 +352,33 @@ impl Swing {
     }
 }
 
-/// Clearances and verdict of a plant, given the ground over which the tool was not fully out.
-fn plant_outcome(plant: &Canopy, closed: &[Range<f64>], machine: &Machine, timing: Timing) -> PlantOutcome {
-    let span = timing.kept_mm(plant);
-    // The canopy's middle divides the swing before the plant from the one behind it. If a swing began or ended beyond
-    // the middle, its end divides them.
-    let across = closed.iter().find(|ground| ground.contains(&plant.position_mm));
-    let parting_mm = match across {
-        Some(ground) if ground.end < span.end => ground.end,
-        Some(ground) if ground.start > span.start => ground.start,
-        _ => plant.position_mm,
-    };
-    let clearance_before_mm = closed
-        .iter()
-        .rev()
-        .find(|ground| ground.start < parting_mm)
-        .map(|ground| span.start - ground.end.min(span.end));
-    let clearance_behind_mm =
-        closed.iter().find(|ground| ground.end > parting_mm).map(|ground| ground.start.max(span.start) - span.end);
+/// Clearances and verdict of a plant. `closed` is the ground over which the tool was not fully out. `over_zone` is the
+/// ground over which its edge was nearer to the row's line than each point of the zone's outline.
+fn plant_outcome(
+    plant: &Canopy,
+    closed: &[Range<f64>],
+    over_zone: &[(Level, Vec<Range<f64>>)],
+    machine: &Machine,
+    timing: Timing,
+) -> PlantOutcome {
+    let kept = timing.kept_mm(plant);
+    let (clear_mm, back_mm) = swings_beside(closed, &kept, plant.position_mm);
+    let (mut clearance_before_mm, mut clearance_behind_mm) = (None, None);
+    for (level, ground) in over_zone {
+        let inside_mm = level.inside_mm(&kept, timing.stem_zone_mm);
+        let zone = kept.start + inside_mm..kept.end - inside_mm;
+        let (out_mm, in_mm) = swings_beside(ground, &zone, plant.position_mm);
+        let lesser = |clearance_mm: Option<f64>, now_mm: Option<f64>| match (clearance_mm, now_mm) {
+            (Some(clearance_mm), Some(now_mm)) => Some(clearance_mm.min(now_mm)),
+            (clearance_mm, now_mm) => clearance_mm.or(now_mm),
+        };
+        clearance_before_mm = lesser(clearance_before_mm, out_mm.map(|out_mm| zone.start - out_mm));
+        clearance_behind_mm = lesser(clearance_behind_mm, in_mm.map(|in_mm| in_mm - zone.end));
+    }
     let narrowest_mm = [clearance_before_mm, clearance_behind_mm].into_iter().flatten().fold(f64::INFINITY, f64::min);
-    // A stroke that ends within the canopy does not clear it.
+    // A stroke that ends within the zone does not clear it.
     let verdict = if narrowest_mm < 0.0 || machine.room_mm() < timing.kept_across_mm(plant) / 2.0 {
-        Verdict::Damaged
+        Verdict::Reached
     } else if narrowest_mm < f64::from(timing.margin_mm) - MARGIN_TOLERANCE_MM {
         Verdict::MarginCut
     } else {
@@ -317,15 +386,46 @@ fn plant_outcome(plant: &Canopy, closed: &[Range<f64>], machine: &Machine, timin
     };
     PlantOutcome {
         plant: plant.clone(),
-        kept_mm: span,
+        kept_mm: kept,
         clearance_before_mm,
         clearance_behind_mm,
+        clear_mm,
+        back_mm,
         swings: 0,
         out_error_ticks: None,
         in_error_ticks: None,
         verdict,
     }
 }
+
+/// Where the tool had left the row before a zone, and where it came back behind it, but not beyond the zone's other end.
+/// `near` is the ground that it had not left.
+fn swings_beside(near: &[Range<f64>], zone: &Range<f64>, middle_mm: f64) -> (Option<f64>, Option<f64>) {
+    // The zone's middle divides the swing before the plant from the one behind it. If a swing began or ended beyond
+    // the middle, its end divides them.
+    let across = near.iter().find(|ground| ground.contains(&middle_mm));
+    let parting_mm = match across {
+        Some(ground) if ground.end < zone.end => ground.end,
+        Some(ground) if ground.start > zone.start => ground.start,
+        _ => middle_mm,
+    };
+    let before = near.iter().rev().find(|ground| ground.start < parting_mm);
+    let behind = near.iter().find(|ground| ground.end > parting_mm);
+    (before.map(|ground| ground.end.min(zone.end)), behind.map(|ground| ground.start.max(zone.start)))
+}
+
+/// The least position of the tool in the first moments of a time in which its arm swings in.
+fn carried_back_mm(machine: &Machine, motion: &Motion, stroke: &Stroke, times_s: &Range<f64>) -> f64 {
+    let places_mm = (0..=SWING_STEPS).map(|step| {
+        let time_s = (times_s.start + f64::from(step) * SWING_STEP_S).min(times_s.end);
+        machine.tool_mm(motion.position_mm(time_s)) + machine.forward_mm(stroke.degrees(time_s))
+    });
+    places_mm.fold(f64::INFINITY, f64::min)
+}
+
+/// Steps that are together longer than a swing.
+const SWING_STEPS: u32 = 500;
+const SWING_STEP_S: f64 = 0.001;
 
 /// The parts of `whole` between the stretches of a union.
 fn between(union: &[Range<f64>], whole: &Range<f64>) -> Vec<Range<f64>> {
@@ -341,8 +441,8 @@ fn path(machine: &Machine, motion: &Motion, stroke: &Stroke) -> Vec<(f64, f64)> 
         .chain(turns_s)
         .chain([during_s.end])
         .map(|time_s| {
-            let ground_mm = machine.tool_mm(motion.position_mm(time_s));
-            (ground_mm, stroke.degrees(time_s))
+            let degrees = stroke.degrees(time_s);
+            (machine.tool_mm(motion.position_mm(time_s)) + machine.forward_mm(degrees), degrees)
         })
         .collect()
 }
@@ -426,7 +526,7 @@ mod tests {
     fn swings_commanded_where_they_should_be_done_damage_the_plants_at_speed() {
         let timing = Timing::as_in_the_paper();
         let judgement = judged(&ideal_mm(timing), timing);
-        assert_eq!(judgement.count(Verdict::Damaged), 2);
+        assert_eq!(judgement.reached(), 2);
         // 180 ms of dead time and travel, less the margin.
         let before_mm = judgement.plants[0].clearance_before_mm.unwrap();
         assert!((before_mm - (50.0 - 0.182 * mm_s(2.5))).abs() < 0.2, "{before_mm} mm");
@@ -446,7 +546,7 @@ mod tests {
     #[test]
     fn a_plant_without_a_swing_is_damaged() {
         let judgement = judged(&[200.0], Timing::default());
-        assert_eq!(judgement.count(Verdict::Damaged), 2);
+        assert_eq!(judgement.reached(), 2);
         assert!(judgement.plants.iter().all(|plant| plant.swings == 0));
         assert!(judgement.swing_errors_ticks().is_empty());
         assert_eq!(judgement.weeded_share, 1.0);
@@ -479,7 +579,7 @@ mod tests {
         let judgement = judged(&[], Timing::default());
         assert_eq!(judgement.count(Verdict::Kept), 2);
         assert_eq!(judgement.weeded_share, 0.0);
-        assert_eq!(judgement.plants[0].clear_mm(), None);
+        assert_eq!(judgement.plants[0].clear_mm, None);
     }
 
     #[test]
@@ -489,7 +589,7 @@ mod tests {
         let pulses = pulses(&there, &places);
         let back = motion().change_speed(-mm_s(1.0), 1000.0).roll_to(1000.0);
         let judgement = judge(&row(), &Machine::default(), &back, Timing::default(), &pulses, START_CYCLE);
-        assert_eq!(judgement.count(Verdict::Damaged), 2);
+        assert_eq!(judgement.reached(), 2);
     }
 
     #[test]

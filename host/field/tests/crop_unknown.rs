@@ -82,7 +82,7 @@ fn weeds_in_a_gap_of_a_weedy_row_are_taken_for_a_crop_in_a_row_of_a_thousand_at_
 
 #[test]
 fn weeds_in_a_gap_are_taken_for_a_crop_in_a_row_of_ten_thousand_at_the_most_where_the_machine_is_set_up() {
-    assert_rare("set-up", 10_000);
+    assert_rare("straight", 10_000);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::numbers::{number_within, whole_within};
 use crate::source;
 use anyhow::{Result, ensure};
 use clap::Args;
-use field::conditions::Conditions;
+use field::conditions::{self, Conditions};
 use field::planting::Planting;
 use field::row::Row;
 use files::csv_table;
@@ -34,9 +34,9 @@ pub struct CourseArguments {
     /// Distance from the beam back to the tool in mm, 100 to 2000. Default: the field's, 400.
     #[arg(long, value_parser = whole_within(100..=2000_u32))]
     beam_to_tool: Option<u32>,
-    /// Machine, settings and wheel slip: a preset such as set-up, from-the-box or paper, or a TOML file as for
+    /// Machine, settings and wheel slip: a preset such as walked, from-the-box or paper, or a TOML file as for
     /// `weeder trial`; - for standard input.
-    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = "set-up")]
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = conditions::DEFAULT)]
     pub field: String,
     /// Grow canopies with gaps for the beam.
     #[arg(long)]

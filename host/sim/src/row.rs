@@ -146,6 +146,7 @@ fn in_json(arguments: &Arguments, trial: &Trial, outcome: &Outcome) -> Value {
         "speed_km_h": arguments.course.speed,
         "as_in_the_paper": arguments.paper,
         "damaged": judgement.count(Verdict::Damaged),
+        "zones_reached": judgement.reached(),
         "margin_cut": judgement.count(Verdict::MarginCut),
         "kept": judgement.count(Verdict::Kept),
         "idle_swings": judgement.idle_swings,

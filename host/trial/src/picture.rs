@@ -153,18 +153,20 @@ fn canopy(plant: &Canopy, x: f64, verdict: Verdict) -> Group {
 fn colour(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Kept => PLANT,
-        Verdict::MarginCut => DOUBTFUL,
+        Verdict::MarginCut | Verdict::Reached => DOUBTFUL,
         Verdict::Damaged => WRONG,
     }
 }
 
-/// Marks for the verdicts, in addition to colours: one stroke for a cut margin, a cross for a reached canopy.
+/// Marks for the verdicts, in addition to colours: one stroke for a cut margin, two for a reached zone, and a cross for a
+/// damaged plant.
 fn strokes(x: f64, y: f64, reach: f64, verdict: Verdict) -> Path {
     let (left, right, top, bottom) = (tenth(x - reach), tenth(x + reach), tenth(y - reach), tenth(y + reach));
     let stroke = Data::new().move_to((left, bottom)).line_to((right, top));
     let drawn = match verdict {
         Verdict::Kept => Data::new(),
         Verdict::MarginCut => stroke,
+        Verdict::Reached => stroke.move_to((x, bottom)).line_to((right, tenth(y))),
         Verdict::Damaged => stroke.move_to((left, top)).line_to((right, bottom)),
     };
     Path::new().set("d", drawn).set("stroke", PAPER).set("stroke-width", 2.5).set("stroke-linecap", "round")
@@ -188,11 +190,11 @@ fn scale(ground: &Range<f64>) -> Group {
 }
 
 fn legend() -> Group {
-    // The verdicts refer to the canopy, which is stricter than a plant's damage.
     let verdicts = [
-        (Verdict::Kept, "canopy and margin kept"),
+        (Verdict::Kept, "zone and margin kept"),
         (Verdict::MarginCut, "margin cut"),
-        (Verdict::Damaged, "canopy reached"),
+        (Verdict::Reached, "zone reached"),
+        (Verdict::Damaged, "plant damaged"),
     ];
     let entries = [
         (WEED, "tall weed"),
@@ -237,7 +239,10 @@ mod tests {
         let path = |verdict| strokes(0.0, 0.0, 5.0, verdict).to_string();
         assert_eq!(path(Verdict::Kept).matches('L').count(), 0);
         assert_eq!(path(Verdict::MarginCut).matches('L').count(), 1);
-        assert_eq!(path(Verdict::Damaged).matches('L').count(), 2);
+        for verdict in [Verdict::Reached, Verdict::Damaged] {
+            assert_eq!(path(verdict).matches('L').count(), 2);
+        }
+        assert_ne!(path(Verdict::Reached), path(Verdict::Damaged));
     }
 
     #[test]

@@ -57,8 +57,8 @@ pub fn table(outcome: &Outcome) -> Table {
             Cell::new(index + 1),
             Cell::new(format!("{:.0}", plant.plant.position_mm)),
             Cell::new(format!("{:.0}", plant.plant.width_mm)),
-            Cell::new(whole(plant.clear_mm(), "start")),
-            Cell::new(whole(plant.back_mm(), "end")),
+            Cell::new(whole(plant.clear_mm, "start")),
+            Cell::new(whole(plant.back_mm, "end")),
             Cell::new(whole(plant.clearance_before_mm, "-")),
             Cell::new(whole(plant.clearance_behind_mm, "-")),
             Cell::new(tenths(plant.out_error_ticks)),
@@ -74,7 +74,7 @@ fn verdict_cell(verdict: Verdict) -> Cell {
     let cell = Cell::new(verdict);
     match verdict {
         Verdict::Kept => cell.fg(Color::Green),
-        Verdict::MarginCut => cell.fg(Color::Yellow),
+        Verdict::MarginCut | Verdict::Reached => cell.fg(Color::Yellow),
         Verdict::Damaged => cell.fg(Color::Red).add_attribute(Attribute::Bold),
     }
 }
@@ -93,14 +93,15 @@ pub fn totals(trial: &Trial, outcome: &Outcome) -> String {
     line(
         "Plants",
         format!(
-            "{plants}: {} damaged, {} with the margin cut, {} kept",
+            "{plants}: {} damaged, {} whose zone was reached, {} with the margin cut, {} kept",
             judgement.count(Verdict::Damaged),
+            judgement.count(Verdict::Reached),
             judgement.count(Verdict::MarginCut),
             judgement.count(Verdict::Kept),
         ),
     );
     if let Some(depth_mm) = deepest_mm(&judgement.plants) {
-        line("", format!("the tool reached {depth_mm:.0} mm into the {kept} that was hit worst"));
+        line("", format!("the tool reached {depth_mm:.0} mm into the {kept} that it reached farthest"));
     }
     if judgement.idle_swings > 0 {
         line("", format!("the tool swung out {} for no plant", counted(judgement.idle_swings, "time")));
@@ -205,8 +206,8 @@ pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
     let record = |plant: &PlantOutcome| PlantRecord {
         position_mm: plant.plant.position_mm,
         width_mm: plant.plant.width_mm,
-        clear_from_mm: plant.clear_mm(),
-        clear_to_mm: plant.back_mm(),
+        clear_from_mm: plant.clear_mm,
+        clear_to_mm: plant.back_mm,
         clearance_before_mm: plant.clearance_before_mm,
         clearance_behind_mm: plant.clearance_behind_mm,
         out_error_ticks: plant.out_error_ticks,
@@ -215,6 +216,7 @@ pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
         verdict: match plant.verdict {
             Verdict::Kept => "kept",
             Verdict::MarginCut => "margin_cut",
+            Verdict::Reached => "zone_reached",
             Verdict::Damaged => "damaged",
         },
     };
@@ -290,8 +292,8 @@ pub(crate) mod tests {
         let (trial, outcome) = ruined_row();
         let totals = totals(&trial, &outcome);
         for words in [
-            "2: 2 damaged, 0 with the margin cut, 0 kept",
-            "the tool reached 150 mm into the canopy that was hit worst",
+            "2: 2 damaged, 0 whose zone was reached, 0 with the margin cut, 0 kept",
+            "the tool reached 150 mm into the canopy that it reached farthest",
             "1 of 1 cut",
             "100.0 % of the row's 1.00 m",
             "none was commanded for a plant",

@@ -48,7 +48,7 @@ export interface Dimensions {
 }
 
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
-export type Verdict = "kept" | "marginCut" | "damaged";
+export type Verdict = "kept" | "marginCut" | "reached" | "damaged";
 
 /** A change from now on: `Different` in host/page/src/trial.rs. */
 export type Change =

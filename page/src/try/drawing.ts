@@ -15,10 +15,11 @@ const BEHIND = { share: 0.3, mostMm: 700 };
 const SPECK_SPACING_MM = 14;
 const SPECK_ACROSS_MM = 150;
 
-/** A tick for a kept plant, a bar for a cut margin, and a cross for a damaged plant. */
+/** A tick for a kept plant, a bar for a cut margin, a slash for a reached zone, and a cross for a damaged plant. */
 const SIGNS: Readonly<Record<Verdict, string>> = {
     kept: "M-16 0L-5 12L17 -13",
     marginCut: "M-16 0H16",
+    reached: "M-14 14L14 -14",
     damaged: "M-14 -14L14 14M-14 14L14 -14",
 };
 

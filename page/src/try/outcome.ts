@@ -32,7 +32,7 @@ export class Outcome {
 
     /** How many plants there were of each verdict, and tall weeds, cut and passed. */
     get totals() {
-        const plants = { kept: 0, marginCut: 0, damaged: 0 };
+        const plants = { kept: 0, marginCut: 0, reached: 0, damaged: 0 };
         for (const verdict of this.plants.values()) plants[verdict] += 1;
         const cut = [...this.weeds.values()].filter((cut) => cut).length;
         return { plants, weeds: { cut, passed: this.weeds.size } };
@@ -40,10 +40,11 @@ export class Outcome {
 }
 
 export function inWords({ plants, weeds }: Outcome["totals"]): string {
-    const passed = plants.kept + plants.marginCut + plants.damaged;
+    const passed = plants.kept + plants.marginCut + plants.reached + plants.damaged;
     if (passed === 0) return say("noPlantYet");
     const words = [plants.kept === passed ? say("allKept") : say("someKept", { kept: plants.kept })];
     if (plants.marginCut > 0) words.push(say("someCut", { cut: plants.marginCut }));
+    if (plants.reached > 0) words.push(say("reached", { count: plants.reached }));
     if (plants.damaged > 0) words.push(say("damaged", { count: plants.damaged }));
     const sentences = [say("passed", { count: passed, rest: words.join("; ") })];
     if (weeds.passed > 0) sentences.push(say("weedsCut", { count: weeds.passed, cut: weeds.cut }));

@@ -29,7 +29,7 @@ export const fr: Language = {
         legendWindow: "laissé libre par le micrologiciel",
         legendWorked: "passage de l'outil",
         beam: "faisceau",
-        legendSigns: "✓ intacte, − marge entamée, × abîmée",
+        legendSigns: "✓ intacte, − marge entamée, / zone atteinte, × abîmée",
         drive: "Conduire",
         workSwitch: "Interrupteur de travail",
         switchHint: "Il compte quand il passe d'arrêt à marche.",
@@ -59,7 +59,8 @@ export const fr: Language = {
         allKept: "toutes intactes, avec leur marge",
         someKept: "{kept} intactes, avec leur marge",
         someCut: "{cut} avec la marge entamée",
-        damaged: "{count} abîmée : l'outil était sur le feuillage|{count} abîmées : l'outil était sur le feuillage",
+        reached: "{count} dont la zone est atteinte|{count} dont la zone est atteinte",
+        damaged: "{count} abîmée : l'outil était à la tige|{count} abîmées : l'outil était à la tige",
         weedsCut:
             "Sur {count} adventice haute, il en a coupé {cut}.|Sur {count} adventices hautes, il en a coupé {cut}.",
         ground: "Du sol : {parts}.",

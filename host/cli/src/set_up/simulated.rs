@@ -3,7 +3,7 @@
 use anyhow::Result;
 use comfy_table::{CellAlignment, Table};
 use experiments::experiment::{Engine, Experiment, Treatment, totals};
-use field::conditions::Conditions;
+use field::conditions::{self, Conditions};
 use link::set_up::steps;
 use trial::by_the_manual::Novice;
 use trial::report::number_table;
@@ -14,15 +14,26 @@ const REPLICATIONS: u32 = 10;
 /// Selects the random fields and measurements.
 const SEED: u64 = 1;
 
+const SPEED_KM_H: f64 = 2.5;
+
+/// The field, seed and speed.
+pub fn about() -> String {
+    format!(
+        "Field {}, seed {SEED}, {SPEED_KM_H} km/h, {REPLICATIONS} replications at 50 and 60 cm.",
+        conditions::DEFAULT
+    )
+}
+
 /// A line for the machine from the box, and one after each step. The steps add up.
 pub fn table() -> Result<Table> {
-    let header = ["step", "", "ground of the\nrow weeded, %", "plants\ndamaged, %", "zones\nreached, %"];
+    let header = ["step", "", "ground of the\nrow weeded, %", "seen plants\ndamaged, %", "zones\nreached, %"];
     let mut table = number_table(header, 0);
     table.column_iter_mut().skip(1).take(1).for_each(|column| column.set_cell_alignment(CellAlignment::Left));
-    let mut novice = Novice::new(Conditions::default(), SEED);
+    let field = Conditions::load(conditions::DEFAULT)?;
+    let mut novice = Novice::new(field.from_the_box(), SEED);
     let mut line = |number: String, title: &str, conditions: &Conditions| {
         let experiment = Experiment {
-            speeds_km_h: vec![2.5],
+            speeds_km_h: vec![SPEED_KM_H],
             replications: REPLICATIONS,
             controllers: vec![Treatment::Firmware],
             ..Experiment::as_in_the_paper(conditions.clone(), SEED)
@@ -32,7 +43,7 @@ pub fn table() -> Result<Table> {
                 number.clone(),
                 title.to_owned(),
                 format!("{:.1}", 100.0 * total.plots.weeded_share),
-                format!("{:.1}", total.plant_damage_percent()),
+                format!("{:.1}", total.damage_of_seen().percent()),
                 format!("{:.1}", total.zones_reached_percent()),
             ]);
         }

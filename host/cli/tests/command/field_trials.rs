@@ -32,7 +32,10 @@ fn a_trial_prints_each_controller_s_damage_and_writes_its_report() {
     assert!(
         page.contains("weeder trial --field small.toml --out report") && page.contains("a queue without look-ahead")
     );
-    assert!(page.contains("s controller at 1 to 2.5 km/h: "), "what contradicts the paper stands in the report");
+    assert!(
+        page.contains("s program at 1 to 2.5 km/h, on this report"),
+        "what contradicts the paper stands in the report"
+    );
     assert!(page.contains("this firmware, SIMULATED") && page.contains("10.25165/j.ijabe.20211406.6542"));
     let controllers = fs::read_to_string(folder.path().join("report/controllers.csv")).unwrap();
     // Four controllers, eight treatments, three replications, and the header.

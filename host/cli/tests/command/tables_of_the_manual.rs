@@ -6,6 +6,7 @@
 use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
 use expect_test::{ExpectFile, expect_file};
+use experiments::evaluation::published;
 use field::conditions::{Conditions, Parameter};
 use field::wiring;
 use link::settings::{help, name, unit};
@@ -195,9 +196,9 @@ fn the_page_of_the_blinking_led_has_every_code_with_advice() {
 #[test]
 fn the_result_in_the_readme_is_that_of_the_figures() {
     let figures = expect_file!["../../../../docs/figures.md"].data();
-    let (_, trial) = figures
-        .split_once("<!-- figures: weeder trial --speeds 1,1.5,2,2.5,3,4 --replications 60 -->")
-        .expect("a trial of the set-up machine");
+    let command = "weeder trial --speeds 1,1.5,2,2.5,3,4 --replications 60";
+    let (_, trial) =
+        figures.split_once(&format!("<!-- figures: {command} -->")).expect("a trial of the set-up machine");
     // The first line of this speed and controller is of plants, the second of ground.
     let cells = |controller: &str, table: usize| -> Vec<&str> {
         let lines = trial.lines().map(|line| line.trim_matches(['│', ' ']));
@@ -205,8 +206,10 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
         let line = line.unwrap_or_else(|| panic!("no line of {controller}"));
         line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).skip(2).collect()
     };
+    // The first share with an interval is that of the plants that a beam sees.
     let of = |controller: &str| {
-        (cells(controller, 0)[0], cells(controller, 1)[0].split_whitespace().next().unwrap_or_default())
+        let damaged = cells(controller, 0).into_iter().find(|cell| cell.contains(" (")).expect("a share of the plants");
+        (damaged, cells(controller, 1)[0].split_whitespace().next().unwrap_or_default())
     };
     let ((damaged, weeded), (damaged_there, weeded_there)) = (of("this firmware"), of("paper's controller"));
     let split = |damaged: &str| -> (String, String) {
@@ -214,9 +217,11 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
         (share.to_owned(), interval.to_owned())
     };
     let ((damaged, interval), (damaged_there, _)) = (split(damaged), split(damaged_there));
+    let (lowest, highest) = published::DAMAGED_PERCENT;
     let sentence = format!(
-        "In simulated rows at 2.5 km/h, this firmware weeded {weeded} % of the row's ground and damaged {damaged} % of the plants \
-         ({interval} %).\nThe paper's controller weeded {weeded_there} % and damaged {damaged_there} %.\n"
+        "In simulated rows at 2.5 km/h, this firmware weeded {weeded} % of the row's ground. Of the plants that its beam sees, it \
+         damaged {damaged} %\n({interval} %, a one-sided 95 % bound). The paper's program on the same machine weeded {weeded_there} % and \
+         damaged {damaged_there} %. On its own machine\nthe paper measured {lowest} to {highest} %. `{command}` prints these figures.\n"
     );
     let page = expect_file!["../../../../README.md"];
     page.assert_eq(&with_part(&page, "result", &sentence));
@@ -225,8 +230,10 @@ fn the_result_in_the_readme_is_that_of_the_figures() {
 /// Every parameter of the simulated field as a list in Markdown.
 fn parameters() -> String {
     let mut list = String::new();
-    for (Parameter { name, meaning, source, least, greatest }, default) in Conditions::default().values() {
-        writeln!(list, "- `{name}` = {default} ({least} to {greatest}): {meaning}. Source: {source}.")
+    for (parameter, default) in Conditions::default().values() {
+        let Parameter { name, meaning, source, .. } = parameter;
+        let (default, range) = (parameter.written(default), parameter.range());
+        writeln!(list, "- `{name}` = {default} ({range}): {meaning}. Source: {source}.")
             .expect("a string takes everything");
     }
     list

@@ -1,8 +1,9 @@
 //! A trial's findings, in sentences.
 
-use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment};
-use crate::statistics::{SIGNIFICANCE, Share, Term, probability};
-use crate::table::distinct;
+use super::table::LEAVE_OUT;
+use super::{Analysis, Performance, PlotRecord, Response, ResponseAnalysis, Treatment, nominal};
+use crate::statistics::{OddsTerm, SIGNIFICANCE, Share, Term, grouped, probability};
+use crate::table::{distinct, in_words, list};
 use field::counted;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -15,19 +16,67 @@ impl Analysis {
             findings.extend(response.odds());
         }
         findings.extend(self.responses.iter().flat_map(ResponseAnalysis::checked));
+        findings.extend(self.incomplete());
+        findings.extend(self.more_weeds());
+        findings.extend(self.speeds_as_measured());
         // Area, time, width or speed is wrong.
-        let plots = (1..).zip(&self.performances);
-        let hasty =
-            plots.filter(|(_, plot)| plot.field_efficiency_percent > 100.0).map(|(number, _)| f64::from(number));
-        let hasty: Vec<f64> = hasty.collect();
-        if !hasty.is_empty() {
-            let of = if hasty.len() == 1 { "Plot" } else { "Plots" };
+        let is_hasty = |_: &PlotRecord, plot: &Performance| plot.field_efficiency_percent.is_some_and(|it| it > 100.0);
+        if let Some(plots) = self.named(is_hasty) {
             findings.push(format!(
-                "{of} {}: more ground was covered than speed and width allow (field efficiency above 100 %), so check area, time, width and speed.",
-                list(&hasty)
+                "{plots}: more ground was covered than speed and width allow (field efficiency above 100 %), so check area, time, width and speed."
             ));
         }
         findings
+    }
+
+    /// The plots for which this is true, with their numbers: `Plots 2 and 5`.
+    fn named(&self, is_meant: impl Fn(&PlotRecord, &Performance) -> bool) -> Option<String> {
+        let plots = self.records.iter().zip(&self.performances);
+        let numbers: Vec<f64> =
+            plots.filter(|(record, plot)| is_meant(record, plot)).map(|(record, _)| f64::from(record.plot)).collect();
+        let of = if numbers.len() == 1 { "Plot" } else { "Plots" };
+        (!numbers.is_empty()).then(|| format!("{of} {}", list(&numbers)))
+    }
+
+    /// The plots that take no part in a measure, and why.
+    fn incomplete(&self) -> Vec<String> {
+        let reasons = grouped(self.records.iter().zip(&self.performances).filter_map(|(record, plot)| {
+            let lacks_it = |response: &Response| response.value(plot).is_none();
+            let without: Vec<String> =
+                Response::ALL.into_iter().filter(lacks_it).map(|response| response.title().to_lowercase()).collect();
+            (!without.is_empty()).then(|| ((lacking(record), without), f64::from(record.plot)))
+        }));
+        let sentence = |((lacking, without), plots): ((Vec<String>, Vec<String>), Vec<f64>)| {
+            let (of, have) = if plots.len() == 1 { ("Plot", "takes") } else { ("Plots", "take") };
+            let (plots, lacking, without) = (list(&plots), in_words(&lacking), in_words(&without));
+            format!("{of} {plots} ({lacking}) {have} no part in {without}.")
+        };
+        reasons.into_iter().map(sentence).collect()
+    }
+
+    /// The plots with more weeds after weeding than before.
+    fn more_weeds(&self) -> Option<String> {
+        let plots = self.named(|record, _| record.has_more_weeds_after())?;
+        Some(format!(
+            "{plots}: more weeds were counted after weeding than before. The weeding efficiency is negative there; in the binomial model no weed counts as gone. If this is a mistake, correct it; {LEAVE_OUT}."
+        ))
+    }
+
+    /// An offer of nominal speeds.
+    fn speeds_as_measured(&self) -> Option<String> {
+        // Nominal speeds that were given are not guessed again.
+        if self.records.iter().zip(&self.levels_km_h).any(|(record, level)| record.speed_km_h != *level) {
+            return None;
+        }
+        let nominal = nominal::guessed(&self.records)?;
+        let speeds = distinct(self.levels_km_h.iter().copied()).len();
+        let option: Vec<String> = nominal.iter().map(f64::to_string).collect();
+        Some(format!(
+            "Speeds differ by less than a step: {speeds} speeds in {}. If they were measured at {} km/h, add --speeds {}: the means and the analysis of variance then compare these.",
+            counted(self.records.len(), "plot"),
+            list(&nominal),
+            option.join(",")
+        ))
     }
 
     /// How large the trial was.
@@ -46,34 +95,42 @@ impl Analysis {
         )
     }
 
-    /// The damage, and the treatment with most of it.
+    /// The damage, and the plots with most of it.
     fn damage(&self) -> String {
         let share = super::damaged(&self.records);
         let Share { count, of, .. } = share;
-        let percent = |(_, plot): &(&PlotRecord, &Performance)| plot.plant_damage_percent;
-        let plots = self.records.iter().zip(&self.performances);
-        match plots.max_by(|a, b| percent(a).total_cmp(&percent(b))) {
-            Some((worst, plot)) if count > 0 => format!(
-                "{count} of {of} plants were damaged ({:.2} %, which may be {share} %), at most {:.2} % in a plot (replication {}, {} km/h, {} cm).",
-                share.percent(),
-                plot.plant_damage_percent,
-                worst.replication,
-                worst.speed_km_h,
-                worst.spacing_cm
-            ),
-            _ => format!("None of {of} plants was damaged: in truth {share} %."),
+        if of == 0 {
+            return "Damaged plants were counted in no plot.".to_owned();
         }
+        if count == 0 {
+            return format!("None of {of} plants was damaged: {share} % ({}).", share.kind());
+        }
+        let percents = self.performances.iter().map(|plot| plot.plant_damage_percent);
+        let most = percents.clone().flatten().fold(0.0, f64::max);
+        let is_worst = |percent: &Option<f64>| percent.is_some_and(|percent| percent >= most);
+        let worst = self.records.iter().zip(percents).filter(|(_, percent)| is_worst(percent));
+        let place = |(plot, _): (&PlotRecord, _)| {
+            format!("replication {}, {} km/h, {} cm", plot.replication, plot.speed_km_h, plot.spacing_cm)
+        };
+        let worst: Vec<String> = worst.map(place).collect();
+        let kind = if worst.len() == 1 { "a plot" } else { "each of these plots" };
+        format!(
+            "{count} of {of} plants were damaged: {:.2} %, {} {share} %. At most {most:.2} % in {kind}: {}.",
+            share.percent(),
+            share.kind(),
+            worst.join("; ")
+        )
     }
 
-    /// Contradictions to the paper's text: a sentence for each measure whose 95 % interval of the slope excludes the
-    /// paper's slope. One sentence if there is none.
+    /// Differences from the paper's text: a sentence for each measure whose 95 % interval of the slope excludes the paper's
+    /// slope. One sentence if there is none.
     pub fn against_the_paper(&self) -> Vec<String> {
         let said: Vec<String> = self.responses.iter().filter_map(ResponseAnalysis::against_the_paper).collect();
         let compared =
             self.responses.iter().filter(|of| of.model.is_ok() && of.published.text.per_km_h.is_some()).count();
         match (said.is_empty(), compared) {
             (_, 0) => Vec::new(),
-            (true, _) => vec!["no slope by speed contradicts the paper's.".to_owned()],
+            (true, _) => vec!["No slope by speed differs from the paper's.".to_owned()],
             (false, _) => said,
         }
     }
@@ -95,7 +152,7 @@ impl ResponseAnalysis {
         }
     }
 
-    /// A contradiction to the paper's slope by speed.
+    /// A difference from the paper's slope by speed.
     fn against_the_paper(&self) -> Option<String> {
         let paper = self.published.text.per_km_h?;
         let model = self.model.as_ref().ok()?;
@@ -104,8 +161,8 @@ impl ResponseAnalysis {
         let within = distribution.inverse_cdf(1.0 - SIGNIFICANCE / 2.0) * term.standard_error;
         ((term.estimate - paper).abs() > within).then(|| {
             format!(
-                "{} changes by {:+.2} ± {within:.2} for each km/h, where the paper's text has {paper:+}: they contradict each other.",
-                self.response.title().to_lowercase(),
+                "{} changes by {:+.2} ± {within:.2} for each km/h, where the paper's text has {paper:+}.",
+                self.response.title(),
                 term.estimate
             )
         })
@@ -114,21 +171,21 @@ impl ResponseAnalysis {
     /// The effect of speed on the odds of the counts, if it is significant.
     fn odds(&self) -> Option<String> {
         let model = self.binomial.as_ref()?.as_ref().ok()?;
-        let term = model.term("speed").filter(|term| term.p < SIGNIFICANCE)?;
+        let OddsTerm { p, odds_ratio, odds_interval: (least, greatest), .. } =
+            model.term("speed").filter(|term| term.p < SIGNIFICANCE)?;
         let what = match self.response {
             Response::PlantDamage => "that a plant is damaged",
             _ => "that a weed is gone",
         };
-        let (times, least, greatest) = term.odds_ratio();
         Some(format!(
-            "Counted, the odds {what} are {times:.2} times as high for each km/h more ({least:.2} to {greatest:.2}; {}).",
-            probability(term.p)
+            "Counted, the odds {what} are {odds_ratio:.2} times as high for each km/h more ({least:.2} to {greatest:.2}; {}).",
+            probability(*p)
         ))
     }
 
     /// The findings of the residuals, a sentence each.
     pub fn checked(&self) -> Vec<String> {
-        self.checks.as_ref().map(|checks| checks.sentences(self.response.title())).unwrap_or_default()
+        self.checks.as_ref().map(|checks| checks.sentences(self.response.title(), &self.numbers)).unwrap_or_default()
     }
 }
 
@@ -144,11 +201,11 @@ fn effect(term: &Term, response: Response, name: &str, unit: &str) -> String {
     format!("{verb} by {:.3}{measure} for each {unit}{significance}", term.estimate.abs())
 }
 
-/// Numbers as in a sentence.
-fn list(numbers: &[f64]) -> String {
-    let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
-    match words.as_slice() {
-        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
-        words => words.join(""),
-    }
+/// What a plot lacks.
+fn lacking(record: &PlotRecord) -> Vec<String> {
+    let is_missing = |(_, value): &(&str, String)| value.is_empty();
+    let missing = record.columns().into_iter().filter(is_missing).map(|(column, _)| format!("no {column}"));
+    let none = [(record.weeds_before, "no weed before weeding"), (record.plants, "no plant")];
+    let none = none.into_iter().filter(|(count, _)| *count == Some(0)).map(|(_, what)| what.to_owned());
+    missing.chain(none).collect()
 }

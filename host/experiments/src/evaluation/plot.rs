@@ -1,7 +1,7 @@
 //! A plot's counts and measurements, and its measures by the paper's Eq. 22 to 27. The paper models four of them on
 //! speed and spacing.
 
-use crate::table::{fixed, short};
+use crate::table::{fixed, optional, short};
 use anyhow::{Result, anyhow};
 use files::FileError;
 use files::csv_table::Line;
@@ -16,11 +16,14 @@ const S_PER_H: f64 = 3600.0;
 macro_rules! plot_record {
     ($(
         $(#[doc = $about:literal])+
-        $column:ident: $type:ty = $read:ident($($least:literal)?), $heading:literal => $shown:expr;
+        $column:ident: $type:ty = $read:ident($($least:literal)?), $heading:literal => $shown:expr, $csv:expr;
     )+) => {
-        /// The counts and measurements of one plot.
+        /// The counts and measurements of one plot. What was not counted or measured is `None`.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
         pub struct PlotRecord {
+            /// Its number in the field, from 1; 0 if it has none yet.
+            #[serde(default, skip_serializing_if = "is_zero")]
+            pub plot: u32,
             $($(#[doc = $about])+ pub $column: $type,)+
         }
 
@@ -33,18 +36,19 @@ macro_rules! plot_record {
 
             /// The cells of a report.
             pub(super) fn cells(&self) -> Vec<String> {
-                let Self { $($column),+ } = *self;
+                let Self { $($column,)+ .. } = *self;
                 vec![$($shown),+]
             }
 
-            /// Each column with its value.
+            /// Each column with its value, which is empty if it is not known.
             pub(crate) fn columns(&self) -> Vec<(&'static str, String)> {
-                vec![$((stringify!($column), self.$column.to_string())),+]
+                let Self { $($column,)+ .. } = *self;
+                vec![$((stringify!($column), $csv)),+]
             }
 
             /// Parses a line of a table. The values are not checked yet.
             pub(super) fn read(line: Line) -> Result<Self, FileError> {
-                Ok(Self { $($column: $read(line, stringify!($column) $(, $least)?)?),+ })
+                Ok(Self { plot: 0, $($column: $read(line, stringify!($column) $(, $least)?)?),+ })
             }
         }
     };
@@ -52,45 +56,58 @@ macro_rules! plot_record {
 
 plot_record! {
     /// The number of its replication.
-    replication: u32 = count(0), "replication" => replication.to_string();
-    /// Forward speed that the machine was set to, km/h.
-    speed_km_h: f64 = number(), "speed, km/h" => short(speed_km_h);
+    replication: u32 = whole(), "replication" => replication.to_string(), replication.to_string();
+    /// Forward speed that the machine was set to, or that was measured, km/h.
+    speed_km_h: f64 = number(), "speed, km/h" => short(speed_km_h), speed_km_h.to_string();
     /// Plant spacing along the row, cm.
-    spacing_cm: f64 = number(), "spacing, cm" => short(spacing_cm);
+    spacing_cm: f64 = number(), "spacing, cm" => short(spacing_cm), spacing_cm.to_string();
     /// Weeds counted before weeding.
-    weeds_before: u32 = count(1), "weeds before" => weeds_before.to_string();
-    /// Weeds counted after weeding, on the same ground.
-    weeds_after: u32 = count(0), "weeds after" => weeds_after.to_string();
+    weeds_before: Option<u32> = count(), "weeds before" => counted(weeds_before), text(weeds_before);
+    /// Weeds counted after weeding, on the same ground. More may be there than before: some emerge, and counts scatter.
+    weeds_after: Option<u32> = count(), "weeds after" => counted(weeds_after), text(weeds_after);
     /// Crop plants in the plot.
-    plants: u32 = count(1), "plants" => plants.to_string();
+    plants: Option<u32> = count(), "plants" => counted(plants), text(plants);
     /// Crop plants that the machine injured.
-    damaged: u32 = count(0), "damaged" => damaged.to_string();
+    damaged: Option<u32> = count(), "damaged" => counted(damaged), text(damaged);
     /// Area that was weeded, m2.
-    area_m2: f64 = number(), "area, m²" => fixed(area_m2, 2);
+    area_m2: Option<f64> = measured(), "area, m²" => optional(area_m2, |area| fixed(area, 2)), text(area_m2);
     /// Time that this took, with turns and stops, s.
-    time_s: f64 = number(), "time, s" => fixed(time_s, 1);
+    time_s: Option<f64> = measured(), "time, s" => optional(time_s, |time| fixed(time, 1)), text(time_s);
     /// Working width of the machine, m.
-    width_m: f64 = number(), "width, m" => fixed(width_m, 2);
+    width_m: Option<f64> = measured(), "width, m" => optional(width_m, |width| fixed(width, 2)), text(width_m);
     /// Power that the machine needs, hp.
-    power_hp: f64 = number(), "power, hp" => fixed(power_hp, 2);
+    power_hp: Option<f64> = measured(), "power, hp" => optional(power_hp, |power| fixed(power, 2)), text(power_hp);
 }
 
-/// The measures of one plot.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(number: &u32) -> bool {
+    *number == 0
+}
+
+fn counted(count: Option<u32>) -> String {
+    optional(count.map(f64::from), short)
+}
+
+fn text<T: ToString>(value: Option<T>) -> String {
+    value.map(|value| value.to_string()).unwrap_or_default()
+}
+
+/// The measures of one plot. A measure is `None` if something that it needs was not counted or measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Performance {
     /// Plants injured, percent of those in the plot (Eq. 23).
-    pub plant_damage_percent: f64,
-    /// Weeds removed, percent of those before weeding (Eq. 22).
-    pub weeding_efficiency_percent: f64,
+    pub plant_damage_percent: Option<f64>,
+    /// Weeds removed, percent of those before weeding (Eq. 22). It is below 0 if more weeds were counted after weeding.
+    pub weeding_efficiency_percent: Option<f64>,
     /// Area an hour at the set speed with the whole width and no time lost, ha/h (Eq. 25).
-    pub theoretical_capacity_ha_h: f64,
+    pub theoretical_capacity_ha_h: Option<f64>,
     /// Area an hour that was weeded, ha/h (Eq. 26).
-    pub effective_capacity_ha_h: f64,
+    pub effective_capacity_ha_h: Option<f64>,
     /// Effective in percent of theoretical capacity (Eq. 24).
-    pub field_efficiency_percent: f64,
+    pub field_efficiency_percent: Option<f64>,
     /// Capacity times the percentages of undamaged plants and removed weeds, divided by power (Eq. 27), in ha %2/(h
     /// hp). The paper does not say which capacity it uses; this is the effective one.
-    pub performance_index: f64,
+    pub performance_index: Option<f64>,
 }
 
 impl PlotRecord {
@@ -100,27 +117,25 @@ impl PlotRecord {
     /// Names the first quantity that is out of its range or contradicts another.
     pub fn check(&self) -> Result<()> {
         let within = |value: f64, lowest: f64, highest: f64| (lowest..=highest).contains(&value);
+        let measured = |value: Option<f64>, lowest, highest| value.is_none_or(|value| within(value, lowest, highest));
+        let shown = |value: Option<f64>| value.unwrap_or_default();
+        let is_damage_possible = match (self.damaged, self.plants) {
+            (Some(damaged), Some(plants)) => damaged <= plants,
+            _ => true,
+        };
         let checks = [
             ("speed_km_h", self.speed_km_h, within(self.speed_km_h, 0.1, 15.0), "it has to be from 0.1 to 15 km/h"),
             ("spacing_cm", self.spacing_cm, within(self.spacing_cm, 5.0, 500.0), "it has to be from 5 to 500 cm"),
+            ("damaged", shown(self.damaged.map(f64::from)), is_damage_possible, "it cannot exceed plants"),
+            ("area_m2", shown(self.area_m2), measured(self.area_m2, 0.01, 1e6), "it has to be from 0.01 to 1000000 m2"),
+            ("time_s", shown(self.time_s), measured(self.time_s, 0.1, 1e6), "it has to be from 0.1 to 1000000 s"),
+            ("width_m", shown(self.width_m), measured(self.width_m, 0.01, 50.0), "it has to be from 0.01 to 50 m"),
             (
-                "weeds_before",
-                self.weeds_before.into(),
-                self.weeds_before > 0,
-                "without a weed before weeding there is no weeding efficiency",
+                "power_hp",
+                shown(self.power_hp),
+                measured(self.power_hp, 0.001, 1000.0),
+                "it has to be from 0.001 to 1000 hp",
             ),
-            (
-                "weeds_after",
-                self.weeds_after.into(),
-                self.weeds_after <= self.weeds_before,
-                "it cannot exceed weeds_before",
-            ),
-            ("plants", self.plants.into(), self.plants > 0, "without a plant there is no plant damage in percent"),
-            ("damaged", self.damaged.into(), self.damaged <= self.plants, "it cannot exceed plants"),
-            ("area_m2", self.area_m2, within(self.area_m2, 0.01, 1e6), "it has to be from 0.01 to 1000000 m2"),
-            ("time_s", self.time_s, within(self.time_s, 0.1, 1e6), "it has to be from 0.1 to 1000000 s"),
-            ("width_m", self.width_m, within(self.width_m, 0.01, 50.0), "it has to be from 0.01 to 50 m"),
-            ("power_hp", self.power_hp, within(self.power_hp, 0.001, 1000.0), "it has to be from 0.001 to 1000 hp"),
         ];
         let wrong = checks.into_iter().find(|(_, _, fits, _)| !fits);
         wrong.map_or(Ok(()), |(column, value, _, right)| Err(anyhow!("{column} is {value}: {right}")))
@@ -128,21 +143,41 @@ impl PlotRecord {
 
     /// The plot's measures by Eq. 22 to 27. They are finite if [`PlotRecord::check`] succeeds.
     pub fn performance(&self) -> Performance {
-        let share = |part: u32, whole: u32| f64::from(part) / f64::from(whole);
-        let plant_damage_percent = share(self.damaged, self.plants) * 100.0;
+        let percent = |part: f64, whole: u32| (whole > 0).then(|| 100.0 * part / f64::from(whole));
+        let plant_damage_percent =
+            self.damaged.zip(self.plants).and_then(|(damaged, plants)| percent(f64::from(damaged), plants));
+        let weeds = self.weeds_before.zip(self.weeds_after);
         let weeding_efficiency_percent =
-            share(self.weeds_before.saturating_sub(self.weeds_after), self.weeds_before) * 100.0;
-        let theoretical_capacity_ha_h = self.speed_km_h * self.width_m / 10.0;
-        let effective_capacity_ha_h = (self.area_m2 / M2_PER_HA) / (self.time_s / S_PER_H);
+            weeds.and_then(|(before, after)| percent(f64::from(before) - f64::from(after), before));
+        let theoretical_capacity_ha_h = self.width_m.map(|width_m| self.speed_km_h * width_m / 10.0);
+        let effective_capacity_ha_h =
+            self.area_m2.zip(self.time_s).map(|(area_m2, time_s)| (area_m2 / M2_PER_HA) / (time_s / S_PER_H));
+        let field_efficiency_percent = effective_capacity_ha_h
+            .zip(theoretical_capacity_ha_h)
+            .map(|(effective, theoretical)| effective / theoretical * 100.0);
+        let index = || {
+            let undamaged = 100.0 - plant_damage_percent?;
+            Some(effective_capacity_ha_h? * undamaged * weeding_efficiency_percent? / self.power_hp?)
+        };
         Performance {
             plant_damage_percent,
             weeding_efficiency_percent,
             theoretical_capacity_ha_h,
             effective_capacity_ha_h,
-            field_efficiency_percent: effective_capacity_ha_h / theoretical_capacity_ha_h * 100.0,
-            performance_index: effective_capacity_ha_h * (100.0 - plant_damage_percent) * weeding_efficiency_percent
-                / self.power_hp,
+            field_efficiency_percent,
+            performance_index: index(),
         }
+    }
+
+    /// Whether more weeds were counted after weeding than before.
+    pub fn has_more_weeds_after(&self) -> bool {
+        self.weeds_before.zip(self.weeds_after).is_some_and(|(before, after)| after > before)
+    }
+
+    /// Whether nothing of the plot was counted or timed. Area, width and power may be known beforehand.
+    pub fn is_blank(&self) -> bool {
+        [self.weeds_before, self.weeds_after, self.plants, self.damaged].iter().all(Option::is_none)
+            && self.time_s.is_none()
     }
 }
 
@@ -183,19 +218,26 @@ impl Response {
         }
     }
 
-    /// The count in a plot, and its total. `None` for a measure that is not counted.
+    /// The count in a plot, and its total. `None` for a measure that is not counted, and if it was not. Of a plot with
+    /// more weeds after than before, no weed counts as removed.
     pub fn count(self, record: &PlotRecord) -> Option<(u32, u32)> {
         match self {
-            Self::PlantDamage => Some((record.damaged, record.plants)),
+            Self::PlantDamage => record.damaged.zip(record.plants),
             Self::WeedingEfficiency => {
-                Some((record.weeds_before.saturating_sub(record.weeds_after), record.weeds_before))
+                let (before, after) = record.weeds_before.zip(record.weeds_after)?;
+                Some((before.saturating_sub(after), before))
             }
             Self::PerformanceIndex | Self::FieldEfficiency => None,
         }
     }
 
+    /// Whether it is counted, so that it has a binomial model.
+    pub fn is_counted(self) -> bool {
+        matches!(self, Self::PlantDamage | Self::WeedingEfficiency)
+    }
+
     /// Its value in a plot.
-    pub fn value(self, performance: &Performance) -> f64 {
+    pub fn value(self, performance: &Performance) -> Option<f64> {
         match self {
             Self::PlantDamage => performance.plant_damage_percent,
             Self::WeedingEfficiency => performance.weeding_efficiency_percent,
@@ -205,14 +247,32 @@ impl Response {
     }
 }
 
-/// Parses a count. Its least value is the one in [`PlotRecord::check`].
-fn count(line: Line, column: &str, least: u32) -> Result<u32, FileError> {
-    line.value(column, &format!("a whole number, {least} or more"))
+/// Texts of a cell that say that a count was not made.
+const NOT_COUNTED: [&str; 8] = ["", "na", "n/a", "n.a.", "-", "\u{2013}", "?", "."];
+
+/// Whether a cell says that its count or measurement was not made.
+pub(super) fn is_not_counted(cell: &str) -> bool {
+    NOT_COUNTED.contains(&cell.to_lowercase().as_str())
+}
+
+/// Parses a whole number.
+pub(super) fn whole(line: Line, column: &str) -> Result<u32, FileError> {
+    line.value(column, "a whole number, 0 or more")
 }
 
 fn number(line: Line, column: &str) -> Result<f64, FileError> {
     let Number(value) = line.value(column, "a number, like 1.5")?;
     Ok(value)
+}
+
+fn count(line: Line, column: &str) -> Result<Option<u32>, FileError> {
+    let right = "a whole number, 0 or more, or empty if it was not counted";
+    (!is_not_counted(line.text(column))).then(|| line.value(column, right)).transpose()
+}
+
+fn measured(line: Line, column: &str) -> Result<Option<f64>, FileError> {
+    let right = "a number, like 1.5, or empty if it was not measured";
+    (!is_not_counted(line.text(column))).then(|| line.value(column, right).map(|Number(value)| value)).transpose()
 }
 
 /// A decimal number, without `inf` and `nan`.

@@ -18,6 +18,9 @@ use serde::Serialize;
 /// The least and greatest speed of its trial, km/h. Its slopes are not valid beyond them.
 pub const SPEEDS_KM_H: (f64, f64) = (1.0, 2.5);
 
+/// The least and greatest damage that it measured in a plot, percent of the plants.
+pub const DAMAGED_PERCENT: (f64, f64) = (0.0, 3.92);
+
 /// Machines that weed in the row, those with a beam first, as measured by their authors in a field or on a test track.
 /// Each source counts weeds in its own way.
 ///
@@ -130,8 +133,9 @@ const PLANT_DAMAGE: Published = Published {
     text: Coefficients { constant: None, per_km_h: Some(1.26), per_cm: Some(-0.081) },
     r_squared: 0.79,
     adjusted_r_squared: None,
-    ranges: &[(0.0, 3.92)],
-    contradictions: &["Eq. 28 cannot be read in the copy at hand: the text gives its slopes, but not its constant."],
+    ranges: &[DAMAGED_PERCENT],
+    // Eq. 28 is illegible in the available copy, which contradicts nothing.
+    contradictions: &[],
 };
 
 const WEEDING_EFFICIENCY: Published = Published {
@@ -194,8 +198,11 @@ mod tests {
     /// The index of a plot with these counts out of 10,000: the paper prints two decimals.
     fn index(capacity_ha_h: f64, damaged: u32, weeds_after: u32, power_hp: f64) -> f64 {
         let (area_m2, time_s) = (capacity_ha_h * 10_000.0, 3600.0);
-        let record = PlotRecord { weeds_before: 10_000, weeds_after, plants: 10_000, damaged, ..PLOT };
-        PlotRecord { area_m2, time_s, power_hp, ..record }.performance().performance_index
+        let (weeds, plants) = (Some(10_000), Some(10_000));
+        let record =
+            PlotRecord { weeds_before: weeds, weeds_after: Some(weeds_after), plants, damaged: Some(damaged), ..PLOT };
+        let (area_m2, time_s, power_hp) = (Some(area_m2), Some(time_s), Some(power_hp));
+        PlotRecord { area_m2, time_s, power_hp, ..record }.performance().performance_index.unwrap()
     }
 
     #[test]

@@ -13,7 +13,9 @@ p is how probable it is that chance alone makes an effect as large: below 0.05 i
 Capacities are by Eq. 25 and 26 of the paper, field efficiency by Eq. 24. The performance index (Eq. 27) is
 effective capacity in ha/h, times the percentages of plants unharmed and of weeds gone, by the power in hp.
 Weeding efficiency is of the weeds that were counted: over a whole plot it is higher than in the row alone.
-Behind damage stands its exact 95 % interval over all plants of the treatment, behind weeding that of a mean of plots.
+Behind damage stands its exact 95 % interval over all plants of the treatment: two-sided where it has two ends, one-sided
+where it reads below or above. It takes plants as independent: where plots scatter by more than counting, it is too narrow.
+Behind weeding stands the two-sided 95 % interval of a mean of plots.
 ";
 
 /// Columns of [`Analysis::plots`] that stand in the trial's own table already.
@@ -41,12 +43,7 @@ impl Display for ResponseAnalysis {
         writeln!(f, "\n{}\n\n{}", self.terms(), self.fit())?;
         match &self.binomial {
             Some(Ok(model)) => {
-                writeln!(f, "\n{}", model.table())?;
-                writeln!(
-                    f,
-                    "deviance {:.3} with {} degrees of freedom, of {:.3} without speed and spacing; dispersion {:.2}",
-                    model.deviance, model.degrees_of_freedom, model.null_deviance, model.dispersion
-                )?;
+                writeln!(f, "\n{}\n{}", model.table(), model.fit_in_words())?;
             }
             Some(Err(reason)) => writeln!(f, "\nNo binomial model: {reason}.")?,
             None => {}
@@ -71,13 +68,14 @@ const MEASURES: [&str; 6] = [
 ];
 
 fn measures(performance: &Performance) -> [String; 6] {
+    let shown = |value, decimals| optional(value, |value| fixed(value, decimals));
     [
-        fixed(performance.plant_damage_percent, 2),
-        fixed(performance.weeding_efficiency_percent, 2),
-        fixed(performance.theoretical_capacity_ha_h, 4),
-        fixed(performance.effective_capacity_ha_h, 4),
-        fixed(performance.field_efficiency_percent, 2),
-        fixed(performance.performance_index, 2),
+        shown(performance.plant_damage_percent, 2),
+        shown(performance.weeding_efficiency_percent, 2),
+        shown(performance.theoretical_capacity_ha_h, 4),
+        shown(performance.effective_capacity_ha_h, 4),
+        shown(performance.field_efficiency_percent, 2),
+        shown(performance.performance_index, 2),
     ]
 }
 
@@ -92,7 +90,7 @@ impl Analysis {
             let damage = format!("{damage} ({})", treatment.damaged);
             let weeding = treatment
                 .weeding_efficiency
-                .within
+                .and_then(|mean| mean.within)
                 .map_or(weeding.clone(), |it| format!("{weeding} ± {}", fixed(it, 2)));
             let cells = [name, treatment.plots.to_string(), damage, weeding];
             table.rows.push(cells.into_iter().chain(others).collect());
@@ -104,8 +102,8 @@ impl Analysis {
     pub(crate) fn plots(&self) -> Table {
         let columns = ["plot"].iter().chain(PlotRecord::HEADINGS).chain(&MEASURES).copied();
         let mut table = Table::new("Each plot: counts, measurements and results", columns);
-        for ((record, performance), number) in self.records.iter().zip(&self.performances).zip(1_u32..) {
-            table.rows.push([vec![number.to_string()], record.cells(), measures(performance).into()].concat());
+        for (record, performance) in self.records.iter().zip(&self.performances) {
+            table.rows.push([vec![record.plot.to_string()], record.cells(), measures(performance).into()].concat());
         }
         table
     }
@@ -166,7 +164,11 @@ impl ResponseAnalysis {
             ),
             row("residual standard error", ours(|model| model.residual_standard_error, significant), nothing()),
             row("degrees of freedom", ours(|model| model.degrees_of_freedom as f64, short), nothing()),
-            row(&format!("range, {}", self.response.unit()), range(&self.range), published.join(",\n")),
+            row(
+                &format!("range, {}", self.response.unit()),
+                self.range.as_ref().map_or_else(nothing, range),
+                published.join(",\n"),
+            ),
         ];
         table
     }
@@ -189,10 +191,20 @@ impl ResponseAnalysis {
 }
 
 impl BinomialModel {
+    /// How well the model fits.
+    pub(crate) fn fit_in_words(&self) -> String {
+        let in_errors = if self.is_quasi { ", which is in the standard errors and p" } else { "" };
+        format!(
+            "deviance {:.3} with {} degrees of freedom, of {:.3} without speed and spacing; dispersion {:.2}{in_errors}",
+            self.deviance, self.degrees_of_freedom, self.null_deviance, self.dispersion
+        )
+    }
+
     /// The effects of speed and spacing on the odds.
     pub(crate) fn table(&self) -> Table {
-        let columns = ["term", "log odds", "standard error", "z", "p", "odds times (95 %)"];
-        let mut table = Table::new("Binomial model of the counts", columns);
+        let (name, statistic) = if self.is_quasi { ("Quasi-binomial", "t") } else { ("Binomial", "z") };
+        let columns = ["term", "log odds", "standard error", statistic, "p", "odds times (two-sided 95 %)"];
+        let mut table = Table::new(format!("{name} model of the counts"), columns);
         for term in &self.terms {
             let (name, decimals) = match term.name {
                 "speed" => ("for each km/h", Some(2)),
@@ -200,12 +212,16 @@ impl BinomialModel {
                 name => (name, None),
             };
             let times = decimals.map_or(NOTHING.to_owned(), |decimals| {
-                let (times, least, greatest) = term.odds_ratio();
                 let fixed = |odds| fixed(odds, decimals);
-                format!("{} ({} to {})", fixed(times), fixed(least), fixed(greatest))
+                let (least, greatest) = term.odds_interval;
+                format!("{} ({} to {})", fixed(term.odds_ratio), fixed(least), fixed(greatest))
             });
-            let cells =
-                [significant(term.estimate), significant(term.standard_error), fixed(term.z, 2), probability(term.p)];
+            let cells = [
+                significant(term.estimate),
+                significant(term.standard_error),
+                fixed(term.statistic, 2),
+                probability(term.p),
+            ];
             table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());
         }
         table

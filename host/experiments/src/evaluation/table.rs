@@ -1,37 +1,32 @@
 //! The plots of a trial as a CSV table, from a spreadsheet or a simulated trial.
 //!
-//! The columns are the fields of [`PlotRecord`], in any order. Other columns are ignored. Lines that begin with `#` are
-//! comments. Every line is checked before any is used.
+//! The columns are the fields of [`PlotRecord`], in any order. Other columns are ignored, but `plot` numbers the plots.
+//! Lines that begin with `#` are comments. Every line is checked before any is used.
 
-use super::plot::{COLUMNS, PlotRecord};
+use super::plot::{COLUMNS, PlotRecord, whole};
 use files::FileError;
-use files::csv_table::{CsvTable, Line};
+use files::csv_table::CsvTable;
+use std::collections::HashSet;
 use std::path::Path;
 
-/// Reads the plots of a trial.
+/// How to leave a plot out of an evaluation.
+pub(super) const LEAVE_OUT: &str = "to leave a plot out, put # in front of its line";
+
+/// Reads the plots of a trial. A cell of a count or a measurement may be empty: the plot then takes part in what it has.
 ///
 /// # Errors
-/// Names the file, the line and the column, and what would be right. The errors are: a missing column, empty plots,
-/// text in a number, a value out of range, more weeds after than before, more damaged plants than plants, and a
-/// replication of a speed and spacing that occurs twice.
+/// Names the file, the line and the column, and what would be right. The errors are: a missing column, no plot that is
+/// filled in, text in a number, a value out of range, more damaged plants than plants, and a replication of a speed and
+/// spacing that occurs twice.
 pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
-    let table = CsvTable::read(path, COLUMNS)?;
-    let empty = |line: Line| COLUMNS.iter().find(|column| line.text(column).is_empty());
-    let mut unfilled = table.lines().filter_map(|line| Some((line, empty(line)?)));
-    if let Some((line, column)) = unfilled.next() {
-        let (count, all) = (1 + unfilled.count(), table.lines().count());
-        let verb = if count == 1 { "is" } else { "are" };
-        return Err(line.error(format!("{count} of {all} plots {verb} not filled in: here {column} is empty")));
-    }
+    let table = CsvTable::read_with_gaps(path, COLUMNS)?;
+    let numbers = numbers(&table);
     let mut plots: Vec<(u64, PlotRecord)> = Vec::new();
-    for line in table.lines() {
-        let plot = PlotRecord::read(line)?;
-        plot.check().map_err(|problem| line.error(problem.to_string()))?;
-        let same = |other: &PlotRecord| {
-            (other.replication, other.speed_km_h, other.spacing_cm)
-                == (plot.replication, plot.speed_km_h, plot.spacing_cm)
-        };
-        if let Some((first, _)) = plots.iter().find(|(_, other)| same(other)) {
+    for (line, number) in table.lines().zip(numbers) {
+        let plot = PlotRecord { plot: number, ..PlotRecord::read(line)? };
+        plot.check().map_err(|problem| line.error(format!("{problem}; {LEAVE_OUT}")))?;
+        let treatment = |of: &PlotRecord| (of.replication, of.speed_km_h, of.spacing_cm);
+        if let Some((first, _)) = plots.iter().find(|(_, other)| treatment(other) == treatment(&plot)) {
             return Err(line.error(format!(
                 "replication {} of {} km/h and {} cm is already in line {first}: each plot needs its own replication",
                 plot.replication, plot.speed_km_h, plot.spacing_cm
@@ -39,7 +34,21 @@ pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
         }
         plots.push((line.number(), plot));
     }
+    if plots.iter().all(|(_, plot)| plot.is_blank())
+        && let Some(line) = table.lines().next()
+    {
+        let all = plots.len();
+        return Err(line.error(format!("{all} of {all} plots are not filled in: enter what was counted")));
+    }
     Ok(plots.into_iter().map(|(_, plot)| plot).collect())
+}
+
+/// The number of each line's plot: by the column `plot` if it numbers all plots, else by the line.
+fn numbers(table: &CsvTable) -> Vec<u32> {
+    let numbered: Option<Vec<u32>> =
+        table.lines().map(|line| whole(line, "plot").ok().filter(|number| *number > 0)).collect();
+    let is_each_once = |numbers: &Vec<u32>| numbers.iter().collect::<HashSet<_>>().len() == numbers.len();
+    numbered.filter(is_each_once).unwrap_or_else(|| (1..).zip(table.lines()).map(|(number, _)| number).collect())
 }
 
 #[cfg(test)]
@@ -72,21 +81,40 @@ mod tests {
         for (wrong, said) in [
             ("1,fast,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is `fast`: it has to be a number, like 1.5"),
             ("1,nan,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is `nan`: it has to be a number, like 1.5"),
-            ("1,,50,200,30,50,1,24,180,0.4,2.5", "1 of 1 plots is not filled in: here speed_km_h is empty"),
-            ("1,0.05,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is 0.05: it has to be from 0.1 to 15 km/h"),
-            ("1,1.5,0.5,200,30,50,1,24,180,0.4,2.5", "spacing_cm is 0.5: it has to be from 5 to 500 cm"),
-            ("1,1.5,50,200,201,50,1,24,180,0.4,2.5", "weeds_after is 201: it cannot exceed weeds_before"),
-            ("1,1.5,50,-2,30,50,1,24,180,0.4,2.5", "weeds_before is `-2`: it has to be a whole number, 1 or more"),
+            ("1,,50,200,30,50,1,24,180,0.4,2.5", "speed_km_h is ``: it has to be a number, like 1.5"),
             (
-                "1,1.5,50,0,0,50,1,24,180,0.4,2.5",
-                "weeds_before is 0: without a weed before weeding there is no weeding efficiency",
+                "1,0.05,50,200,30,50,1,24,180,0.4,2.5",
+                "speed_km_h is 0.05: it has to be from 0.1 to 15 km/h; to leave a plot out, put # in front of its line",
             ),
-            ("1,1.5,50,200,30,0,0,24,180,0.4,2.5", "plants is 0: without a plant there is no plant damage in percent"),
-            ("1,1.5,50,200,30,50,51,24,180,0.4,2.5", "damaged is 51: it cannot exceed plants"),
-            ("1,1.5,50,200,30,50,1,0,180,0.4,2.5", "area_m2 is 0: it has to be from 0.01 to 1000000 m2"),
-            ("1,1.5,50,200,30,50,1,24,0,0.4,2.5", "time_s is 0: it has to be from 0.1 to 1000000 s"),
-            ("1,1.5,50,200,30,50,1,24,180,0,2.5", "width_m is 0: it has to be from 0.01 to 50 m"),
-            ("1,1.5,50,200,30,50,1,24,180,0.4,-1", "power_hp is -1: it has to be from 0.001 to 1000 hp"),
+            (
+                "1,1.5,0.5,200,30,50,1,24,180,0.4,2.5",
+                "spacing_cm is 0.5: it has to be from 5 to 500 cm; to leave a plot out, put # in front of its line",
+            ),
+            (
+                "1,1.5,50,-2,30,50,1,24,180,0.4,2.5",
+                "weeds_before is `-2`: it has to be a whole number, 0 or more, or empty if it was not counted",
+            ),
+            ("1,1.5,50,,,,,24,,0.4,2.5", "1 of 1 plots are not filled in: enter what was counted"),
+            (
+                "1,1.5,50,200,30,50,51,24,180,0.4,2.5",
+                "damaged is 51: it cannot exceed plants; to leave a plot out, put # in front of its line",
+            ),
+            (
+                "1,1.5,50,200,30,50,1,0,180,0.4,2.5",
+                "area_m2 is 0: it has to be from 0.01 to 1000000 m2; to leave a plot out, put # in front of its line",
+            ),
+            (
+                "1,1.5,50,200,30,50,1,24,0,0.4,2.5",
+                "time_s is 0: it has to be from 0.1 to 1000000 s; to leave a plot out, put # in front of its line",
+            ),
+            (
+                "1,1.5,50,200,30,50,1,24,180,0,2.5",
+                "width_m is 0: it has to be from 0.01 to 50 m; to leave a plot out, put # in front of its line",
+            ),
+            (
+                "1,1.5,50,200,30,50,1,24,180,0.4,-1",
+                "power_hp is -1: it has to be from 0.001 to 1000 hp; to leave a plot out, put # in front of its line",
+            ),
         ] {
             assert_eq!(read(&format!("# a trial\n{HEADER}{wrong}\n")), Err(format!("trial.csv, line 3: {said}")));
         }

@@ -8,7 +8,7 @@ use std::io;
 
 /// A line of [`write_csv`]: a plot's record, figures and loss budget, each cell behind its column's name.
 fn line(outcome: &PlotOutcome) -> Vec<(String, String)> {
-    let record = PlotRecord { time_s: thousandth(outcome.record.time_s), ..outcome.record };
+    let record = PlotRecord { time_s: outcome.record.time_s.map(thousandth), ..outcome.record };
     let figure = |(name, figure): (&'static str, Value)| match figure.as_f64() {
         Some(number) if figure.is_f64() => (name, thousandth(number).to_string()),
         _ => (name, figure.to_string()),

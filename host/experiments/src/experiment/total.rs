@@ -23,6 +23,17 @@ impl Total {
         Share::of(self.plots.effect.injured(), self.plots.effect.plants)
     }
 
+    /// Plants damaged of those that the beam can see, with the interval of their share.
+    pub fn damage_of_seen(&self) -> Share {
+        let (damaged, seen) = self.plots.effect.injured_of_seen();
+        Share::of(damaged, seen)
+    }
+
+    /// Plants damaged of those that the beam cannot see.
+    pub fn damage_of_unseen(&self) -> Share {
+        Share::of(self.plots.effect.unseen, self.plots.effect.all_unseen)
+    }
+
     /// Plants damaged, % (Eq. 23).
     pub fn plant_damage_percent(&self) -> f64 {
         self.damage().percent()

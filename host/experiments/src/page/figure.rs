@@ -80,11 +80,11 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
         let moved = |(speed_km_h, value): (f64, f64)| (speed_km_h + aside(index), value);
         let of_spacing = treatments.iter().filter(|treatment| treatment.spacing_cm == spacing_cm);
         let line: Vec<_> =
-            of_spacing.map(|treatment| (treatment.speed_km_h, response.value(&treatment.mean))).collect();
+            of_spacing.filter_map(|treatment| Some((treatment.speed_km_h, response.value(&treatment.mean)?))).collect();
         let plots = analysis.records.iter().zip(&analysis.performances);
         let cloud = plots
             .filter(|(record, _)| record.spacing_cm == spacing_cm)
-            .map(|(record, performance)| moved((record.speed_km_h, response.value(performance))))
+            .filter_map(|(record, performance)| Some(moved((record.speed_km_h, response.value(performance)?))))
             .collect();
         let meaning = spacing(spacing_cm);
         words += &said(&meaning, &line);
@@ -119,7 +119,7 @@ pub fn residuals(analysis: &Analysis, of: &ResponseAnalysis) -> Result<Option<Fi
     for (index, spacing_cm) in spacings_cm(analysis).into_iter().enumerate() {
         let look = Look::of_series(index);
         let points = model.fitted.iter().copied().zip(model.residuals.iter().copied());
-        let of_spacing = points.zip(&analysis.records).filter(|(_, record)| record.spacing_cm == spacing_cm);
+        let of_spacing = points.zip(&of.plots).filter(|(_, plot)| analysis.records[**plot].spacing_cm == spacing_cm);
         legend.push(Key { svg: key(look, false)?, meaning: spacing(spacing_cm) });
         series.push(Series { look, line: Vec::new(), cloud: of_spacing.map(|(point, _)| point).collect() });
     }

@@ -2,20 +2,26 @@
 //!
 //! A count of damaged plants or removed weeds is a number out of a total. Its scatter depends on its share and on the
 //! total, and a share ends at 0 and 1. The linear model ignores both. This is R's `glm(cbind(count, of - count) ~
-//! speed + spacing, family = binomial)`, fitted by iteratively reweighted least squares with nalgebra.
+//! speed + spacing, family = binomial)`, fitted by iteratively reweighted least squares.
 //!
-//! Plots of one field differ by more than the scatter of counting. [`BinomialModel::dispersion`] measures this. If it
-//! is above 1, the true standard errors are larger by its root. The reported ones are those of R's binomial family,
-//! without this correction.
+//! Plots of one field differ by more than the scatter of counting. [`BinomialModel::dispersion`] measures this. Above 1
+//! the model is R's `quasibinomial`: standard errors are multiplied by the root of the dispersion, and each estimate
+//! divided by its error is a t with the residual degrees of freedom. Up to 1 it is R's `binomial` with its z.
 
-use super::design::{Column, Design, NoModel, Remark, matrix};
-use nalgebra::{DMatrix, DVector};
+use super::basis::{Basis, Solution};
+use super::design::{Column, Design, NoModel, Remark};
+use super::interval::CONFIDENCE;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// The most steps of a fit, and the change of the deviance at which it has converged.
+/// The most steps of a fit.
 const STEPS: usize = 100;
-const SETTLED: f64 = 1e-14;
+
+/// The relative change of the deviance at which the fit has converged, as in R. Rounding is smaller.
+const SETTLED: f64 = 1e-8;
+
+/// The change of a plot's logarithm of odds at which the fit has converged. Slopes that diverge change by 1 a step.
+const STILL: f64 = 1e-6;
 
 /// Greatest logarithm of odds that counts can support. Beyond it the counts lie on one side of the speeds or spacings.
 const NEVER_LOG_ODDS: f64 = 30.0;
@@ -29,19 +35,14 @@ pub struct OddsTerm {
     pub estimate: f64,
     /// Its standard error.
     pub standard_error: f64,
-    /// Estimate by standard error.
-    pub z: f64,
-    /// The two-sided p-value of z, 0 to 1.
+    /// Estimate divided by standard error: a t if the model is quasi-binomial, else a z.
+    pub statistic: f64,
+    /// The two-sided p-value of the statistic, 0 to 1.
     pub p: f64,
-}
-
-impl OddsTerm {
-    /// The factor of the odds for each unit, with the ends of its 95 % interval.
-    pub fn odds_ratio(&self) -> (f64, f64, f64) {
-        const QUANTILE: f64 = 1.959_963_984_540_054;
-        let at = |errors: f64| (self.estimate + errors * self.standard_error).exp();
-        (at(0.0), at(-QUANTILE), at(QUANTILE))
-    }
+    /// The factor of the odds for each unit.
+    pub odds_ratio: f64,
+    /// The ends of its two-sided 95 % interval.
+    pub odds_interval: (f64, f64),
 }
 
 /// Counts on speed and spacing.
@@ -57,16 +58,17 @@ pub struct BinomialModel {
     pub degrees_of_freedom: usize,
     /// Pearson's chi-square divided by the degrees of freedom: 1 if plots differ only by the scatter of counting.
     pub dispersion: f64,
+    /// Whether the dispersion is above 1, and in the standard errors.
+    pub is_quasi: bool,
     /// The model's share for each plot, 0 to 1.
     pub fitted: Vec<f64>,
     /// Remarks for the reader.
     pub remarks: Vec<Remark>,
 }
 
-/// An unfinished fit.
+/// A fit that has converged.
 struct Fit {
-    coefficients: DVector<f64>,
-    covariance: DMatrix<f64>,
+    solution: Solution,
     fitted: Vec<f64>,
     deviance: f64,
 }
@@ -75,7 +77,8 @@ impl BinomialModel {
     /// Fits the model to a plot's count, and to how many it is of.
     ///
     /// # Errors
-    /// If the plots carry none: nothing was counted or everything, no factor varies, or the counts lie on one side.
+    /// If the plots carry none: nothing was counted or everything, no factor varies, or the counts lie on one side. Also
+    /// if the iteration does not converge.
     ///
     /// # Panics
     /// If there are more or fewer counts than plots.
@@ -87,25 +90,43 @@ impl BinomialModel {
             return Err(NoModel::Constant { value: if all == 0.0 { 0.0 } else { 100.0 } });
         }
         let (columns, mut remarks) = design.columns()?;
-        let fit = fit(&matrix(&columns), &counts).ok_or(NoModel::OneSided)?;
+        let Fit { solution, fitted, deviance: unexplained } = fit(&columns, &counts)?;
         let share = all / of;
         let degrees_of_freedom = counts.len() - columns.len();
-        let dispersion = pearson(&counts, &fit.fitted) / degrees_of_freedom as f64;
-        if dispersion > OVERDISPERSED {
-            remarks.push(Remark::Overdispersed { factor: dispersion.sqrt() });
+        let dispersion = pearson(&counts, &fitted) / degrees_of_freedom as f64;
+        let is_quasi = dispersion > 1.0;
+        let factor = dispersion.max(1.0).sqrt();
+        if factor.powi(2) > OVERDISPERSED {
+            remarks.push(Remark::Overdispersed { factor });
         }
+        let student = StudentsT::new(0.0, 1.0, degrees_of_freedom as f64).ok().filter(|_| is_quasi);
+        let beyond =
+            |statistic| student.map_or_else(|| Normal::standard().sf(statistic), |student| student.sf(statistic));
+        let upper = 1.0 - (1.0 - CONFIDENCE) / 2.0;
+        let quantile =
+            student.map_or_else(|| Normal::standard().inverse_cdf(upper), |student| student.inverse_cdf(upper));
         let term = |(index, (name, _)): (usize, &Column)| {
-            let (estimate, standard_error) = (fit.coefficients[index], fit.covariance[(index, index)].sqrt());
-            let z = estimate / standard_error;
-            OddsTerm { name, estimate, standard_error, z, p: 2.0 * Normal::standard().sf(z.abs()) }
+            let (estimate, standard_error) = (solution.coefficients[index], factor * solution.variances[index].sqrt());
+            let statistic = estimate / standard_error;
+            let odds = |errors: f64| (estimate + errors * standard_error).exp();
+            OddsTerm {
+                name,
+                estimate,
+                standard_error,
+                statistic,
+                p: 2.0 * beyond(statistic.abs()),
+                odds_ratio: odds(0.0),
+                odds_interval: (odds(-quantile), odds(quantile)),
+            }
         };
         Ok(Self {
             terms: columns.iter().enumerate().map(term).collect(),
-            deviance: fit.deviance,
+            deviance: unexplained,
             null_deviance: deviance(&counts, &vec![share; counts.len()]),
             degrees_of_freedom,
             dispersion,
-            fitted: fit.fitted,
+            is_quasi,
+            fitted,
             remarks,
         })
     }
@@ -122,39 +143,44 @@ const OVERDISPERSED: f64 = 1.5;
 /// A plot's count, and how many it is of.
 type Count = (f64, f64);
 
-/// Iteratively reweighted least squares. `None` if the coefficients diverge.
-fn fit(matrix: &DMatrix<f64>, counts: &[Count]) -> Option<Fit> {
+/// Iteratively reweighted least squares.
+fn fit(columns: &[Column], counts: &[Count]) -> Result<Fit, NoModel> {
     // R starts half a count inside, so that no plot is at 0 or 1.
     let mut fitted: Vec<f64> = counts.iter().map(|(count, of)| (count + 0.5) / (of + 1.0)).collect();
+    let mut before: Vec<f64> = fitted.iter().map(|share| (share / (1.0 - share)).ln()).collect();
     let (mut last, mut is_settled) = (f64::INFINITY, false);
     for _ in 0..STEPS {
-        let root = |plot: usize| (counts[plot].1 * fitted[plot] * (1.0 - fitted[plot])).sqrt();
-        let working = DVector::from_fn(counts.len(), |plot, _| {
-            let ((count, of), share) = (counts[plot], fitted[plot]);
-            let observed = count / of.max(1.0);
-            ((share / (1.0 - share)).ln() + (observed - share) / (share * (1.0 - share))) * root(plot)
+        let plots = || counts.iter().zip(&fitted);
+        let roots: Vec<f64> = plots().map(|((_, of), share)| (of * share * (1.0 - share)).sqrt()).collect();
+        let working = plots().zip(&before).zip(&roots).map(|((((count, of), share), log_odds), root)| {
+            (log_odds + (count / of.max(1.0) - share) / (share * (1.0 - share))) * root
         });
-        let weighted =
-            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |plot, column| matrix[(plot, column)] * root(plot));
-        // By QR, which keeps digits that the normal equations lose.
-        let parts = weighted.qr();
-        let inverse = parts.r().try_inverse()?;
-        let coefficients = &inverse * (parts.q().transpose() * working);
-        let covariance = &inverse * inverse.transpose();
-        let log_odds = matrix * &coefficients;
-        if log_odds.iter().any(|odds| odds.abs() > NEVER_LOG_ODDS || odds.is_nan()) {
-            return None;
+        let working: Vec<f64> = working.collect();
+        let weigh = |(_, values): &Column| values.iter().zip(&roots).map(|(value, root)| value * root).collect();
+        let weighted: Vec<Vec<f64>> = columns.iter().map(weigh).collect();
+        let basis = Basis::of(&weighted).ok_or(NoModel::NotSolved)?;
+        // Counts on one side leave weights so small that columns depend on each other.
+        let solution = basis.solve(&working).ok_or(NoModel::OneSided)?;
+        let coefficients = || solution.coefficients.iter().zip(columns);
+        let log_odds = |plot: usize| coefficients().map(|(of, (_, values))| of * values[plot]).sum();
+        let log_odds: Vec<f64> = (0..counts.len()).map(log_odds).collect();
+        if log_odds.iter().any(|odds| odds.is_nan()) {
+            return Err(NoModel::NotSolved);
+        }
+        if log_odds.iter().any(|odds| odds.abs() > NEVER_LOG_ODDS) {
+            return Err(NoModel::OneSided);
         }
         fitted = log_odds.iter().map(|odds| 1.0 / (1.0 + (-odds).exp())).collect();
         let deviance = deviance(counts, &fitted);
         // The deviance is flat at its minimum: one more step lets the coefficients converge as well.
         if is_settled {
-            return Some(Fit { coefficients, covariance, fitted, deviance });
+            return Ok(Fit { solution, fitted, deviance });
         }
-        is_settled = (deviance - last).abs() <= SETTLED * (deviance.abs() + 0.1);
-        last = deviance;
+        let is_still = log_odds.iter().zip(&before).all(|(now, before)| (now - before).abs() <= STILL);
+        is_settled = is_still && (deviance - last).abs() <= SETTLED * (deviance.abs() + 0.1);
+        (last, before) = (deviance, log_odds);
     }
-    None
+    Err(NoModel::NotSolved)
 }
 
 /// Twice the logarithm of the likelihood that these shares fall short of the plots' own.

@@ -10,9 +10,10 @@
 //! Normality of the residuals is not tested. A few dozen plots are too few for such a test, and means tolerate
 //! deviations.
 
-use super::design::{Design, is_zero, matrix};
+use super::design::{Design, basis, is_zero};
 use super::linear::LinearModel;
 use super::variance::{Fit, levels, levels_fit};
+use crate::table::list;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
@@ -20,14 +21,14 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT}
 pub(crate) const SIGNIFICANCE: f64 = 0.05;
 
 /// The checks of a model. A check that the plots do not allow is `None`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Checks {
     /// The p-value of the lack of fit. It needs repeated treatments, and more treatments than terms.
     pub lack_of_fit_p: Option<f64>,
     /// How probable scatter as unequal is by chance.
     pub unequal_scatter_p: Option<f64>,
-    /// The plot that is farthest off, numbered from 1, and its p-value among this many plots.
-    pub farthest: Option<(usize, f64)>,
+    /// The plots that are farthest off, numbered from 0, and their p-value among this many plots. Several are equally far.
+    pub farthest: Option<(Vec<usize>, f64)>,
 }
 
 impl Checks {
@@ -44,8 +45,8 @@ impl Checks {
         }
     }
 
-    /// The findings, a sentence each. `name` is the measure's.
-    pub fn sentences(&self, name: &str) -> Vec<String> {
+    /// The findings, a sentence each. `name` is the measure's, and `plots` has the number of each plot.
+    pub fn sentences(&self, name: &str, plots: &[u32]) -> Vec<String> {
         let mut said = Vec::new();
         let found = |p: Option<f64>| p.filter(|p| *p < SIGNIFICANCE).map(probability);
         if let Some(p) = found(self.lack_of_fit_p) {
@@ -58,12 +59,19 @@ impl Checks {
                 "{name} scatters more at some speeds or spacings than at others ({p}): its p-values are too small."
             ));
         }
-        if let Some((plot, p)) = self.farthest.and_then(|(plot, p)| Some((plot, found(Some(p))?))) {
-            said.push(format!(
-                "Plot {plot} is farther from the model than chance explains ({p}): check what happened there."
-            ));
+        if let Some((farthest, p)) = &self.farthest
+            && let Some(p) = found(Some(*p))
+        {
+            let numbers: Vec<f64> = farthest.iter().map(|&plot| f64::from(plots[plot])).collect();
+            said.push(match numbers.as_slice() {
+                [one] => format!("Plot {one} is farther from the model than chance explains ({p}): check what happened there."),
+                several => format!(
+                    "Plots {} are equally far from the model, and farther than chance explains ({p}): check what happened there.",
+                    list(several)
+                ),
+            });
         }
-        let made = [self.lack_of_fit_p, self.unequal_scatter_p, self.farthest.map(|(_, p)| p)];
+        let made = [self.lack_of_fit_p, self.unequal_scatter_p, self.farthest.as_ref().map(|(_, p)| *p)];
         if said.is_empty() && made.iter().any(Option::is_some) {
             let is_all = made.iter().all(Option::is_some);
             let which = if is_all { "straight lines, even scatter and no outlier" } else { "what can be checked" };
@@ -79,7 +87,7 @@ pub(crate) fn probability(p: f64) -> String {
 }
 
 fn lack_of_fit(design: &Design, values: &[f64], model: &LinearModel) -> Option<f64> {
-    let Fit { parameters: treatments, sum_of_squares: pure } = levels_fit(&levels(design.treatments()), values);
+    let Fit { parameters: treatments, sum_of_squares: pure } = levels_fit(&levels(design.places()), values);
     let pure_freedom = values.len().checked_sub(treatments).filter(|freedom| *freedom > 0)?;
     let lack_freedom = treatments.checked_sub(model.terms.len()).filter(|freedom| *freedom > 0)?;
     if is_zero(pure, values) {
@@ -97,20 +105,22 @@ fn unequal_scatter(design: &Design, model: &LinearModel) -> Option<f64> {
     Some(ChiSquared::new((of_squares.terms.len() - 1) as f64).ok()?.sf(statistic))
 }
 
-fn farthest(design: &Design, model: &LinearModel) -> Option<(usize, f64)> {
+fn farthest(design: &Design, model: &LinearModel) -> Option<(Vec<usize>, f64)> {
+    /// Differences of t below this share are rounding.
+    const TIE: f64 = 1e-9;
     let (columns, _) = design.columns().ok()?;
-    let matrix = matrix(&columns);
-    let inverse = (matrix.transpose() * &matrix).try_inverse()?;
+    let basis = basis(&columns).ok()?;
     let freedom = model.degrees_of_freedom.checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
     let residual: f64 = model.residuals.iter().map(|residual| residual * residual).sum();
     let of_plots = model.residuals.iter().enumerate().filter_map(|(plot, deviation)| {
-        let row = matrix.row(plot);
-        let leverage = (row * &inverse * row.transpose())[(0, 0)];
+        let leverage = basis.leverage(plot);
         let without = (residual - deviation * deviation / (1.0 - leverage)) / freedom;
         let t = deviation / (without * (1.0 - leverage)).sqrt();
-        t.is_finite().then_some((plot + 1, t.abs()))
+        t.is_finite().then_some((plot, t.abs()))
     });
-    let (plot, t) = of_plots.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let of_plots: Vec<(usize, f64)> = of_plots.collect();
+    let t = of_plots.iter().map(|(_, t)| *t).max_by(f64::total_cmp)?;
+    let plots = of_plots.iter().filter(|(_, other)| *other >= t * (1.0 - TIE)).map(|(plot, _)| *plot).collect();
     let alone = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
-    Some((plot, (alone * design.plots() as f64).min(1.0)))
+    Some((plots, (alone * design.plots() as f64).min(1.0)))
 }

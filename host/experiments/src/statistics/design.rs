@@ -1,6 +1,6 @@
 //! The design of a trial: the factors of each plot, the columns of a model, and the reasons why there may be no model.
 
-use nalgebra::{DMatrix, DVector};
+use super::basis::Basis;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -9,6 +9,8 @@ use thiserror::Error;
 pub struct Design {
     pub(super) speeds_km_h: Vec<f64>,
     pub(super) spacings_cm: Vec<f64>,
+    /// The speed of each plot as a level of a factor: its nominal speed, where speeds were measured.
+    pub(super) levels_km_h: Vec<f64>,
     /// The block of each plot; empty without blocks.
     pub(super) blocks: Vec<u32>,
 }
@@ -16,8 +18,18 @@ pub struct Design {
 impl Design {
     /// The speed in km/h and the spacing in cm of each plot; all are finite.
     pub fn new(plots: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let (speeds_km_h, spacings_cm) = plots.into_iter().unzip();
-        Self { speeds_km_h, spacings_cm, blocks: Vec::new() }
+        let (speeds_km_h, spacings_cm): (Vec<f64>, _) = plots.into_iter().unzip();
+        Self { levels_km_h: speeds_km_h.clone(), speeds_km_h, spacings_cm, blocks: Vec::new() }
+    }
+
+    /// The same plots, each at its nominal speed. Models keep the measured speeds. The analysis of variance compares
+    /// the nominal ones.
+    ///
+    /// # Panics
+    /// If there are more or fewer speeds than plots.
+    pub fn at_levels(self, levels_km_h: Vec<f64>) -> Self {
+        assert_eq!(levels_km_h.len(), self.plots(), "each plot has a nominal speed");
+        Self { levels_km_h, ..self }
     }
 
     /// The same plots, each in its block: what differs from block to block is no chance to the analysis of variance.
@@ -29,9 +41,14 @@ impl Design {
         Self { blocks, ..self }
     }
 
-    /// The speed and the spacing of each plot.
-    pub(super) fn treatments(&self) -> impl Iterator<Item = (f64, f64)> {
+    /// The measured speed and the spacing of each plot.
+    pub(super) fn places(&self) -> impl Iterator<Item = (f64, f64)> {
         self.speeds_km_h.iter().copied().zip(self.spacings_cm.iter().copied())
+    }
+
+    /// The nominal speed and the spacing of each plot.
+    pub(super) fn treatments(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.levels_km_h.iter().copied().zip(self.spacings_cm.iter().copied())
     }
 
     /// How many plots there are.
@@ -59,7 +76,7 @@ impl Design {
             [_] => Err(NoModel::OneTreatment),
             [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => Err(NoModel::Inseparable),
             _ if self.plots() <= columns.len() => {
-                Err(NoModel::TooFewPlots { plots: self.plots(), parameters: columns.len() })
+                Err(NoModel::TooFewPlots { plots: self.plots(), parameters: columns.len(), spare: 1 })
             }
             _ => Ok((columns, remarks)),
         }
@@ -69,10 +86,10 @@ impl Design {
 /// A model's column: its name, and its value in each plot.
 pub(super) type Column = (&'static str, Vec<f64>);
 
-/// The columns as a matrix, with a row for each plot.
-pub(super) fn matrix(columns: &[Column]) -> DMatrix<f64> {
-    let columns: Vec<DVector<f64>> = columns.iter().map(|(_, values)| DVector::from_row_slice(values)).collect();
-    DMatrix::from_columns(&columns)
+/// The directions of a model's columns.
+pub(super) fn basis(columns: &[Column]) -> Result<Basis, NoModel> {
+    let values: Vec<&[f64]> = columns.iter().map(|(_, values)| values.as_slice()).collect();
+    Basis::of(&values).ok_or(NoModel::NotSolved)
 }
 
 /// The plots carry no model.
@@ -88,22 +105,28 @@ pub enum NoModel {
     /// No factor varies.
     #[error("all plots have the same speed and spacing: a model needs two levels of one of them")]
     OneTreatment,
-    /// There are no degrees of freedom left for the scatter.
-    #[error("plots: {plots}, parameters: {parameters}: it takes at least one plot more than parameters")]
+    /// There are too few degrees of freedom left for the scatter.
+    #[error("plots: {plots}, parameters: {parameters}: it takes at least {spare} more plots than parameters")]
     TooFewPlots {
         /// The plots that there are.
         plots: usize,
         /// The number of parameters.
         parameters: usize,
+        /// By how much plots have to exceed parameters.
+        spare: usize,
     },
     /// Speed and spacing go together.
     #[error("speed and spacing change together, so their effects cannot be separated")]
     Inseparable,
     /// A binomial model's slope diverges.
-    #[error(
-        "all that was counted lies on one side of the speeds or spacings, so that the odds have no slope that could be named"
-    )]
+    #[error("all that was counted lies on one side of the speeds or spacings, so the odds have no finite slope")]
     OneSided,
+    /// An iteration ended without a result.
+    #[error("the calculation did not converge; this is no statement about the plots")]
+    NotSolved,
+    /// No plot has the measure.
+    #[error("no plot has it: something that it needs was not counted or measured")]
+    NotMeasured,
 }
 
 /// A remark on a table of figures.
@@ -131,7 +154,7 @@ pub enum Remark {
     NoBlocks,
     /// Plots differ by more than the scatter of counting.
     #[error(
-        "plots differ by more than the counting does: take these standard errors times {factor:.2}, and p for too small"
+        "plots differ by more than counting explains: standard errors of the binomial model are multiplied by {factor:.2}, and t has the residual degrees of freedom (quasi-binomial)"
     )]
     Overdispersed {
         /// The root of the dispersion.

@@ -55,6 +55,11 @@ impl Share {
         format!("{:.*}", if is_small { self.digits() } else { 1 }, self.percent())
     }
 
+    /// What kind of interval it has, in words. If none or all were counted, it has one end.
+    pub fn kind(&self) -> &'static str {
+        if self.count == 0 || self.count >= self.of { "one-sided 95 % bound" } else { "two-sided 95 % interval" }
+    }
+
     /// The decimal places in which the interval's ends differ.
     fn digits(&self) -> usize {
         match self.greatest_percent - self.least_percent {

@@ -1,8 +1,9 @@
 //! The linear model of a response on speed and spacing, by least squares.
 
-use super::design::{Column, Design, NoModel, Remark, is_zero, mean, scatter};
-use linregress::fit_low_level_regression_model;
+use super::basis::Solution;
+use super::design::{Column, Design, NoModel, Remark, basis, is_zero, mean, scatter};
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// One coefficient of a linear model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -55,28 +56,29 @@ impl LinearModel {
             return Err(NoModel::Constant { value: mean(values) });
         }
         let (columns, mut remarks) = design.columns()?;
-
-        let row = |plot: usize| [values[plot]].into_iter().chain(columns.iter().map(move |(_, column)| column[plot]));
-        let rows: Vec<f64> = (0..values.len()).flat_map(row).collect();
-        // It refuses only what was refused above.
-        let fit = fit_low_level_regression_model(&rows, values.len(), columns.len() + 1)
-            .map_err(|_| NoModel::TooFewPlots { plots: values.len(), parameters: columns.len() })?;
-        let residuals = fit.residuals().to_vec();
-        let scatters = !is_zero(fit.ssr(), values);
+        let basis = basis(&columns)?;
+        let Solution { coefficients, variances } = basis.solve(values).ok_or(NoModel::Inseparable)?;
+        let residuals = basis.residual(values);
+        let residual: f64 = residuals.iter().map(|residual| residual * residual).sum();
+        let degrees_of_freedom = values.len() - columns.len();
+        let variance = residual / degrees_of_freedom as f64;
+        let scatters = !is_zero(residual, values);
         if !scatters {
             remarks.push(Remark::NoScatter);
         }
+        let distribution = StudentsT::new(0.0, 1.0, degrees_of_freedom as f64).ok();
         let term = |(index, (name, _)): (usize, &Column)| {
-            let (estimate, standard_error) = (fit.parameters()[index], fit.se()[index]);
+            let (estimate, standard_error) = (coefficients[index], (variance * variances[index]).sqrt());
             let t = scatters.then(|| estimate / standard_error);
-            Term { name, estimate, standard_error, t, p: scatters.then(|| fit.p_values()[index]) }
+            let p = t.zip(distribution).map(|(t, distribution)| 2.0 * distribution.sf(t.abs()));
+            Term { name, estimate, standard_error, t, p }
         };
         Ok(Self {
             terms: columns.iter().enumerate().map(term).collect(),
-            r_squared: fit.rsquared(),
-            adjusted_r_squared: fit.rsquared_adj(),
-            residual_standard_error: fit.scale().sqrt(),
-            degrees_of_freedom: values.len() - columns.len(),
+            r_squared: 1.0 - residual / total,
+            adjusted_r_squared: 1.0 - variance / (total / (values.len() - 1) as f64),
+            residual_standard_error: variance.sqrt(),
+            degrees_of_freedom,
             fitted: values.iter().zip(&residuals).map(|(value, residual)| value - residual).collect(),
             residuals,
             remarks,

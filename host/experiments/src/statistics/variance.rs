@@ -5,10 +5,13 @@
 //! spacing; and of block and treatment. A source's sum of squares is the difference between the residuals of its model
 //! and of the one before. Without blocks the first model is left out.
 
+use super::basis::Basis;
 use super::design::{Design, NoModel, Remark, grouped, is_zero, mean, scatter, varies};
-use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+/// Residual degrees of freedom that an analysis needs. With fewer, its p-values depend on a plot or two.
+const SPARE: usize = 3;
 
 /// One line of an analysis of variance.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -56,14 +59,14 @@ impl AnalysisOfVariance {
         if is_zero(scatter(values), values) {
             return Err(NoModel::Constant { value: mean(values) });
         }
-        let (has_speed, has_spacing) = (varies(&design.speeds_km_h), varies(&design.spacings_cm));
-        let (speeds, spacings) = (levels(&design.speeds_km_h), levels(&design.spacings_cm));
+        let (has_speed, has_spacing) = (varies(&design.levels_km_h), varies(&design.spacings_cm));
+        let (speeds, spacings) = (levels(&design.levels_km_h), levels(&design.spacings_cm));
         let (treatments, blocks) = (levels(design.treatments()), levels(&design.blocks));
 
         let mut remarks = Vec::new();
         let mut in_blocks: Vec<&Levels> = Vec::new();
         if blocks.len() > 1 {
-            if additive_fit(&[&blocks, &treatments], values).parameters < values.len() {
+            if additive_fit(&[&blocks, &treatments], values)?.parameters + SPARE <= values.len() {
                 in_blocks.push(&blocks);
             } else {
                 remarks.push(Remark::NoBlocks);
@@ -73,16 +76,16 @@ impl AnalysisOfVariance {
 
         let mut fits = vec![("", Fit { parameters: 1, sum_of_squares: scatter(values) })];
         if !in_blocks.is_empty() {
-            fits.push(("block", fit(&[])));
+            fits.push(("block", fit(&[])?));
         }
         let before = fits.len();
         if has_speed {
-            fits.push(("speed", fit(&[&speeds])));
+            fits.push(("speed", fit(&[&speeds])?));
         } else {
             remarks.push(Remark::OneSpeed);
         }
         if has_spacing {
-            fits.push(("spacing", fit(&[&speeds, &spacings])));
+            fits.push(("spacing", fit(&[&speeds, &spacings])?));
         } else {
             remarks.push(Remark::OneSpacing);
         }
@@ -91,10 +94,10 @@ impl AnalysisOfVariance {
         }
         if has_speed && has_spacing {
             let (by_speed, both) = (fits[before].1.parameters, fits[before + 1].1.parameters);
-            if both == by_speed || both == fit(&[&spacings]).parameters {
+            if both == by_speed || both == fit(&[&spacings])?.parameters {
                 return Err(NoModel::Inseparable);
             }
-            let each = fit(&[&treatments]);
+            let each = fit(&[&treatments])?;
             if each.parameters == values.len() {
                 remarks.push(Remark::NoReplication);
             } else if each.parameters > both {
@@ -106,8 +109,8 @@ impl AnalysisOfVariance {
             }
         }
         let (_, last) = fits[fits.len() - 1];
-        if last.parameters >= values.len() {
-            return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters });
+        if last.parameters + SPARE > values.len() {
+            return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters, spare: SPARE });
         }
 
         let residual_freedom = values.len() - last.parameters;
@@ -148,29 +151,19 @@ pub(super) fn levels<K: PartialEq>(plots: impl IntoIterator<Item = K>) -> Levels
 }
 
 /// Effects of some factors that add up.
-fn additive_fit(factors: &[&Levels], values: &[f64]) -> Fit {
-    /// Singular values below this share of the largest are rounding.
-    const TOLERANCE: f64 = 1e-9;
+fn additive_fit(factors: &[&Levels], values: &[f64]) -> Result<Fit, NoModel> {
     // For a single factor the means suffice, and are exact.
     if let [only] = factors {
-        return levels_fit(only, values);
+        return Ok(levels_fit(only, values));
     }
+    // A column for each level of each factor: more than needed, so some depend on others.
+    let column = |level: &Vec<usize>| (0..values.len()).map(|plot| f64::from(level.contains(&plot))).collect();
+    let columns: Vec<Vec<f64>> = factors.iter().copied().flatten().map(column).collect();
+    let basis = Basis::of(&columns).ok_or(NoModel::NotSolved)?;
     let mean = mean(values);
-    let response = DVector::from_iterator(values.len(), values.iter().map(|value| value - mean));
-    // A column for each level of each factor: more than needed. The singular values show the rank.
-    let columns: Vec<&Vec<usize>> = factors.iter().copied().flatten().collect();
-    let matrix =
-        DMatrix::from_fn(values.len(), columns.len(), |plot, column| f64::from(columns[column].contains(&plot)));
-    let decomposition = matrix.svd(true, false);
-    let smallest = decomposition.singular_values.max() * TOLERANCE;
-    let mut residual = response.clone();
-    let mut parameters = 0;
-    let basis = decomposition.u.iter().flat_map(|u| u.column_iter().collect::<Vec<_>>());
-    for (direction, _) in basis.zip(&decomposition.singular_values).filter(|(_, size)| **size > smallest) {
-        residual -= direction * direction.dot(&response);
-        parameters += 1;
-    }
-    Fit { parameters, sum_of_squares: residual.norm_squared() }
+    let deviations: Vec<f64> = values.iter().map(|value| value - mean).collect();
+    let sum_of_squares = basis.residual(&deviations).iter().map(|residual| residual * residual).sum();
+    Ok(Fit { parameters: basis.rank(), sum_of_squares })
 }
 
 /// A mean for each level.

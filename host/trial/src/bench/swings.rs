@@ -9,7 +9,7 @@ use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::{Planting, WEED_MARGIN_MM};
 use field::trial::Trial;
-use field::verdict::{Timing, Verdict};
+use field::verdict::{Judgement, Timing, Verdict};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -50,8 +50,8 @@ pub struct Lateness {
     pub plants: usize,
     /// Plants to which the tool did not keep the margin.
     pub not_kept: usize,
-    /// Plants damaged.
-    pub damaged: usize,
+    /// Plants whose keep-out zone was reached.
+    pub reached: usize,
     /// Rows at whose end the firmware's position was wrong.
     pub wrong_positions: usize,
 }
@@ -126,7 +126,7 @@ pub fn lateness(elf: &Path, rows: &Rows, progress: impl Fn(f64) + Sync) -> Resul
         ticks_per_s: mm_s(rows.speed_km_h) / rows.machine.tick_mm(),
         plants,
         not_kept: plants - judgements().map(|judgement| judgement.count(Verdict::Kept)).sum::<usize>(),
-        damaged: judgements().map(|judgement| judgement.count(Verdict::Damaged)).sum(),
+        reached: judgements().map(Judgement::reached).sum(),
         wrong_positions: outcomes
             .iter()
             .filter(|outcome| outcome.status.position_ticks != outcome.true_ticks || outcome.status.lost_ticks != 0)
