@@ -166,7 +166,7 @@ export class Panel {
 
     /** Goes on, at the machine's time. */
     turn(nowMs: number): void {
-        this.#now = nowMs;
+        this.#now = this.machine.nowMs = nowMs;
         const pending = this.#holdPending;
         if (pending?.againMs !== undefined && nowMs >= pending.againMs) void this.#sendHold(pending);
         this.#link?.turn?.(nowMs);
@@ -182,17 +182,23 @@ export class Panel {
         parts.write("why", machine.why);
         this.#tell();
         parts.write("speed", status ? number(status.speedMmS * 0.0036, 1) : "-");
-        parts.write("tool", machine.version === undefined ? "-" : say(machine.toolOut ? "toolOut" : "toolIn"));
+        const isKnown = machine.state !== "none" && machine.state !== "unknown";
+        parts.write("tool", isKnown ? say(machine.toolOut ? "toolOut" : "toolIn") : "-");
         parts.write("place", status ? quantity((status.position * machine.tickMm) / 1000, "meter", 2) : "-");
         parts.write("zones", status ? String(status.zones) : "-");
         const trouble = machine.alarm ?? machine.warning;
-        parts.html("alarm").hidden = trouble === undefined;
-        parts.html("alarm").classList.toggle("warning", machine.alarm === undefined);
+        const { restarted } = machine;
+        const restart = restarted === undefined ? "" : say("restarted", { cause: restarted });
+        parts.html("alarm").hidden = trouble === undefined && restarted === undefined;
+        parts.html("alarm").classList.toggle("warning", machine.alarm === undefined && restarted === undefined);
         parts.html("clear").hidden = machine.alarm === undefined;
         if (trouble !== undefined) {
             const { title, advice } = fault(trouble);
             parts.write("alarm-name", say(machine.alarm === undefined ? "warning" : "alarm", { title }));
-            parts.write("alarm-advice", sentence(advice));
+            parts.write("alarm-advice", [restart, sentence(advice)].join(" ").trim());
+        } else if (restarted !== undefined) {
+            parts.write("alarm-name", restart);
+            parts.write("alarm-advice", say("notWeeded"));
         }
         drawStrip(this.#strip, machine, this.#now);
         this.#examples.show();
@@ -203,9 +209,10 @@ export class Panel {
     }
 
     #take(happening: Happening): void {
-        const { alarm } = this.machine;
+        const { alarm, restarted } = this.machine;
         this.machine.take(happening, this.#now);
         this.#signal(happening, this.machine.alarm !== alarm);
+        if (this.machine.restarted !== undefined && this.machine.restarted !== restarted) signal("alarm");
         this.#log.add(happening, this.#now);
         this.#setUp.take(happening);
         const { is } = happening;
