@@ -3,11 +3,13 @@
 #
 #     ./release.sh FOLDER
 #
+# START.html          where to begin, in the page's languages
 # weeder.hex          the firmware, for the page or avrdude to write
 # weeder-tester.hex   the firmware of a second Uno, which checks the first
 # firmware.txt        its size, and its worst-case stack and time
 # page/               the page: open its index.html, or serve it to a phone with `weeder serve`
-# weeder              the host tools, for computers like this one, with the page inside
+# weeder              the host tools, for computers like this one, with the firmware and the page inside
+# 60-weeder.rules     lets a Linux user open an Uno's port
 # manual/             README.md and docs/, as Markdown, and the sources that docs/ links; book/ is docs/ for a browser
 # sbom/               the parts as CycloneDX, for programs: packages, versions, licences
 # licences/           the parts, their authors and licences, with the licences' texts
@@ -36,7 +38,7 @@ trap 'rm -rf "$folder"' EXIT
 chmod 755 "$folder"
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
-# The host tools, first without the page: they build it.
+# The host tools, first without the firmware and the page: they build them.
 cargo build --locked --release --package weeder-cli
 cp "$target/release/weeder" "$folder/"
 WEEDER_COMMIT=$("$folder/weeder" --version | sed -n 's/.*(\(.*\))$/\1/p')
@@ -55,21 +57,48 @@ elf=$target/avr-none/firmware/weeder-firmware.elf
 # The tester's firmware.
 "$folder/weeder" hex --tester "$folder/weeder-tester.hex"
 
+# What the host tools have inside: the firmware of each chip with its budgets, and the Uno's bootloader for the virtual Uno.
+cargo bench-firmware --locked
+cargo tester-firmware --locked
+inside=$target/release-inside
+rm -rf "$inside"
+mkdir -p "$inside/tester"
+for name in weeder-firmware knn-bench tester-firmware; do
+    avr-objcopy --strip-debug "$(dirname "$elf")/$name.elf" "$inside/$name.elf"
+done
+cp budgets.toml "$inside/"
+cp tester/budgets.toml "$inside/tester/"
+# As in host/uno/src/hex.rs.
+avr-gcc -mmcu=atmega328p -DF_CPU=16000000L -DBAUD_RATE=115200 -w -Os -mrelax -nostdlib -fno-split-wide-types \
+    -fno-inline-small-functions -nostartfiles -Wl,--section-start=.text=0x7e00 -o "$inside/optiboot.elf" \
+    /usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c
+avr-objcopy -O ihex -j .text "$inside/optiboot.elf" "$inside/optiboot.hex"
+"$folder/weeder" hex --elf "$inside/weeder-firmware.elf" "$inside/weeder.hex"
+cmp "$inside/weeder.hex" "$folder/weeder.hex"
+
 # The page.
 [ -d page/node_modules ] || npm --prefix page ci --no-audit --no-fund
 WEEDER="$folder/weeder" npm --prefix page run build
 cp -r page/dist "$folder/page"
-WEEDER_PAGE="$folder/page" cargo build --locked --release --package weeder-cli
+WEEDER_PAGE="$folder/page" WEEDER_FIRMWARE="$inside" cargo build --locked --release --package weeder-cli
 cp "$target/release/weeder" "$folder/"
+"$folder/weeder" hex --force "$inside/weeder.hex"
+cmp "$inside/weeder.hex" "$folder/weeder.hex"
+
+# The front door, and the rule for Linux.
+sed "s|SYSTEM|$(uname -s) on $(uname -m)|" page/START.html >"$folder/START.html"
+cp host/cli/60-weeder.rules "$folder/"
 
 # The manual, with the sources that docs/ links. Other links to sources do not work here.
 mkdir "$folder/manual"
-cp -r README.md CHANGELOG.md CONTRIBUTING.md docs "$folder/manual/"
+cp -r README.md CHANGELOG.md CONTRIBUTING.md CITATION.cff LICENSE-MIT LICENSE-APACHE docs "$folder/manual/"
+cp --parents avr-bounds/README.md "$folder/manual/"
 grep -oh '](\.\./[^)#]*' docs/*.md | sed 's|^](\.\./||' | LC_ALL=C sort -u | xargs cp --parents --target-directory="$folder/manual"
 cargo install --quiet --locked mdbook --version 0.5.4 --no-default-features --features search --root "$target/mdbook"
 "$target/mdbook/bin/mdbook" build --dest-dir "$folder/book"
 # mdBook has made .html of the linked .md, which are outside of the book.
 sed -i -e 's|href="\.\./|href="../manual/|g' -e 's|\(href="\.\./manual/[^"#]*\)\.html|\1.md|g' "$folder"/book/*.html
+node .ci/links.mjs "$folder"
 
 # Licences. Tools that only run during the build are left out.
 mkdir -p "$folder/licences/texts"
@@ -81,6 +110,7 @@ each licence's text where its author gives one.
 
 - weeder has simavr in it (https://github.com/buserror/simavr, by simavr-ffi), which is under GPL-3.0: so is `weeder` as a whole, and
   distributors have to offer all sources with it. libelf (LGPL-3.0 or GPL-2.0) is in it too.
+- weeder has Optiboot in it (https://github.com/Optiboot/optiboot, from arduino-core-avr), for the virtual Uno: GPL-2.0.
 - weeder.hex and weeder-tester.hex have code of avr-libc (modified BSD) and libgcc (GPL-3.0 with the GCC Runtime Library Exception) in them.
 - The page has avr8js in it (MIT), and this project's firmware and Rust.
 - book/ has mdBook's theme in it (MPL-2.0), with highlight.js (BSD-3-Clause) and fonts (OFL-1.1).

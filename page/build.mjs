@@ -88,6 +88,15 @@ async function english() {
     };
 }
 
+/** The files that an installed page has, and their media types. */
+const MEDIA = {
+    "index.html": "text/html; charset=utf-8",
+    "page.css": "text/css; charset=utf-8",
+    "page.js": "text/javascript; charset=utf-8",
+    "manifest.webmanifest": "application/manifest+json",
+    "icon.svg": "image/svg+xml",
+};
+
 /** @type {import("esbuild").BuildOptions} */
 const common = {
     bundle: true,
@@ -130,11 +139,23 @@ if (what === "page") {
             out: basename(path, extname(path)),
         })),
     ];
-    await build({ ...page, entryPoints });
-    // Another name for each page that differs.
+    // The build's name is the hash of the files without it.
+    const { outputFiles } = await build({ ...page, entryPoints, write: false });
     const hash = createHash("sha256");
-    for (const name of readdirSync("dist").sort()) hash.update(readFileSync(join("dist", name)));
-    const define = { BUILD: JSON.stringify(hash.digest("hex").slice(0, 16)) };
+    for (const { path, contents } of outputFiles.sort((one, other) => (one.path < other.path ? -1 : 1)))
+        hash.update(basename(path)).update(contents);
+    const name = hash.digest("hex").slice(0, 16);
+    await build({ ...page, entryPoints, define: { BUILD: JSON.stringify(name) } });
+    const html = readFileSync("dist/index.html", "utf8").replaceAll("?BUILD", `?${name}`);
+    writeFileSync("dist/index.html", html);
+    // What the worker stores: by its address, the hash of its content, and its media type.
+    const files = Object.entries(MEDIA).map(([file, media]) => {
+        const content = readFileSync(join("dist", file));
+        const address =
+            { "index.html": "./", "page.css": `page.css?${name}`, "page.js": `page.js?${name}` }[file] ?? file;
+        return [address, { hash: createHash("sha256").update(content).digest("hex"), media }];
+    });
+    const define = { BUILD: JSON.stringify(name), FILES: JSON.stringify(Object.fromEntries(files)) };
     await build({ ...page, entryPoints: ["src/app/worker.ts"], define });
     console.log("The page is in page/dist: open index.html.");
 } else if (what === "tests") {

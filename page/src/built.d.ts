@@ -14,3 +14,6 @@ declare module "faults.json" {
     const faults: { name: string; title: string; advice: string }[];
     export default faults;
 }
+
+/** This build of the page: the hash of its files (build.mjs). */
+declare const BUILD: string;

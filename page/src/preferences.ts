@@ -27,3 +27,6 @@ export function keep(name: string, value: string): void {
 
 /** Whether the operator's system asks for little motion. */
 export const isStill = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+/** Time between two pictures of something that moves, under reduced motion. */
+export const STILL_MS = 1000;

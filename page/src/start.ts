@@ -2,4 +2,8 @@
 
 import { ready } from "./core.ts";
 
-void ready.then(() => import("./page.ts"));
+const { currentScript } = document;
+const isOwn = currentScript instanceof HTMLScriptElement && currentScript.src.endsWith(`?${BUILD}`);
+// A server whose upload is not complete, or a browser's cache, may have the files of two builds.
+if (isOwn) void ready.then(() => import("./page.ts"));
+else void import("./words/words.ts").then(({ say }) => document.body.prepend(say("twoBuilds")));

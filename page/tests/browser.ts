@@ -109,7 +109,9 @@ export async function open(browser: Browser, view: string, viewport = DESK, port
 
 /** A new page. Requests that do not begin with `own` are errors. */
 async function blank(browser: Browser, { locale, ...viewport }: Screen, own: string): Promise<Opened> {
-    const page = await browser.newPage({ viewport, ...(locale && { locale }) });
+    // A context of its own can have several tabs.
+    const context = await browser.newContext({ viewport, ...(locale && { locale }) });
+    const page = await context.newPage();
     page.setDefaultTimeout(PATIENCE_MS);
     const errors: string[] = [];
     page.on("pageerror", (error) => errors.push(String(error)));
@@ -126,7 +128,7 @@ async function blank(browser: Browser, { locale, ...viewport }: Screen, own: str
 /** Closes a page and asserts that it had no errors. */
 export async function close({ page, errors }: Opened): Promise<void> {
     assert.deepEqual(errors, []);
-    await page.close();
+    await page.context().close();
 }
 
 /**

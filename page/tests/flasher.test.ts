@@ -2,6 +2,7 @@
 // errors.
 
 import assert from "node:assert/strict";
+import { resolve } from "node:path";
 import test, { after, before } from "node:test";
 import type { Browser, Page } from "playwright-core";
 import { hex } from "../src/core.ts";
@@ -9,8 +10,9 @@ import { BOARDS } from "../src/flasher/stk500.ts";
 import { FLASH_BYTES } from "../src/uno/chip.ts";
 import { readHex, usedBytes } from "../src/uno/hex.ts";
 import { close, inspect, launch, open, PHONE, served } from "./browser.ts";
-import { type Device, Foreign, VirtualUno } from "./ports.ts";
+import { type Device, Foreign, offerPorts, VirtualUno } from "./ports.ts";
 
+const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
 const OPTIBOOT = ["--bootloader", "optiboot"];
 const OLD = ["--bootloader", "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex"];
 
@@ -62,11 +64,15 @@ test("an old bootloader is flashed at its own rate and its fault is told, or tha
     const board = BOARDS.find(({ isOld }) => isOld);
     assert(board);
     await opened.page.getByLabel("Board").selectOption(board.id);
+    // Before it is flashed.
+    const fault = opened.page.getByText("the machine does not restart after a stop by its watchdog");
+    await fault.waitFor();
+    await inspect(opened.page, "desk-old-board");
     const fits = usedBytes(readHex(hex, FLASH_BYTES)) <= board.roomBytes;
     assert.match(
         await flash(opened.page),
         fits
-            ? /^Done: .* signal until power is taken away/
+            ? /^Done: /
             : /^Not flashed: the firmware takes \d+ bytes, and this board's bootloader leaves 30720: give it the Uno's bootloader/,
     );
     await close(opened);
@@ -90,6 +96,54 @@ test("a byte that is lost on the way is sent again", async (test) => {
     assert.match(await flash(opened.page), /^Done: /);
     assert.deepEqual(uno.loseBytes, []);
     await close(opened);
+});
+
+/** Puts the page into the background, where each of its own timers takes a second or more. */
+async function hide(page: Page): Promise<void> {
+    await page.evaluate(() => {
+        Object.defineProperty(document, "hidden", { value: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+        const later = setTimeout;
+        Object.assign(globalThis, {
+            setTimeout: (done: () => void, ms = 0) => later(done, Math.max(ms, 1100)),
+        });
+    });
+}
+
+test("an Uno is flashed in a hidden tab too, through the bootloader's second", async (test) => {
+    const uno = await VirtualUno.start(test, ...OPTIBOOT);
+    const opened = await open(browser, "flash", undefined, [uno]);
+    await hide(opened.page);
+    assert.match(await flash(opened.page), /^Done: /);
+    await close(opened);
+});
+
+test("a failure in a hidden tab names that first thing to change", async () => {
+    const opened = await open(browser, "flash", undefined, [new Foreign(() => [])]);
+    const flashing = flash(opened.page);
+    await opened.page.getByText("keep this tab in front").waitFor();
+    await hide(opened.page);
+    assert.match(await flashing, /^Not flashed: no bootloader.*\. This tab was hidden meanwhile: keep it in front/);
+    await close(opened);
+});
+
+test("a port that another tab of the page has open is told, and free when that tab disconnects", async (test) => {
+    const uno = await VirtualUno.start(test, "--elf", FIRMWARE);
+    const first = await open(browser, "work", undefined, [uno]);
+    const { page } = first;
+    await page.getByRole("button", { name: "Connect an Uno" }).click();
+    await page.locator("#work-panel [data-part=state]", { hasText: "alarm" }).waitFor();
+    // As Chromium refuses a port that is open elsewhere.
+    const taken = new Foreign(() => [], "", { name: "NetworkError", message: "Failed to open serial port." });
+    const tab = await page.context().newPage();
+    await offerPorts(tab, [taken]);
+    await tab.goto(page.url().replace("#work", "#flash"));
+    await tab.waitForFunction(() => "trial" in globalThis);
+    assert.match(await flash(tab), /^Not flashed: another tab of this page has a port open: disconnect there/);
+    await page.getByRole("button", { name: "Disconnect" }).click();
+    await page.getByRole("button", { name: "Connect an Uno" }).waitFor();
+    assert.match(await flash(tab), /^Not flashed: the port cannot be opened\./);
+    await close(first);
 });
 
 test("a device that babbles is told from an Uno by what it says", async () => {
@@ -130,7 +184,7 @@ test("a byte that reads back wrong is told", async () => {
 test("a port that cannot be opened is told with both causes, as the browser tells neither", async () => {
     const refuses = { name: "NetworkError", message: "Failed to open serial port." };
     const text = await said(new Foreign(() => [], "", refuses));
-    assert.match(text, /another program or another tab has it: close the serial monitor.*usermod -aG dialout/);
+    assert.match(text, /another tab or another program has it: close the other tab first.*usermod -aG dialout/);
 });
 
 test("where no port is chosen, the way to one is told", async () => {

@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
 import type { Browser } from "playwright-core";
 import { close, DESK, inspect, launch, open, PHONE } from "./browser.ts";
-import { part, pass, rollTo, tryIt, type } from "./trying.ts";
+import { part, pass, rollTo, tryIt, type, weeds } from "./trying.ts";
 
 let browser: Browser;
 
@@ -50,6 +50,22 @@ test("the page weeds a row with the real firmware, no plant is damaged, and it s
         .waitFor();
     await page.locator("#drawing [data-kind=plant][data-verdict=kept] .verdict").first().waitFor({ state: "attached" });
     await type(page, "status", /state=work tool=(in|out) /);
+    await close(opened);
+});
+
+test("on opening the machine weeds, and the first sentence says what to watch", async () => {
+    const opened = await open(browser, "try");
+    const { page } = opened;
+    await page.getByText("Watch the tool: it swings out at each plant").waitFor();
+    await weeds(page);
+    assert(await page.getByLabel("Work switch").isChecked());
+    await rollTo(page, 2500);
+    await page.locator("#outcome", { hasText: /all kept, with the margin/ }).waitFor();
+    await page.locator("#why", { hasText: /[1-9]\d?(\.\d)?% weeded/ }).waitFor();
+    await part(page, "hold").click();
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await part(page, "start").click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
     await close(opened);
 });
 

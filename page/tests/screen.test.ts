@@ -1,6 +1,7 @@
 // Parts that must be on the screen without scrolling: state, its reason, the alarm and HOLD, in every tab of "Try it"
 // and "Work with it", on the screens that the manual names, in Chromium and in Firefox ESR.
 
+import assert from "node:assert/strict";
 import { join } from "node:path";
 import test from "node:test";
 import type { Browser } from "playwright-core";
@@ -62,3 +63,56 @@ for (const [name, launched] of BROWSERS) {
         await close({ page: work.page, errors: work.errors.filter((error) => !error.includes("status of 409")) });
     });
 }
+
+test("with large text or zoom the dock takes at most half of the screen, HOLD is whole, and Clear can be reached", async (test) => {
+    const browser = await launch();
+    test.after(() => browser.close());
+    const opened = await tryIt(browser);
+    const { page } = opened;
+    await page.getByLabel("Work switch").check();
+    await tryPart(page, "state").filter({ hasText: "work" }).waitFor();
+    await page.locator("#time").selectOption("0");
+    await page.getByLabel("Kill the encoder").check();
+    await pass(page, 5);
+    await tryPart(page, "alarm-name").filter({ hasText: "encoder_silent" }).waitFor();
+    // 400 % of 1280x800, and text of 200 % on a phone and a desk.
+    for (const [width, height, rem] of [
+        [320, 200, 16],
+        [320, 256, 16],
+        [390, 844, 32],
+        [360, 640, 32],
+        [1280, 800, 32],
+    ] as const)
+        for (const language of ["en", "hi", "es", "fr"]) {
+            await page.setViewportSize({ width, height });
+            await page.evaluate((rem) => document.documentElement.style.setProperty("font-size", `${rem}px`), rem);
+            await page.locator("#language").selectOption(language);
+            await tryPart(page, "clear").focus();
+            await tryPart(page, "clear").scrollIntoViewIfNeeded();
+            await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+            const found = await page.evaluate(() => {
+                const part = (name: string) => document.querySelector(`#try-panel [data-part=${name}]`);
+                const isWhole = (name: string) => {
+                    const { left, right, top, bottom } = part(name)?.getBoundingClientRect() ?? new DOMRect();
+                    const isOnTop = [left + 12, right - 12].every((x) =>
+                        [top + 12, bottom - 12].every((y) => {
+                            const found = document.elementFromPoint(x, y);
+                            return found !== null && part(name)?.contains(found);
+                        }),
+                    );
+                    const text = part(name);
+                    return (
+                        isOnTop &&
+                        text &&
+                        text.scrollWidth <= text.clientWidth &&
+                        text.scrollHeight <= text.clientHeight
+                    );
+                };
+                const height = part("dock")?.getBoundingClientRect().height ?? 0;
+                return { hold: isWhole("hold"), clear: isWhole("clear"), isHalf: height <= innerHeight / 2 + 1 };
+            });
+            const where = `${width}x${height}, ${rem} px, ${language}`;
+            assert.deepEqual(found, { hold: true, clear: true, isHalf: true }, where);
+        }
+    await close(opened);
+});

@@ -5,16 +5,20 @@ import { DESK, type Opened, open } from "./browser.ts";
 
 export const part = (page: Page, name: string): Locator => page.locator(`#try-panel [data-part="${name}"]`);
 
-/** Opens "Try it", and waits until its settings are saved and it holds. Before that the work switch has no effect. */
+/** Opens "Try it", where the machine weeds at once, and takes it to hold by its work switch. */
 export async function tryIt(browser: Browser, viewport = DESK): Promise<Opened> {
     const opened = await open(browser, "try", viewport);
-    await pass(opened.page, 0.5);
-    await part(opened.page, "said")
-        .locator("div", { hasText: /clear$/ })
-        .waitFor();
+    await weeds(opened.page);
+    await opened.page.getByLabel("Work switch").uncheck();
     await pass(opened.page, 0.3);
     await part(opened.page, "state").filter({ hasText: "hold" }).waitFor();
     return opened;
+}
+
+/** Waits until the machine is set up, and has begun to weed. */
+export async function weeds(page: Page): Promise<void> {
+    const state = part(page, "state").filter({ hasText: "work" });
+    while (!(await state.isVisible())) await pass(page, 0.1);
 }
 
 /** Lets time pass in the page until the tool has reached a position along the row, as fast as this machine can. */

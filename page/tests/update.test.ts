@@ -1,12 +1,13 @@
 // The page as an app without a network, a newer page, and a firmware that differs from the page's.
 
 import assert from "node:assert/strict";
+import { createHash } from "node:crypto";
 import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import test, { after, before } from "node:test";
+import test, { after, before, type TestContext } from "node:test";
 import type { Browser } from "playwright-core";
-import { close, inspect, launch, open, openAt, PHONE, served } from "./browser.ts";
+import { close, inspect, launch, type Opened, open, openAt, PHONE, served } from "./browser.ts";
 import { type Device, VirtualUno } from "./ports.ts";
 
 const FIRMWARE = resolve("../target/avr-none/firmware/weeder-firmware.elf");
@@ -19,12 +20,49 @@ before(async () => {
 
 after(() => browser?.close());
 
-test("from localhost the page can be installed, opens without a network, and says when a newer one is there", async (test) => {
+/** A copy of the page on a server. */
+async function installed(test: TestContext): Promise<{ folder: string; address: string; close(): Promise<void> }> {
     const folder = mkdtempSync(join(tmpdir(), "weeder-app-"));
     test.after(() => rmSync(folder, { recursive: true }));
     cpSync("dist", folder, { recursive: true });
-    const server = await served(test, folder);
-    const opened = await openAt(browser, `http://127.0.0.1:${server.port}/#work`);
+    const { port, close } = await served(test, folder);
+    // In "Work with it": with a simulated row, a slow computer's browser delays the check.
+    return { folder, address: `http://127.0.0.1:${port}/#work`, close };
+}
+
+/** Makes another build of a copy: `change` changes the content of page.js, `html` that of index.html. */
+function rebuild(folder: string, html: (text: string) => string, change = (text: string) => text): void {
+    const read = (name: string) => readFileSync(join(folder, name), "utf8");
+    const hash = (text: string) => createHash("sha256").update(text).digest("hex");
+    const [page, script] = [read("index.html"), read("page.js")];
+    const build = page.match(/page\.js\?(\w+)/)?.[1] ?? "";
+    const other = hash(build).slice(0, 16);
+    const texts = {
+        "index.html": html(page).replaceAll(build, other),
+        "page.js": change(script.replaceAll(build, other)),
+    };
+    const worker = read("worker.js")
+        .replaceAll(build, other)
+        .replace(hash(page), hash(texts["index.html"]))
+        .replace(hash(script), hash(texts["page.js"]));
+    for (const [name, text] of Object.entries({ ...texts, "worker.js": worker }))
+        writeFileSync(join(folder, name), text);
+}
+
+const second = (text: string) => text.replace("<h1>weeder", "<h1>weeder 2");
+
+/** Opens an address in a browser of its own, and waits until its page is stored. */
+async function install(address: string): Promise<Opened> {
+    const opened = await openAt(browser, address);
+    await opened.page.evaluate(() => navigator.serviceWorker.ready);
+    await opened.page.reload();
+    await opened.page.waitForFunction(() => "trial" in globalThis);
+    return opened;
+}
+
+test("from localhost the page can be installed, opens without a network, and says when a newer one is there", async (test) => {
+    const { folder, address, close } = await installed(test);
+    const opened = await openAt(browser, address);
     const { page } = opened;
     await page.evaluate(() => navigator.serviceWorker.ready);
     const devtools = await page.context().newCDPSession(page);
@@ -37,29 +75,85 @@ test("from localhost the page can be installed, opens without a network, and say
     const newer = page.getByText("A newer page is there.");
     assert(await newer.isHidden());
 
-    for (const name of ["index.html", "worker.js"]) {
-        const text = readFileSync(join(folder, name), "utf8");
-        writeFileSync(
-            join(folder, name),
-            name === "worker.js" ? `${text}\n` : text.replace("<h1>weeder", "<h1>weeder 2"),
-        );
-    }
-    // In "Work with it": with a simulated row, a slow computer's browser delays the check.
+    rebuild(folder, second);
     await page.reload();
     await newer.waitFor();
     await inspect(page, "desk-newer");
     assert.equal(await page.locator("h1").textContent(), "weeder");
+    const other = await page.context().newPage();
+    await other.goto(address);
     await page.getByRole("button", { name: "Load it" }).click();
     await page.locator("h1", { hasText: "weeder 2" }).waitFor();
+    // The other tab has the button too, and the newer page is already there.
+    assert.equal(await other.locator("h1").textContent(), "weeder");
+    await other.getByRole("button", { name: "Load it" }).click();
+    await other.locator("h1", { hasText: "weeder 2" }).waitFor();
+    await page.waitForFunction(async () => (await caches.keys()).length === 1);
 
-    await server.close();
-    await page.goto(`http://127.0.0.1:${server.port}/#try`);
-    await page.locator("#try-panel [data-part=state]", { hasText: /hold|alarm/ }).waitFor();
+    await close();
+    await page.goto(address.replace("work", "try"));
+    await page.locator("#try-panel [data-part=state]", { hasText: /hold|work|alarm/ }).waitFor();
     await page.context().close();
     assert.deepEqual(
         opened.errors.filter((error) => !error.includes("ERR_CONNECTION_REFUSED")),
         [],
     );
+});
+
+test("a captive portal and every half of an upload leave the installed page as it is", async (test) => {
+    const { folder, address } = await installed(test);
+    const opened = await install(address);
+    const { page } = opened;
+    const PORTAL = "<!doctype html><title>Accept the terms</title>";
+    const names = ["index.html", "page.css", "page.js", "manifest.webmanifest", "icon.svg", "worker.js"];
+    rebuild(folder, second);
+    const texts = names.map((name) => [name, readFileSync(join(folder, name), "utf8")] as const);
+    const isInstalled = () =>
+        page.evaluate(async () => {
+            const registration = await navigator.serviceWorker.ready;
+            await registration.update().catch(() => {});
+            const { installing } = registration;
+            const changed = new Promise((done) => installing?.addEventListener("statechange", done));
+            if (installing) await changed;
+            return registration.waiting !== null;
+        });
+    for (const [name, text] of texts)
+        for (const content of [PORTAL, text.slice(0, text.length / 2)]) {
+            writeFileSync(join(folder, name), content);
+            assert.equal(await isInstalled(), false, `${name}: ${content.slice(0, 60)}`);
+            writeFileSync(join(folder, name), text);
+        }
+    assert.equal(await isInstalled(), true);
+    await page.context().close();
+});
+
+test("a newer page that does not start gives way to the older one, and can be tried again", async (test) => {
+    const { folder, address } = await installed(test);
+    const opened = await install(address);
+    const { page } = opened;
+    rebuild(folder, second, () => "throw new Error('broken')");
+    await page.reload();
+    await page.getByRole("button", { name: "Load it" }).click();
+    await page.locator("h1", { hasText: "weeder 2" }).waitFor();
+    // It is shown, and dead.
+    await page.locator("h1", { hasText: /^weeder$/ }).waitFor();
+    await page.waitForFunction(() => "trial" in globalThis);
+    await page.getByText("A newer page is there.").waitFor();
+    await page.getByRole("button", { name: "Load it" }).click();
+    await page.locator("h1", { hasText: "weeder 2" }).waitFor();
+    await page.context().close();
+});
+
+test("a page of two builds does not start, and says so", async (test) => {
+    const { folder, address } = await installed(test);
+    const script = readFileSync(join(folder, "page.js"), "utf8");
+    rebuild(folder, second);
+    writeFileSync(join(folder, "page.js"), script);
+    const page = await browser.newPage();
+    await page.goto(address);
+    await page.getByText("This page's files are of two versions").waitFor();
+    assert.equal(await page.evaluate(() => "trial" in globalThis), false);
+    await page.close();
 });
 
 /** A device with changed lines in both directions. */

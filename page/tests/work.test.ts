@@ -224,7 +224,7 @@ test("a device that is no weeder is told by what it says, and the port is let go
 test("a port that another program has is told with the way out", async () => {
     const refuses = { name: "NetworkError", message: "Failed to open serial port." };
     const opened = await connect(new Foreign(() => [], "", refuses));
-    await opened.page.getByText(/Not connected: .*close the serial monitor/).waitFor();
+    await opened.page.getByText(/Not connected: .*close the other tab first, then the serial monitor/).waitFor();
     await close(opened);
 });
 
@@ -285,5 +285,119 @@ test("an object is taught by a button, and one that the built-in examples know b
     await part(page, "examples-count").filter({ hasText: "1 of 32" }).waitFor();
     await page.getByRole("button", { name: "Forget example 0" }).click();
     await part(page, "examples-count").filter({ hasText: "0 of 32" }).waitFor();
+    await close({ page, errors });
+});
+
+test("closing the page is asked for while a machine is at work or the log is not saved", async (test) => {
+    const { page, errors } = await atHold(test);
+    /** Whether the browser asks before it closes the page. The answer is no. */
+    const asks = async () => {
+        const asked = page.waitForEvent("dialog");
+        await Promise.race([page.close({ runBeforeUnload: true }), asked]);
+        const dialog = await asked;
+        assert.equal(dialog.type(), "beforeunload");
+        await dialog.dismiss();
+    };
+    await part(page, "start").click();
+    await part(page, "state").filter({ hasText: "work" }).waitFor();
+    await asks();
+    await part(page, "hold").click();
+    await part(page, "state").filter({ hasText: "hold" }).waitFor();
+    await asks();
+    const download = page.waitForEvent("download");
+    await part(page, "log-save").click();
+    await download;
+    // The machine stands in hold, so that no new detection is logged.
+    assert.deepEqual(errors, []);
+    await page.getByRole("button", { name: "Disconnect" }).click();
+    const closed = page.waitForEvent("close");
+    await page.close({ runBeforeUnload: true });
+    await closed;
+});
+
+test("pasted lines are typed one by one, whatever ends them, and HOLD drops the rest", async (test) => {
+    const { page, errors } = await atHold(test, DESK, "--stand");
+    const typed = part(page, "typed");
+    const paste = (text: string) =>
+        typed.evaluate((input, text) => {
+            const clipboardData = new DataTransfer();
+            clipboardData.setData("text/plain", text);
+            input.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
+        }, text);
+    const lines = () => part(page, "said").locator("div.typed").allTextContents();
+    const before = (await lines()).length;
+    await paste("set margin_mm 41\nset stem_zone_mm 0\r\n\r  get margin_mm\r");
+    await part(page, "said")
+        .getByText(/^margin_mm=41/)
+        .waitFor();
+    assert.deepEqual((await lines()).slice(before), ["> set margin_mm 41", "> set stem_zone_mm 0", "> get margin_mm"]);
+    await paste("x".repeat(200));
+    await part(page, "said")
+        .getByText(/^error: .*80 characters/)
+        .waitFor();
+    await page.evaluate(() => {
+        const input = document.querySelector("#work-panel [data-part=typed]");
+        const clipboardData = new DataTransfer();
+        clipboardData.setData("text/plain", `${"examples\n".repeat(30)}start`);
+        input?.dispatchEvent(new ClipboardEvent("paste", { clipboardData, bubbles: true, cancelable: true }));
+        document.querySelector<HTMLElement>("#work-panel [data-part=hold]")?.click();
+    });
+    await part(page, "said").locator("div.typed", { hasText: "> hold" }).waitFor();
+    await type(page, "get k");
+    assert(!(await lines()).includes("> start"));
+    await close({ page, errors });
+});
+
+test("the console follows again after another tab, unless it was scrolled back", async (test) => {
+    const { page, errors } = await atHold(test, PHONE, "--stand");
+    const said = part(page, "said");
+    const isAtTheEnd = () => said.evaluate((it) => it.scrollHeight - it.scrollTop - it.clientHeight < 8);
+    for (let time = 0; time < 3; time++) await type(page, "get");
+    assert(await isAtTheEnd());
+    for (const [leave, back] of [
+        [page.getByRole("tab", { name: "Settings" }), page.getByRole("tab", { name: "Console" })],
+        [page.getByRole("link", { name: "Flash" }), page.getByRole("link", { name: "Work" })],
+    ] as const) {
+        await leave.click();
+        await said.waitFor({ state: "hidden" });
+        await back.click();
+        await said.waitFor();
+        await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+        assert(await isAtTheEnd());
+        await type(page, "get k");
+        assert(await isAtTheEnd());
+    }
+    await said.evaluate((it) => it.scrollTo(0, 0));
+    await type(page, "get k");
+    assert.equal(await said.evaluate((it) => it.scrollTop), 0);
+    await close({ page, errors });
+});
+
+test("the steps of the set-up take a value each, set and save it, and keep what is being typed", async (test) => {
+    const { page, errors } = await atHold(test, PHONE, "--stand");
+    await page.getByRole("tab", { name: "Calibrate" }).click();
+    const steps = part(page, "set-up-steps");
+    const beam = steps.locator("[data-step=beam_to_tool_mm]");
+    assert.equal(await beam.inputValue(), "400");
+    const step = steps.locator("li").filter({ has: page.locator("[data-step=beam_to_tool_mm]") });
+    await beam.fill("4000");
+    await step.getByRole("button", { name: "Set and save" }).click();
+    await step.getByText("beam_to_tool_mm takes a whole number from").waitFor();
+    assert.equal(await beam.inputValue(), "4000");
+    await beam.fill("430");
+    await step.getByRole("button", { name: "Set and save" }).click();
+    await step.getByText("Saved.").waitFor();
+    await inspect(page, "phone-set-up");
+    await type(page, "revert");
+    await type(page, "get beam_to_tool_mm");
+    await part(page, "said")
+        .getByText(/^beam_to_tool_mm=430/)
+        .first()
+        .waitFor();
+    await page.getByRole("tab", { name: "Calibrate" }).click();
+    await steps.getByRole("button", { name: "Swing six times" }).click();
+    await steps.getByText("The tool swings in and out six times.").waitFor();
+    await page.locator("#language").selectOption("fr");
+    assert.equal(await beam.inputValue(), "430");
     await close({ page, errors });
 });

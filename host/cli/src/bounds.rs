@@ -4,12 +4,13 @@
 
 use crate::output::{print, tell};
 use crate::program::Finding;
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use avr_bounds::command::{Options, Report, report};
 use avr_bounds::{Budgets, Held, Program};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use trial::firmware;
+use uno::elf::Image;
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -22,7 +23,7 @@ The status is 0 if every bound is within its budget, and 1 if one is not. It is 
 Reasons are recursion, calls to unknown addresses, handlers that enable interrupts, functions that
 break the calling convention, and loops without a bound where time needs one.")]
 pub struct Arguments {
-    /// Analyse this ELF instead of building the firmware of this repository.
+    /// Analyse this ELF instead of this weeder's own firmware.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
     #[command(flatten)]
@@ -32,7 +33,9 @@ pub struct Arguments {
 /// Proves and prints.
 pub fn run(arguments: &Arguments) -> Result<Finding> {
     let mut options = arguments.options.clone();
-    options.budgets.get_or_insert_with(|| firmware::workspace_root().join("budgets.toml"));
+    if options.budgets.is_none() {
+        options.budgets = Some(firmware::budgets(false)?);
+    }
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
     let Report { text, keeps } = report(&elf, &options)?;
     print(format_args!("{text}"))?;
@@ -49,8 +52,8 @@ fn prove(elf: &Path, budgets: &Path) -> Result<Vec<Held>> {
 /// The firmware to flash, and whether it may have unproved bounds.
 #[derive(Args)]
 pub struct Firmware {
-    /// Take this ELF instead of building the firmware of this repository.
-    #[arg(long, value_name = "FILE.elf")]
+    /// Take this ELF, or HEX file, instead of this weeder's own firmware.
+    #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
     /// Take the firmware of the tester, the second Uno of `weeder check-board`.
     #[arg(long, conflicts_with = "elf")]
@@ -74,13 +77,23 @@ impl Firmware {
         })
     }
 
-    /// Proves this ELF's bounds, and says where that fails but is insisted on.
+    /// Proves an ELF, or a HEX file that has the flash of the ELF that this command would take itself.
+    fn prove(&self, file: &Path) -> Result<Vec<Held>> {
+        let flash = Image::read(file)?;
+        let mut elf = file.to_owned();
+        if !flash.has_symbols() {
+            elf = Self { elf: None, ..*self }.elf()?;
+            ensure!(Image::read(&elf)?.flash == flash.flash, "it is a HEX file of another firmware: name its ELF");
+        }
+        prove(&elf, &firmware::budgets(self.tester)?)
+    }
+
+    /// Proves this firmware's bounds, and says where that fails but is insisted on.
     ///
     /// # Errors
     /// If it fails, or a bound is over its budget, without `--unproved`.
     pub fn check(&self, elf: &Path) -> Result<()> {
-        let name = if self.tester { "tester/budgets.toml" } else { "budgets.toml" };
-        let why = match prove(elf, &firmware::workspace_root().join(name)) {
+        let why = match self.prove(elf) {
             Ok(held) => match held.into_iter().find(|held| !held.keeps) {
                 Some(Held { name, proved, budget, .. }) => format!("{name} is {proved}, and its budget is {budget}"),
                 None => return Ok(()),

@@ -10,6 +10,7 @@ use clap::Args;
 use comfy_table::{Table, presets};
 use gps::job::{self, Wanted};
 use gps::summary::{Stand, Summary};
+use gps::wheel::Ratio;
 use gps::{Job, map, picture};
 use link::log;
 use serde_json::json;
@@ -94,7 +95,37 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if counted.iter().all(|(_, summary)| summary.fixes == 0) {
         tell!("The records have no fix, so no event has a position: `weeder record --gps PORT` records a receiver");
     }
+    for (record, summary) in &counted {
+        for problem in problems(summary) {
+            tell!("{record}: {problem}");
+        }
+    }
     printed
+}
+
+/// What is wrong with a record, and what would be right.
+fn problems(summary: &Summary) -> Vec<String> {
+    let mut problems = Vec::new();
+    if let (Some(value), Some(error)) = (summary.wheel_ratio, summary.wheel_ratio_error)
+        && (Ratio { value, error }).is_wrong()
+    {
+        problems.push(format!(
+            "for each metre of the wheel the receiver has {value:.3} ± {error:.3} m: calibrate the wheel (docs/set-up.md), unless it slips"
+        ));
+    }
+    if summary.wheel_spun_m > 0.0 {
+        problems.push(format!(
+            "the wheel rolled {:.1} m on the spot: see `wheel_spun` on the map, and press the wheel to the ground",
+            summary.wheel_spun_m
+        ));
+    }
+    if summary.restarts > 0 {
+        problems.push(format!(
+            "the machine restarted at work, {} times: see `restart` on the map, it has not weeded from there",
+            summary.restarts
+        ));
+    }
+    problems
 }
 
 /// A log's name on the map: its file's name.
@@ -103,7 +134,7 @@ fn name(path: &Path) -> String {
 }
 
 /// The counts in words, as a table.
-fn rows(summary: &Summary) -> [(&'static str, String); 19] {
+fn rows(summary: &Summary) -> [(&'static str, String); 22] {
     let mm = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.0}"));
     [
         ("plants, those unknown among them", summary.plants.to_string()),
@@ -114,6 +145,7 @@ fn rows(summary: &Summary) -> [(&'static str, String); 19] {
         ("tall weeds", summary.weeds.to_string()),
         ("swings out of the row", summary.swings.to_string()),
         ("alarms", summary.alarms.to_string()),
+        ("restarts at work", summary.restarts.to_string()),
         ("ground of the row worked, m", format!("{:.1}", summary.worked_m)),
         ("  weeded, m", format!("{:.1}", summary.weeded_m)),
         ("  weeded, %", summary.weeded_percent.map_or("unknown".to_owned(), |share| format!("{share:.1}"))),
@@ -124,6 +156,14 @@ fn rows(summary: &Summary) -> [(&'static str, String); 19] {
         ("  without a place", summary.without_place.to_string()),
         ("fixes", summary.fixes.to_string()),
         ("  that had jumped", summary.jumps.to_string()),
+        (
+            "receiver's metres for a metre of the wheel",
+            match (summary.wheel_ratio, summary.wheel_ratio_error) {
+                (Some(ratio), Some(error)) => format!("{ratio:.3} ± {error:.3}"),
+                _ => "unknown".to_owned(),
+            },
+        ),
+        ("  wheel spun, m; gaps of its statuses", format!("{:.1}; {}", summary.wheel_spun_m, summary.wheel_gaps)),
         (
             "fix lost, receiver lost, damaged lines",
             format!("{}, {}, {}", summary.fix_losses, summary.receiver_losses, summary.damaged_lines),

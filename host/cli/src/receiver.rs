@@ -1,19 +1,20 @@
 //! A satellite receiver for a log: its options, and its port, which is opened again after a loss.
 //!
-//! [`gps`] interprets its lines. A file can replace the port: it is read at the pace of its times.
+//! [`gps`] interprets its bytes. A file can replace the port: it is read at the pace of its times.
 
 use crate::numbers::{number_within, whole_within};
 use crate::ports::{Chosen, Named, named};
-use anyhow::{Result, anyhow, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
+use gps::playback::{self, Piece};
 use gps::recorder::Lines;
-use gps::sentence::{DAY_MS, Line};
 use gps::{Antenna, Recorder};
 use link::LinkError;
+use link::log::Kind;
 use link::session::Happening;
 use std::collections::VecDeque;
 use std::fs;
-use std::io::{self, ErrorKind, Read};
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -73,6 +74,11 @@ pub struct GpsArguments {
 }
 
 impl GpsArguments {
+    /// The receiver's port, if the user named one.
+    pub fn port(&self) -> Option<&str> {
+        self.gps.as_ref().map(|gps| gps.port.as_str())
+    }
+
     /// The receiver, if the user named one, and the first lines of the record.
     ///
     /// # Errors
@@ -97,7 +103,7 @@ impl GpsArguments {
         let (mut recorder, mut lines) = Recorder::new(&antenna);
         let source = open(port, self.gps_baud)?;
         lines.extend(recorder.found(0, port));
-        let gps = Gps { row, port: port.clone(), baud: self.gps_baud, source: Some(source), retry_at: None, recorder };
+        let gps = Gps { row, port: port.clone(), baud: self.gps_baud, source, recorder };
         Ok(Some((gps, lines)))
     }
 }
@@ -108,10 +114,19 @@ pub struct Gps {
     pub row: usize,
     port: String,
     baud: u32,
-    /// `None` while it is lost.
-    source: Option<Box<dyn Read + Send>>,
-    retry_at: Option<Instant>,
+    source: Source,
     recorder: Recorder,
+}
+
+/// Where its bytes come from.
+enum Source {
+    Port(Box<dyn Read + Send>),
+    /// The port is lost. It is opened again then.
+    Lost(Instant),
+    /// A file's pieces, and when the first was due. `None` before the first turn.
+    File(VecDeque<Piece>, Option<Instant>),
+    /// The file has ended.
+    Ended,
 }
 
 impl Gps {
@@ -122,28 +137,41 @@ impl Gps {
 
     /// The received input, as lines of the log. Waits for a millisecond at most.
     pub fn turn(&mut self, time_ms: u64, now: Instant) -> Lines {
-        let Some(source) = &mut self.source else {
-            if self.retry_at.is_some_and(|at| now < at) {
-                return Lines::new();
-            }
-            self.retry_at = Some(now + RETRY);
-            // The reason for a failure was reported when it was lost.
-            self.source = open(&self.port, self.baud).ok();
-            return if self.source.is_some() { self.recorder.found(time_ms, &self.port) } else { Lines::new() };
-        };
         let mut bytes = [0; 4096];
-        let read = match source.read(&mut bytes) {
-            Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
-            read => read,
-        };
-        match read {
-            Ok(count) => self.recorder.take(time_ms, &bytes[..count]),
-            Err(error) => {
-                self.source = None;
-                self.retry_at = Some(now + RETRY);
-                self.recorder.lost(&format!("the receiver's port is gone: {error}"))
+        match &mut self.source {
+            Source::Ended => Lines::new(),
+            Source::Lost(retry_at) if now < *retry_at => Lines::new(),
+            Source::Lost(retry_at) => {
+                *retry_at = now + RETRY;
+                // The reason for a failure was reported when it was lost.
+                let Ok(source) = open(&self.port, self.baud) else { return Lines::new() };
+                self.source = source;
+                self.recorder.found(time_ms, &self.port)
             }
+            Source::File(pieces, began) => {
+                let since_ms = now.duration_since(*began.get_or_insert(now)).as_millis();
+                let mut lines = Lines::new();
+                while let Some(piece) = pieces.pop_front_if(|piece| u128::from(piece.due_ms) <= since_ms) {
+                    lines.extend(piece.note.map(|note| (Kind::GpsMark, note)));
+                    lines.extend(self.recorder.take(time_ms, &piece.bytes));
+                }
+                if pieces.is_empty() {
+                    self.source = Source::Ended;
+                    lines.extend(self.recorder.lost("the file ends here"));
+                }
+                lines
+            }
+            Source::Port(port) => match port.read(&mut bytes) {
+                Ok(count) if count > 0 => self.recorder.take(time_ms, &bytes[..count]),
+                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {
+                    self.recorder.take(time_ms, b"")
+                }
+                gone => {
+                    let error = gone.err().unwrap_or(ErrorKind::UnexpectedEof.into());
+                    self.source = Source::Lost(now + RETRY);
+                    self.recorder.lost(&format!("the receiver's port is gone: {error}"))
+                }
+            },
         }
     }
 
@@ -158,12 +186,14 @@ impl Gps {
 }
 
 /// Opens a port, or the file that replaces it.
-fn open(name: &str, baud: u32) -> Result<Box<dyn Read + Send>> {
+fn open(name: &str, baud: u32) -> Result<Source> {
     let path = Path::new(name);
     if path.metadata().is_ok_and(|there| there.is_file()) {
-        return Ok(Box::new(Paced::new(&String::from_utf8_lossy(&fs::read(path)?))));
+        let file = fs::read(path).with_context(|| format!("{name} cannot be read"))?;
+        let pieces = playback::pieces(&file).map_err(|why| anyhow!("{name} is no file for --gps: {why}"))?;
+        return Ok(Source::File(pieces, None));
     }
-    link::listen(name, baud).map_err(|error| match error {
+    let port = link::listen(name, baud).map_err(|error| match error {
         LinkError::Absent(port) => {
             anyhow!("there is no port {port} for --gps: plug the receiver in, and name its port")
         }
@@ -171,70 +201,6 @@ fn open(name: &str, baud: u32) -> Result<Box<dyn Read + Send>> {
             anyhow!("{port} is in use: end the other program that reads the receiver, such as gpsd")
         }
         other => other.into(),
-    })
-}
-
-/// The lines of a file, each at its due time.
-struct Paced {
-    began: Instant,
-    /// Milliseconds since the first time, and the bytes of the line.
-    lines: VecDeque<(u64, Vec<u8>)>,
-}
-
-impl Paced {
-    fn new(text: &str) -> Self {
-        let (mut due_ms, mut last_ms) = (0, None::<i64>);
-        let line = |line: &str| {
-            if let Line::Report(report) = Line::parse(line)
-                && let Some(time_ms) = report.time_ms
-            {
-                // The time of day restarts at 0 at midnight.
-                due_ms += last_ms.map_or(0, |last_ms| (time_ms - last_ms).rem_euclid(DAY_MS)).unsigned_abs();
-                last_ms = Some(time_ms);
-            }
-            (due_ms, format!("{line}\n").into_bytes())
-        };
-        Self { began: Instant::now(), lines: text.lines().map(line).collect() }
-    }
-
-    /// The lines that are due after this time, as far as there is room for them.
-    fn read_due(&mut self, elapsed: Duration, bytes: &mut [u8]) -> usize {
-        let mut count = 0;
-        while let Some((due_ms, line)) = self.lines.front()
-            && Duration::from_millis(*due_ms) <= elapsed
-            && count + line.len() <= bytes.len()
-        {
-            bytes[count..count + line.len()].copy_from_slice(line);
-            count += line.len();
-            self.lines.pop_front();
-        }
-        count
-    }
-}
-
-impl Read for Paced {
-    /// Times out, as a port does, if no line is due.
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        match self.read_due(self.began.elapsed(), bytes) {
-            0 => Err(ErrorKind::TimedOut.into()),
-            count => Ok(count),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_is_read_at_the_pace_of_its_times_over_midnight_too() {
-        let lines = ["$GPRMC,235959.00,V,,,,,,,311226,,,N*79", "noise", "$GPRMC,000000.50,V,,,,,,,010127,,,N*7D"];
-        let mut file = Paced::new(&lines.join("\r\n"));
-        let mut at = |ms| {
-            let mut bytes = [0; 4096];
-            let count = file.read_due(Duration::from_millis(ms), &mut bytes);
-            String::from_utf8_lossy(&bytes[..count]).lines().count()
-        };
-        assert_eq!([at(0), at(1499), at(1500), at(9999)], [2, 0, 1, 0]);
-    }
+    })?;
+    Ok(Source::Port(port))
 }

@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Faults in a simulated hour, on average, 0 to 10000.
     #[arg(long, default_value = "120", value_parser = whole_within(0..=10_000_u32))]
     faults: u32,
-    /// Run this ELF instead of building the firmware of this repository.
+    /// Run this ELF instead of this weeder's own firmware.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
     /// Run only this shard, the Ith of N, and write its result to the file of --out.

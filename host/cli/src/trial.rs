@@ -83,7 +83,7 @@ pub struct Arguments {
     /// Number of seeds, from that one on, each with all replications: for rare events. 1 to 1000.
     #[arg(long, default_value = "1", value_parser = whole_within(1..=1000_u32))]
     seeds: u32,
-    /// Run this ELF instead of building the firmware of this repository.
+    /// Run this ELF instead of this weeder's own firmware.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
     /// Write report.html, trial.csv and controllers.csv into this folder, and create it if needed; with --shard, the

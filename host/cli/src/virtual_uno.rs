@@ -14,7 +14,6 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use trial::firmware;
 use trial::live::rows::{LiveRows, Ran};
 use trial::live::{Course, Sender, Setup};
-use uno::FileError;
 use uno::hex::Bootloader;
 
 #[derive(Args)]
@@ -64,8 +63,8 @@ pub struct Arguments {
     /// given.
     #[arg(long, value_name = "optiboot|FILE.hex")]
     bootloader: Option<PathBuf>,
-    /// Run this ELF instead of building the firmware of this repository.
-    #[arg(long, value_name = "FILE.elf")]
+    /// Run this ELF, or HEX file, instead of this weeder's own firmware.
+    #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
     /// Keep the EEPROM in this file from one run to the next.
     #[arg(long, value_name = "FILE")]
@@ -94,8 +93,11 @@ pub struct Arguments {
 }
 
 /// The bootloader of that name, or in that file.
-fn bootloader(name: &Path) -> Result<Bootloader, FileError> {
-    if name == Path::new("optiboot") { Bootloader::optiboot() } else { Bootloader::read(name) }
+fn bootloader(name: &Path) -> Result<Bootloader> {
+    if name != Path::new("optiboot") {
+        return Ok(Bootloader::read(name)?);
+    }
+    Ok(firmware::optiboot()?.map_or_else(Bootloader::optiboot, |hex| Bootloader::read(&hex))?)
 }
 
 /// Runs until Ctrl-C, or until it is asked to end by SIGTERM or SIGHUP.

@@ -1,34 +1,32 @@
 //! Reads a log as a job: the machine's detections and actions, each with its distance, position and time.
 //!
-//! [`Job::read`] reads the log's lines in order and divides them into stretches. A new stretch begins when the Uno
-//! restarts, when the wheel's settings change, and when the log is opened again. Distances are comparable only within a
-//! stretch. Each fix gets the distance at which it was taken, from the statuses around it. Each event gets its position
-//! from [`Track`].
+//! [`Job::read`] follows the log's lines ([`Follower`]) and divides them into stretches. A new stretch begins when the
+//! Uno restarts, when the wheel's settings change or are unknown, and when the log is opened again. Distances are
+//! comparable only within a stretch. Each fix gets the distance at which it was taken, from the statuses around it. Over
+//! a gap of the statuses that distance is unknown, and the fix is not used. Each event gets its position from [`Track`].
 //!
 //! - A plant or weed is the middle of its detection, at the beam's position. So is guarded ground.
 //! - A swing or an alarm has the tool's position at the time of its event. A swing is the command: the tool follows
 //!   after the lead.
 //! - Ground is weeded if the machine is at work and the tool is commanded into the row. It is not weeded if the tool is
 //!   commanded out. Ground counts once: passing it again after rolling back adds nothing.
+//! - A restart at work is where the machine was at its last status. The ground behind it is not weeded.
 //! - A label is the class that the operator gave the last detection, if the machine accepted it.
 
 use crate::antenna::Antenna;
 use crate::plane::Place;
-use crate::receiver::{Counts, Fix, Heard, Jump, Mark, Receiver};
-use crate::track::{Found, Missing, Offset, Track};
+use crate::receiver::{Counts, Fix, Heard, Jump, Mark, Receiver, WHEEL_GAP_MS};
+use crate::track::{Basis, Found, Missing, Offset, STANDING_M, Track};
+use crate::wheel::{self, Ratio};
+use link::follower::{Followed, Follower};
 use link::log::{Entry, Kind};
-use link::settings::{Setting, Settings, shown};
-use link::{Class, ConsoleLine, EventLine, Mode, Status};
-use std::collections::VecDeque;
-use std::f64::consts::PI;
+use link::settings::Setting;
+use link::{Class, EventLine, Mode, Status};
 use std::ops::Range;
 
 /// Time before and after a stretch in which the machine is assumed to have stood, in ms. A fix in this time belongs to
 /// the stretch's beginning or end.
 const STANDING_MS: f64 = 1000.0;
-
-/// The longest distance between two statuses in ticks, some hundred metres.
-pub(crate) const LONGEST_DISTANCE: u32 = 1_000_000;
 
 /// The parameters of reading a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +63,12 @@ pub enum EventKind {
     SwingIn,
     /// A fault was latched.
     Alarm,
+    /// The machine restarted at work.
+    Restart,
+    /// The wheel rolled on while the antenna stayed.
+    WheelSpun,
+    /// The wheel rolled while the log has no status.
+    WheelGap,
 }
 
 impl EventKind {
@@ -80,6 +84,9 @@ impl EventKind {
             Self::SwingOut => "swing_out",
             Self::SwingIn => "swing_in",
             Self::Alarm => "alarm",
+            Self::Restart => "restart",
+            Self::WheelSpun => "wheel_spun",
+            Self::WheelGap => "wheel_gap",
         }
     }
 }
@@ -91,7 +98,7 @@ pub struct Event {
     pub kind: EventKind,
     /// The log's line.
     pub line: u64,
-    /// As it stands there.
+    /// As it stands there, or what is wrong.
     pub text: String,
     /// Its time, by the log's clock.
     pub time_ms: u64,
@@ -101,6 +108,14 @@ pub struct Event {
     pub width_mm: f64,
     /// Where it is.
     pub found: Result<Found, Missing>,
+}
+
+impl Event {
+    /// A mark at this distance.
+    fn mark(kind: EventKind, text: String, line: u64, time_ms: f64, distance_m: f64) -> Self {
+        let (time_ms, found) = (time_ms as u64, Err(Missing::NoFixBefore));
+        Self { kind, line, text, time_ms, distance_m, width_mm: 0.0, found }
+    }
 }
 
 /// The machine's work on some ground.
@@ -161,21 +176,40 @@ pub struct Job {
     pub midnight_ms: Option<i64>,
     /// The offsets of beam and tool that were used.
     pub antenna: Antenna,
+    /// The wheel's distance against the receiver's, for each straight stretch.
+    pub ratios: Vec<Ratio>,
+    /// Metres that the wheel spun.
+    pub spun_m: f64,
+}
+
+/// A restart at work that is not certain yet.
+#[derive(Default)]
+struct Restart {
+    /// Index of its stretch and its event.
+    at: Option<(usize, usize)>,
+    /// Whether the link is there again.
+    is_connected: bool,
+    cause: Option<String>,
+}
+
+/// A status of the wheel.
+#[derive(Clone, Copy)]
+struct Rolled {
+    time_ms: f64,
+    /// Distance since the stretch began.
+    m: f64,
+    line: u64,
 }
 
 /// A stretch while it is read.
 #[derive(Default)]
 struct Reading {
-    settings: Option<Settings>,
-    /// The wheel's positions: milliseconds of the log, and ticks since the stretch began.
-    wheel: Vec<(f64, i64)>,
-    last_position: Option<i32>,
+    wheel: Vec<Rolled>,
     last_status: Option<Status>,
+    beam_to_tool_mm: f64,
     fixes: Vec<Fix>,
     events: Vec<Event>,
     ground: Vec<Ground>,
-    /// Commands without an answer so far: the line, its time, and the text.
-    unanswered: VecDeque<(u64, u64, String)>,
     time_ms: Option<Range<u64>>,
 }
 
@@ -185,25 +219,45 @@ impl Job {
         let antenna = wanted.antenna.or_else(|| antenna_of(log)).unwrap_or_default();
         let mut job = Self { antenna, ..Self::default() };
         let mut receiver = Receiver::new(antenna.error_m());
+        let mut follower = Follower::default();
         let mut reading = Reading::default();
+        let mut restart = Restart::default();
         let mut last_ms = 0;
         for entry in log {
-            if entry.time_ms < last_ms {
-                // The log was closed, and opened again.
-                job.heard(receiver.end(), &mut reading, entry);
-                receiver.wheel_lost();
-                job.close(&mut reading, wanted, None);
+            let tick_mm = follower.tick_mm();
+            let followed = follower.take(entry);
+            let is_cut = match &followed {
+                Followed::Linked => true,
+                Followed::Status(_, goes_on) => !goes_on,
+                _ => false,
+            };
+            // An earlier time: the log was closed, and opened again.
+            if is_cut || entry.time_ms < last_ms {
+                let was_at_work = reading.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work);
+                if matches!(followed, Followed::Linked) && was_at_work {
+                    reading.restart(entry);
+                    restart =
+                        Restart { at: Some((job.stretches.len(), reading.events.len() - 1)), ..Restart::default() };
+                }
+                job.end(&mut receiver, &mut reading, entry, wanted);
             }
             last_ms = entry.time_ms;
-            match entry.kind {
-                Kind::Connected | Kind::Lost => {
-                    job.heard(receiver.end(), &mut reading, entry);
-                    receiver.wheel_lost();
-                    job.close(&mut reading, wanted, None);
-                    if entry.kind == Kind::Connected {
-                        reading.settings = Some(Settings::new());
+            restart.is_connected |= entry.kind == Kind::Connected;
+            match followed {
+                Followed::Status(status, _) => {
+                    job.judge(&mut restart, status.mode != Mode::Work);
+                    if let Some(mm) = follower.mm(status.position) {
+                        let m = mm / 1000.0;
+                        receiver.rolled(entry.time_ms as f64, m, f64::from(status.speed_mm_s));
+                        reading.beam_to_tool_mm = follower.in_use().settings().get(Setting::BeamToToolMm).into();
+                        reading.status(status, m, entry);
                     }
                 }
+                Followed::Event(event) => reading.event(entry, &event, &follower),
+                Followed::Answered(command, true) => reading.label(&command),
+                _ => {}
+            }
+            match entry.kind {
                 Kind::Gps | Kind::GpsDamaged => {
                     let heard = receiver.take(entry.time_ms as f64, &entry.text);
                     job.heard(heard, &mut reading, entry);
@@ -212,50 +266,48 @@ impl Job {
                     job.unplugged += 1;
                     job.heard(receiver.silent(), &mut reading, entry);
                 }
-                Kind::Setting => reading.set(&entry.text, false),
-                Kind::Status => {
-                    if let Some(status) = Status::parse(&entry.text) {
-                        if reading.is_far(&status) {
-                            receiver.wheel_lost();
-                            let settings = reading.settings.clone();
-                            job.close(&mut reading, wanted, settings);
-                        }
-                        reading.status(status, entry.time_ms);
-                        if let (Some(&(_, ticks)), Some(status)) = (reading.wheel.last(), &reading.last_status) {
-                            let rolled_m = reading.metres(ticks);
-                            receiver.rolled(entry.time_ms as f64, rolled_m, f64::from(status.speed_mm_s));
-                        }
-                    }
+                _ if restart.at.is_some() => restart.cause = cause(&entry.text).or(restart.cause),
+                _ => {}
+            }
+            if follower.tick_mm() != tick_mm && !reading.wheel.is_empty() {
+                // The machine's position stays.
+                let last_status = reading.last_status.take();
+                job.end(&mut receiver, &mut reading, entry, wanted);
+                if let Some((status, mm)) =
+                    last_status.and_then(|status| follower.mm(status.position).map(|mm| (status, mm)))
+                {
+                    reading.status(status, mm / 1000.0, entry);
                 }
-                Kind::Event => reading.event(entry),
-                Kind::Command => {
-                    reading.unanswered.push_back((entry.number, entry.time_ms, entry.text.clone()));
-                }
-                Kind::Answer => {
-                    if let Some(settings) = reading.answer(&entry.text) {
-                        job.heard(receiver.end(), &mut reading, entry);
-                        receiver.wheel_lost();
-                        // Unanswered commands stay, and so does the machine's position.
-                        let unanswered = std::mem::take(&mut reading.unanswered);
-                        let last_status = reading.last_status.take();
-                        job.close(&mut reading, wanted, Some(settings));
-                        reading.unanswered = unanswered;
-                        if let Some(status) = last_status {
-                            reading.status(status, entry.time_ms);
-                        }
-                    }
-                }
-                Kind::Started | Kind::Example | Kind::Antenna | Kind::GpsFound | Kind::GpsMark => {}
             }
             reading.seen(entry.time_ms);
         }
         if let Some(last) = log.last() {
-            job.heard(receiver.end(), &mut reading, last);
+            job.end(&mut receiver, &mut reading, last, wanted);
         }
-        job.close(&mut reading, wanted, None);
+        let is_certain = restart.is_connected;
+        job.judge(&mut restart, is_certain);
         job.counts = receiver.counts();
         job.midnight_ms = receiver.midnight_ms();
         job
+    }
+
+    /// Ends a stretch.
+    fn end(&mut self, receiver: &mut Receiver, reading: &mut Reading, entry: &Entry, wanted: &Wanted) {
+        self.heard(receiver.end(), reading, entry);
+        receiver.wheel_lost();
+        self.close(reading, wanted);
+    }
+
+    /// Keeps the mark of a restart, or removes it: the machine has worked on without its link.
+    fn judge(&mut self, restart: &mut Restart, is_one: bool) {
+        let Restart { at: Some((stretch, event)), cause, .. } = std::mem::take(restart) else { return };
+        let Some(stretch) = self.stretches.get_mut(stretch) else { return };
+        if is_one {
+            let cause = cause.map_or(String::new(), |cause| format!(" ({cause})"));
+            stretch.events[event].text = format!("restarted{cause} while at work: not weeded from here");
+        } else {
+            stretch.events.remove(event);
+        }
     }
 
     fn heard(&mut self, heard: Heard, reading: &mut Reading, entry: &Entry) {
@@ -269,36 +321,62 @@ impl Job {
         }
     }
 
-    /// Ends a stretch and begins another one with these settings.
-    fn close(&mut self, reading: &mut Reading, wanted: &Wanted, settings: Option<Settings>) {
-        let read = std::mem::replace(reading, Reading { settings, ..Reading::default() });
+    /// Gives the events of a stretch their positions, and begins another one.
+    fn close(&mut self, reading: &mut Reading, wanted: &Wanted) {
+        let read = std::mem::take(reading);
         if read.wheel.is_empty() {
             return;
         }
-        let tick_m = read.tick_mm() / 1000.0;
         let mut fixes: Vec<(f64, Fix)> =
-            read.fixes.iter().filter_map(|fix| Some((read.ticks_at(fix.time_ms)? * tick_m, *fix))).collect();
+            read.fixes.iter().filter_map(|fix| Some((read.m_at(fix.time_ms)?, *fix))).collect();
         // When a shorter delay is found, a later fix may get an earlier time.
         fixes.sort_by(|(_, one), (_, other)| one.time_ms.total_cmp(&other.time_ms));
-        let track = Track::through(&fixes, self.antenna.error_m(), wanted.longest_outage_m);
+        let track = Track::through(&fixes, wanted.longest_outage_m);
         let find = |distance_m: f64, recorded_ms: u64, offset: Offset| match &track {
             Some(track) => track.find(distance_m, recorded_ms as f64, offset),
             None => Err(Missing::NoFixBefore),
         };
-        let (beam, tool) = (self.antenna.beam(), self.antenna.tool(read.mm(Setting::BeamToToolMm)));
+        let marks =
+            read.gaps().chain(track.iter().flat_map(|track| self.compare(track, &read.wheel))).collect::<Vec<_>>();
+        let (beam, tool) = (self.antenna.beam(), self.antenna.tool(read.beam_to_tool_mm));
         let (mut events, mut ground) = (read.events, read.ground);
+        events.extend(marks);
         for event in &mut events {
             let offset = match event.kind {
                 EventKind::Detection { .. } | EventKind::Guarded | EventKind::Label(_) => beam,
-                EventKind::SwingOut | EventKind::SwingIn | EventKind::Alarm => tool,
+                _ => tool,
             };
             event.found = find(event.distance_m, event.time_ms, offset);
+            if let (EventKind::Restart, Err(Missing::NoFixBehind), Some(track)) = (event.kind, event.found, &track) {
+                // The track ends at the last fix, a little before the machine's last position.
+                let last_m = track.stations().last().map_or(0.0, |station| station.distance_m);
+                let on_m = event.distance_m - last_m;
+                let at_end = find(last_m, event.time_ms, offset);
+                event.found =
+                    at_end.map(|found| Found { error_m: found.error_m + on_m, basis: Basis::Interpolated, ..found });
+            }
         }
         for ground in ground.iter_mut().filter(|ground| ground.did != Did::Rolled) {
             let until_ms = ground.time_ms.end;
             ground.lines = lines(&ground.distance_m, |distance_m| find(distance_m, until_ms, tool));
         }
         self.stretches.push(Stretch { events, ground, time_ms: read.time_ms.unwrap_or_default() });
+    }
+
+    /// Compares the wheel with the receiver. Returns where the wheel spun.
+    fn compare(&mut self, track: &Track, wheel: &[Rolled]) -> Vec<Event> {
+        let stations = track.stations();
+        let spins = wheel::spins(stations);
+        self.ratios.extend(wheel::ratios(stations, &spins));
+        let event = |spin: &Range<usize>| {
+            let (from, to) = (&stations[spin.start], &stations[spin.end]);
+            let rolled_m = (to.distance_m - from.distance_m).abs();
+            self.spun_m += rolled_m;
+            let at = wheel.partition_point(|rolled| rolled.time_ms < to.time_ms).min(wheel.len() - 1);
+            let text = format!("the wheel rolled {rolled_m:.1} m on the spot");
+            Event::mark(EventKind::WheelSpun, text, wheel[at].line, to.time_ms, from.distance_m.midpoint(to.distance_m))
+        };
+        spins.iter().map(event).collect()
     }
 
     /// Everything that happened.
@@ -328,80 +406,64 @@ fn lines(distance_m: &Range<f64>, find: impl Fn(f64) -> Result<Found, Missing>) 
 }
 
 impl Reading {
-    fn tick_mm(&self) -> f64 {
-        self.settings.as_ref().map_or(0.0, tick_mm)
-    }
-
-    fn metres(&self, ticks: i64) -> f64 {
-        ticks as f64 * self.tick_mm() / 1000.0
-    }
-
-    fn mm(&self, setting: Setting) -> f64 {
-        self.settings.as_ref().map_or(0.0, |settings| f64::from(settings.get(setting)))
-    }
-
-    /// Takes a line `name=value`: shown by the machine, or what it `changed`.
-    fn set(&mut self, line: &str, changed: bool) {
-        if let (Some((setting, value)), Some(settings)) = (shown(line), &mut self.settings) {
-            // A log of another version may have another range. Then the default is used.
-            let _ = if changed { settings.change(setting, value) } else { settings.set(setting, value) };
-        }
-    }
-
     fn seen(&mut self, time_ms: u64) {
         let range = self.time_ms.get_or_insert(time_ms..time_ms);
         range.end = time_ms;
     }
 
-    /// Ticks since the stretch began, for a position near the last one.
-    fn ticks(&self, position: i32) -> Option<i64> {
-        let (&(_, ticks), last) = (self.wheel.last()?, self.last_position?);
-        Some(ticks + i64::from(position.wrapping_sub(last)))
+    /// Whether the wheel has rolled between two statuses, and it is not known when.
+    fn is_gap(from: &Rolled, to: &Rolled) -> bool {
+        to.time_ms - from.time_ms > WHEEL_GAP_MS && (to.m - from.m).abs() > STANDING_M
     }
 
-    /// Whether the distance since the last status is impossible: the log has a gap.
-    fn is_far(&self, status: &Status) -> bool {
-        self.last_position.is_some_and(|last| status.position.wrapping_sub(last).unsigned_abs() > LONGEST_DISTANCE)
+    /// The marks of all gaps.
+    fn gaps(&self) -> impl Iterator<Item = Event> {
+        let gaps = self.wheel.windows(2).filter(|pair| Self::is_gap(&pair[0], &pair[1]));
+        gaps.map(|pair| {
+            let (from, to) = (&pair[0], &pair[1]);
+            let text = format!(
+                "no status for {:.1} s and {:.1} m: positions there are interpolated",
+                (to.time_ms - from.time_ms) / 1000.0,
+                (to.m - from.m).abs()
+            );
+            Event::mark(EventKind::WheelGap, text, to.line, to.time_ms, from.m)
+        })
     }
 
-    /// The wheel's ticks at a time. `None` outside of the stretch.
-    fn ticks_at(&self, time_ms: f64) -> Option<f64> {
-        let next = self.wheel.partition_point(|&(at_ms, _)| at_ms < time_ms);
+    /// The wheel's distance at a time, in metres. `None` outside of the stretch, and in a gap.
+    fn m_at(&self, time_ms: f64) -> Option<f64> {
+        let next = self.wheel.partition_point(|rolled| rolled.time_ms < time_ms);
         let before = next.checked_sub(1).map(|place| self.wheel[place]);
         match (before, self.wheel.get(next)) {
-            (Some((from_ms, from)), Some(&(to_ms, to))) => {
-                Some(from as f64 + (to - from) as f64 * (time_ms - from_ms) / (to_ms - from_ms))
+            (Some(from), Some(to)) if Self::is_gap(&from, to) => None,
+            (Some(from), Some(to)) => {
+                Some(from.m + (to.m - from.m) * (time_ms - from.time_ms) / (to.time_ms - from.time_ms))
             }
-            (None, Some(&(at_ms, ticks))) | (Some((at_ms, ticks)), None) => {
-                ((time_ms - at_ms).abs() <= STANDING_MS).then_some(ticks as f64)
-            }
+            (None, Some(&at)) | (Some(at), None) => ((time_ms - at.time_ms).abs() <= STANDING_MS).then_some(at.m),
             (None, None) => None,
         }
     }
 
-    fn status(&mut self, status: Status, time_ms: u64) {
-        let ticks = self.ticks(status.position).unwrap_or(0);
-        self.wheel.push((time_ms as f64, ticks));
-        self.last_position = Some(status.position);
-        let (did, at_m) = (did(&status), self.metres(ticks));
+    fn status(&mut self, status: Status, at_m: f64, entry: &Entry) {
+        self.wheel.push(Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number });
+        let did = did(&status);
         match self.ground.last_mut() {
-            None => self.ground.push(Ground::begin(did, at_m, time_ms)),
+            None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
             Some(passed) => {
                 passed.distance_m.end = passed.distance_m.end.max(at_m);
-                passed.time_ms.end = time_ms;
+                passed.time_ms.end = entry.time_ms;
                 // A swing has its own position.
                 let is_at_work = |did: Did| did != Did::Rolled;
                 if is_at_work(passed.did) != is_at_work(did) {
-                    self.turn_to(did, ticks, time_ms);
+                    self.turn_to(did, at_m, entry.time_ms);
                 }
             }
         }
         self.last_status = Some(status);
     }
 
-    /// From these ticks on the ground gets another kind of work.
-    fn turn_to(&mut self, did: Did, ticks: i64, time_ms: u64) {
-        let at_m = self.metres(ticks);
+    /// From this distance on the ground gets another kind of work.
+    fn turn_to(&mut self, did: Did, at_m: f64, time_ms: u64) {
         let Some(passed) = self.ground.last_mut() else { return };
         if passed.did == did {
             return;
@@ -413,87 +475,67 @@ impl Reading {
         self.ground.push(Ground::begin(did, at_m, time_ms));
     }
 
-    fn event(&mut self, entry: &Entry) {
-        let Some(event) = EventLine::parse(&entry.text) else { return };
-        let (kind, position, behind_mm, width_mm) = match event {
+    /// The link ends or begins while the machine is at work.
+    fn restart(&mut self, entry: &Entry) {
+        let Some(&Rolled { m, .. }) = self.wheel.last() else { return };
+        let mark = Event::mark(EventKind::Restart, String::new(), entry.number, entry.time_ms as f64, m);
+        self.events.push(mark);
+    }
+
+    fn event(&mut self, entry: &Entry, event: &EventLine, follower: &Follower) {
+        let metres = |position| follower.mm(position).map(|mm| mm / 1000.0);
+        let (kind, position, width_mm) = match *event {
             EventLine::Detection { class, position, votes, hold, .. } => {
-                let hold_mm = f64::from(hold) * self.tick_mm();
-                let width_mm = (hold_mm - 2.0 * self.mm(Setting::MarginMm)).max(0.0);
-                (EventKind::Detection { class, votes }, position, width_mm / 2.0, width_mm)
+                let margin_mm = f64::from(follower.in_use().settings().get(Setting::MarginMm));
+                let width_mm = (f64::from(hold) * follower.tick_mm() - 2.0 * margin_mm).max(0.0);
+                (EventKind::Detection { class, votes }, position, width_mm)
             }
-            EventLine::Guarded { position } => (EventKind::Guarded, position, 0.0, 0.0),
+            EventLine::Guarded { position } => (EventKind::Guarded, position, 0.0),
             EventLine::Swing { out, position } => {
                 let is_at_work = self.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work)
                     || self.ground.last().is_some_and(|passed| passed.did != Did::Rolled);
-                if let Some(ticks) = self.ticks(position).filter(|_| is_at_work) {
-                    self.turn_to(if out { Did::Spared } else { Did::Weeded }, ticks, entry.time_ms);
+                if let Some(at_m) = metres(position).filter(|_| is_at_work) {
+                    self.turn_to(if out { Did::Spared } else { Did::Weeded }, at_m, entry.time_ms);
                 }
-                (if out { EventKind::SwingOut } else { EventKind::SwingIn }, position, 0.0, 0.0)
+                (if out { EventKind::SwingOut } else { EventKind::SwingIn }, position, 0.0)
             }
-            EventLine::Alarm { position, .. } => (EventKind::Alarm, position, 0.0, 0.0),
+            EventLine::Alarm { position, .. } => (EventKind::Alarm, position, 0.0),
             EventLine::State { mode } => {
                 if let Some(status) = &mut self.last_status {
                     status.mode = mode;
                 }
                 if mode != Mode::Work
-                    && let Some(&(_, ticks)) = self.wheel.last()
+                    && let Some(&Rolled { m, .. }) = self.wheel.last()
                 {
-                    self.turn_to(Did::Rolled, ticks, entry.time_ms);
+                    self.turn_to(Did::Rolled, m, entry.time_ms);
                 }
                 return;
             }
             _ => return,
         };
-        let Some(ticks) = self.ticks(position) else { return };
-        self.events.push(Event {
-            kind,
-            line: entry.number,
-            text: entry.text.clone(),
-            time_ms: entry.time_ms,
-            distance_m: (ticks as f64 * self.tick_mm() + behind_mm) / 1000.0,
-            width_mm,
-            found: Err(Missing::NoFixBefore),
-        });
+        let Some(at_m) = metres(position) else { return };
+        // A detection is its middle.
+        let mark = Event::mark(kind, entry.text.clone(), entry.number, entry.time_ms as f64, at_m + width_mm / 2000.0);
+        self.events.push(Event { width_mm, ..mark });
     }
 
-    /// Takes a line of an answer. If it changes the wheel, returns the settings of the new stretch.
-    fn answer(&mut self, line: &str) -> Option<Settings> {
-        let before = self.tick_mm();
-        match ConsoleLine::parse(line) {
-            ConsoleLine::End { error: None } => {
-                let (number, time_ms, command) = self.unanswered.pop_front()?;
-                let words: Vec<&str> = command.split_whitespace().collect();
-                match words.as_slice() {
-                    ["set", name, value] => self.set(&format!("{name}={value}"), true),
-                    ["label", class, ..] => self.label(class, number, time_ms, &command),
-                    _ => {}
-                }
-            }
-            ConsoleLine::End { error: Some(_) } => {
-                self.unanswered.pop_front();
-            }
-            // The output of `get` and `calibrate`.
-            ConsoleLine::Setting { .. } => self.set(line, false),
-            _ => {}
-        }
-        (before != self.tick_mm()).then(|| self.settings.clone()).flatten()
-    }
-
-    fn label(&mut self, class: &str, line: u64, time_ms: u64, command: &str) {
+    /// Takes a command that the machine has carried out.
+    fn label(&mut self, command: &Entry) {
+        let mut words = command.text.split_whitespace();
+        let (Some("label"), Some(class)) = (words.next(), words.next()) else { return };
         let class = if class == "plant" { Class::Plant } else { Class::Weed };
         let is_detection = |event: &&Event| matches!(event.kind, EventKind::Detection { .. });
         let Some(detection) = self.events.iter().rev().find(is_detection).cloned() else { return };
-        self.events.push(Event { kind: EventKind::Label(class), line, text: command.to_owned(), time_ms, ..detection });
+        let (line, time_ms, text) = (command.number, command.time_ms, command.text.clone());
+        self.events.push(Event { kind: EventKind::Label(class), line, text, time_ms, ..detection });
     }
 }
 
-/// Millimetres in a tick of the encoder.
-pub fn tick_mm(settings: &Settings) -> f64 {
-    let value = |setting| f64::from(settings.get(setting));
-    match value(Setting::TicksPerM) {
-        0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
-        ticks_per_m => 1000.0 / ticks_per_m,
-    }
+/// The reset's cause in a line, such as the greeting.
+fn cause(line: &str) -> Option<String> {
+    let (_, rest) = line.split_once("reset by ")?;
+    let word: String = rest.chars().take_while(|letter| letter.is_alphanumeric() || *letter == '_').collect();
+    (!word.is_empty()).then_some(word)
 }
 
 /// The last offsets of beam and tool in a log.

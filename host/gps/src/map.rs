@@ -1,6 +1,6 @@
 //! A job as GeoJSON (RFC 7946), for QGIS and other map programs.
 //!
-//! It is one FeatureCollection. A plant, weed, swing, alarm, label or jump of the receiver is a point. A piece of
+//! It is one FeatureCollection. A plant, weed, swing, alarm, label, restart, fault of the wheel or jump of the receiver is a point. A piece of
 //! ground, weeded or not, is a line. An event without a position has no geometry, and gives the reason. The crate
 //! `geojson` writes the file.
 
@@ -71,7 +71,7 @@ fn event(job: &Job, event: &Event) -> Feature {
     if event.width_mm > 0.0 {
         feature.set_property("width_mm", event.width_mm.round());
     }
-    if event.kind == EventKind::Alarm {
+    if matches!(event.kind, EventKind::Alarm | EventKind::Restart | EventKind::WheelSpun | EventKind::WheelGap) {
         feature.set_property("said", event.text.as_str());
     }
     feature

@@ -37,7 +37,7 @@ pub struct Words {
 
 impl Default for Words {
     fn default() -> Self {
-        let legend = ["weeded", "not weeded", "plant", "unknown, kept", "tall weed", "label", "alarm"];
+        let legend = ["weeded", "not weeded", "plant", "unknown, kept", "tall weed", "label", "alarm, restart"];
         let [without_place, north] = ["without a position:", "north is up"].map(str::to_owned);
         Self { legend: legend.map(str::to_owned), without_place, north }
     }
@@ -50,8 +50,10 @@ fn mark(kind: EventKind) -> Option<(&'static str, f64)> {
         EventKind::Detection { class: Class::Unknown, .. } => Some((DOUBTFUL, 2.5)),
         EventKind::Detection { class: Class::Weed, .. } => Some((WEED, 2.0)),
         EventKind::Label(_) => Some((NOTE, 3.0)),
-        EventKind::Alarm => Some((WRONG, 4.0)),
-        EventKind::Guarded | EventKind::SwingOut | EventKind::SwingIn => None,
+        EventKind::Alarm | EventKind::Restart => Some((WRONG, 4.0)),
+        EventKind::Guarded | EventKind::SwingOut | EventKind::SwingIn | EventKind::WheelSpun | EventKind::WheelGap => {
+            None
+        }
     }
 }
 

@@ -1,21 +1,23 @@
-//! A satellite receiver, read line by line: its fixes on the log's clock, and its faults.
+//! A satellite receiver, read sentence by sentence: its fixes on the log's clock, and its faults.
 //!
 //! [`Receiver::take`] gets each line with the time at which it came, and [`Receiver::rolled`] gets the wheel's
 //! distance. Both are called while a log is written, to add marks, and when it is read. The same lines give the same
 //! fixes and marks.
 //!
-//! - **Moments.** RMC and GGA of the same time are one fix. It is returned when the next moment begins, or by
-//!   [`Receiver::end`]. A date also counts for the days before and after it. A time that jumps back by half a day or
-//!   more is past midnight.
+//! - **Moments.** RMC and GGA of the same time are one fix, at the position with more digits. It is returned when the
+//!   next moment begins, or by [`Receiver::end`]. A time that jumps back by half a day or more is past midnight.
+//! - **Date.** The one on which most lines agree, with the midnights between them. It may be wrong in some.
 //! - **Time.** A line comes some time after its moment. The delay varies, because other lines go first on the wire and
 //!   the PC is busy. The receiver uses the shortest delay of the last ten or twenty seconds, since the real delay
-//!   cannot be longer. The antenna's setting `delay_ms` covers the rest.
+//!   cannot be longer. The antenna's setting `delay_ms` covers the rest. If the delay rises by whole seconds and stays,
+//!   or the time goes back, the receiver's clock has stepped back. Fixes wait until that is clear.
 //! - **Jumps.** A fix is dropped if it is farther from the last fix than the wheel's distance and both errors explain.
 //!   If dropped fixes agree with each other for [`AGREEING_MS`], the earlier fixes may have been wrong. The track then
 //!   starts again with the first of them.
 
 use crate::plane::Place;
-use crate::sentence::{DAY_MS, Line, Quality, Report};
+use crate::sentence::{DAY_MS, Finder, Line, Quality, Report};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// After a jump, fixes are accepted again once they have agreed for this time, in ms.
@@ -41,6 +43,16 @@ const DELAYS_MS: f64 = 10_000.0;
 /// right time.
 const LONGEST_DELAY_MS: f64 = 30_000.0;
 
+/// A longer time without a status of the wheel is a gap, in ms.
+pub(crate) const WHEEL_GAP_MS: f64 = 2000.0;
+
+/// The least rise of the delay that may be a step of the receiver's clock, and for how long it must stay, in ms.
+const LEAST_STEP_MS: f64 = 500.0;
+const STEP_STAYS_MS: f64 = 2000.0;
+
+/// The greatest difference of such a rise from whole seconds, and between its lines, in ms.
+const STEP_JITTER_MS: f64 = 300.0;
+
 /// A fix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fix {
@@ -52,6 +64,8 @@ pub struct Fix {
     pub place: Place,
     /// How good it is.
     pub quality: Quality,
+    /// Its standard deviation to the east and to the north, in metres: of the receiver, and of its digits.
+    pub error_m: f64,
     /// The number of its track. Fixes that have jumped for good begin a new one.
     pub track: u32,
 }
@@ -80,6 +94,8 @@ pub enum Mark {
     Jumped(Jump),
     /// The fixes stay at their new position, and are used from there on.
     Stayed,
+    /// The receiver's clock has stepped back by these seconds.
+    Stepped(f64),
 }
 
 impl fmt::Display for Mark {
@@ -91,6 +107,9 @@ impl fmt::Display for Mark {
                 write!(formatter, "jumped {far_m:.2} m while the wheel rolled {rolled_m:.2} m: not used")
             }
             Self::Stayed => formatter.write_str("stays where it has jumped to: used from here on"),
+            Self::Stepped(seconds) => {
+                write!(formatter, "the receiver's clock went back by {seconds:.0} s: used as it is now")
+            }
         }
     }
 }
@@ -123,12 +142,21 @@ struct Moment {
     arrived_ms: f64,
     utc_ms: i64,
     place: Option<Place>,
+    /// The last digit of the position in metres.
+    digit_m: f64,
     is_valid: bool,
     quality: Option<Quality>,
     /// The wheel when the first line came.
     wheel: Option<Wheel>,
     /// Whether it is over. Later lines of it are not used.
     is_over: bool,
+}
+
+impl Moment {
+    /// By how much the log's clock is ahead of UTC.
+    fn ahead_ms(&self) -> f64 {
+        self.arrived_ms - self.utc_ms as f64
+    }
 }
 
 /// The last report of the wheel, by the log's clock.
@@ -157,12 +185,16 @@ pub struct Receiver {
     moment: Option<Moment>,
     /// Midnights since the first line.
     days: i64,
-    /// Days from 1970 to the first line's.
-    first_day: Option<i64>,
+    /// How many lines have which day as that of the first line, from 1970.
+    first_days: BTreeMap<i64, u64>,
     /// The least difference of the log's clock ahead of UTC, in this period and the one before, and the start of this
     /// one.
     ahead_ms: [Option<f64>; 2],
     delays_since_ms: f64,
+    /// The last moment that has its time, in UTC.
+    timed_utc_ms: i64,
+    /// Moments whose delay has risen. It is not clear yet whether they came late or the receiver's clock has stepped.
+    risen: Vec<Moment>,
     has_fix: Option<bool>,
     wheel: Option<Wheel>,
     last: Option<Rolled>,
@@ -184,9 +216,11 @@ impl Receiver {
     }
 
     /// The midnight from which the fixes' [`Fix::utc_ms`] counts, in milliseconds since the first of January 1970.
-    /// `None` if no line had a date.
+    /// `None` if no date is that of most lines.
     pub fn midnight_ms(&self) -> Option<i64> {
-        Some(self.first_day? * DAY_MS)
+        let all: u64 = self.first_days.values().sum();
+        let (day, _) = self.first_days.iter().find(|(_, lines)| 2 * **lines > all)?;
+        Some(day * DAY_MS)
     }
 
     /// Reports the wheel's total distance at a time of the log's clock, and its speed in mm/s.
@@ -204,12 +238,15 @@ impl Receiver {
         self.jumped.clear();
     }
 
-    /// Takes a line, without its end, that came at this time of the log's clock.
+    /// Takes a line that came at this time of the log's clock.
     pub fn take(&mut self, time_ms: f64, line: &str) -> Heard {
-        match Line::parse(line) {
-            Line::Report(report) => self.report(time_ms, report),
-            Line::Other => {}
-            Line::Damaged => self.counts.damaged += 1,
+        // A log of an earlier version has lines with several sentences, or with something in front.
+        for sentence in Finder::all(line.as_bytes()) {
+            match Line::parse(&sentence) {
+                Line::Report(report) => self.report(time_ms, report),
+                Line::Other => {}
+                Line::Damaged => self.counts.damaged += 1,
+            }
         }
         std::mem::take(&mut self.heard)
     }
@@ -217,12 +254,14 @@ impl Receiver {
     /// The end of the log: the last moment's fix is complete.
     pub fn end(&mut self) -> Heard {
         self.complete();
+        self.release();
         std::mem::take(&mut self.heard)
     }
 
     /// The receiver is gone or silent.
     pub fn silent(&mut self) -> Heard {
         self.complete();
+        self.release();
         self.no_fix();
         std::mem::take(&mut self.heard)
     }
@@ -243,20 +282,29 @@ impl Receiver {
         }
         self.complete();
         let utc_ms = self.days * DAY_MS + time_ms;
-        let wheel = self.wheel;
-        self.moment =
-            Some(Moment { arrived_ms, utc_ms, place: None, is_valid: true, quality: None, wheel, is_over: false });
+        self.moment = Some(Moment {
+            arrived_ms,
+            utc_ms,
+            place: None,
+            digit_m: f64::INFINITY,
+            is_valid: true,
+            quality: None,
+            wheel: self.wheel,
+            is_over: false,
+        });
         self.add(report);
     }
 
     /// Adds the values of a sentence to its moment.
     fn add(&mut self, report: Report) {
         if let Some(day) = report.day {
-            self.first_day = Some(day - self.days);
+            *self.first_days.entry(day - self.days).or_default() += 1;
         }
         let Some(moment) = &mut self.moment else { return };
         moment.is_valid &= report.place.is_some();
-        moment.place = moment.place.or(report.place);
+        if report.place.is_some() && report.digit_m < moment.digit_m {
+            (moment.place, moment.digit_m) = (report.place, report.digit_m);
+        }
         moment.quality = moment.quality.max(report.quality);
     }
 
@@ -273,22 +321,56 @@ impl Receiver {
         let Some(moment) = self.moment.as_mut().filter(|moment| !moment.is_over) else { return };
         moment.is_over = true;
         let moment = *moment;
-        let (Some(place), true) = (moment.place, moment.is_valid) else {
+        if moment.place.is_none() || !moment.is_valid {
             return self.no_fix();
-        };
-        let quality = moment.quality.unwrap_or(Quality::Satellites);
+        }
         if self.has_fix != Some(true) {
             self.has_fix = Some(true);
-            self.heard.marks.push(Mark::Found(quality));
+            self.heard.marks.push(Mark::Found(moment.quality.unwrap_or(Quality::Satellites)));
         }
-        let time_ms = moment.utc_ms as f64 + self.ahead_ms(moment);
-        let fix = Fix { time_ms, utc_ms: moment.utc_ms, place, quality, track: self.track };
-        self.judge(fix, moment.wheel);
+        self.time(moment);
+    }
+
+    /// Gives a moment its time, or keeps it until it is clear whether the receiver's clock has stepped back.
+    fn time(&mut self, moment: Moment) {
+        let least_ms = self.least_ahead_ms().unwrap_or(moment.ahead_ms());
+        let rise_ms = |moment: &Moment| moment.ahead_ms() - least_ms;
+        let has_risen = (LEAST_STEP_MS..LONGEST_DELAY_MS).contains(&rise_ms(&moment));
+        let stays = |first: &Moment| (moment.ahead_ms() - first.ahead_ms()).abs() < STEP_JITTER_MS;
+        if !has_risen || !self.risen.first().is_none_or(stays) {
+            // They came late.
+            self.release();
+        }
+        if !has_risen {
+            return self.judge(moment);
+        }
+        self.risen.push(moment);
+        let first = self.risen[0];
+        let rise_s = self.risen.iter().map(rise_ms).fold(f64::INFINITY, f64::min) / 1000.0;
+        let is_whole = (rise_s - rise_s.round()).abs() < STEP_JITTER_MS / 1000.0;
+        let has_stayed = moment.arrived_ms - first.arrived_ms >= STEP_STAYS_MS;
+        // A time that goes back is a step in any case.
+        if first.utc_ms < self.timed_utc_ms || (has_stayed && is_whole) {
+            self.ahead_ms = [None; 2];
+            self.heard.marks.push(Mark::Stepped(rise_s));
+        }
+        if has_stayed || self.ahead_ms == [None; 2] {
+            self.release();
+        }
+    }
+
+    /// Gives the kept moments their time.
+    fn release(&mut self) {
+        std::mem::take(&mut self.risen).into_iter().for_each(|moment| self.judge(moment));
+    }
+
+    fn least_ahead_ms(&self) -> Option<f64> {
+        self.ahead_ms.into_iter().flatten().reduce(f64::min)
     }
 
     /// By how much the record's clock is ahead of UTC, and of the receiver's least delay.
-    fn ahead_ms(&mut self, moment: Moment) -> f64 {
-        let ahead_ms = moment.arrived_ms - moment.utc_ms as f64;
+    fn ahead_ms(&mut self, moment: &Moment) -> f64 {
+        let ahead_ms = moment.ahead_ms();
         let is_another = |least: f64| (ahead_ms - least).abs() > LONGEST_DELAY_MS;
         if self.ahead_ms.into_iter().flatten().any(is_another) {
             self.ahead_ms = [None; 2];
@@ -298,11 +380,21 @@ impl Receiver {
             self.delays_since_ms = moment.arrived_ms;
         }
         self.ahead_ms[0] = Some(self.ahead_ms[0].map_or(ahead_ms, |least| least.min(ahead_ms)));
-        self.ahead_ms.into_iter().flatten().fold(ahead_ms, f64::min)
+        self.least_ahead_ms().unwrap_or(ahead_ms)
     }
 
-    /// Compares a fix with the last one, and with the wheel.
-    fn judge(&mut self, fix: Fix, wheel: Option<Wheel>) {
+    /// Compares a moment's fix with the last one, and with the wheel.
+    fn judge(&mut self, moment: Moment) {
+        let Some(place) = moment.place else { return };
+        let time_ms = moment.utc_ms as f64 + self.ahead_ms(&moment);
+        self.timed_utc_ms = moment.utc_ms;
+        let quality = moment.quality.unwrap_or(Quality::Satellites);
+        // A receiver may cut its digits instead of rounding them.
+        let digits_m = moment.digit_m / 3_f64.sqrt();
+        let error_m = self.error_m.unwrap_or_else(|| quality.usual_error_m()).hypot(digits_m);
+        let (utc_ms, track) = (moment.utc_ms, self.track);
+        let wheel = moment.wheel.filter(|wheel| time_ms - wheel.time_ms <= WHEEL_GAP_MS);
+        let fix = Fix { time_ms, utc_ms, place, quality, error_m, track };
         let rolled_m = wheel.map_or(0.0, |wheel| {
             // The wheel is reported ten times a second. A line that came much too late has a position that is no longer
             // known here.
@@ -316,8 +408,8 @@ impl Receiver {
         };
         // As the wheel rolls on, the machine could have reached the position of the jumped fixes. But these agree with
         // each other.
-        let agrees = self.jumped.last().is_some_and(|jumped| self.follows(jumped, &here));
-        if !agrees && self.follows(&last, &here) {
+        let agrees = self.jumped.last().is_some_and(|jumped| Self::follows(jumped, &here));
+        if !agrees && Self::follows(&last, &here) {
             self.jumped.clear();
             return self.accept(here);
         }
@@ -341,9 +433,8 @@ impl Receiver {
     }
 
     /// Whether the machine can have travelled from one fix to the other.
-    fn follows(&self, from: &Rolled, to: &Rolled) -> bool {
-        let error_m = |rolled: &Rolled| self.error_m.unwrap_or_else(|| rolled.fix.quality.usual_error_m());
-        let room_m = SWAY_M + DEVIATIONS * error_m(from).max(error_m(to));
+    fn follows(from: &Rolled, to: &Rolled) -> bool {
+        let room_m = SWAY_M + DEVIATIONS * from.fix.error_m.max(to.fix.error_m);
         let far_m = from.fix.place.distance_m(to.fix.place);
         far_m <= SKIDDING * (to.rolled_m - from.rolled_m).abs() + room_m
     }

@@ -1,23 +1,26 @@
 //! The receiver's part of a log while it is written: its lines, and marks for its faults.
 //!
 //! [`Recorder::take`] makes lines of the log from received bytes. Sentences with a position or time are logged
-//! unchanged, and so is every damaged line. Other sentences are left out. A reader of the log can derive the same marks
-//! again. The recorder opens no port: the caller reports a connected or lost port by [`Recorder::found`] and
+//! unchanged, and so is every damaged one. Other sentences and bytes are left out. A reader of the log can derive the
+//! same marks again, except that no sentence is of use. The recorder opens no port: the caller reports a connected or lost port by [`Recorder::found`] and
 //! [`Recorder::lost`].
 
 use crate::antenna::Antenna;
-use crate::job::{LONGEST_DISTANCE, tick_mm};
 use crate::receiver::{Heard, Receiver};
-use crate::sentence::Line;
-use link::LineReader;
+use crate::sentence::{Finder, Line};
+use link::follower::{Distance, tick_mm};
 use link::log::Kind;
 use link::session::Happening;
 
 /// A receiver that is silent for this long is lost, in ms. Every receiver sends a line within five seconds.
 const SILENCE_MS: u64 = 5_000;
 
-/// This number of damaged lines, without a good one between, is a fault.
-const DAMAGED_IN_A_ROW: u32 = 20;
+/// A receiver whose bytes have no RMC or GGA for this long is of no use, in ms.
+const USELESS_MS: u64 = 5_000;
+
+/// Why a receiver or a file of its lines is of no use.
+pub const NO_POSITION: &str = "no line has RMC or GGA of NMEA 0183: turn these sentences on in the receiver";
+const NO_SENTENCE: &str = "no line is NMEA 0183: check --gps-baud and the cable";
 
 /// Lines of the log: their kind and text.
 pub type Lines = Vec<(Kind, String)>;
@@ -26,16 +29,15 @@ pub type Lines = Vec<(Kind, String)>;
 #[derive(Debug, Default)]
 pub struct Recorder {
     receiver: Receiver,
-    lines: LineReader,
-    /// Whether no line has ended yet since the port was opened, in the middle of a line.
-    is_first: bool,
+    sentences: Finder,
     /// Time of the last input. `None` if its silence was reported.
     heard_ms: Option<u64>,
-    /// Damaged lines since the last good one.
-    damaged: u32,
-    tick_m: f64,
-    /// The encoder's count, and ticks since the Uno began.
-    wheel: Option<(i32, i64)>,
+    /// Since when there was no RMC or GGA. `None` if that was reported.
+    useless_since_ms: Option<u64>,
+    /// Whether there was a good sentence since then.
+    has_others: bool,
+    tick_mm: f64,
+    distance: Distance,
 }
 
 impl Recorder {
@@ -49,36 +51,34 @@ impl Recorder {
     pub fn happened(&mut self, time_ms: u64, happening: &Happening) {
         match happening {
             Happening::Connected { settings, .. } | Happening::Settings(settings, _) => {
-                let tick_m = tick_mm(settings) / 1000.0;
-                if matches!(happening, Happening::Connected { .. }) || tick_m != self.tick_m {
+                let tick_mm = tick_mm(settings);
+                if matches!(happening, Happening::Connected { .. }) || tick_mm != self.tick_mm {
                     self.wheel_lost();
                 }
-                self.tick_m = tick_m;
+                self.tick_mm = tick_mm;
             }
             Happening::Lost(_) => self.wheel_lost(),
             Happening::Status(status, _) => {
-                let step = |last: i32| status.position.wrapping_sub(last);
-                if self.wheel.is_some_and(|(last, _)| step(last).unsigned_abs() > LONGEST_DISTANCE) {
+                if !self.distance.take(status.position, self.tick_mm) {
                     self.wheel_lost();
+                    self.distance.take(status.position, self.tick_mm);
                 }
-                let ticks = self.wheel.map_or(0, |(last, ticks)| ticks + i64::from(step(last)));
-                self.wheel = Some((status.position, ticks));
-                self.receiver.rolled(time_ms as f64, ticks as f64 * self.tick_m, f64::from(status.speed_mm_s));
+                let rolled_m = self.distance.at(status.position, self.tick_mm).unwrap_or_default() / 1000.0;
+                self.receiver.rolled(time_ms as f64, rolled_m, f64::from(status.speed_mm_s));
             }
             _ => {}
         }
     }
 
     fn wheel_lost(&mut self) {
-        self.wheel = None;
+        self.distance = Distance::default();
         self.receiver.wheel_lost();
     }
 
     /// The receiver's port is there, of this name.
     pub fn found(&mut self, time_ms: u64, port: &str) -> Lines {
-        self.lines = LineReader::default();
-        self.is_first = true;
-        self.heard_ms = Some(time_ms);
+        self.sentences = Finder::default();
+        (self.heard_ms, self.useless_since_ms, self.has_others) = (Some(time_ms), Some(time_ms), false);
         vec![(Kind::GpsFound, port.to_owned())]
     }
 
@@ -92,31 +92,35 @@ impl Recorder {
 
     /// Takes received bytes, or none.
     pub fn take(&mut self, time_ms: u64, bytes: &[u8]) -> Lines {
-        self.lines.take(bytes);
         let mut lines = Lines::new();
-        while let Some(line) = self.lines.next_line() {
+        if !bytes.is_empty() {
             self.heard_ms = Some(time_ms);
-            let is_first = std::mem::take(&mut self.is_first);
-            let parsed = Line::parse(&line);
-            // The port was opened in the middle of this line.
-            if parsed == Line::Damaged && is_first && !line.starts_with('$') {
-                continue;
-            }
-            self.damaged = if parsed == Line::Damaged { self.damaged.saturating_add(1) } else { 0 };
-            let kind = match parsed {
-                Line::Other => continue,
-                Line::Damaged => Kind::GpsDamaged,
-                Line::Report(_) => Kind::Gps,
-            };
-            let heard = self.receiver.take(time_ms as f64, &line);
-            lines.push((kind, line));
-            lines.extend(marks(&heard));
-            if self.damaged == DAMAGED_IN_A_ROW {
-                let why = "no received line is NMEA 0183: check --gps-baud and the cable";
-                lines.push((Kind::GpsMark, why.to_owned()));
-            }
         }
-        if self.heard_ms.is_some_and(|heard_ms| time_ms.saturating_sub(heard_ms) > SILENCE_MS) {
+        for &byte in bytes {
+            let Some(sentence) = self.sentences.take(byte) else { continue };
+            let kind = match Line::parse(&sentence) {
+                Line::Other => {
+                    self.has_others = true;
+                    continue;
+                }
+                Line::Damaged => Kind::GpsDamaged,
+                Line::Report(_) => {
+                    (self.useless_since_ms, self.has_others) = (Some(time_ms), false);
+                    Kind::Gps
+                }
+            };
+            let heard = self.receiver.take(time_ms as f64, &sentence);
+            lines.push((kind, sentence));
+            lines.extend(marks(&heard));
+        }
+        let is_past =
+            |since_ms: Option<u64>, limit_ms| since_ms.is_some_and(|ms| time_ms.saturating_sub(ms) > limit_ms);
+        if !bytes.is_empty() && is_past(self.useless_since_ms, USELESS_MS) {
+            self.useless_since_ms = None;
+            let why = if self.has_others { NO_POSITION } else { NO_SENTENCE };
+            lines.push((Kind::GpsMark, why.to_owned()));
+        }
+        if is_past(self.heard_ms, SILENCE_MS) {
             lines.extend(self.lost("the receiver is silent"));
         }
         lines
@@ -155,13 +159,14 @@ mod tests {
     }
 
     #[test]
-    fn noise_alone_as_with_another_baud_rate_is_reported_once() {
-        let (mut recorder, _) = Recorder::new(&Antenna::default());
-        recorder.found(0, "a port");
-        let lines: Lines = (0..200).flat_map(|_| recorder.take(10, &[0x80, b'x', 0xFF, b'\n'])).collect();
-        let told: Vec<_> = lines.iter().filter(|(kind, _)| *kind == Kind::GpsMark).collect();
-        assert_eq!((told.len(), lines.len()), (1, 200), "{told:?}");
-        assert!(told[0].1.contains("--gps-baud"), "{told:?}");
+    fn bytes_without_a_position_are_reported_once_after_5_s() {
+        for (bytes, advice) in [(&b"\x80x\xFF\n"[..], "--gps-baud"), (&b"$GPGSV,1,1,00*79\r\n"[..], "RMC or GGA")] {
+            let (mut recorder, _) = Recorder::new(&Antenna::default());
+            recorder.found(0, "a port");
+            let lines: Lines = (0..200).flat_map(|tenth| recorder.take(100 * tenth, bytes)).collect();
+            assert_eq!(kinds(&lines), [Kind::GpsMark], "{lines:?}");
+            assert!(lines[0].1.contains(advice), "{lines:?}");
+        }
     }
 
     #[test]

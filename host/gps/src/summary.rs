@@ -6,6 +6,7 @@
 
 use crate::job::{Did, Event, EventKind, Job};
 use crate::track::{Basis, Found};
+use crate::wheel::Ratio;
 use link::Class;
 use serde::Serialize;
 
@@ -40,6 +41,8 @@ pub struct Summary {
     pub swings: u64,
     /// Alarms.
     pub alarms: u64,
+    /// Restarts at work.
+    pub restarts: u64,
     /// Number of labels.
     pub labels: u64,
     /// Ground of the row over which the machine was at work, in metres.
@@ -70,12 +73,24 @@ pub struct Summary {
     pub damaged_lines: u64,
     /// How often the receiver was lost or silent.
     pub receiver_losses: u64,
+    /// Metres by the receiver for a metre of the wheel, over straight stretches. `None` without one.
+    pub wheel_ratio: Option<f64>,
+    /// Its standard deviation.
+    pub wheel_ratio_error: Option<f64>,
+    /// Metres that the wheel spun.
+    pub wheel_spun_m: f64,
+    /// Gaps of the statuses in which the wheel rolled.
+    pub wheel_gaps: u64,
 }
 
 impl Summary {
     /// That of a job.
     pub fn of(job: &Job, stand: &Stand) -> Self {
+        let ratio = Ratio::mean(&job.ratios);
         let mut summary = Self {
+            wheel_ratio: ratio.map(|ratio| ratio.value),
+            wheel_ratio_error: ratio.map(|ratio| ratio.error),
+            wheel_spun_m: job.spun_m,
             fixes: job.counts.fixes,
             fix_losses: job.counts.losses,
             jumps: job.counts.jumps,
@@ -93,7 +108,9 @@ impl Summary {
                 EventKind::SwingOut => summary.swings += 1,
                 EventKind::Alarm => summary.alarms += 1,
                 EventKind::Label(_) => summary.labels += 1,
-                EventKind::SwingIn | EventKind::Guarded => {}
+                EventKind::SwingIn | EventKind::Guarded | EventKind::WheelSpun => {}
+                EventKind::Restart => summary.restarts += 1,
+                EventKind::WheelGap => summary.wheel_gaps += 1,
             }
             match event.found {
                 Err(_) => summary.without_place += 1,

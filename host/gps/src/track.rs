@@ -7,7 +7,8 @@
 //!   Several fixes of a standing wheel are averaged.
 //! - **The heading** is the direction of a straight line, fitted by least squares over the wheel's distance. It uses as
 //!   many fixes around the position as its error needs to fall to [`HEADING_ERROR`], but at most [`LONGEST_CHORD_M`].
-//!   It is the heading of the machine, not of its motion: a machine that rolls back keeps it.
+//!   It is the heading of the machine, not of its motion: a machine that rolls back keeps it. Its error grows with the
+//!   misfit of the line, as at a row end, where some of the fixes are in the turn.
 //! - **Outages.** Two fixes are successive if at most one and a half of the receiver's intervals lie between them.
 //!   Otherwise the machine is assumed to have travelled straight between them, by the wheel's distance, up to the
 //!   longest allowed distance.
@@ -37,7 +38,7 @@ const ROLLED_BACK_M: f64 = 50.0;
 const RECORDED_EARLY_MS: f64 = 1000.0;
 
 /// The wheel stands while it rolls less than this, in metres.
-const STANDING_M: f64 = 0.005;
+pub(crate) const STANDING_M: f64 = 0.005;
 
 /// An offset from the antenna.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,13 +94,13 @@ pub struct Found {
 
 /// A fix on the track.
 #[derive(Clone, Copy, Debug)]
-struct Station {
-    time_ms: f64,
+pub(crate) struct Station {
+    pub(crate) time_ms: f64,
     utc_ms: i64,
-    distance_m: f64,
-    at: Metres,
-    error_m: f64,
-    track: u32,
+    pub(crate) distance_m: f64,
+    pub(crate) at: Metres,
+    pub(crate) error_m: f64,
+    pub(crate) track: u32,
     /// Number of fixes in its mean.
     fixes: f64,
     /// Time of the last of them.
@@ -117,20 +118,18 @@ pub struct Track {
 
 impl Track {
     /// The track through these fixes in order of time, each with the wheel's distance in metres. `None` without a fix.
-    /// The error is the standard deviation of a fix, if that is known.
-    pub fn through(fixes: &[(f64, Fix)], error_m: Option<f64>, longest_outage_m: f64) -> Option<Self> {
+    pub fn through(fixes: &[(f64, Fix)], longest_outage_m: f64) -> Option<Self> {
         let plane = Plane::around(fixes.first()?.1.place);
         let mut stations: Vec<Station> = Vec::with_capacity(fixes.len());
         let mut intervals = Vec::new();
         for &(distance_m, fix) in fixes {
             let at = plane.metres(fix.place);
-            let error_m = error_m.unwrap_or_else(|| fix.quality.usual_error_m());
             let station = Station {
                 time_ms: fix.time_ms,
                 utc_ms: fix.utc_ms,
                 distance_m,
                 at,
-                error_m,
+                error_m: fix.error_m,
                 track: fix.track,
                 fixes: 1.0,
                 until_ms: fix.time_ms,
@@ -143,7 +142,7 @@ impl Track {
             if last.track == fix.track && (distance_m - last.distance_m).abs() < STANDING_M {
                 last.fixes += 1.0;
                 last.at = last.at.plus(at.minus(last.at).times(1.0 / last.fixes));
-                last.error_m = last.error_m.max(error_m);
+                last.error_m = last.error_m.max(fix.error_m);
                 last.until_ms = fix.time_ms;
             } else {
                 stations.push(station);
@@ -152,6 +151,10 @@ impl Track {
         intervals.sort_by(f64::total_cmp);
         let interval_ms = intervals.get(intervals.len() / 2).copied().unwrap_or(f64::INFINITY);
         Some(Self { plane, stations, interval_ms, longest_outage_m })
+    }
+
+    pub(crate) fn stations(&self) -> &[Station] {
+        &self.stations
     }
 
     /// The position of an event with this offset from the antenna, at this distance of the wheel. It was recorded at
@@ -221,38 +224,108 @@ impl Track {
             station.track == track && (station.distance_m - distance_m).abs() <= LONGEST_CHORD_M / 2.0
         };
         let (mut begin, mut end) = (first, first + 2);
+        let mut line = Fitted::default();
+        stations[begin..end].iter().for_each(|station| line.add(station));
+        let mut best = line;
         loop {
-            let (heading, error) = fitted(&stations[begin..end]);
+            if line.heading_error() < best.heading_error() {
+                best = line;
+            }
             let behind = begin.checked_sub(1).filter(|&at| is_in(&stations[at]));
             let ahead = stations.get(end).filter(|station| is_in(station));
-            let is_done = error <= HEADING_ERROR || (behind.is_none() && ahead.is_none());
-            if is_done {
-                let length = heading.length();
-                return (error <= NO_HEADING && length > 0.0).then(|| (heading.times(1.0 / length), error));
+            let error = best.heading_error();
+            if error <= HEADING_ERROR || (behind.is_none() && ahead.is_none()) {
+                let length = best.slope().length();
+                return (error <= NO_HEADING && length > 0.0).then(|| (best.slope().times(1.0 / length), error));
             }
+            behind.into_iter().for_each(|at| line.add(&stations[at]));
+            ahead.into_iter().for_each(|station| line.add(station));
             begin = behind.unwrap_or(begin);
             end += usize::from(ahead.is_some());
         }
     }
 }
 
-/// The direction of the straight line that fits these fixes over the wheel's distance, and its standard deviation in
-/// radians.
-fn fitted(stations: &[Station]) -> (Metres, f64) {
-    let count = stations.len() as f64;
-    let (mut mean_m, mut middle, mut error_m) = (0.0, Metres::default(), 0.0_f64);
-    for station in stations {
-        mean_m += station.distance_m / count;
-        middle = middle.plus(station.at.times(1.0 / count));
-        error_m = error_m.max(station.error_m);
+/// The straight line that fits some fixes over the wheel's distance, by least squares.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Fitted {
+    /// The first fix, from which the others count.
+    origin: Option<(f64, Metres)>,
+    count: f64,
+    error_m: f64,
+    /// Sums of distances and positions, and of their squares and products.
+    distance: f64,
+    at: Metres,
+    distance_distance: f64,
+    distance_at: Metres,
+    at_at: Metres,
+    east_north: f64,
+}
+
+impl Fitted {
+    /// Adds a fix.
+    pub(crate) fn add(&mut self, station: &Station) {
+        let (distance_m, at) = *self.origin.get_or_insert((station.distance_m, station.at));
+        let (distance, at) = (station.distance_m - distance_m, station.at.minus(at));
+        self.count += 1.0;
+        self.error_m = self.error_m.max(station.error_m);
+        self.distance += distance;
+        self.at = self.at.plus(at);
+        self.distance_distance += distance * distance;
+        self.distance_at = self.distance_at.plus(at.times(distance));
+        self.at_at = self.at_at.plus(Metres { east: at.east * at.east, north: at.north * at.north });
+        self.east_north += at.east * at.north;
     }
-    let (mut spread, mut slope) = (0.0, Metres::default());
-    for station in stations {
-        let distance_m = station.distance_m - mean_m;
-        spread += distance_m * distance_m;
-        slope = slope.plus(station.at.minus(middle).times(distance_m));
+
+    /// Number of fixes.
+    pub(crate) fn count(&self) -> f64 {
+        self.count
     }
-    (slope, error_m / spread.sqrt())
+
+    /// The greatest error of a fix.
+    pub(crate) fn error_m(&self) -> f64 {
+        self.error_m
+    }
+
+    /// The sum of the squared distances from their mean.
+    fn spread(&self) -> f64 {
+        self.distance_distance - self.distance * self.distance / self.count
+    }
+
+    /// Metres to the east and north for each metre of the wheel.
+    pub(crate) fn slope(&self) -> Metres {
+        let products = self.distance_at.minus(self.at.times(self.distance / self.count));
+        products.times(1.0 / self.spread())
+    }
+
+    /// The variances of the positions to the east and north, and their covariance.
+    fn variances(&self) -> (f64, f64, f64) {
+        let mean = self.at.times(1.0 / self.count);
+        let variance = |squares: f64, mean: f64| squares / self.count - mean * mean;
+        let covariance = self.east_north / self.count - mean.east * mean.north;
+        (variance(self.at_at.east, mean.east), variance(self.at_at.north, mean.north), covariance)
+    }
+
+    /// How far the fixes are from the line, as the root of the mean square. 0 for fixes of one distance.
+    pub(crate) fn misfit_m(&self) -> f64 {
+        let (east, north, _) = self.variances();
+        let along = self.slope().length().powi(2) * self.spread() / self.count;
+        (east + north - along).max(0.0).sqrt()
+    }
+
+    /// The standard deviation of its direction in radians: by the error of the fixes, and by the bend in which they are.
+    fn heading_error(&self) -> f64 {
+        let slope = self.slope();
+        let forward = slope.times(1.0 / slope.length());
+        let (east, north, covariance) = self.variances();
+        // The variance beside the line.
+        let beside = east * forward.north.powi(2) + north * forward.east.powi(2)
+            - 2.0 * covariance * forward.east * forward.north;
+        // What the fixes' own error does not explain is a bend. Its error does not become less with more fixes.
+        let bend = (beside - self.error_m.powi(2)).max(0.0);
+        let error = (self.error_m.powi(2) / self.spread() + bend * self.count / self.spread()).sqrt();
+        if error.is_nan() { f64::INFINITY } else { error }
+    }
 }
 
 #[cfg(test)]
@@ -268,7 +341,14 @@ mod tests {
         let plane = Plane::around(FIELD);
         let fix = |(second, distance_m): (usize, f64)| {
             let (time_ms, utc_ms) = (1000.0 * second as f64, 1000 * second as i64);
-            let fix = Fix { time_ms, utc_ms, place: plane.place(at(distance_m)), quality: Quality::Rtk, track: 0 };
+            let fix = Fix {
+                time_ms,
+                utc_ms,
+                place: plane.place(at(distance_m)),
+                quality: Quality::Rtk,
+                error_m: 0.015,
+                track: 0,
+            };
             (distance_m, fix)
         };
         distances_m.into_iter().enumerate().map(fix).collect()
@@ -279,7 +359,7 @@ mod tests {
     }
 
     fn track(fixes: &[(f64, Fix)]) -> Track {
-        Track::through(fixes, None, 20.0).expect("there are fixes")
+        Track::through(fixes, 20.0).expect("there are fixes")
     }
 
     fn every_half_metre(count: u32) -> impl Iterator<Item = f64> {
@@ -324,7 +404,7 @@ mod tests {
             let fixes = driven(every_half_metre(60), eastward);
             let kept: Vec<_> =
                 fixes.iter().enumerate().filter(|(at, _)| !(lost..lost + length).contains(&(*at as u32))).map(|(_, it)| *it).collect();
-            let track = Track::through(&kept, None, 10.0).expect("there are fixes");
+            let track = Track::through(&kept, 10.0).expect("there are fixes");
             let found = track.find(distance_m, 2000.0 * distance_m, Offset::default());
             let end_m = 0.5 * f64::from(lost + length);
             let has_no_end = end_m > 29.5;
@@ -352,7 +432,7 @@ mod tests {
         assert_eq!(track.find(-0.1, 5000.0, Offset::default()), Err(Missing::NoFixBefore));
         assert_eq!(track.find(4.6, 9000.0, Offset::default()), Err(Missing::NoFixBehind));
         assert_eq!(track.find(1.0, -1500.0, Offset::default()), Err(Missing::NoFixBefore));
-        assert!(Track::through(&[], None, 20.0).is_none());
+        assert!(Track::through(&[], 20.0).is_none());
     }
 
     #[test]
@@ -373,6 +453,29 @@ mod tests {
     }
 
     #[test]
+    fn at_a_row_end_the_error_covers_a_heading_that_reaches_into_the_turn() {
+        // Ten metres to the east, and then around a circle of 1.5 m, with a receiver whose heading needs a long line.
+        let at = |distance_m: f64| match distance_m - 10.0 {
+            ..0.0 => eastward(distance_m),
+            turned_m => {
+                let (sin, cos) = (turned_m / 1.5).sin_cos();
+                Metres { east: 10.0 + 1.5 * sin, north: 1.5 - 1.5 * cos }
+            }
+        };
+        let mut fixes = driven(every_half_metre(30), at);
+        fixes.iter_mut().for_each(|(_, fix)| fix.error_m = 0.1);
+        let track = track(&fixes);
+        for distance_m in (0..28).map(|step| f64::from(step) / 2.0) {
+            let found = track.find(distance_m, 30_000.0, Offset { ahead_m: 1.0, right_m: 0.0 });
+            let Ok(Found { error_m, .. }) = found else { continue };
+            let turned = f64::max(0.0, (distance_m - 10.0) / 1.5);
+            let forward = Metres { east: turned.cos(), north: turned.sin() };
+            let off_m = off_m(found, at(distance_m).plus(forward));
+            assert!(off_m <= 2.0 * error_m, "at {distance_m}: {off_m} m off, and {error_m}");
+        }
+    }
+
+    #[test]
     fn where_the_fixes_have_jumped_for_good_nothing_is_interpolated() {
         let mut fixes = driven(every_half_metre(20), eastward);
         fixes[10..].iter_mut().for_each(|(_, fix)| fix.track = 1);
@@ -388,7 +491,8 @@ mod tests {
         for (at, north) in [(0, 0.3), (1, -0.3), (2, 0.6)] {
             fixes[at].1.place = plane.place(Metres { east: 0.0, north });
         }
-        let track = Track::through(&fixes, Some(0.5), 20.0).expect("there are fixes");
+        fixes.iter_mut().for_each(|(_, fix)| fix.error_m = 0.5);
+        let track = Track::through(&fixes, 20.0).expect("there are fixes");
         assert!(off_m(track.find(0.0, 4000.0, Offset::default()), Metres { east: 0.0, north: 0.2 }) < 1e-4);
         let beside = Offset { ahead_m: 1.0, right_m: 0.0 };
         assert_eq!(track.find(0.25, 4000.0, beside), Err(Missing::NoHeading));

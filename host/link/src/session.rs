@@ -11,7 +11,7 @@
 //! the machine.
 
 use super::moment::Moment;
-use super::settings::{self, Settings, SettingsError};
+use super::settings::{self, Settings, SettingsError, Shown};
 use super::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
 use control::say::command::{Command, parse};
 use std::collections::{BTreeSet, VecDeque};
@@ -61,7 +61,7 @@ pub enum Happening {
     Connected {
         /// The firmware's version.
         version: String,
-        /// Its settings.
+        /// Its settings, as far as this version knows them: see [`other_version`](super::settings::other_version).
         settings: Settings,
         /// The lines that show them.
         shown: Vec<String>,
@@ -356,7 +356,10 @@ impl Session {
 /// Asks a machine for all that a session reports at its connection. The second is its status, if it is understood.
 fn introduce(link: &mut Link) -> Result<(Happening, Option<Happening>), SettingsError> {
     let shown = link.ask(SETTINGS)?;
-    let settings = settings::shown_by(&shown)?;
+    if !shown.iter().any(|line| settings::shown(line).is_some()) {
+        return Err(LinkError::Refused { command: SETTINGS.to_owned(), answer: shown.join(" ") }.into());
+    }
+    let settings = Shown::by(&shown).settings;
     let examples = link.ask(EXAMPLES)?;
     link.ask(EVENTS)?;
     let status = link.ask(STATUS)?;
@@ -369,7 +372,7 @@ fn introduce(link: &mut Link) -> Result<(Happening, Option<Happening>), Settings
 fn parse_answer(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
     Ok(match question {
         STATUS => answer.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line))),
-        SETTINGS => Some(Happening::Settings(settings::shown_by(&answer)?, answer)),
+        SETTINGS => Some(Happening::Settings(Shown::by(&answer).settings, answer)),
         EXAMPLES => Some(Happening::Examples(answer)),
         _ => None,
     })

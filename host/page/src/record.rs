@@ -11,8 +11,9 @@
 //! where `get` has shown the values, or at the next connection.
 
 use control::say::command::{self, Command};
-use gps::job::{Job, Wanted, tick_mm};
+use gps::job::{Job, Wanted};
 use gps::picture::{Words, draw};
+use link::follower::tick_mm;
 use link::log::{Entry, Kind, Pieces};
 use link::settings::{Setting, Settings, shown};
 use link::{Class, EventLine, Mode, Status, Values, replay};

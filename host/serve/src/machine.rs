@@ -9,6 +9,7 @@ use link::advice;
 use link::moment::Moment;
 use link::rows::Opener;
 use link::session::{HOLD, Happening, PAUSE, Session};
+use link::settings::other_version;
 use link::{EventLine, Mode};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -220,6 +221,9 @@ impl Talk {
             Happening::Connected { version, shown, examples, .. } => {
                 self.hub.there(self.number, &version, &shown, &examples);
                 (self.tell)(&format!("{}: weeder {version} is there.", self.name));
+                if let Some(other) = other_version(&version, &shown) {
+                    (self.tell)(&format!("{}: {other}.", self.name));
+                }
             }
             Happening::Started { greeting, while_at_work: Some(cause) } => {
                 (self.tell)(&format!("{}: {}.", self.name, advice::restarted(&cause)));
@@ -234,7 +238,10 @@ impl Talk {
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
             Happening::Event(event, line) => {
                 // Its switch and its alarms are HOLDs too.
-                if let EventLine::State { mode: Mode::Hold | Mode::Alarm } | EventLine::Alarm { .. } = event {
+                if let EventLine::State { mode: Mode::Hold | Mode::Alarm }
+                | EventLine::Alarm { .. }
+                | EventLine::Newer { is_alarm: true } = event
+                {
                     self.hub.hold(self.number);
                 }
                 if let EventLine::State { mode: Mode::Work } = event {

@@ -18,6 +18,7 @@ use std::path::PathBuf;
 use trial::Outcome;
 use trial::replay::{Counted, replay};
 use trial::{animation, firmware, picture, report};
+use uno::elf::Size;
 use uno::{PinChange, recording};
 
 /// The arguments.
@@ -44,7 +45,7 @@ pub struct Arguments {
     vcd: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
-    /// Run this ELF instead of building the firmware of this repository.
+    /// Run this ELF instead of this weeder's own firmware.
     #[arg(long, value_name = "FILE.elf")]
     elf: Option<PathBuf>,
     /// Play a logic analyser's recording to the encoder's pins, and print what the firmware counts; - for standard
@@ -98,6 +99,8 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     trial.settings = conditions.firmware_settings();
     trial.motion = trial.motion.with_slip(|| conditions.ground.slip_percent / 100.0);
     let elf = arguments.elf.clone().map_or_else(firmware::build, Ok)?;
+    // The memory is printed, and a HEX file does not tell it.
+    Size::read(&elf)?;
     if !arguments.json {
         let manner = if arguments.paper { ", swings as in the paper" } else { "" };
         let introduction = report::introduction(&trial.row, &trial.machine, &trial.motion);

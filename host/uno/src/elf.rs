@@ -1,4 +1,4 @@
-//! Reads the firmware's ELF.
+//! Reads the firmware's ELF, or its flash from an Intel HEX file.
 //!
 //! [`Image`] has the contents of flash and EEPROM, the memory that the program takes, and the addresses of its symbols.
 //! This module neither builds nor runs the firmware; [`Uno`](crate::Uno) runs it.
@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use crate::file_error::FileError;
+use crate::hex;
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf,
@@ -22,6 +23,14 @@ pub const EEPROM_BYTES: usize = 1024;
 const SRAM_ORIGIN: u64 = 0x80_0000;
 const EEPROM_ORIGIN: u64 = 0x81_0000;
 const FUSES_ORIGIN: u64 = 0x82_0000;
+
+/// The section in which avr-libc's start-up code names the chip, and the offset of that name: behind the note's head, six
+/// sizes, and the table of one name.
+const DEVICE_INFO: &str = ".note.gnu.avr.deviceinfo";
+const DEVICE_NAME: usize = 0x31;
+
+/// The chips whose programs run on the ATmega328P: they differ in their power consumption alone (data sheet, section 2.2).
+const CHIPS: [&str; 2] = ["atmega328p", "atmega328"];
 
 /// Memory that a firmware takes, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,14 +78,24 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads the ELF at `path`.
+    /// Whether it has the program's symbols. A HEX file has none.
+    pub fn has_symbols(&self) -> bool {
+        !self.functions.is_empty()
+    }
+
+    /// Reads the ELF or the Intel HEX file at `path`. A HEX file has the flash alone.
     ///
     /// # Errors
     ///
-    /// Where the file cannot be read, is no ELF for AVR, or holds more than the ATmega328P does.
+    /// Where the file cannot be read, is neither an ELF for AVR nor HEX, is for another chip, or holds more than the
+    /// ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, FileError> {
         let bytes = read_bytes(path)?;
+        if is_hex(&bytes) {
+            return Ok(Image { flash: hex::flash(path, &bytes)?, ..Image::default() });
+        }
         let file = parse(path, &bytes)?;
+        check_chip(path, &file)?;
         let mut flash = Vec::new();
         let mut eeprom = Vec::new();
         for header in file.elf_program_headers() {
@@ -108,18 +127,37 @@ impl Image {
     }
 }
 
+fn is_hex(bytes: &[u8]) -> bool {
+    bytes.trim_ascii_start().starts_with(b":")
+}
+
 fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     std::fs::read(path).map_err(|source| FileError::unread(path, source))
 }
 
 /// Takes the content of the file at `path` for an ELF for AVR.
 fn parse<'data>(path: &Path, bytes: &'data [u8]) -> Result<ElfFile32<'data, LittleEndian>, FileError> {
+    if is_hex(bytes) {
+        return Err(FileError::new(path, "is an Intel HEX file, which has no symbols: name the firmware's ELF"));
+    }
     let not_elf = |reason| FileError::new(path, format_args!("is not a readable ELF file ({reason})"));
     let architecture = object::File::parse(bytes).map_err(not_elf)?.architecture();
     if architecture != Architecture::Avr {
         return Err(FileError::new(path, format_args!("was made for {architecture:?}: an ELF for AVR is needed")));
     }
     ElfFile32::parse(bytes).map_err(not_elf)
+}
+
+/// Checks that an ELF that names its chip is for this one.
+fn check_chip(path: &Path, file: &ElfFile32<LittleEndian>) -> Result<(), FileError> {
+    let note = file.section_by_name(DEVICE_INFO).and_then(|section| section.data().ok());
+    let name = note.and_then(|note| note.get(DEVICE_NAME..)?.split(|byte| *byte == 0).next());
+    match name.map(String::from_utf8_lossy).filter(|name| !name.is_empty()) {
+        Some(chip) if !CHIPS.contains(&&*chip) => {
+            Err(FileError::new(path, format_args!("is for the {chip}: the Uno has an {}", CHIPS[0])))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn size(file: &ElfFile32<LittleEndian>) -> Size {

@@ -124,6 +124,22 @@ pub fn text(flash: &[u8]) -> String {
     text + "\n"
 }
 
+/// The flash of a firmware's Intel HEX file, from address 0 to its last byte.
+pub(crate) fn flash(path: &Path, content: &[u8]) -> Result<Vec<u8>, FileError> {
+    let wrong = |problem: String| FileError::new(path, problem);
+    let pieces = pieces(&String::from_utf8_lossy(content));
+    let pieces = pieces.map_err(|reason| wrong(format!("is no whole Intel HEX file: {reason}")))?;
+    let end = pieces.iter().map(|(address, bytes)| address + bytes.len()).max().unwrap_or(0);
+    if end == 0 || end > FLASH_BYTES {
+        return Err(wrong(format!("fills {end} bytes of flash: the ATmega328P has {FLASH_BYTES}")));
+    }
+    let mut flash = vec![0xFF; end];
+    for (address, bytes) in pieces {
+        flash[address..][..bytes.len()].copy_from_slice(&bytes);
+    }
+    Ok(flash)
+}
+
 /// The file's stretches of data, each with its address.
 fn pieces(text: &str) -> Result<Vec<(usize, Vec<u8>)>, ReaderError> {
     let mut base = 0;
@@ -156,6 +172,25 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         Bootloader::read(file.path()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_firmware_is_read_from_its_hex_and_not_from_half_of_it_or_another_chips() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let read = |text: &str| {
+            std::fs::write(file.path(), text).unwrap();
+            Image::read(file.path()).map(|image| image.flash).map_err(|error| error.to_string())
+        };
+        let firmware: Vec<u8> = (0..1000_u16).map(|byte| byte as u8).collect();
+        let whole = text(&firmware);
+        assert_eq!(read(&whole), Ok(firmware));
+        let mega = ":020000040001F9\n:0100000000FF\n:00000001FF\n";
+        for (text, why) in
+            [(&whole[..whole.len() / 2 + 5], "no whole Intel HEX"), (mega, "fills 65537 bytes"), (":", "")]
+        {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(why), "{error}");
+        }
     }
 
     #[test]

@@ -16,15 +16,27 @@ export async function makeInstallable(onNewer: (load: () => void) => void): Prom
     // If the server lacks the worker, or the browser stores nothing, the page still works.
     const registration = await serviceWorker.register("worker.js").catch(() => undefined);
     if (!registration) return;
+    // Before the worker's first installation there is no controller, and nothing older to forget.
+    serviceWorker.controller?.postMessage({ started: BUILD });
     const look = () => {
         const newer = registration.waiting;
         // The first installation is no update.
         if (!newer || !serviceWorker.controller) return;
         onNewer(() => {
+            // Another tab may have let it take over.
+            if (newer.state !== "installed") location.reload();
             serviceWorker.addEventListener("controllerchange", () => location.reload());
             newer.postMessage("take over");
         });
     };
+    // The worker has a newer page, which did not start.
+    serviceWorker.addEventListener("message", ({ data }) => {
+        if (data !== "newer") return;
+        onNewer(() => {
+            serviceWorker.controller?.postMessage("try again");
+            location.reload();
+        });
+    });
     const follow = () => registration.installing?.addEventListener("statechange", look);
     registration.addEventListener("updatefound", follow);
     // It may have been found before this listener was added.

@@ -17,6 +17,8 @@ export class Flasher {
     readonly #image: Uint8Array;
     #flashed: SerialPort | undefined;
     #isBusy = false;
+    /** Whether the tab was hidden since the button was pressed. */
+    #wasHidden = false;
 
     constructor(
         private readonly parts: Parts,
@@ -34,7 +36,15 @@ export class Flasher {
         }
         const last = BOARDS.find(({ id }) => id === chosen("board"));
         if (last) choice.value = last.id;
-        choice.addEventListener("change", () => keep("board", choice.value));
+        const warn = () => {
+            const isOld = BOARDS.some(({ id, isOld }) => isOld && id === choice.value);
+            parts.say("board-said", () => (isOld ? say("oldBootloader") : ""));
+        };
+        warn();
+        choice.addEventListener("change", () => {
+            keep("board", choice.value);
+            warn();
+        });
         parts.button("hex", () => download("weeder.hex", hex, "text/plain"));
         parts.button("to-work", () => this.#flashed && this.onWork(this.#flashed));
         const why = whyNoSerial();
@@ -43,6 +53,9 @@ export class Flasher {
         parts.say("no-serial", () => told(why ?? ""));
         globalThis.addEventListener("beforeunload", (event) => {
             if (this.#isBusy) event.preventDefault();
+        });
+        document.addEventListener("visibilitychange", () => {
+            this.#wasHidden ||= document.hidden;
         });
     }
 
@@ -61,18 +74,22 @@ export class Flasher {
                 this.#say("failed", () => told(english("noPort")));
                 return;
             }
+            this.#wasHidden = document.hidden;
             await this.onBegin(port);
             const startedMs = performance.now();
             await this.#flash(port, board);
             const seconds = (performance.now() - startedMs) / 1000;
             this.#flashed = port;
-            this.#say("done", () => {
-                const done = say("flashed", { count: this.#image.length, time: quantity(seconds, "second", 1) });
-                return board.isOld ? `${done} ${say("oldBootloader")}` : done;
-            });
+            this.#say("done", () =>
+                say("flashed", { count: this.#image.length, time: quantity(seconds, "second", 1) }),
+            );
             this.parts.html("to-work").hidden = false;
         } catch (error) {
-            this.#say("failed", () => say("notFlashed", { why: told(error) }));
+            const wasHidden = this.#wasHidden;
+            this.#say("failed", () => {
+                const why = sentence(say("notFlashed", { why: told(error) }));
+                return wasHidden ? `${why} ${say("wasHidden")}` : why;
+            });
             if (!(error instanceof PortError || error instanceof FlashError)) throw error;
         } finally {
             this.#isBusy = false;

@@ -3,7 +3,8 @@
 // A command ends with CRC_EOP. Its answer begins with INSYNC and ends with OK. The bootloader listens for a second or
 // two after a reset. Addresses are in words. Optiboot and its predecessor erase each page before they write it.
 
-import { type PortError, type SerialLine, wait } from "../link/serial.ts";
+import { after, wait } from "../clock.ts";
+import type { PortError, SerialLine } from "../link/serial.ts";
 import { english, type Plain } from "../words/words.ts";
 
 /** A board that can be flashed. The boards differ in their bootloader alone. */
@@ -198,9 +199,9 @@ export class Bootloader {
             const left = by - performance.now();
             if (left <= 0) return undefined;
             await new Promise<void>((done) => {
-                const timer = setTimeout(done, left);
+                const stop = after(left, done);
                 this.#arrived = () => {
-                    clearTimeout(timer);
+                    stop();
                     done();
                 };
             });

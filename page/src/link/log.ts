@@ -10,6 +10,8 @@ export class Log {
     #lines: string[] = [];
     #from: number | undefined;
     isFull = false;
+    /** Whether it has work, or something that the operator did, since `text` was called. */
+    isUnsaved = false;
 
     /** Lines in it, without the heading. */
     get length(): number {
@@ -19,6 +21,9 @@ export class Log {
     /** Records an event at a time. */
     add(happening: Happening, nowMs: number): void {
         this.#from ??= nowMs;
+        const { is } = happening;
+        const isWork = is === "status" && happening.status.mode === "work";
+        this.isUnsaved ||= isWork || is === "event" || is === "command";
         const timeMs = Math.round(nowMs - this.#from);
         const write = (kind: string, line: string) => {
             this.isFull = this.#lines.length >= MOST;
@@ -36,7 +41,9 @@ export class Log {
         else if ("line" in happening) write(happening.is, happening.line);
     }
 
+    /** The file's text, for saving it. */
     text(): string {
+        this.isUnsaved = false;
         return `${["time_ms,kind,line", ...this.#lines].join("\n")}\n`;
     }
 }

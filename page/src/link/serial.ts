@@ -3,6 +3,7 @@
 // Every error has its cause and what to do. The browser does not distinguish a busy port from one without permission,
 // so the message names both. Garbled input is lost, and does not end the line. A pulled cable does.
 
+import { wait } from "../clock.ts";
 import { english } from "../words/words.ts";
 import { isServed } from "./served.ts";
 import { Session } from "./session.ts";
@@ -34,10 +35,21 @@ export async function choosePort(): Promise<SerialPort | undefined> {
     }
 }
 
-function whyNotOpened(error: unknown): PortError {
+/** The name of this page's lock while it has a port open, so that the browser's other tabs can say so. */
+const LOCKS = "weeder-port-";
+const LOCK = LOCKS + Math.random();
+
+/** Whether another tab of this page has a port open. False where the browser does not tell. */
+async function isInOtherTab(): Promise<boolean> {
+    const { held = [] } = (await navigator.locks?.query().catch(() => undefined)) ?? {};
+    return held.some(({ name = "" }) => name.startsWith(LOCKS) && name !== LOCK);
+}
+
+async function whyNotOpened(error: unknown): Promise<PortError> {
     const { name, message } = error instanceof Error ? error : { name: "", message: String(error) };
     if (name === "InvalidStateError") return new PortError(english("portOpen"));
     if (name !== "NetworkError") return new PortError(english("portRefused", { text: message }));
+    if (await isInOtherTab()) return new PortError(english("portInTab"));
     const isLinux = /Linux/.test(navigator.userAgent) && !/Android/.test(navigator.userAgent);
     return new PortError(english("portTaken", { or: english(isLinux ? "noPermission" : "driverHangs") }));
 }
@@ -52,13 +64,15 @@ export class SerialLine {
     #reader: ReadableStreamDefaultReader<Uint8Array> | undefined;
     #isClosing = false;
     #closed: Promise<void> | undefined;
+    /** Gives up this page's lock. */
+    #unlock = () => {};
 
     /** Opens a port. Throws a PortError. */
     static async open(port: SerialPort, baudRate: number): Promise<SerialLine> {
         try {
             await port.open({ baudRate, bufferSize: 4096 });
         } catch (error) {
-            throw whyNotOpened(error);
+            throw await whyNotOpened(error);
         }
         return new SerialLine(port);
     }
@@ -66,6 +80,10 @@ export class SerialLine {
     private constructor(port: SerialPort) {
         this.#port = port;
         if (!port.writable) throw new PortError(english("portGone"));
+        const isOver = new Promise<void>((done) => {
+            this.#unlock = done;
+        });
+        void navigator.locks?.request(LOCK, { mode: "shared" }, () => isOver).catch(() => {});
         this.#writer = port.writable.getWriter();
         this.#listening = this.#listen();
     }
@@ -105,6 +123,7 @@ export class SerialLine {
         await this.#listening;
         this.#writer.releaseLock();
         await this.#port.close().catch(ignore);
+        this.#unlock();
     }
 
     async #listen(): Promise<void> {
@@ -145,8 +164,4 @@ export function sessionOver(line: SerialLine, now: number): Session {
     line.onBytes = (bytes) => session.receive(String.fromCharCode(...bytes));
     line.onEnd = ({ message }) => session.end(message);
     return session;
-}
-
-export function wait(ms: number): Promise<void> {
-    return new Promise((done) => setTimeout(done, ms));
 }

@@ -14,11 +14,32 @@ export class Console {
     /** Which of the typed lines the arrow keys are at. */
     #recalled = 0;
     #waiting: HTMLElement[] = [];
+    /** Whether it scrolls with new lines: until the operator scrolls back. */
+    #follows = true;
+    /** Whether it was shown since it was hidden. A browser forgets how far a hidden element is scrolled. */
+    #isShown = false;
 
     /** `type` types a line to the machine. */
     constructor(parts: Parts, type: (line: string) => void) {
-        this.#said = parts.html("said");
+        const said = parts.html("said");
+        this.#said = said;
+        said.addEventListener("scroll", () => {
+            if (this.#isShown) this.#follows = said.scrollHeight - said.scrollTop - said.clientHeight < AT_THE_END;
+        });
         const input = parts.get("typed", HTMLInputElement);
+        // The field would join pasted lines to one, and cut a long one.
+        const paste = (event: Event, data: DataTransfer | null) => {
+            const text = data?.getData("text/plain") ?? "";
+            const lines = text.split(/[\r\n]+/).filter((line) => line.trim() !== "");
+            if (lines.length < 2 && text.length <= input.maxLength) return;
+            event.preventDefault();
+            for (const line of lines) {
+                this.#recalled = this.#typed.push(line.trim());
+                type(line.trim());
+            }
+        };
+        input.addEventListener("paste", (event) => paste(event, event.clipboardData));
+        input.addEventListener("drop", (event) => paste(event, event.dataTransfer));
         parts.get("line", HTMLFormElement).addEventListener("submit", (event) => {
             event.preventDefault();
             const line = input.value.trim();
@@ -42,11 +63,12 @@ export class Console {
     }
 
     show(): void {
-        if (this.#waiting.length === 0) return;
         const said = this.#said;
-        const follows = said.scrollHeight - said.scrollTop - said.clientHeight < AT_THE_END;
+        const isNew = this.#waiting.length > 0;
         said.append(...this.#waiting.splice(0));
         while (said.childElementCount > LINES) said.firstElementChild?.remove();
-        if (follows) said.scrollTop = said.scrollHeight;
+        const wasShown = this.#isShown;
+        this.#isShown = said.clientHeight > 0;
+        if (this.#follows && this.#isShown && (isNew || !wasShown)) said.scrollTop = said.scrollHeight;
     }
 }

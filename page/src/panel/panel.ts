@@ -7,6 +7,7 @@ import { download, Parts } from "../dom.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
 import { type Ask, type Happening, type Link, NoMachine, Refused } from "../link/session.ts";
+import { isStill, STILL_MS } from "../preferences.ts";
 import { signal } from "../signals.ts";
 import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
 import { Calibration } from "./calibration.ts";
@@ -54,6 +55,8 @@ export class Panel {
     #holdPending: { againMs: number | undefined } | undefined;
     #link: Link | undefined;
     #now = 0;
+    /** When the strip was last drawn. */
+    #drawnMs = Number.NEGATIVE_INFINITY;
 
     /**
      * Fills an element. `name` distinguishes it from the page's other panels. `allowed` are the commands that may be
@@ -98,6 +101,17 @@ export class Panel {
             this.#setUp.show();
         });
         if (into.classList.contains("alone")) followDock(parts.html("dock"));
+    }
+
+    /** The log so far, as a file. */
+    get log(): File {
+        return new File([this.#log.text()], "weeder-log.csv", { type: "text/csv" });
+    }
+
+    /** Whether closing the page would leave a machine at work, or drop an unsaved log. */
+    get isNeeded(): boolean {
+        const { version, mode } = this.machine;
+        return (version !== undefined && mode === "work") || this.#log.isUnsaved;
     }
 
     /**
@@ -200,7 +214,11 @@ export class Panel {
             parts.write("alarm-name", restart);
             parts.write("alarm-advice", say("notWeeded"));
         }
-        drawStrip(this.#strip, machine, this.#now);
+        const nowMs = performance.now();
+        if (!isStill() || nowMs - this.#drawnMs > STILL_MS) {
+            this.#drawnMs = nowMs;
+            drawStrip(this.#strip, machine, this.#now);
+        }
         this.#examples.show();
         this.#calibration.show();
         const lines = say("logLines", { count: this.#log.length });

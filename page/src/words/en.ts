@@ -17,11 +17,14 @@ export const en = {
         lightTitle: "Light, for work in the sun",
         newerPage: "A newer page is there. Loading it lets go of a machine that is connected.",
         loadIt: "Load it",
+        twoBuilds:
+            "This page's files are of two versions: its server is being updated, or the browser kept an old file. Load the page again in a minute.",
         unchecked: "",
 
         // Try.
         tryIt: "Try it",
-        tryLead: "The real firmware weeds a row here, on a virtual Uno. Throw the work switch, and break something.",
+        tryLead:
+            "Watch the tool: it swings out at each plant, and weeds between the plants. The real firmware does that here, on a virtual Uno. Press HOLD, or break something.",
         theRow: "The row",
         drawing: "The row from above: plants, weeds, beam and tool",
         noPlantYet: "The tool has passed no plant yet.",
@@ -200,7 +203,8 @@ export const en = {
 
         // Calibration.
         steps: "The steps",
-        stepsLead: "In any order, and the margin last. The values are the simulated machine's: type what you measure.",
+        stepsLead: "Step by step: type what you measure on your machine. The margin comes last.",
+        setAndSave: "Set and save",
         beforeMargin: "Before the margin is lowered: {steps}",
         next: "Next, {step}.",
         setMargin: "Set the margin to {margin} and save",
@@ -265,7 +269,7 @@ export const en = {
         oldBoard: "Nano or Duemilanove, old bootloader",
         saveHex: "Save the HEX as a file",
         howFar: "How far it is",
-        leaveCable: "Leave the cable in.",
+        leaveCable: "Leave the cable in, and keep this tab in front.",
         phaseWaiting: "Waiting for the bootloader",
         phaseWriting: "Writing: {share}",
         phaseVerifying: "Reading it back: {share}",
@@ -273,6 +277,7 @@ export const en = {
         oldBootloader:
             "With this bootloader the machine does not restart after a stop by its watchdog: the tool has no signal until you switch the power off and on. Optiboot, which Arduino's IDE can burn, has no such fault.",
         notFlashed: "Not flashed: {why}",
+        wasHidden: "This tab was hidden meanwhile: keep it in front, and flash it again first.",
         withoutSerial: "Without Web Serial",
         withoutSerialHow: "Save the HEX as a file. avrdude, which the Arduino IDE brings along, writes it:",
         portIs: "PORT is COM3 or the like on Windows, /dev/ttyACM0 on Linux. Old bootloaders speak at 57600.",
@@ -286,6 +291,7 @@ export const en = {
         cancelled: "Cancelled.",
         notRead: "{file} cannot be read: {why}",
         openLog: "Open a log",
+        logExample: "An example: the log of Try",
         logFile: "A log file",
         noLog: "{file} is no log: {why}",
         emptyLog: "{file} has no machine in it.",
@@ -329,9 +335,10 @@ export const en = {
         portGone: "the port is gone: its cable was pulled, or the Uno lost its power; plug it in again",
         portForbidden: "the browser forbids this page its serial ports: allow them in the site's settings",
         portOpen: "this page has the port open already: disconnect there, then try again",
+        portInTab: "another tab of this page has a port open: disconnect there or close that tab first, then try again",
         portRefused: "the port cannot be opened: the browser says \u201c{text}\u201d",
         portTaken:
-            "the port cannot be opened. Either another program or another tab has it: close the serial monitor, the Arduino IDE, or the other program that talks to the Uno. {or} Then pull the cable, plug it in again and choose the port again.",
+            "the port cannot be opened. Either another tab or another program has it: close the other tab first, then the serial monitor, the Arduino IDE, or the other program that talks to the Uno. {or} If nothing else has it, pull the cable, plug it in again and choose the port again.",
         driverHangs: "Or its driver hangs.",
         noPermission: "Or you may not open it: `sudo usermod -aG dialout $USER`, then log in again.",
         noPort: "No port was chosen. Where the list has no Uno: plug it in, by a cable that carries data and not power alone.",

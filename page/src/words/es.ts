@@ -16,12 +16,14 @@ export const es: Language = {
         lightTitle: "Claro, para trabajar al sol",
         newerPage: "Hay una página más nueva. Al cargarla se suelta la máquina conectada.",
         loadIt: "Cargarla",
+        twoBuilds:
+            "Los archivos de esta página son de dos versiones: su servidor se está actualizando, o el navegador guardó un archivo viejo. Cargue la página otra vez dentro de un minuto.",
         unchecked:
             "Ningún hablante ha revisado todavía esta traducción. CONTRIBUTING.md, en las fuentes del proyecto, dice dónde corregirla.",
 
         tryIt: "Pruébelo",
         tryLead:
-            "Aquí el firmware real desherba una hilera en un Uno virtual. Accione el interruptor de trabajo y estropee algo.",
+            "Mire la herramienta: sale en cada planta y desherba entre las plantas. Lo hace aquí el firmware real, en un Uno virtual. Pulse PAUSA o estropee algo.",
         theRow: "La hilera",
         drawing: "La hilera desde arriba: plantas, malezas, haz y herramienta",
         noPlantYet: "La herramienta aún no ha pasado ninguna planta.",
@@ -197,8 +199,8 @@ export const es: Language = {
             "{file}: {count} es distinto del de la máquina. Mírelo y envíelo.|{file}: {count} son distintos de los de la máquina. Mírelos y envíelos.",
 
         steps: "Los pasos",
-        stepsLead:
-            "En cualquier orden, y el margen al final. Los valores son de la máquina simulada: escriba lo que mida.",
+        stepsLead: "Paso a paso: escriba lo que mida en su máquina. El margen va al final.",
+        setAndSave: "Fijar y guardar",
         beforeMargin: "Antes de bajar el margen: {steps}",
         next: "Ahora: {step}.",
         setMargin: "Poner el margen en {margin} y guardar",
@@ -262,7 +264,7 @@ export const es: Language = {
         oldBoard: "Nano o Duemilanove, cargador antiguo",
         saveHex: "Guardar el HEX en un archivo",
         howFar: "Cuánto lleva",
-        leaveCable: "Deje el cable puesto.",
+        leaveCable: "Deje el cable puesto y esta pestaña delante.",
         phaseWaiting: "Esperando al cargador de arranque",
         phaseWriting: "Escribiendo: {share}",
         phaseVerifying: "Comprobando: {share}",
@@ -271,6 +273,7 @@ export const es: Language = {
             "Con este cargador la máquina no vuelve sola después de que su vigilante la haya parado: la herramienta no tiene señal " +
             "hasta que se quita la corriente y se vuelve a dar. Optiboot, que el IDE de Arduino puede grabar, no tiene ese defecto.",
         notFlashed: "No grabado: {why}",
+        wasHidden: "Mientras tanto esta pestaña estuvo oculta: déjela delante y, antes que nada, grabe otra vez.",
         withoutSerial: "Sin Web Serial",
         withoutSerialHow: "Guarde el HEX en un archivo. Lo escribe avrdude, que viene con el IDE de Arduino:",
         portIs: "PORT es COM3 o parecido en Windows, /dev/ttyACM0 en Linux. Los cargadores antiguos hablan a 57600.",
@@ -283,6 +286,7 @@ export const es: Language = {
         cancelled: "Cancelado.",
         notRead: "{file} no se puede leer: {why}",
         openLog: "Abrir un registro",
+        logExample: "Un ejemplo: el registro de Probar",
         logFile: "Un archivo de registro",
         noLog: "{file} no es un registro: {why}",
         emptyLog: "{file} no tiene ninguna máquina.",
@@ -322,11 +326,11 @@ export const es: Language = {
         portGone: "el puerto ya no está: se sacó su cable, o el Uno perdió la corriente; enchúfelo otra vez",
         portForbidden: "el navegador prohíbe a esta página sus puertos serie: permítalos en la configuración del sitio",
         portOpen: "esta página ya tiene el puerto abierto: desconecte allí e inténtelo otra vez",
+        portInTab:
+            "otra pestaña de esta página tiene un puerto abierto: desconecte allí o cierre antes esa pestaña, e inténtelo otra vez",
         portRefused: "el puerto no se puede abrir: el navegador dice «{text}»",
         portTaken:
-            "el puerto no se puede abrir. Puede que lo tenga otro programa u otra pestaña: cierre el monitor serie, el IDE de " +
-            "Arduino, o el otro programa que habla con el Uno. {or} Después saque el cable, enchúfelo otra vez y elija otra vez " +
-            "el puerto.",
+            "el puerto no se puede abrir. Puede que lo tenga otra pestaña u otro programa: cierre primero la otra pestaña, y después el monitor serie, el IDE de Arduino, o el otro programa que habla con el Uno. {or} Si nadie más lo tiene, saque el cable, enchúfelo otra vez y elija otra vez el puerto.",
         driverHangs: "O su controlador está colgado.",
         noPermission: "O usted no tiene permiso: `sudo usermod -aG dialout $USER`, y entre de nuevo en su sesión.",
         noPort: "No se eligió ningún puerto. Si en la lista no hay un Uno: enchúfelo, con un cable que lleve datos y no solo corriente.",

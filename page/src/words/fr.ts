@@ -16,12 +16,14 @@ export const fr: Language = {
         lightTitle: "Clair, pour travailler au soleil",
         newerPage: "Une page plus récente est là. La charger libère la machine connectée.",
         loadIt: "La charger",
+        twoBuilds:
+            "Les fichiers de cette page sont de deux versions : son serveur est mis à jour, ou le navigateur a gardé un ancien fichier. Rechargez la page dans une minute.",
         unchecked:
             "Aucun locuteur n'a encore vérifié cette traduction. CONTRIBUTING.md, dans les sources du projet, dit où la corriger.",
 
         tryIt: "L'essayer",
         tryLead:
-            "Le vrai micrologiciel désherbe ici un rang, sur un Uno virtuel. Actionnez l'interrupteur de travail, et cassez quelque chose.",
+            "Regardez l'outil : il s'écarte à chaque plante et désherbe entre les plantes. Le vrai micrologiciel le fait ici, sur un Uno virtuel. Appuyez sur PAUSE, ou cassez quelque chose.",
         theRow: "Le rang",
         drawing: "Le rang vu d'en haut : plantes, adventices, faisceau et outil",
         noPlantYet: "L'outil n'a encore passé aucune plante.",
@@ -197,8 +199,8 @@ export const fr: Language = {
             "{file} : {count} diffère de celui de la machine. Regardez-le, puis envoyez-le.|{file} : {count} diffèrent de ceux de la machine. Regardez-les, puis envoyez-les.",
 
         steps: "Les étapes",
-        stepsLead:
-            "Dans n'importe quel ordre, et la marge en dernier. Les valeurs sont celles de la machine simulée : tapez ce que vous mesurez.",
+        stepsLead: "Pas à pas : tapez ce que vous mesurez sur votre machine. La marge vient en dernier.",
+        setAndSave: "Régler et enregistrer",
         beforeMargin: "Avant de baisser la marge : {steps}",
         next: "Ensuite : {step}.",
         setMargin: "Mettre la marge à {margin} et enregistrer",
@@ -262,7 +264,7 @@ export const fr: Language = {
         oldBoard: "Nano ou Duemilanove, ancien chargeur",
         saveHex: "Enregistrer le HEX dans un fichier",
         howFar: "Où il en est",
-        leaveCable: "Laissez le câble branché.",
+        leaveCable: "Laissez le câble branché, et cet onglet au premier plan.",
         phaseWaiting: "En attente du chargeur de démarrage",
         phaseWriting: "Écriture : {share}",
         phaseVerifying: "Relecture : {share}",
@@ -271,6 +273,7 @@ export const fr: Language = {
             "Avec ce chargeur, la machine ne revient pas d'elle-même quand son chien de garde a dû l'arrêter : l'outil n'a pas de " +
             "signal jusqu'à ce que le courant soit coupé et rendu. Optiboot, que l'IDE d'Arduino peut graver, n'a pas ce défaut.",
         notFlashed: "Non flashé : {why}",
+        wasHidden: "Entre-temps cet onglet était caché : laissez-le au premier plan, et flashez d'abord à nouveau.",
         withoutSerial: "Sans Web Serial",
         withoutSerialHow: "Enregistrez le HEX dans un fichier. avrdude, fourni avec l'IDE d'Arduino, l'écrit :",
         portIs: "PORT est COM3 ou semblable sous Windows, /dev/ttyACM0 sous Linux. Les anciens chargeurs parlent à 57600.",
@@ -283,6 +286,7 @@ export const fr: Language = {
         cancelled: "Arrêté.",
         notRead: "{file} ne peut pas être lu : {why}",
         openLog: "Ouvrir un journal",
+        logExample: "Un exemple : le journal d'Essayer",
         logFile: "Un fichier de journal",
         noLog: "{file} n'est pas un journal : {why}",
         emptyLog: "{file} n'a aucune machine.",
@@ -321,10 +325,11 @@ export const fr: Language = {
         portGone: "le port a disparu : son câble a été débranché, ou l'Uno a perdu le courant ; rebranchez-le",
         portForbidden: "le navigateur interdit à cette page ses ports série : autorisez-les dans les réglages du site",
         portOpen: "cette page a déjà ouvert le port : déconnectez-la, puis réessayez",
+        portInTab:
+            "un autre onglet de cette page a ouvert un port : déconnectez-le là-bas ou fermez d'abord cet onglet, puis réessayez",
         portRefused: "le port ne s'ouvre pas : le navigateur dit « {text} »",
         portTaken:
-            "le port ne s'ouvre pas. Un autre programme ou un autre onglet l'a peut-être : fermez le moniteur série, l'IDE d'Arduino, " +
-            "ou l'autre programme qui parle à l'Uno. {or} Débranchez ensuite le câble, rebranchez-le et choisissez à nouveau le port.",
+            "le port ne s'ouvre pas. Un autre onglet ou un autre programme l'a peut-être : fermez d'abord l'autre onglet, puis le moniteur série, l'IDE d'Arduino, ou l'autre programme qui parle à l'Uno. {or} Si rien d'autre ne l'a, débranchez le câble, rebranchez-le et choisissez à nouveau le port.",
         driverHangs: "Ou son pilote est bloqué.",
         noPermission: "Ou vous n'en avez pas le droit : `sudo usermod -aG dialout $USER`, puis reconnectez-vous.",
         noPort: "Aucun port n'a été choisi. Si la liste n'a pas d'Uno : branchez-le, par un câble qui porte des données et pas seulement le courant.",

@@ -7,6 +7,7 @@ use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
 use crate::{ConsoleLine, EventLine, Mode, Status};
 use control::say::command::{self, Command};
+use files::in_a_line;
 use std::collections::VecDeque;
 
 /// The content of a log line.
@@ -27,6 +28,8 @@ pub(super) struct Stretch<'a> {
     /// The first of its statuses.
     pub(super) first: Status,
     pub(super) happened: Vec<(&'a Entry, Happened<'a>)>,
+    /// Notes on lines that only a newer version knows.
+    pub(super) notes: Vec<String>,
 }
 
 impl<'a> Stretch<'a> {
@@ -35,6 +38,14 @@ impl<'a> Stretch<'a> {
         let mut settings = Settings::new();
         let (mut examples, mut built_in) = (Vec::new(), 0);
         let mut happened = Vec::new();
+        let mut notes: Vec<String> = Vec::new();
+        let mut skip = |entry: &Entry, what: &str| {
+            let name = entry.text.split([' ', '=']).next().unwrap_or_default();
+            let note = format!("{what} `{}`, which this version does not know, is left out", in_a_line(name));
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        };
         // Indices in `happened` of commands without an answer so far. Answers come in the order of commands.
         let mut unanswered = VecDeque::new();
         for entry in entries {
@@ -44,12 +55,24 @@ impl<'a> Stretch<'a> {
             };
             match entry.kind {
                 Kind::Setting => {
-                    let (setting, value) = shown(&entry.text).ok_or_else(|| wrong("no setting of this version"))?;
-                    settings.set(setting, value).map_err(|_| wrong("out of range"))?;
+                    let Some((setting, value)) = shown(&entry.text) else {
+                        let name = entry.text.split('=').next().unwrap_or_default();
+                        if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
+                            return Err(wrong("no setting"));
+                        }
+                        skip(entry, "the setting");
+                        continue;
+                    };
+                    // With another value than the machine's, the decisions are others.
+                    settings.set(setting, value).map_err(|_| wrong("out of the range of this version"))?;
                 }
                 Kind::Example => {
                     // The list may end with the number of damaged examples.
                     if entry.text.starts_with("spoiled=") {
+                        continue;
+                    }
+                    if matches!(EventLine::parse(&entry.text), Some(EventLine::Newer { .. })) {
+                        skip(entry, "the event");
                         continue;
                     }
                     let (from_field, _, example) = taught(&entry.text).ok_or_else(|| wrong("no example"))?;
@@ -62,6 +85,10 @@ impl<'a> Stretch<'a> {
                 }
                 Kind::Event => {
                     let event = EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
+                    if let EventLine::Newer { .. } = event {
+                        skip(entry, "the event");
+                        continue;
+                    }
                     happened.push((entry, Happened::Event(event)));
                 }
                 Kind::Command => {
@@ -80,7 +107,7 @@ impl<'a> Stretch<'a> {
             }
         }
         let first = happened.iter().find_map(status).cloned();
-        Ok(first.map(|first| Self { settings, examples, built_in, first, happened }))
+        Ok(first.map(|first| Self { settings, examples, built_in, first, happened, notes }))
     }
 
     /// The position from which the machine is replayed. If the log shows where watching began, it is that, or a little
