@@ -1,14 +1,19 @@
 //! `weeder flash`: builds the firmware, proves its bounds, and flashes it with avrdude.
 
+mod avrdude;
+mod bootloader;
+
+use self::bootloader::{ATMEGA328P, Heard, Signature, heard};
 use crate::bounds::Firmware;
 use crate::output::say;
 use crate::ports::Port;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use std::collections::HashSet;
-use std::io::{self, BufRead, BufReader, Write};
+use link::Claim;
+use link::row_names::Board;
+use std::io;
 use std::path::{self, Path};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use trial::firmware;
 use uno::elf::Image;
 use uno::hex;
@@ -33,34 +38,122 @@ pub struct Arguments {
     firmware: Firmware,
 }
 
-/// Baud rates of the bootloader, Optiboot's and its predecessor's.
-const BAUD: u32 = 115_200;
-const OLD_BAUD: u32 = 57_600;
+/// A bootloader: its rate in bits a second, and the flash that it leaves. It takes the last 512 or 2048 bytes of 32 KiB.
+#[derive(Clone, Copy)]
+struct Bootloader {
+    baud: u32,
+    available: usize,
+    /// What the user adds to the command for it.
+    option: &'static str,
+}
 
-/// Flash for the firmware, in bytes, with each bootloader: they take the last 512 and the last 2048 of 32 KiB.
-const AVAILABLE_BYTES: usize = 32_256;
+const OPTIBOOT: Bootloader = Bootloader { baud: 115_200, available: 32_256, option: "without --old-bootloader" };
+const OLD: Bootloader = Bootloader { baud: 57_600, available: OLD_AVAILABLE_BYTES, option: "with --old-bootloader" };
+
+/// Flash for the firmware beside the old bootloader, in bytes.
 pub const OLD_AVAILABLE_BYTES: usize = 30_720;
 
 /// Flashes, with each of avrdude's own messages once on the terminal.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let (baud, available) =
-        if arguments.old_bootloader { (OLD_BAUD, OLD_AVAILABLE_BYTES) } else { (BAUD, AVAILABLE_BYTES) };
-    let port = arguments.port.board()?.port()?;
-    // This check comes before the build, and its error says more than avrdude's.
+    let (bootloader, other) = if arguments.old_bootloader { (OLD, OPTIBOOT) } else { (OPTIBOOT, OLD) };
+    let board = arguments.port.board()?;
+    let port = board.port()?;
+    // These checks come before the build, and their errors say more than avrdude's.
     link::try_port(&port)?;
+    let claim = link::claim(&port)?;
+    if let (Board::Only { .. }, Some(converter)) = (&board, link::converter_at(&port)) {
+        let heard = [bootloader, other].map(|bootloader| heard(&claim, &port, bootloader.baud));
+        ensure!(
+            heard.iter().any(|heard| matches!(heard, Ok(Heard::Bootloader(_)))),
+            "the only candidate is {port}, a {converter} converter, and no bootloader answers there: if it is the Uno's \
+             and not another device's, name it: --port {port}"
+        );
+    }
     let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
-    hex::check_room(flash.len(), available)?;
+    hex::check_room(flash.len(), bootloader.available)?;
     arguments.firmware.check(&elf)?;
-    if arguments.ravedude && !arguments.old_bootloader && run_ravedude(&elf, &port)? {
+    say!("Writing {} to the Uno at {port}", elf.display())?;
+    say!(
+        "The servo has no signal for {} s, and the tool may fall: keep clear of it.",
+        seconds(flash.len(), bootloader.baud)
+    )?;
+    if arguments.old_bootloader {
+        say!(
+            "This bootloader does not start the machine again after a stop by its watchdog. The tool then has no signal \
+             until you switch the power off and on. Before work in a field, burn optiboot with the Arduino IDE."
+        )?;
+    } else if arguments.ravedude && run_ravedude(&elf, &port)? {
         return Ok(());
     }
-    say!("Writing {} to the Uno at {port}", elf.display())?;
     // Files beside the ELF belong to the user.
     let folder = tempfile::tempdir().context("there is no room for a temporary file")?;
     let image = folder.path().join("weeder.hex");
     std::fs::write(&image, hex::text(&flash)).context("there is no room for a temporary file")?;
-    run_avrdude(&image, &port, baud, arguments.old_bootloader)
+    let written = avrdude::write(&image, &port, bootloader.baud)?;
+    ensure!(!written.port_is_gone, "{port} is gone while the Uno was written: plug it in, and flash it again. {WHOLE}");
+    ensure!(
+        !written.is_silent,
+        "avrdude fell silent and was ended: plug the Uno out and in, and flash it again. {WHOLE}"
+    );
+    if !written.succeeded {
+        bail!("avrdude did not succeed: {}", why(&claim, &port, bootloader, other, written.signature));
+    }
+    say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")
+}
+
+/// Writing cannot reach the bootloader.
+const WHOLE: &str = "The bootloader is not changed";
+
+/// Seconds from the reset until the firmware starts: the bytes go to the Uno and back, a page takes 5 ms to write, and
+/// the bootloader waits.
+fn seconds(bytes: usize, baud: u32) -> u32 {
+    let bytes = bytes as f64;
+    (2.0 + 2.0 * bytes * 10.0 / f64::from(baud) + bytes / 128.0 * 0.005).ceil() as u32
+}
+
+/// Why avrdude did not succeed, and what to do.
+fn why(claim: &Claim, port: &str, bootloader: Bootloader, other: Bootloader, named: Option<Signature>) -> String {
+    if let Some(signature) = named.filter(|&signature| signature != ATMEGA328P) {
+        return other_chip(signature);
+    }
+    let mut device = None;
+    for answers in [bootloader, other] {
+        match heard(claim, port, answers.baud) {
+            Err(error) => return error.to_string(),
+            Ok(Heard::Bootloader(signature)) if signature != ATMEGA328P => return other_chip(signature),
+            Ok(Heard::Bootloader(_)) if answers.baud == bootloader.baud => {
+                return "the bootloader answers now: flash it again. If it fails again, pull D0 and D1 free of other \
+                        devices, and take another cable"
+                    .to_owned();
+            }
+            Ok(Heard::Bootloader(_)) => {
+                return format!("its bootloader answers at {} baud: flash it {}", answers.baud, answers.option);
+            }
+            Ok(Heard::Text(text)) => device = device.or(Some(text)),
+            Ok(Heard::Nothing) => {}
+        }
+    }
+    match device {
+        Some(text) if text.contains("weeder ") => {
+            "the weeder's firmware answers, and no bootloader: press the board's \
+             reset when the command begins to write. A board without a bootloader needs a programmer"
+                .to_owned()
+        }
+        Some(text) => format!("another device sends {text:?}: name the Uno's port by --port"),
+        None => format!(
+            "no bootloader answers at {} or {} baud: pull D0 and D1 free of other devices, press the board's reset when \
+             the command begins to write, and see that {port} is the Uno's",
+            OPTIBOOT.baud, OLD.baud
+        ),
+    }
+}
+
+fn other_chip(signature: Signature) -> String {
+    format!(
+        "the board has another chip, {}: nothing was written. The firmware is for the Uno's ATmega328P",
+        bootloader::chip(signature)
+    )
 }
 
 /// Flashes an ELF with ravedude. Returns whether it is installed.
@@ -79,81 +172,13 @@ fn run_ravedude(elf: &Path, port: &str) -> Result<bool> {
     }
 }
 
-/// Writes and verifies an Intel HEX file with avrdude.
-fn run_avrdude(image: &Path, port: &str, baud: u32, old_bootloader: bool) -> Result<()> {
-    let mut avrdude = Command::new("avrdude")
-        // Each page is erased before it is written: a bootloader cannot erase the chip.
-        .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])
-        .arg("-U")
-        .arg(format!("flash:w:{}:i", image.display()))
-        .stderr(Stdio::piped())
-        .spawn()
-        .context("avrdude cannot be started: ./setup.sh installs it")?;
-    if let Some(words) = avrdude.stderr.take() {
-        pass_on(BufReader::new(words), io::stderr());
-    }
-    let status = avrdude.wait().context("avrdude cannot be waited for")?;
-    let other = if old_bootloader { "without" } else { "with" };
-    ensure!(
-        status.success(),
-        "avrdude did not succeed: pull D0 and D1 free of other devices, press reset and try again, or try {other} \
-         --old-bootloader"
-    );
-    say!("Done: the Uno runs it. `weeder monitor --port {port}` talks to it.")?;
-    if old_bootloader {
-        say!(
-            "With this bootloader the machine does not restart after a stop by its watchdog: the tool has no signal until you switch the power off and on. Optiboot, which Arduino's IDE can burn, has no such fault."
-        )?;
-    }
-    Ok(())
-}
-
-/// How avrdude's messages begin.
-const MESSAGE: &[u8] = b"avrdude";
-
-/// Passes on avrdude's messages, each once over all tries, and its progress at once, until the input ends.
-fn pass_on(from: impl BufRead, mut to: impl Write) {
-    // The messages that were passed on, without their numbers.
-    let mut said = HashSet::new();
-    let (mut line, mut passed) = (Vec::new(), 0);
-    for byte in from.bytes().map_while(Result::ok).map(Some).chain([None]) {
-        line.extend(byte);
-        let ends = matches!(byte, None | Some(b'\n' | b'\r'));
-        let is_shown = match line.starts_with(MESSAGE) {
-            true => {
-                ends && said.insert(line.iter().filter(|byte| !byte.is_ascii_hexdigit()).copied().collect::<Vec<_>>())
-            }
-            // It may become a message.
-            false => ends || !MESSAGE.starts_with(&line),
-        };
-        if is_shown {
-            // If the output is closed, no message can be shown. avrdude goes on.
-            let _ = to.write_all(&line[passed..]).and_then(|()| to.flush());
-            passed = line.len();
-        }
-        if ends {
-            line.clear();
-            passed = 0;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_repeated_message_is_printed_once_and_progress_at_once() {
-        let mut words = String::from("avrdude: ser_open(): no modem lines\n\n");
-        for attempt in 1..=10 {
-            words += &format!("avrdude: stk500_getsync() attempt {attempt} of 10: not in sync: resp=0x{attempt:02x}\n");
-        }
-        words += "Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you.";
-        let mut said = Vec::new();
-        pass_on(words.as_bytes(), &mut said);
-        let said = String::from_utf8(said).unwrap();
-        assert_eq!(said.matches("not in sync").count(), 1, "{said}");
-        assert!(said.starts_with("avrdude: ser_open(): no modem lines\n\navrdude: stk500_getsync() attempt 1 of 10"));
-        assert!(said.ends_with("Writing | #### | 10%\rWriting | ######## | 20%\navrdude done.  Thank you."), "{said}");
+    fn the_time_without_a_signal_counts_both_ways_at_either_rate() {
+        // 29,400 bytes both ways take 5.1 s at 115200 baud and 10.2 at 57600, and 230 pages 1.2 s.
+        assert_eq!([OPTIBOOT, OLD].map(|bootloader| seconds(29_400, bootloader.baud)), [9, 14]);
     }
 }

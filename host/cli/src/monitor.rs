@@ -4,7 +4,9 @@
 //! adds the keyboard. [`plain`] works without a screen: lines in, lines out.
 
 mod command_line;
+mod input;
 mod model;
+mod pager;
 mod plain;
 mod terminal;
 mod view;
@@ -16,20 +18,22 @@ use anyhow::Result;
 use clap::Args;
 use link::row_names::ALL;
 use link::rows::Rows;
+use link::session::HOLD;
 use std::path::PathBuf;
 
 #[derive(Args)]
 #[command(after_help = "\
 Keys:\n  \
     Esc                  HOLD to every row; drops the line that you are typing\n  \
-    Page Up, Page Down   select the row for commands, or all; `left: status` does it for one command\n  \
+    Page Up, Page Down   earlier lines, later lines; with several rows Ctrl-Up, Ctrl-Down\n  \
+    Page Up, Page Down   with several rows: select the row for commands, or all\n  \
     Tab, Up, Down        complete, recall earlier lines\n  \
-    Ctrl-C               end\n\
+    Ctrl-U, Ctrl-C       clear the line, end\n\
 HOLD is no emergency stop: that one cuts the power.\n\nExamples:\n  \
     weeder monitor                                     watch the only Uno, and type commands\n  \
     weeder monitor --log row.csv                       also keep a log, for `weeder replay`\n  \
     weeder monitor --all                               every row of a machine at a glance\n  \
-    echo status | weeder monitor --plain               from a script; status 1 if refused\n  \
+    echo status | weeder monitor --plain               from a script; status 1 if refused, 2 if not sent\n  \
     echo left: status | weeder monitor --plain --all   to one row; without a name, to all")]
 pub struct Arguments {
     #[command(flatten)]
@@ -54,7 +58,7 @@ fn addressed<'a>(line: &'a str, names: &[String], chosen: Option<usize>) -> Resu
         _ => (chosen, line.trim()),
     };
     match link::is_command(command) {
-        true => Ok((to, command)),
+        true => Ok((to, if link::is_hold(command) { HOLD } else { command })),
         false => Err(format!(
             "{command:?} is no command: it has to be one line of at most {} printable ASCII characters",
             link::COMMAND_LENGTH
@@ -72,7 +76,7 @@ fn row(name: &str, names: &[String]) -> Result<Option<usize>, String> {
 /// Sends a command to a row. `hold` comes before all waiting commands.
 fn send(rows: &Rows, row: usize, command: &str) {
     match command {
-        "hold" => rows.hold(row),
+        HOLD => rows.hold(row),
         _ => rows.command(row, command),
     }
 }

@@ -98,7 +98,7 @@ impl Port {
     pub fn board(&self) -> Result<Board> {
         match &self.port {
             Some(port) => self.names.board(port),
-            None => Ok(Board::Only),
+            None => Ok(Board::Only { beside: None }),
         }
     }
 
@@ -153,10 +153,18 @@ impl Ports {
     /// # Errors
     /// If there is none, two have a name, or the file of the names cannot be read.
     pub fn choose(&self) -> Result<Chosen> {
+        self.choose_beside(None)
+    }
+
+    /// The chosen rows. A device at the port `beside`, such as a receiver, is none.
+    ///
+    /// # Errors
+    /// As [`choose`](Self::choose).
+    pub fn choose_beside(&self, beside: Option<&str>) -> Result<Chosen> {
         let rows = if self.all {
-            every_row(&self.names.read()?)?
+            every_row(&self.names.read()?, beside)?
         } else if self.port.is_empty() {
-            vec![Row { name: "Uno".to_owned(), board: Board::Only }]
+            vec![Row { name: "Uno".to_owned(), board: Board::Only { beside: beside.map(str::to_owned) } }]
         } else {
             self.port.iter().map(|machine| row(machine, &self.names)).collect::<Result<_>>()?
         };
@@ -191,13 +199,13 @@ fn end_of(port: &str) -> String {
 
 /// The Unos that control no row with a name.
 pub fn unnamed<'a>(names: &'a Names, unos: &'a [Plugged]) -> impl Iterator<Item = &'a Plugged> {
-    let has = |row: &Row, uno: &Plugged| row.board == uno.board || row.board == Board::Port(uno.port.clone());
-    unos.iter().filter(move |uno| !names.rows().iter().any(|row| has(row, uno)))
+    unos.iter().filter(|uno| !names.rows().iter().any(|row| row.board.is(uno)))
 }
 
 /// Every row with a name, and every other Uno.
-fn every_row(names: &Names) -> Result<Vec<Row>> {
-    let (mut rows, unos) = (names.rows().to_vec(), plugged()?);
+fn every_row(names: &Names, beside: Option<&str>) -> Result<Vec<Row>> {
+    let (mut rows, mut unos) = (names.rows().to_vec(), plugged()?);
+    unos.retain(|uno| beside.is_none_or(|beside| !link::is_same(&uno.port, beside)));
     rows.extend(unnamed(names, &unos).map(|uno| Row { name: end_of(&uno.port), board: uno.board.clone() }));
     ensure!(
         !rows.is_empty(),

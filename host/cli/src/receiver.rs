@@ -74,6 +74,11 @@ pub struct GpsArguments {
 }
 
 impl GpsArguments {
+    /// The receiver's port, if the user named one.
+    pub fn port(&self) -> Option<&str> {
+        self.gps.as_ref().map(|gps| gps.port.as_str())
+    }
+
     /// The receiver, if the user named one, and the first lines of the record.
     ///
     /// # Errors

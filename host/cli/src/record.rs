@@ -11,6 +11,7 @@ use gps::recorder::Lines;
 use link::log::{LogError, LogWriter};
 use link::rows::{Rows, What};
 use link::session::Happening;
+use link::settings::other_version;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -41,7 +42,7 @@ pub struct Arguments {
 
 /// Records until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let chosen = arguments.ports.choose()?;
+    let chosen = arguments.ports.choose_beside(arguments.gps.port())?;
     let gps = arguments.gps.open(&chosen)?;
     let mut logs = Logs::open(&arguments.out, &chosen)?;
     let mut gps = match gps {
@@ -72,8 +73,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             gps.happened(logs.now_ms(heard.row), &happening);
         }
         match happening {
-            Happening::Connected { version, .. } => {
+            Happening::Connected { version, shown, .. } => {
                 tell!("{}", chosen.under_name(heard.row, &format!("weeder {version} is there")));
+                if let Some(other) = other_version(&version, &shown) {
+                    tell!("{}", chosen.under_name(heard.row, &other));
+                }
             }
             Happening::Lost(why) => tell!("{}", chosen.under_name(heard.row, &why)),
             _ => {}

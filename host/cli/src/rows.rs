@@ -90,7 +90,7 @@ fn list(names: &Names, json: bool) -> Result<()> {
             let (serial_number, known_port) = match &line.board {
                 Board::SerialNumber(number) => (Some(number), None),
                 Board::Port(port) => (None, Some(port)),
-                Board::Only => (None, None),
+                Board::Only { .. } => (None, None),
             };
             json!({ "name": line.name, "serial_number": serial_number, "known_port": known_port, "port": line.port })
         };
@@ -113,7 +113,7 @@ fn list(names: &Names, json: bool) -> Result<()> {
 fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<Line> {
     let now = |board: &Board| match board {
         Board::Port(port) if exists(port) => Some(port.clone()),
-        _ => unos.iter().find(|uno| uno.board == *board).map(|uno| uno.port.clone()),
+        board => unos.iter().find(|uno| board.is(uno)).map(|uno| uno.port.clone()),
     };
     let rows = names.rows().iter();
     let rows = rows.map(|row| Line { name: Some(row.name.clone()), port: now(&row.board), board: row.board.clone() });
@@ -128,7 +128,7 @@ fn lines(names: &Names, unos: &[Plugged], exists: impl Fn(&str) -> bool) -> Vec<
 /// A board's identification, in words.
 fn described(board: &Board) -> String {
     match board {
-        Board::Only => "the only Uno".to_owned(),
+        Board::Only { .. } => "the only Uno".to_owned(),
         Board::SerialNumber(number) => format!("the board with the serial number {number}"),
         Board::Port(port) => format!("the board at {port}"),
     }

@@ -10,8 +10,8 @@ use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
 use field::conditions::Conditions;
 use link::row_names::Row;
-use link::settings::{self, Setting, Settings, name, unit};
-use link::settings_file;
+use link::settings::{self, Setting, SettingsError, Shown, name, unit};
+use link::settings_file::{self, Named};
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -98,8 +98,8 @@ fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -
         folder if chosen.are_several => Some(Chosen::file_in(folder, row, "toml")),
         file => Some(file.to_owned()),
     };
-    let pulled = chosen.each(|_, link| Ok(settings::read(link)?));
-    let write = |(row, pulled): (&Row, Result<Settings>)| {
+    let pulled = chosen.each(|_, link| Ok(settings::read_shown(link)?));
+    let write = |(row, pulled): (&Row, Result<Shown>)| {
         let settings = pulled?;
         folder.as_ref().map_or(Ok(()), OutFolder::make)?;
         path(row).map_or(Ok(()), |path| settings_file::write(&path, &settings))?;
@@ -116,7 +116,8 @@ fn pull(file: Option<&OutName>, replace: Replace, json: bool, chosen: &Chosen) -
 fn push(file: &Path, save: bool, json: bool, chosen: &Chosen) -> Result<Finding> {
     let wanted = chosen.wanted(file)?;
     let pushed = chosen.each(|row, link| {
-        Ok(settings::push(link, &wanted[&row.name], save)?.into_iter().map(name).collect::<Vec<_>>())
+        let wanted = &wanted[&row.name];
+        Ok(settings::push_all(link, &wanted.settings, &wanted.foreign, save)?)
     });
     let in_json = |set: &Vec<String>| json!({ "set": set, "saved": save });
     chosen.show(pushed, json, in_json, |place, set| {
@@ -135,10 +136,11 @@ fn push(file: &Path, save: bool, json: bool, chosen: &Chosen) -> Result<Finding>
 
 fn diff(file: &Path, json: bool, chosen: &Chosen) -> Result<Finding> {
     let wanted = chosen.wanted(file)?;
-    let found = chosen.each(|row, link| Ok(differences(&wanted[&row.name], &settings::read(link)?)));
+    let found = chosen.each(|row, link| Ok(differences(&wanted[&row.name], &settings::read_shown(link)?)?));
     let differs = found.iter().flatten().any(|differences| !differences.is_empty());
     let in_json = |differences: &Vec<Difference>| {
-        let of_one = |&(setting, file, machine): &Difference| json!({ "setting": name(setting), "file": value(setting, file), "machine": value(setting, machine) });
+        let of_one =
+            |(name, file, machine, _): &Difference| json!({ "setting": name, "file": file, "machine": machine });
         differences.iter().map(of_one).collect()
     };
     chosen.show(found, json, in_json, |place, differences| {
@@ -157,7 +159,7 @@ fn diff(file: &Path, json: bool, chosen: &Chosen) -> Result<Finding> {
 
 impl Chosen {
     /// The settings for each row, by its name. All files are read before anything is sent.
-    fn wanted(&self, file: &Path) -> Result<HashMap<String, Vec<(Setting, u16)>>> {
+    fn wanted(&self, file: &Path) -> Result<HashMap<String, Named>> {
         if !file.is_dir() {
             let wanted = wanted(file)?;
             return Ok(self.rows.iter().map(|row| (row.name.clone(), wanted.clone())).collect());
@@ -202,7 +204,7 @@ impl Chosen {
 }
 
 /// The settings of a file, at least one.
-fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
+fn wanted(file: &Path) -> Result<Named> {
     // Its leads and its stroke, on another machine, would bring the tool over plants.
     let is_preset = !file.exists() && file.to_str().and_then(Conditions::preset).is_some();
     ensure!(
@@ -211,30 +213,48 @@ fn wanted(file: &Path) -> Result<Vec<(Setting, u16)>> {
         file.display()
     );
     let wanted = settings_file::read(file)?;
-    ensure!(!wanted.is_empty(), "{} names no setting: `weeder settings pull` writes them all", file.display());
+    ensure!(wanted != Named::default(), "{} names no setting: `weeder settings pull` writes them all", file.display());
     Ok(wanted)
 }
 
-/// A setting that the machine has otherwise than the file: with the file's value and the machine's.
-type Difference = (Setting, u16, u16);
+/// A setting that the machine has otherwise than the file: its name, the file's value, the machine's, and its unit.
+type Difference = (String, Value, Value, String);
 
-fn differences(wanted: &[(Setting, u16)], found: &Settings) -> Vec<Difference> {
-    let with_found = wanted.iter().map(|&(setting, value)| (setting, value, found.get(setting)));
-    with_found.filter(|(_, file, machine)| file != machine).collect()
+fn differences(wanted: &Named, found: &Shown) -> Result<Vec<Difference>, SettingsError> {
+    let mut differences = Vec::new();
+    for &(setting, file) in &wanted.settings {
+        let own = found.others.iter().find(|other| other.name == name(setting)).map(|other| Value::from(other.value));
+        let machine = match found.missing.contains(&setting) {
+            true => own.unwrap_or(Value::Null),
+            false => value(setting, found.settings.get(setting)),
+        };
+        differences.push((name(setting), value(setting, file), machine, unit(setting)));
+    }
+    for foreign in &wanted.foreign {
+        let own = found.takes(foreign)?;
+        let value = |number: u16| if own.is_switched { Value::from(number != 0) } else { Value::from(number) };
+        differences.push((own.name.clone(), value(foreign.value), value(own.value), own.unit.clone()));
+    }
+    differences.retain(|(_, file, machine, _)| file != machine);
+    Ok(differences)
 }
 
 fn table(differences: &[Difference]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_BORDERS_ONLY).set_header(["setting", "file", "machine", "unit"]);
-    for &(setting, file, machine) in differences {
-        let [file, machine] = [file, machine].map(|number| value(setting, number).to_string());
-        table.add_row([name(setting), file, machine, unit(setting)]);
+    for (name, file, machine, unit) in differences {
+        table.add_row([name, &file.to_string(), &machine.to_string(), unit]);
     }
     table
 }
 
-fn as_json(settings: &Settings) -> Value {
-    Setting::all().map(|setting| (name(setting), value(setting, settings.get(setting)))).collect()
+fn as_json(shown: &Shown) -> Value {
+    let known = Setting::all().filter(|setting| !shown.missing.contains(setting));
+    let known = known.map(|setting| (name(setting), value(setting, shown.settings.get(setting))));
+    let others = shown.others.iter().map(|other| {
+        (other.name.clone(), if other.is_switched { Value::from(other.value != 0) } else { Value::from(other.value) })
+    });
+    known.chain(others).collect()
 }
 
 /// A setting's value in JSON, as in the file.

@@ -29,7 +29,7 @@ enum ShortLines {
 }
 
 /// What may separate the cells of a line, the usual one first.
-const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
+const SEPARATORS: [u8; 3] = *b",;\t";
 
 impl CsvTable {
     /// Reads a file as [`parse`](Self::parse) parses its text.

@@ -2,6 +2,7 @@
 
 use control::say::command::LINE_LENGTH;
 use std::io;
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// Why there is no link, or no good answer.
@@ -11,11 +12,13 @@ pub enum LinkError {
     #[cfg(not(target_arch = "wasm32"))]
     #[error("the serial ports cannot be listed: name the Uno's by --port")]
     NoList(#[source] serialport::Error),
-    #[error(
-        "there is no Uno at any USB port{}: plug it in with a cable that carries data, or name its port by --port",
-        others(.0)
-    )]
-    NoUno(Vec<String>),
+    #[error("there is no Uno at any USB port{}: {}", others(.ports), remedy(.without_port))]
+    NoUno {
+        /// The other ports.
+        ports: Vec<String>,
+        /// Known devices on the USB bus that have no port.
+        without_port: Vec<&'static str>,
+    },
     #[error("there are several Unos: choose one by --port, of {}", .0.join(", "))]
     SeveralUnos(Vec<String>),
     #[error(
@@ -31,6 +34,10 @@ pub enum LinkError {
     Absent(String),
     #[error("{0} is in use: close the serial monitor, or the other program that has it open")]
     Busy(String),
+    #[error("{0} is being flashed by another program: wait until that has ended")]
+    Flashed(String),
+    #[error("{} cannot be locked, so another program could write to the same Uno", .path.display())]
+    NotClaimed { path: PathBuf, source: io::Error },
     #[error(
         "{0} may not be opened: add yourself to the port's group (on Debian and Ubuntu `sudo usermod -aG dialout $USER`) \
          and log in again"
@@ -69,4 +76,18 @@ pub enum LinkError {
 /// The other ports, for the message that none of them is an Uno's.
 fn others(ports: &[String]) -> String {
     if ports.is_empty() { String::new() } else { format!(" (there is {})", ports.join(", ")) }
+}
+
+/// What to do if there is no Uno.
+fn remedy(without_port: &[&str]) -> String {
+    const OF_THE_SYSTEM: &str = if cfg!(target_os = "linux") {
+        "on Linux, brltty may have taken it: remove that program with `sudo apt remove brltty`, then plug it in again"
+    } else {
+        "install the driver of its maker, then plug it in again"
+    };
+    if without_port.is_empty() {
+        return "plug it in with a cable that carries data, or name its port by --port".to_owned();
+    }
+    let (is, has) = if without_port.len() == 1 { ("is", "has") } else { ("are", "have") };
+    format!("{} {is} on the USB bus and {has} no port; {OF_THE_SYSTEM}", without_port.join(" and "))
 }

@@ -1,7 +1,7 @@
 //! Parses the firmware's lines with `key=value` words: events, and the answer to `status`.
 //!
-//! Lines are `name key=value key=value`. Unknown keys are ignored, so that a newer firmware may add more. A line that
-//! lacks a key, or has an invalid value, does not match.
+//! Lines are `name key=value key=value`. Unknown keys are ignored, so that a newer firmware may add more. An event
+//! that lacks a key, or has a value that is not known here, is [`EventLine::Newer`].
 
 use control::alarm::{Alarm, Warning};
 use control::ground::{class::Class, features};
@@ -55,6 +55,11 @@ macro_rules! event_lines {
             )*
             /// Points of a plotter's curves.
             Plot,
+            /// An event that only a newer firmware has, or a value of one. The line says what it is.
+            Newer {
+                /// Whether it is an alarm.
+                is_alarm: bool,
+            },
         }
 
         /// All events, in the order of the table.
@@ -85,16 +90,17 @@ macro_rules! event_lines {
                         return Some(event);
                     }
                 )*
-                None
+                is_event(line).then(|| Self::Newer { is_alarm: line.starts_with("alarm ") })
             }
 
-            /// The event's name in [`EVENTS`], or `Plot`, and its fields by name.
+            /// The event's name in [`EVENTS`], or `Plot` or `Newer`, and its fields by name.
             pub fn fields(&self) -> Fields {
                 match *self {
                     $(Self::$Event { $($($field,)?)* } => {
                         (stringify!($Event), vec![$($((stringify!($field), $field.into()),)?)*])
                     })*
                     Self::Plot => ("Plot", Vec::new()),
+                    Self::Newer { is_alarm } => ("Newer", vec![("is_alarm", is_alarm.into())]),
                 }
             }
         }
@@ -316,6 +322,17 @@ pub(super) mod kind {
     }
 }
 
+/// Whether a line has the form of an event: its name, then a value with its key. No line of an answer has.
+fn is_event(line: &str) -> bool {
+    let is_name =
+        |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+    let is_value = |word: &str| word.split_once('=').is_some_and(|(key, value)| is_name(key) && !value.is_empty());
+    let mut words = line.split(' ');
+    line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
+        && words.next().is_some_and(is_name)
+        && words.next().is_some_and(is_value)
+}
+
 /// Whether a line is plotter data: `label:value,label:value`, or Teleplot's format.
 fn is_plot(line: &str) -> bool {
     let point = |point: &str| {
@@ -489,6 +506,7 @@ mod tests {
     #[test]
     fn lines_of_other_versions_and_curves_are_events_and_nothing_else_is() {
         let too_fast = Some(EventLine::Alarm { alarm: Alarm::TooFast, position: 1 });
+        let newer = |is_alarm| Some(EventLine::Newer { is_alarm });
         for (line, meant) in [
             ("alarm code=3-1 name=too_fast pos=1", too_fast),
             // In the format of version 0.1.
@@ -505,17 +523,19 @@ mod tests {
             ("", None),
             ("ok", None),
             ("plant", None),
-            ("plant pos=1 votes=3", None),
-            ("swing tool=up pos=1", None),
-            ("swing tool=out pos=99999999999", None),
+            ("tilt deg=4 of=5, rising", newer(false)),
+            ("tilt d\u{fffd}g=4", None),
+            ("plant pos=1 votes=3", newer(false)),
+            ("swing tool=up pos=1", newer(false)),
+            ("swing tool=out pos=99999999999", newer(false)),
             ("state=work tool=in pos=1", None),
-            ("alarm code=1-1 name=boredom pos=1", None),
+            ("alarm code=1-1 name=boredom pos=1", newer(true)),
             ("warning name=", None),
-            ("calibrated by=hand", None),
-            ("calibrated lead_out_ms=150 set=yes", None),
+            ("calibrated by=hand", newer(false)),
+            ("calibrated lead_out_ms=150 set=yes", newer(false)),
             ("guardedpos=1", None),
             ("pos=1 swing tool=out", None),
-            ("plant pos=1 votes=300 spacing=1 delay=1 hold=1 actuation=1", None),
+            ("plant pos=1 votes=300 spacing=1 delay=1 hold=1 actuation=1", newer(false)),
         ] {
             assert_eq!(EventLine::parse(line), meant, "{line}");
         }

@@ -42,7 +42,7 @@ pub use self::event_line::{
 };
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
-pub use self::port::{find_uno, listen, open_other, try_port};
+pub use self::port::{Claim, claim, converter_at, find_uno, is_same, listen, open_other, open_to_flash, try_port};
 pub use control::{ground::class::Class, say::names};
 
 use std::collections::VecDeque;
@@ -110,7 +110,7 @@ impl Link {
     /// If the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
-        let name = port.map_or_else(find_uno, |port| Ok(port.to_owned()))?;
+        let name = port.map_or_else(|| find_uno(None), |port| Ok(port.to_owned()))?;
         let (port, resets) = port::open(&name)?;
         // Without a second handle, a stalled port may send its bytes later.
         let serial = port.try_clone().ok();
@@ -138,8 +138,10 @@ impl Link {
         link.wait_until_quiet()?;
         let mut answer = link.ask("version");
         let mut retries = 0;
-        // The Uno may be starting right now for another reason than this opening.
-        while retries < RETRIES && matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. })) {
+        // The Uno may be starting right now for another reason than this opening. Characters that came before are lost.
+        while retries < RETRIES
+            && matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. } | LinkError::Refused { .. }))
+        {
             answer = link.ask("version");
             retries += 1;
         }
@@ -192,8 +194,8 @@ impl Link {
                     return Err(LinkError::Refused { command: command.to_owned(), answer: line });
                 }
                 ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
-                // An event can come before an answer, never within it.
-                ConsoleLine::Event(_) if answer.is_empty() => self.events.push_back(line),
+                // The form of an event is no answer's. A newer firmware may send one at any time.
+                ConsoleLine::Event(_) => self.events.push_back(line),
                 _ => answer.push(line),
             }
         }

@@ -6,7 +6,6 @@
 //! is read. So a power failure damages at most the last line.
 
 use super::session::Happening;
-use super::settings::{Setting, name};
 use files::{CsvTable, FileError, in_a_line};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -131,11 +130,12 @@ impl LogWriter {
     /// If the file cannot be written.
     pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
         match happening {
-            Happening::Connected { version, settings, examples, .. } => {
+            Happening::Connected { version, shown, examples, .. } => {
                 self.line(time_ms, Kind::Connected, version)?;
-                for setting in Setting::all() {
-                    let line = format!("{}={}", name(setting), settings.get(setting));
-                    self.line(time_ms, Kind::Setting, &line)?;
+                // As they came: a newer firmware has settings, or values, that this program does not know.
+                for line in shown.iter().filter(|line| line.contains('=')) {
+                    let value = line.split([' ', ',']).next().unwrap_or_default();
+                    self.line(time_ms, Kind::Setting, value)?;
                 }
                 examples.iter().try_for_each(|example| self.line(time_ms, Kind::Example, example))
             }

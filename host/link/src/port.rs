@@ -4,8 +4,12 @@
 //! port.
 
 use super::error::LinkError;
+use nusb::MaybeFuture;
 use serialport::{ErrorKind, SerialPort, SerialPortInfo, SerialPortType, UsbPortInfo};
+use std::collections::HashSet;
+use std::fs::{File, TryLockError};
 use std::io::{self, Read};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Bits in a second on the firmware's serial line.
@@ -14,43 +18,141 @@ const BAUD: u32 = 115_200;
 /// Longest wait of a read for a byte, and of a write for room.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// USB vendors and products of the Uno, and of the converters on compatible boards.
-const UNOS: [(u16, u16); 10] = [
-    (0x2341, 0x0001),
-    (0x2341, 0x0043),
-    (0x2341, 0x0243),
-    (0x2A03, 0x0043),
-    (0x2A03, 0x0243),
-    (0x1A86, 0x7523), // CH340
-    (0x1A86, 0x5523), // CH341
-    (0x0403, 0x6001), // FT232R
-    (0x0403, 0x6015), // FT231X
-    (0x10C4, 0xEA60), // CP2102
+/// USB vendors and products of the Uno.
+const UNOS: [(u16, u16); 5] =
+    [(0x2341, 0x0001), (0x2341, 0x0043), (0x2341, 0x0243), (0x2A03, 0x0043), (0x2A03, 0x0243)];
+
+/// Those of the converters on compatible boards, and their names. Other devices have them too, such as satellite receivers.
+const CONVERTERS: [((u16, u16), &str); 15] = [
+    ((0x1A86, 0x7523), "CH340"),
+    ((0x1A86, 0x7522), "CH340K"),
+    ((0x1A86, 0x5523), "CH341"),
+    ((0x1A86, 0x55D3), "CH343"),
+    ((0x1A86, 0x55D4), "CH9102"),
+    ((0x0403, 0x6001), "FT232R"),
+    ((0x0403, 0x6015), "FT231X"),
+    ((0x10C4, 0xEA60), "CP2102"),
+    ((0x067B, 0x2303), "PL2303"),
+    ((0x067B, 0x23A3), "PL2303GC"),
+    ((0x067B, 0x23B3), "PL2303GB"),
+    ((0x067B, 0x23C3), "PL2303GT"),
+    ((0x067B, 0x23D3), "PL2303GL"),
+    ((0x067B, 0x23E3), "PL2303GE"),
+    ((0x067B, 0x23F3), "PL2303GS"),
 ];
 
-/// The only Uno's port among those of this machine.
+/// How a Mac names the two ports of a device: for a program that calls out, and for one that waits for a call.
+const CALLS_OUT: &str = "/dev/cu.";
+const IS_CALLED: &str = "/dev/tty.";
+
+/// All ports of this computer, each once.
+///
+/// # Errors
+/// If the system has no list of its ports.
+pub(super) fn listed() -> Result<Vec<SerialPortInfo>, LinkError> {
+    serialport::available_ports().map(merged).map_err(LinkError::NoList)
+}
+
+/// Leaves out the second port of each device on a Mac.
+fn merged(mut ports: Vec<SerialPortInfo>) -> Vec<SerialPortInfo> {
+    let names: HashSet<String> = ports.iter().map(|port| port.port_name.clone()).collect();
+    ports.retain(|port| {
+        let first = calling_out(&port.port_name);
+        first == port.port_name || !names.contains(&first)
+    });
+    ports
+}
+
+/// A Mac's port for a program that calls out, if this is the other port of a device.
+pub(super) fn calling_out(port: &str) -> String {
+    port.strip_prefix(IS_CALLED).map_or_else(|| port.to_owned(), |device| format!("{CALLS_OUT}{device}"))
+}
+
+/// Whether two names lead to the same port.
+#[must_use]
+pub fn is_same(one: &str, other: &str) -> bool {
+    let resolved = |port: &str| {
+        let path = std::fs::canonicalize(port).map_or_else(|_| port.to_owned(), |path| path.display().to_string());
+        calling_out(&path)
+    };
+    resolved(one) == resolved(other)
+}
+
+/// The only Uno's port among those of this machine. A device at the port `beside` is none.
 ///
 /// # Errors
 /// If there is none, or several.
-pub fn find_uno() -> Result<String, LinkError> {
-    only_uno(&serialport::available_ports().map_err(LinkError::NoList)?)
+pub fn find_uno(beside: Option<&str>) -> Result<String, LinkError> {
+    only_uno(&listed()?, beside, on_the_bus)
 }
 
-fn only_uno(ports: &[SerialPortInfo]) -> Result<String, LinkError> {
-    let unos: Vec<String> = ports.iter().filter(|port| is_uno(port)).map(|port| port.port_name.clone()).collect();
-    match unos.as_slice() {
-        [only] => Ok(only.clone()),
-        [] => Err(LinkError::NoUno(ports.iter().map(|port| port.port_name.clone()).collect())),
-        _ => Err(LinkError::SeveralUnos(unos)),
+/// True Unos come before boards with a converter, because other devices have such converters too.
+fn only_uno(
+    ports: &[SerialPortInfo],
+    beside: Option<&str>,
+    on_the_bus: impl FnOnce() -> Vec<(u16, u16)>,
+) -> Result<String, LinkError> {
+    let free = || ports.iter().filter(|port| beside.is_none_or(|beside| !is_same(&port.port_name, beside)));
+    let unos: Vec<&SerialPortInfo> =
+        free().filter(|port| number(port).is_some_and(|number| UNOS.contains(&number))).collect();
+    let found = if unos.is_empty() { free().filter(|port| is_uno(port)).collect() } else { unos };
+    match found.as_slice() {
+        [only] => Ok(only.port_name.clone()),
+        [] => Err(LinkError::NoUno {
+            ports: free().map(|port| port.port_name.clone()).collect(),
+            without_port: without_port(&on_the_bus(), ports),
+        }),
+        several => Err(LinkError::SeveralUnos(several.iter().map(|port| named(port)).collect())),
+    }
+}
+
+/// The USB vendor and product of the device at a port.
+fn number(port: &SerialPortInfo) -> Option<(u16, u16)> {
+    match &port.port_type {
+        SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => Some((*vid, *pid)),
+        _ => None,
     }
 }
 
 /// Whether the port belongs to an Uno or a compatible board, by its USB vendor and product.
 pub(super) fn is_uno(port: &SerialPortInfo) -> bool {
-    match &port.port_type {
-        SerialPortType::UsbPort(UsbPortInfo { vid, pid, .. }) => UNOS.contains(&(*vid, *pid)),
-        _ => false,
-    }
+    number(port).is_some_and(|number| name(number).is_some())
+}
+
+/// The name of an Uno or a converter.
+fn name(number: (u16, u16)) -> Option<&'static str> {
+    let converter = || CONVERTERS.iter().find(|(known, _)| *known == number).map(|(_, name)| *name);
+    if UNOS.contains(&number) { Some("Uno") } else { converter() }
+}
+
+/// The converter at a port, if it is one that devices other than an Uno have too.
+#[must_use]
+pub fn converter_at(port: &str) -> Option<&'static str> {
+    let ports = listed().ok()?;
+    let port = ports.iter().find(|listed| is_same(&listed.port_name, port))?;
+    number(port).and_then(name).filter(|name| *name != "Uno")
+}
+
+fn named(port: &SerialPortInfo) -> String {
+    let name = number(port).and_then(name);
+    name.map_or_else(|| port.port_name.clone(), |name| format!("{} ({name})", port.port_name))
+}
+
+/// The USB vendors and products of all devices.
+fn on_the_bus() -> Vec<(u16, u16)> {
+    // Without the list, the message does not name devices without a port.
+    let devices = nusb::list_devices().wait().into_iter().flatten();
+    devices.map(|device| (device.vendor_id(), device.product_id())).collect()
+}
+
+/// Names of known devices on the USB bus for which the system has made no port.
+fn without_port(on_the_bus: &[(u16, u16)], ports: &[SerialPortInfo]) -> Vec<&'static str> {
+    let mut with_port: Vec<(u16, u16)> = ports.iter().filter_map(number).collect();
+    let has_none = |number: &&(u16, u16)| {
+        let place = with_port.iter().position(|with| with == *number);
+        place.map(|place| with_port.swap_remove(place)).is_none()
+    };
+    on_the_bus.iter().filter(has_none).filter_map(|number| name(*number)).collect()
 }
 
 /// Opens a port by its name and closes it again.
@@ -63,10 +165,66 @@ pub fn try_port(name: &str) -> Result<(), LinkError> {
 
 /// Opens a port by its name. Also returns whether this has reset the Uno.
 pub(super) fn open(name: &str) -> Result<(Box<dyn SerialPort>, bool), LinkError> {
-    let mut port = serialport::new(name, BAUD).timeout(PATIENCE).open().map_err(|error| explain(name, error))?;
+    // avrdude does not keep other programs off the port, and a reset would end its work.
+    if let Ok(lock) = File::open(lock_of(name))
+        && matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock))
+    {
+        return Err(LinkError::Flashed(name.to_owned()));
+    }
+    open_at(name, BAUD)
+}
+
+/// Opens a port at this rate, also while it is claimed.
+fn open_at(name: &str, baud: u32) -> Result<(Box<dyn SerialPort>, bool), LinkError> {
+    let mut port = serialport::new(name, baud).timeout(PATIENCE).open().map_err(|error| explain(name, error))?;
     // This modem line resets an Uno. A pseudo terminal has none.
     let resets = port.write_data_terminal_ready(true).is_ok();
     Ok((port, resets))
+}
+
+/// A port that other programs of this project leave alone, until it is dropped.
+#[derive(Debug)]
+pub struct Claim {
+    _lock: File,
+}
+
+/// Claims a port for a program that writes to its Uno's flash.
+///
+/// # Errors
+/// If another program has claimed it.
+pub fn claim(name: &str) -> Result<Claim, LinkError> {
+    let path = lock_of(name);
+    // Another user's file can be locked, but not written.
+    let lock = File::options().create(true).append(true).open(&path).or_else(|_| File::open(&path));
+    let not_locked = |source| LinkError::NotClaimed { path: path.clone(), source };
+    let lock = lock.map_err(not_locked)?;
+    match lock.try_lock() {
+        Ok(()) => Ok(Claim { _lock: lock }),
+        Err(TryLockError::WouldBlock) => Err(LinkError::Flashed(name.to_owned())),
+        Err(TryLockError::Error(source)) => Err(not_locked(source)),
+    }
+}
+
+/// The file that is locked while a port is claimed. It stays, because another program may be about to lock it.
+fn lock_of(name: &str) -> PathBuf {
+    let port = std::fs::canonicalize(name).map_or_else(|_| name.to_owned(), |path| path.display().to_string());
+    let port: String = port.chars().map(|part| if part.is_ascii_alphanumeric() { part } else { '-' }).collect();
+    std::env::temp_dir().join(format!("weeder{port}.lock"))
+}
+
+/// Opens a claimed port at `baud` bits a second and resets the Uno.
+///
+/// # Errors
+/// As [`try_port`].
+pub fn open_to_flash(_: &Claim, name: &str, baud: u32) -> Result<Box<dyn crate::Port>, LinkError> {
+    let (mut port, resets) = open_at(name, baud)?;
+    if resets {
+        // Opening a port whose line was high is no reset.
+        let _ = port.write_data_terminal_ready(false);
+        std::thread::sleep(Duration::from_millis(100));
+        let _ = port.write_data_terminal_ready(true);
+    }
+    Ok(Box::new(port))
 }
 
 /// Opens the port of an Uno with other firmware than the weeder's, such as the tester's.
@@ -111,19 +269,81 @@ pub(super) mod tests {
         SerialPortInfo { port_name: name.to_owned(), port_type: SerialPortType::UsbPort(usb) }
     }
 
+    const NANO: (u16, u16) = CONVERTERS[0].0;
+    const RECEIVER: (u16, u16) = (0x10C4, 0xEA60);
+
+    /// The only Uno beside a receiver's port, on a computer without other USB devices.
+    fn only(ports: &[SerialPortInfo], beside: Option<&str>) -> Result<String, String> {
+        let on_the_bus = || ports.iter().filter_map(number).collect();
+        only_uno(ports, beside, on_the_bus).map_err(|error| error.to_string())
+    }
+
     #[test]
     fn the_only_uno_is_found_among_other_ports_and_none_or_two_are_an_error() {
         let other = SerialPortInfo { port_name: "ttyS0".to_owned(), port_type: SerialPortType::Unknown };
-        let (one, two) = (usb("ttyACM0", UNOS[1], None), usb("ttyUSB0", UNOS[5], None));
-        assert_eq!(only_uno(&[other.clone(), one.clone()]).unwrap(), "ttyACM0");
-        for (ports, words) in [
-            (vec![one, two], "choose one by --port, of ttyACM0, ttyUSB0"),
-            (vec![other], "(there is ttyS0): plug it in"),
-            (vec![], "there is no Uno at any USB port: plug it in"),
+        let (one, two) = (usb("ttyACM0", UNOS[1], None), usb("ttyACM1", UNOS[3], None));
+        let (nano, receiver) = (usb("ttyUSB0", NANO, None), usb("ttyUSB1", RECEIVER, None));
+        for ports in [vec![other.clone(), one.clone()], vec![nano.clone(), one.clone(), receiver.clone()]] {
+            assert_eq!(only(&ports, None).unwrap(), "ttyACM0");
+        }
+        assert_eq!(only(&[nano.clone(), receiver.clone()], Some("ttyUSB1")).unwrap(), "ttyUSB0");
+        for (ports, beside, words) in [
+            (vec![one, two], None, "choose one by --port, of ttyACM0 (Uno), ttyACM1 (Uno)"),
+            (vec![nano, receiver.clone()], None, "of ttyUSB0 (CH340), ttyUSB1 (CP2102)"),
+            (vec![receiver], Some("ttyUSB1"), "there is no Uno at any USB port: plug it in"),
+            (vec![other], None, "(there is ttyS0): plug it in"),
+            (vec![], None, "there is no Uno at any USB port: plug it in"),
         ] {
-            let error = only_uno(&ports).unwrap_err().to_string();
+            let error = only(&ports, beside).unwrap_err();
             assert!(error.contains(words), "{error}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_receiver_that_a_link_names_is_no_uno() {
+        let folder = tempfile::tempdir().unwrap();
+        let [port, link] = ["ttyUSB0", "gps"].map(|name| folder.path().join(name).display().to_string());
+        std::fs::write(&port, "").unwrap();
+        std::os::unix::fs::symlink(&port, &link).unwrap();
+        let ports = [usb(&port, RECEIVER, None), usb("ttyUSB1", NANO, None)];
+        assert_eq!(only(&ports, Some(&link)).unwrap(), "ttyUSB1");
+    }
+
+    #[test]
+    fn a_board_with_two_ports_on_a_mac_is_one_board() {
+        let board = |name: &str| usb(name, UNOS[1], Some("A1"));
+        let names =
+            ["/dev/cu.usbmodem1", "/dev/tty.usbmodem1", "/dev/tty.odd", "/dev/cu.usbmodem2", "/dev/tty.usbmodem2"];
+        let listed: Vec<String> = merged(names.map(board).into()).into_iter().map(|port| port.port_name).collect();
+        assert_eq!(listed, ["/dev/cu.usbmodem1", "/dev/tty.odd", "/dev/cu.usbmodem2"]);
+        assert_eq!(only(&merged(names[..2].iter().map(|name| board(name)).collect()), None).unwrap(), names[0]);
+        assert!(is_same(names[0], names[1]) && !is_same(names[0], names[3]));
+    }
+
+    #[test]
+    fn a_known_device_on_the_bus_without_a_port_is_named() {
+        let receiver = [usb("ttyUSB1", RECEIVER, None)];
+        let bus = || vec![(0x1D6B, 0x0002), NANO, RECEIVER];
+        let error = only_uno(&receiver, Some("ttyUSB1"), bus).unwrap_err().to_string();
+        assert!(error.contains("CH340 is on the USB bus and has no port") && !error.contains("CP2102"), "{error}");
+        let twice = without_port(&[RECEIVER, RECEIVER, UNOS[0]], &receiver);
+        assert_eq!(twice, ["CP2102", "Uno"]);
+    }
+
+    #[test]
+    fn a_claimed_port_is_left_alone_until_the_claim_ends() {
+        let folder = tempfile::tempdir().unwrap();
+        let port = folder.path().join("port");
+        std::fs::write(&port, "").unwrap();
+        let port = port.to_str().unwrap();
+        let claimed = claim(port).unwrap();
+        for error in [claim(port).unwrap_err(), try_port(port).unwrap_err()] {
+            assert!(error.to_string().contains("is being flashed"), "{error}");
+        }
+        drop(claimed);
+        drop(claim(port).unwrap());
+        std::fs::remove_file(lock_of(port)).unwrap();
     }
 
     #[test]

@@ -149,6 +149,7 @@ struct Played {
 
 /// Replays a stretch and adds its result.
 fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl FnMut()) -> Result<(), ReplayError> {
+    replayed.notes.extend_from_slice(&stretch.notes);
     if stretch.settings.get(Setting::SecondBeamMm) > 0 {
         replayed.notes.push("a machine with a second beam is not replayed: the log lacks its edges".to_owned());
         return Ok(());
@@ -270,6 +271,25 @@ mod tests {
         let mut has_one = log(20, |_| Vec::new());
         has_one.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });
         assert_eq!(replay(&has_one).unwrap().notes.len(), 1);
+    }
+
+    #[test]
+    fn events_and_settings_that_only_a_newer_version_knows_are_left_out_and_named() {
+        let newer = |status| match status {
+            2 => vec![(Kind::Event, "tilt deg=4 pos=9"), (Kind::Event, "alarm code=9-1 name=boredom pos=9")],
+            3 => vec![(Kind::Event, "tilt deg=5 pos=9"), (Kind::Example, "tilt deg=5")],
+            _ => Vec::new(),
+        };
+        let mut entries = log(20, newer);
+        entries.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: "tilt_deg=7".to_owned() });
+        let replayed = replay(&entries).unwrap();
+        assert_eq!(replayed.difference, None);
+        let left_out = |what: &str| format!("the {what}, which this version does not know, is left out");
+        assert_eq!(replayed.notes, ["setting `tilt_deg`", "event `tilt`", "event `alarm`"].map(left_out));
+        // A known setting with another value is another machine.
+        entries[1].text = "wheel_mm=900".to_owned();
+        let error = replay(&entries).unwrap_err().to_string();
+        assert!(error.contains("`wheel_mm=900` is out of the range of this version"), "{error}");
     }
 
     #[test]

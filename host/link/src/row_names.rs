@@ -6,7 +6,7 @@
 //!
 //! Only [`Board::open`] opens a port. Only [`Names::write`] changes the file.
 
-use super::port::is_uno;
+use super::port::{calling_out, is_same, is_uno, listed};
 use super::settings_file::no_toml;
 use super::{Link, LinkError, find_uno};
 use files::{FileError, whole_file};
@@ -39,8 +39,11 @@ const HEAD: &str = "\
 /// Which board a row has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Board {
-    /// The only Uno at this computer.
-    Only,
+    /// The only Uno at this computer. A device at the port `beside`, such as a receiver, is none.
+    Only {
+        /// That port.
+        beside: Option<String>,
+    },
     /// The board with this USB serial number.
     SerialNumber(String),
     /// The board at this port.
@@ -80,20 +83,25 @@ pub enum NamesError {
 }
 
 impl Board {
+    /// Whether this is the board of that Uno, by its number or by a port that leads to it.
+    #[must_use]
+    pub fn is(&self, uno: &Plugged) -> bool {
+        *self == uno.board || matches!(self, Self::Port(port) if is_same(port, &uno.port))
+    }
+
     /// The board at a port. The system's list shows whether it has its own serial number.
     ///
     /// # Errors
     /// If there is no such port.
     pub fn at(port: &str) -> Result<Self, LinkError> {
         let path = Path::new(port);
+        let ports = listed()?;
         // The list of ports has the link's present target.
-        let now = fs::canonicalize(path).map_or(port.to_owned(), |path| path.to_string_lossy().into_owned());
-        let ports = serialport::available_ports().map_err(LinkError::NoList)?;
-        let listed = ports.iter().find(|listed| listed.port_name == port || listed.port_name == now);
+        let listed = ports.iter().find(|listed| is_same(&listed.port_name, port));
         match listed {
             Some(listed) if serial_number(listed).is_some() => Ok(of(listed, &ports, Path::new(BY_PLACE))),
             // A user's own link may lead to another port some day.
-            Some(listed) if listed.port_name == port => Ok(of(listed, &ports, Path::new(BY_PLACE))),
+            Some(listed) if listed.port_name == calling_out(port) => Ok(of(listed, &ports, Path::new(BY_PLACE))),
             None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
             // An absolute path is valid in any folder.
             _ => Ok(Self::Port(std::path::absolute(path).map_or(port.to_owned(), |path| path.display().to_string()))),
@@ -114,9 +122,9 @@ impl Board {
     /// If it is not plugged in, or matches several boards.
     pub fn port(&self) -> Result<String, LinkError> {
         match self {
-            Self::Only => find_uno(),
+            Self::Only { beside } => find_uno(beside.as_deref()),
             Self::Port(port) => Ok(port.clone()),
-            Self::SerialNumber(number) => numbered(number, &serialport::available_ports().map_err(LinkError::NoList)?),
+            Self::SerialNumber(number) => numbered(number, &listed()?),
         }
     }
 }
@@ -160,7 +168,7 @@ fn of(port: &SerialPortInfo, ports: &[SerialPortInfo], by_place: &Path) -> Board
 /// # Errors
 /// If the system has no list of its ports.
 pub fn plugged() -> Result<Vec<Plugged>, LinkError> {
-    let ports = serialport::available_ports().map_err(LinkError::NoList)?;
+    let ports = listed()?;
     let board = |port: &SerialPortInfo| of(port, &ports, Path::new(BY_PLACE));
     let unos = ports.iter().filter(|port| is_uno(port));
     Ok(unos.map(|port| Plugged { port: port.port_name.clone(), board: board(port) }).collect())
@@ -241,7 +249,9 @@ impl Names {
         let (key, known) = match &board {
             Board::SerialNumber(number) => (SERIAL_NUMBER, number.clone()),
             Board::Port(port) => (PORT, port.clone()),
-            Board::Only => return Err(refused("a row is a board's that is known by more than being alone".to_owned())),
+            Board::Only { .. } => {
+                return Err(refused("a row is a board's that is known by more than being alone".to_owned()));
+            }
         };
         for row in self.rows.iter().filter(|row| row.board == board && row.name != name) {
             self.document.remove(&row.name);

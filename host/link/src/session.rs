@@ -10,7 +10,7 @@
 //! the machine.
 
 use super::moment::Moment;
-use super::settings::{self, Settings, SettingsError};
+use super::settings::{Settings, SettingsError, Shown};
 use super::{ConsoleLine, EventLine, Link, LinkError, Status, is_greeting};
 use control::say::command::{Command, parse};
 use std::collections::{BTreeSet, VecDeque};
@@ -47,7 +47,7 @@ pub enum Happening {
     Connected {
         /// The firmware's version.
         version: String,
-        /// Its settings.
+        /// Its settings, as far as this version knows them: see [`other_version`](super::settings::other_version).
         settings: Settings,
         /// The lines that show them.
         shown: Vec<String>,
@@ -214,7 +214,7 @@ impl Session {
     /// Takes a link whose firmware has just started.
     fn connect(&mut self, mut link: Link) -> Result<(), SettingsError> {
         let shown = link.ask(SETTINGS)?;
-        let settings = settings::shown_by(&shown)?;
+        let settings = Shown::by(&shown).settings;
         let examples = link.ask(EXAMPLES)?;
         link.ask(EVENTS)?;
         self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, shown, examples });
@@ -317,7 +317,7 @@ impl Session {
 fn parse_answer(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
     Ok(match question {
         STATUS => answer.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line))),
-        SETTINGS => Some(Happening::Settings(settings::shown_by(&answer)?, answer)),
+        SETTINGS => Some(Happening::Settings(Shown::by(&answer).settings, answer)),
         EXAMPLES => Some(Happening::Examples(answer)),
         _ => None,
     })

@@ -3,8 +3,9 @@
 //! Names, ranges and defaults are those of the firmware's own table ([`control::settings`]). The firmware refuses a
 //! value that contradicts the others. So the order of changes matters, and [`steps`] finds one.
 
-use super::{Link, LinkError, Mode, Status};
+use super::{ConsoleLine, Link, LinkError, Mode, Status};
 pub use control::settings::{Contradiction, Setting, Settings};
+use std::cmp::Ordering;
 use thiserror::Error;
 
 /// Why settings could not be read or changed.
@@ -13,12 +14,14 @@ use thiserror::Error;
 pub enum SettingsError {
     #[error(transparent)]
     Link(#[from] LinkError),
-    #[error("the firmware gives no valid value for {0}: it has another version; flash this one by `weeder flash`")]
-    Unknown(String),
+    #[error("{0}. This command needs all settings of this program, within its own ranges")]
+    Other(String),
     #[error("the machine is at work, where its settings cannot all be changed: hold it first, by its switch or `hold`")]
     AtWork,
     #[error("{0}; nothing was sent")]
     Contradiction(String),
+    #[error("{0}. The machine does not know it either, and nothing was sent")]
+    NotKnown(String),
     #[error("{setting} was set to {wanted} and is {found}: try again, and see to the supply if it stays so")]
     NotTaken { setting: String, wanted: u16, found: u16 },
 }
@@ -75,24 +78,103 @@ pub fn explain(contradiction: Contradiction) -> String {
 /// Reads all settings in use.
 ///
 /// # Errors
-/// If the console fails, or the firmware has other settings than this program.
+/// If the console fails, or the firmware lacks a setting of this program or has a value outside of its range.
 pub fn read(link: &mut Link) -> Result<Settings, SettingsError> {
-    shown_by(&link.ask("get")?)
+    let lines = link.ask("get")?;
+    let shown = Shown::by(&lines);
+    match other_version(link.version(), &lines) {
+        Some(other) if !shown.missing.is_empty() => Err(SettingsError::Other(other)),
+        _ => Ok(shown.settings),
+    }
 }
 
-/// The settings that the answer to `get` shows.
+/// Reads all settings in use, also those of another version.
 ///
 /// # Errors
-/// If one of them is missing, or has a value that cannot be.
-pub(super) fn shown_by(lines: &[String]) -> Result<Settings, SettingsError> {
-    let shown: Vec<(Setting, u16)> = lines.iter().filter_map(|line| shown(line)).collect();
-    let mut settings = Settings::new();
-    for setting in Setting::all() {
-        let unknown = || SettingsError::Unknown(name(setting));
-        let &(_, value) = shown.iter().find(|(known, _)| *known == setting).ok_or_else(unknown)?;
-        settings.set(setting, value).map_err(|_| unknown())?;
+/// If the console fails.
+pub fn read_shown(link: &mut Link) -> Result<Shown, LinkError> {
+    Ok(Shown::by(&link.ask("get")?))
+}
+
+/// The settings of a machine, whose firmware may have another version.
+#[derive(Clone, Debug, Default)]
+pub struct Shown {
+    /// The settings of this program. Those that are missing have their defaults here.
+    pub settings: Settings,
+    /// Settings of this program that the machine does not have, or whose value is outside of this program's range.
+    pub missing: Vec<Setting>,
+    /// Settings, or values of settings, that only the machine's version has.
+    pub others: Vec<OtherSetting>,
+}
+
+/// A setting of another version.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OtherSetting {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: u16,
+    /// Its least and greatest value.
+    pub range: (u16, u16),
+    /// Whether it is a switch.
+    pub is_switched: bool,
+    /// Its unit; empty for a count.
+    pub unit: String,
+}
+
+impl Shown {
+    /// The settings that the answer to `get` shows.
+    pub fn by(lines: &[String]) -> Self {
+        let mut shown = Self { missing: Setting::all().collect(), ..Self::default() };
+        for line in lines {
+            if let Some((setting, value)) = self::shown(line)
+                && shown.settings.set(setting, value).is_ok()
+            {
+                shown.missing.retain(|missing| *missing != setting);
+            } else if let ConsoleLine::Setting { name, value, unit, least, greatest, is_switched, .. } =
+                ConsoleLine::parse(line)
+            {
+                shown.others.push(OtherSetting { name, value, range: (least, greatest), is_switched, unit });
+            }
+        }
+        shown
     }
-    Ok(settings)
+}
+
+/// This program's version.
+const OWN: &str = env!("CARGO_PKG_VERSION");
+
+/// Says that the machine's firmware has another version than this program, and what to do. `None` if it has this version
+/// and its settings. `lines` are the answer to `get`.
+pub fn other_version(version: &str, lines: &[String]) -> Option<String> {
+    let Shown { missing, others, .. } = Shown::by(lines);
+    let others: Vec<String> = others.into_iter().map(|other| other.name).collect();
+    // Without lines, nothing is known of its settings.
+    let missing = missing.into_iter().filter(|_| !lines.is_empty()).map(name);
+    let missing: Vec<String> = missing.filter(|name| !others.contains(name)).collect();
+    let order = numbers(version).cmp(&numbers(OWN));
+    let mut said = match order {
+        Ordering::Greater => {
+            format!("the firmware {version} is newer than this program, {OWN}: take the `weeder` of that version")
+        }
+        Ordering::Less => {
+            format!("the firmware {version} is older than this program, {OWN}: `weeder flash` brings this version")
+        }
+        Ordering::Equal if others.is_empty() && missing.is_empty() => return None,
+        Ordering::Equal => format!("the firmware {version} has other settings than this program of the same number"),
+    };
+    for (names, what) in [(others, "only the firmware knows"), (missing, "the firmware lacks")] {
+        if !names.is_empty() {
+            said += &format!("; {what} {}", names.join(", "));
+        }
+    }
+    Some(said)
+}
+
+/// The numbers of a version, without its commit.
+fn numbers(version: &str) -> Vec<u32> {
+    let number = version.split(' ').next().unwrap_or_default();
+    number.split(['.', '-']).map_while(|number| number.parse().ok()).collect()
 }
 
 /// The setting in a line `name=value ...`. `None` if the line shows no setting.
@@ -153,6 +235,69 @@ fn beside(setting: Setting, now: &Settings, to: &Settings) -> u16 {
         .unwrap_or(wanted)
 }
 
+/// A setting of a file that this program does not know, or whose value is outside of this program's range.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Foreign {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: u16,
+    /// What would be right for this program, with the file's line.
+    pub problem: String,
+}
+
+impl Shown {
+    /// The machine's own setting of this name, if the machine takes the value.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn takes(&self, foreign: &Foreign) -> Result<&OtherSetting, SettingsError> {
+        let own = self.others.iter().find(|own| own.name == foreign.name);
+        let own = own.filter(|own| (own.range.0..=own.range.1).contains(&foreign.value));
+        own.ok_or_else(|| SettingsError::NotKnown(foreign.problem.clone()))
+    }
+}
+
+/// As [`push`], with settings that only the machine knows.
+///
+/// # Errors
+/// As [`push`], and if the machine does not know one of them.
+pub fn push_all(
+    link: &mut Link,
+    wanted: &[(Setting, u16)],
+    foreign: &[Foreign],
+    save: bool,
+) -> Result<Vec<String>, SettingsError> {
+    let shown = read_shown(link)?;
+    let mut changed = Vec::new();
+    for foreign in foreign {
+        let own = shown.takes(foreign)?;
+        let value = match foreign.value {
+            value if !own.is_switched => value.to_string(),
+            0 => "off".to_owned(),
+            _ => "on".to_owned(),
+        };
+        if own.value != foreign.value {
+            changed.push((foreign.name.clone(), format!("set {} {value}", foreign.name)));
+        }
+    }
+    if !changed.is_empty() && status(link)?.mode == Mode::Work {
+        return Err(SettingsError::AtWork);
+    }
+    let mut set: Vec<String> = push(link, wanted, false)?.into_iter().map(name).collect();
+    for (name, command) in changed {
+        link.ask(&command)?;
+        set.push(name);
+    }
+    if save {
+        if status(link)?.mode == Mode::Work {
+            return Err(SettingsError::AtWork);
+        }
+        link.ask("save")?;
+    }
+    Ok(set)
+}
+
 /// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them.
 ///
 /// Sends nothing if the result would contradict itself, or if the machine is at work. Returns the changed settings.
@@ -163,7 +308,8 @@ pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Ve
     let before = read(link)?;
     let mut after = before.clone();
     for &(setting, value) in wanted {
-        after.set(setting, value).map_err(|_| SettingsError::Unknown(name(setting)))?;
+        // Values of settings are in their ranges.
+        let _ = after.set(setting, value);
     }
     if !wanted.iter().any(|&(setting, _)| setting == Setting::TicksPerM) {
         follow_wheel(&before, &mut after);
@@ -202,8 +348,12 @@ pub fn status(link: &mut Link) -> Result<Status, LinkError> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use control::ground::{examples::EXAMPLES, nearest::Nearest};
+    use control::measure::reset::Cause;
+    use control::memory::Volatile;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use rig::Rig;
 
     /// The factory settings with some other values.
     pub(crate) fn settings(values: &[(Setting, u16)]) -> Settings {
@@ -225,6 +375,32 @@ pub(super) mod tests {
             assert!(!was_right || now.contradiction().is_none(), "{setting:?} {value} from {from:?} to {to:?}");
         }
         assert_eq!(&now, to);
+    }
+
+    /// The answer to `get` of the firmware that this program knows, with a line changed.
+    fn lines_with(change: impl Fn(&str) -> Option<String>) -> Vec<String> {
+        let mut rig = Rig::wake(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), Cause::Unknown);
+        rig.ask("get").iter().filter_map(|line| change(line)).collect()
+    }
+
+    #[test]
+    fn settings_of_another_version_are_shown_and_the_newer_side_is_named() {
+        let same = lines_with(|line| Some(line.to_owned()));
+        assert!(Shown::by(&same).missing.is_empty() && other_version(&format!("{OWN} (abc1234)"), &same).is_none());
+        let wider = lines_with(|line| match line.split('=').next() {
+            Some("wheel_mm") => Some("wheel_mm=900 mm from 200 to 1200, default 400".to_owned()),
+            Some("k") => Some("tilt=on on or off, default off".to_owned()),
+            _ => Some(line.to_owned()),
+        });
+        let shown = Shown::by(&wider);
+        assert_eq!(shown.missing, [Setting::WheelMm, Setting::K]);
+        let others: Vec<(&str, u16)> = shown.others.iter().map(|other| (&*other.name, other.value)).collect();
+        assert_eq!(others, [("wheel_mm", 900), ("tilt", 1)]);
+        let newer = other_version("99.0.1 (abc)", &wider).unwrap();
+        assert!(newer.starts_with("the firmware 99.0.1 (abc) is newer than this program"), "{newer}");
+        assert!(newer.ends_with("; only the firmware knows wheel_mm, tilt; the firmware lacks k"), "{newer}");
+        let older = other_version("0.1.9", &same).unwrap();
+        assert!(older.contains("is older than this program") && older.contains("`weeder flash`"), "{older}");
     }
 
     #[test]

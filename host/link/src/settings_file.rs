@@ -4,7 +4,7 @@
 //! existing file preserves its comments and its order. Settings that a file does not name are not changed. Each value
 //! is checked against the table. The first error gives its line and what would be right.
 
-use super::settings::{Setting, Settings, help, name, range};
+use super::settings::{Foreign, OtherSetting, Setting, Settings, Shown, help, name, range};
 use files::{FileError, whole_file};
 use std::fs;
 use std::path::Path;
@@ -19,21 +19,31 @@ const HEAD: &str = "\
 /// How files of 0.1.0 name `merge_gap_mm`, which was in ticks of the encoder.
 const OLD_MERGE_GAP: &str = "merge_gap_ticks";
 
-/// Reads a file's settings, each within its range.
+/// The settings in a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Named {
+    /// Those of this program, each within its range.
+    pub settings: Vec<(Setting, u16)>,
+    /// Those that another version of the firmware may know.
+    pub foreign: Vec<Foreign>,
+}
+
+/// Reads a file's settings.
 ///
 /// # Errors
 /// Names the file, the line, and what would be right.
-pub fn read(path: &Path) -> Result<Vec<(Setting, u16)>, FileError> {
-    parse(path, &text(path)?).map(|(_, settings)| settings)
+pub fn read(path: &Path) -> Result<Named, FileError> {
+    parse(path, &text(path)?).map(|(_, named)| named)
 }
 
-/// Writes all settings into a file. An existing file keeps its comments, and must be a settings file.
+/// Writes all settings of a machine into a file, also those that only the machine knows. An existing file keeps its
+/// comments, and must be a settings file.
 ///
 /// # Errors
 /// As [`read`], and if the file cannot be written.
-pub fn write(path: &Path, settings: &Settings) -> Result<(), FileError> {
+pub fn write(path: &Path, shown: &Shown) -> Result<(), FileError> {
     let old = if path.exists() { text(path)? } else { HEAD.to_owned() };
-    let new = updated(path, &old, settings)?;
+    let new = updated(path, &old, shown)?;
     let written = whole_file::write(path, |to| to.write_all(new.as_bytes()));
     written.map_err(|source| FileError::unwritten(path, source))
 }
@@ -55,9 +65,9 @@ pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
     FileError::at_byte(path, text, start, error.message().replace('\n', ", "))
 }
 
-fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<(Setting, u16)>), FileError> {
+fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
     let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
-    let mut settings = Vec::new();
+    let (mut settings, mut foreign) = (Vec::new(), Vec::new());
     let mut old_merge_gap = None;
     for (key, item) in document.iter() {
         let wrong = |problem| FileError::at_key(path, text, key, problem);
@@ -67,18 +77,32 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<(Setting, u16)>), 
             old_merge_gap = Some(ticks.ok_or_else(right)?);
             continue;
         }
-        let Some(setting) = Setting::find(key.as_bytes()) else {
-            let known: Vec<String> = Setting::all().map(name).collect();
-            return Err(wrong(format!("there is no setting `{key}`: there are {}", known.join(", "))));
-        };
-        let value = value(setting, item)
-            .ok_or_else(|| wrong(format!("{key} is `{}`: it has to be {}", item.to_string().trim(), right(setting))))?;
-        settings.push((setting, value));
+        let known = Setting::find(key.as_bytes());
+        if let Some(setting) = known
+            && let Some(value) = value(setting, item)
+        {
+            settings.push((setting, value));
+            continue;
+        }
+        let problem = wrong(match known {
+            Some(setting) => format!("{key} is `{}`: it has to be {}", item.to_string().trim(), right(setting)),
+            None => {
+                let known: Vec<String> = Setting::all().map(name).collect();
+                format!("there is no setting `{key}`: there are {}", known.join(", "))
+            }
+        });
+        // Another version may have the setting, or a wider range.
+        let number = item.as_integer().and_then(|value| u16::try_from(value).ok());
+        let value = number.filter(|_| known.is_none_or(|setting| !setting.is_switched()));
+        match value.or_else(|| item.as_bool().filter(|_| known.is_none()).map(u16::from)) {
+            Some(value) => foreign.push(Foreign { name: key.to_owned(), value, problem: problem.to_string() }),
+            None => return Err(problem),
+        }
     }
     if let Some(ticks) = old_merge_gap.filter(|_| settings.iter().all(|&(setting, _)| setting != Setting::MergeGapMm)) {
         settings.push((Setting::MergeGapMm, merge_gap_mm(ticks, &settings)));
     }
-    Ok((document, settings))
+    Ok((document, Named { settings, foreign }))
 }
 
 /// Converts ticks to millimetres of the wheel in these settings. Missing settings have their defaults.
@@ -107,7 +131,7 @@ fn right(setting: Setting) -> String {
     format!("{whole}{}", range(setting))
 }
 
-fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileError> {
+fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
     let (mut document, _) = parse(path, old)?;
     // In a file without values the comments belong to its end, and new values would go before them.
     let head = if document.is_empty() {
@@ -120,10 +144,19 @@ fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileEr
         // Moves its comments as well.
         document.insert_formatted(&Key::new(name(Setting::MergeGapMm)).with_leaf_decor(key.leaf_decor().clone()), item);
     }
-    for setting in Setting::all() {
-        let name = name(setting);
-        let value = settings.get(setting);
-        let mut value = is_true(setting, value).map_or_else(|| Value::from(i64::from(value)), Value::from);
+    let known = Setting::all().filter(|setting| !shown.missing.contains(setting)).map(|setting| {
+        let comment = format!("\n# {}\n# {}\n", help(setting), range(setting));
+        (name(setting), shown.settings.get(setting), setting.is_switched(), comment)
+    });
+    let foreign = shown.others.iter().map(|OtherSetting { name, value, range, is_switched, unit }| {
+        let range =
+            if *is_switched { "true or false".to_owned() } else { format!("{} to {} {unit}", range.0, range.1) };
+        let comment =
+            format!("\n# only the machine's firmware knows this setting, or this value\n# {}\n", range.trim_end());
+        (name.clone(), *value, *is_switched, comment)
+    });
+    for (name, value, is_switched, comment) in known.chain(foreign) {
+        let mut value = if is_switched { Value::from(value != 0) } else { Value::from(i64::from(value)) };
         match document.get_mut(&name).and_then(Item::as_value_mut) {
             Some(old) => {
                 *value.decor_mut() = old.decor().clone();
@@ -131,7 +164,6 @@ fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileEr
             }
             None => {
                 document.insert(&name, Item::Value(value));
-                let comment = format!("\n# {}\n# {}\n", help(setting), range(setting));
                 if let Some(mut key) = document.key_mut(&name) {
                     *key.leaf_decor_mut() = Decor::new(comment, " ");
                 }
@@ -145,9 +177,40 @@ fn updated(path: &Path, old: &str, settings: &Settings) -> Result<String, FileEr
 mod tests {
     use super::*;
 
-    /// Parses a file's text. Returns the error's message otherwise.
+    /// Parses a file's text. Returns the error's message otherwise, also for a setting of another version.
     fn parsed(text: &str) -> Result<Vec<(Setting, u16)>, String> {
-        parse(Path::new("machine.toml"), text).map(|(_, settings)| settings).map_err(|error| error.to_string())
+        let (_, named) = parse(Path::new("machine.toml"), text).map_err(|error| error.to_string())?;
+        named.foreign.into_iter().next().map_or(Ok(named.settings), |foreign| Err(foreign.problem))
+    }
+
+    /// What a machine of this version shows.
+    fn shown(settings: Settings) -> Shown {
+        Shown { settings, ..Shown::default() }
+    }
+
+    #[test]
+    fn settings_that_only_the_machine_knows_are_kept_and_read_back() {
+        let other = |name: &str, value, is_switched| OtherSetting {
+            name: name.to_owned(),
+            value,
+            range: (0, 1200),
+            is_switched,
+            unit: if is_switched { String::new() } else { "mm".to_owned() },
+        };
+        let others = vec![other("wheel_mm", 900, false), other("tilt_mm", 7, false), other("lamp", 1, true)];
+        let shown = Shown { missing: vec![Setting::WheelMm, Setting::K], others, ..Shown::default() };
+        let text = updated(Path::new("machine.toml"), HEAD, &shown).unwrap();
+        assert!(text.contains("knows this setting, or this value\n# 0 to 1200 mm\ntilt_mm = 7\n"), "{text}");
+        assert!(text.contains("\nlamp = true\n") && !text.contains("\nk ="), "{text}");
+        let (_, named) = parse(Path::new("machine.toml"), &text).unwrap();
+        let values: Vec<(&str, u16)> = named.foreign.iter().map(|foreign| (&*foreign.name, foreign.value)).collect();
+        assert_eq!(values, [("wheel_mm", 900), ("tilt_mm", 7), ("lamp", 1)]);
+        assert!(named.foreign.iter().all(|foreign| shown.takes(foreign).is_ok()));
+        let error = Shown::default().takes(&named.foreign[1]).unwrap_err().to_string();
+        assert!(
+            error.contains("there is no setting `tilt_mm`: there are ") && error.contains("nothing was sent"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -155,7 +218,7 @@ mod tests {
         let mut settings = Settings::new();
         settings.set(Setting::WheelMm, 405).unwrap();
         settings.set(Setting::EndSwitch, 1).unwrap();
-        let text = updated(Path::new("machine.toml"), HEAD, &settings).unwrap();
+        let text = updated(Path::new("machine.toml"), HEAD, &shown(settings.clone())).unwrap();
         assert!(text.starts_with(HEAD), "{text}");
         let wheel = "\n# wheel diameter\n# 200 to 800 mm, default 400\nwheel_mm = 405\n";
         assert!(text.contains(wheel), "{text}");
@@ -167,10 +230,10 @@ mod tests {
     #[test]
     fn comments_and_order_of_a_file_stay() {
         let old = "# my machine\nk = 5 # five plants\n\nwheel_mm = 405\n# the end\n";
-        let new = updated(Path::new("machine.toml"), old, &Settings::new()).unwrap();
+        let new = updated(Path::new("machine.toml"), old, &shown(Settings::new())).unwrap();
         assert!(new.starts_with("# my machine\nk = 3 # five plants\n\nwheel_mm = 400\n"), "{new}");
         assert!(new.contains("\nmargin_mm = 50\n") && new.ends_with("\n# the end\n"), "{new}");
-        assert_eq!(updated(Path::new("machine.toml"), &new, &Settings::new()).unwrap(), new);
+        assert_eq!(updated(Path::new("machine.toml"), &new, &shown(Settings::new())).unwrap(), new);
     }
 
     #[test]
@@ -207,7 +270,7 @@ mod tests {
         assert_eq!(gap("merge_gap_ticks = 40\nmerge_gap_mm = 5"), Some((Setting::MergeGapMm, 5)));
         assert!(parsed("merge_gap_ticks = 2001").unwrap_err().contains("now it is merge_gap_mm"));
         let old = "# ragged leaves\nmerge_gap_ticks = 60 # three were too few\n";
-        let new = updated(Path::new("machine.toml"), old, &Settings::new()).unwrap();
+        let new = updated(Path::new("machine.toml"), old, &shown(Settings::new())).unwrap();
         assert!(new.starts_with("# ragged leaves\nmerge_gap_mm = 21 # three were too few\n"), "{new}");
     }
 
@@ -216,7 +279,7 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         for content in [&b"[package]\nname = \"weeder\"\n"[..], b"\xFF\xFE"] {
             fs::write(file.path(), content).unwrap();
-            assert!(write(file.path(), &Settings::new()).is_err());
+            assert!(write(file.path(), &shown(Settings::new())).is_err());
             assert_eq!(fs::read(file.path()).unwrap(), content);
         }
     }

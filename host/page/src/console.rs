@@ -181,6 +181,13 @@ mod tests {
     #[test]
     fn the_page_s_types_of_lines_are_the_tables_of_lines() {
         let plot = LineDescription { name: "Plot", meaning: "", beginning: "", values: &[] };
+        const IS_ALARM: &[ValueDescription] = &[ValueDescription {
+            key: "",
+            kind: "",
+            field: Some(("is_alarm", "bool")),
+            meaning: "whether it is an alarm",
+        }];
+        let newer = LineDescription { name: "Newer", values: IS_ALARM, ..plot };
         let other = LineDescription { name: "Other", ..plot };
         let shapes = |lines: Vec<LineDescription>| lines.iter().map(shape).collect::<String>();
         let modes = [Mode::Hold, Mode::Work, Mode::Alarm].map(|mode| format!("\"{}\"", mode.name())).join(" | ");
@@ -198,7 +205,7 @@ mod tests {
              export type ConsoleLine = EventLine | Named<Answers>;\n\
              export type Line<Name extends ConsoleLine[\"is\"]> = Extract<ConsoleLine, {{ readonly is: Name }}>;\n\
              export type Setting = Line<\"setting\">;\n",
-            shapes([EVENTS, &[plot]].concat()),
+            shapes([EVENTS, &[plot, newer]].concat()),
             shapes([STATUS, ANSWERS, &[other]].concat()),
         ));
     }

@@ -7,6 +7,7 @@ use control::say::command::{Command, parse};
 use link::moment::Moment;
 use link::rows::Opener;
 use link::session::{HOLD, Happening, Session};
+use link::settings::other_version;
 use link::{EventLine, Mode};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -202,6 +203,9 @@ impl Talk {
             Happening::Connected { version, shown, examples, .. } => {
                 self.hub.there(self.number, &version, &shown, &examples);
                 (self.tell)(&format!("{}: weeder {version} is there.", self.name));
+                if let Some(other) = other_version(&version, &shown) {
+                    (self.tell)(&format!("{}: {other}.", self.name));
+                }
             }
             Happening::Lost(why) => {
                 self.hub.lost(self.number, &why);
@@ -211,7 +215,10 @@ impl Talk {
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
             Happening::Event(event, line) => {
                 // Its switch and its alarms are HOLDs too.
-                if let EventLine::State { mode: Mode::Hold | Mode::Alarm } | EventLine::Alarm { .. } = event {
+                if let EventLine::State { mode: Mode::Hold | Mode::Alarm }
+                | EventLine::Alarm { .. }
+                | EventLine::Newer { is_alarm: true } = event
+                {
                     self.hub.hold(self.number);
                 }
                 self.hub.event(self.number, &line);

@@ -24,6 +24,14 @@ const SRAM_ORIGIN: u64 = 0x80_0000;
 const EEPROM_ORIGIN: u64 = 0x81_0000;
 const FUSES_ORIGIN: u64 = 0x82_0000;
 
+/// The section in which avr-libc's start-up code names the chip, and the offset of that name: behind the note's head, six
+/// sizes, and the table of one name.
+const DEVICE_INFO: &str = ".note.gnu.avr.deviceinfo";
+const DEVICE_NAME: usize = 0x31;
+
+/// The chips whose programs run on the ATmega328P: they differ in their power consumption alone (data sheet, section 2.2).
+const CHIPS: [&str; 2] = ["atmega328p", "atmega328"];
+
 /// Memory that a firmware takes, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Size {
@@ -79,13 +87,15 @@ impl Image {
     ///
     /// # Errors
     ///
-    /// Where the file cannot be read, is neither an ELF for AVR nor HEX, or holds more than the ATmega328P does.
+    /// Where the file cannot be read, is neither an ELF for AVR nor HEX, is for another chip, or holds more than the
+    /// ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, FileError> {
         let bytes = read_bytes(path)?;
         if is_hex(&bytes) {
             return Ok(Image { flash: hex::flash(path, &bytes)?, ..Image::default() });
         }
         let file = parse(path, &bytes)?;
+        check_chip(path, &file)?;
         let mut flash = Vec::new();
         let mut eeprom = Vec::new();
         for header in file.elf_program_headers() {
@@ -136,6 +146,18 @@ fn parse<'data>(path: &Path, bytes: &'data [u8]) -> Result<ElfFile32<'data, Litt
         return Err(FileError::new(path, format_args!("was made for {architecture:?}: an ELF for AVR is needed")));
     }
     ElfFile32::parse(bytes).map_err(not_elf)
+}
+
+/// Checks that an ELF that names its chip is for this one.
+fn check_chip(path: &Path, file: &ElfFile32<LittleEndian>) -> Result<(), FileError> {
+    let note = file.section_by_name(DEVICE_INFO).and_then(|section| section.data().ok());
+    let name = note.and_then(|note| note.get(DEVICE_NAME..)?.split(|byte| *byte == 0).next());
+    match name.map(String::from_utf8_lossy).filter(|name| !name.is_empty()) {
+        Some(chip) if !CHIPS.contains(&&*chip) => {
+            Err(FileError::new(path, format_args!("is for the {chip}: the Uno has an {}", CHIPS[0])))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn size(file: &ElfFile32<LittleEndian>) -> Size {

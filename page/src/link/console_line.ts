@@ -25,6 +25,7 @@ interface Events {
     calibratedByEye: object;
     notCalibrated: object;
     plot: object;
+    newer: { isAlarm: boolean };
 }
 
 interface Answers {

@@ -103,6 +103,11 @@ export class Panel {
         if (into.classList.contains("alone")) followDock(parts.html("dock"));
     }
 
+    /** The log so far, as a file. */
+    get log(): File {
+        return new File([this.#log.text()], "weeder-log.csv", { type: "text/csv" });
+    }
+
     /** Whether closing the page would leave a machine at work, or drop an unsaved log. */
     get isNeeded(): boolean {
         const { version, mode } = this.machine;

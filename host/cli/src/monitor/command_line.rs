@@ -6,7 +6,7 @@
 use link::COMMAND_LENGTH;
 use link::completion::{common, complete};
 use link::row_names::NAME_LENGTH;
-use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 /// Lines remembered.
 const HISTORY: usize = 100;
@@ -45,7 +45,12 @@ impl CommandLine {
             return None;
         }
         self.candidates.clear();
+        let is_typed = key.modifiers.difference(KeyModifiers::SHIFT).is_empty();
         match key.code {
+            // A terminal in raw mode has these for a pasted LF and for CR. The LF of both enters an empty line.
+            KeyCode::Char('j' | 'm') if key.modifiers == KeyModifiers::CONTROL => return self.enter(),
+            KeyCode::Char('u') if key.modifiers == KeyModifiers::CONTROL => self.clear(),
+            KeyCode::Char(_) if !is_typed => {}
             KeyCode::Char(character @ ' '..='~') if self.text.len() < self.most() => {
                 self.text.insert(self.cursor, character);
                 self.cursor += 1;
@@ -191,6 +196,35 @@ mod tests {
         assert!(!line.candidates.is_empty());
         line.clear();
         assert!(line.candidates.is_empty());
+    }
+
+    #[test]
+    fn pasted_lines_are_entered_one_by_one_and_no_key_with_ctrl_or_alt_is_a_letter() {
+        let key = |line: &mut CommandLine, letter, modifiers| line.key(KeyEvent::new(KeyCode::Char(letter), modifiers));
+        for ends in [&["j"][..], &["enter"], &["enter", "j"], &["m", "j"]] {
+            let (mut line, mut entered) = (CommandLine::default(), Vec::new());
+            for text in ["set k 5", "hold"] {
+                typed(&mut line, text);
+                for end in ends {
+                    entered.extend(match *end {
+                        "enter" => line.key(KeyCode::Enter.into()),
+                        letter => key(&mut line, letter.chars().next().unwrap(), KeyModifiers::CONTROL),
+                    });
+                }
+            }
+            assert_eq!(entered, ["set k 5", "hold"], "{ends:?}");
+        }
+        let mut line = CommandLine::default();
+        typed(&mut line, "hold");
+        for letter in (' '..='~').filter(|letter| !"jmu".contains(*letter)) {
+            for modifiers in [KeyModifiers::CONTROL, KeyModifiers::ALT, KeyModifiers::CONTROL | KeyModifiers::ALT] {
+                assert_eq!((key(&mut line, letter, modifiers), line.text.as_str()), (None, "hold"), "{letter:?}");
+            }
+        }
+        key(&mut line, 'S', KeyModifiers::SHIFT);
+        assert_eq!(line.text, "holdS");
+        key(&mut line, 'u', KeyModifiers::CONTROL);
+        assert_eq!((line.text.as_str(), line.cursor), ("", 0));
     }
 
     #[test]

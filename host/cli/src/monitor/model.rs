@@ -1,12 +1,13 @@
 //! The state of each row, and its changes by events.
 
 use super::command_line::CommandLine;
+use super::pager::Pager;
 use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, What};
 use link::session::Happening;
 use link::set_up::{SetUp, Step};
-use link::settings::{Setting, Settings};
+use link::settings::{self, Setting, Settings};
 use link::{Class, EventLine, Mode, Status};
 use std::collections::VecDeque;
 
@@ -86,6 +87,7 @@ pub struct Model {
     pub hold: Option<Hold>,
     /// Typed lines, answers and events, the newest last.
     pub lines: VecDeque<String>,
+    pub pager: Pager,
     pub line: CommandLine,
     /// Whether to ring the bell.
     rings: bool,
@@ -162,9 +164,10 @@ impl Model {
             Happening::Connected { version, .. } => Some(format!("-- connected to weeder {version}")),
             Happening::Lost(why) => Some(format!("-- {why}")),
             Happening::Event(EventLine::Plot, _) => None,
-            Happening::Event(EventLine::Alarm { .. } | EventLine::Warning { .. } | EventLine::State { .. }, line) => {
-                Some(line.clone())
-            }
+            Happening::Event(
+                EventLine::Alarm { .. } | EventLine::Warning { .. } | EventLine::State { .. } | EventLine::Newer { .. },
+                line,
+            ) => Some(line.clone()),
             Happening::Event(_, line) => (!self.are_several()).then(|| line.clone()),
             Happening::Command(line) => (!self.are_several()).then(|| format!("> {line}")),
             Happening::Answer(line) => Some(line.clone()),
@@ -178,9 +181,14 @@ impl Model {
         if let Some(said) = said {
             self.say_of(number, &said);
         }
+        if let Happening::Connected { version, shown, .. } = &happening
+            && let Some(other) = settings::other_version(version, shown)
+        {
+            self.say_of(number, &format!("-- {other}"));
+        }
         let row = &mut self.rows[number];
         self.rings |= match &happening {
-            Happening::Event(EventLine::Alarm { .. }, _) => true,
+            Happening::Event(EventLine::Alarm { .. } | EventLine::Newer { is_alarm: true }, _) => true,
             Happening::Lost(_) => row.is_there(),
             _ => false,
         };
@@ -198,6 +206,7 @@ impl Model {
     pub fn say(&mut self, line: String) {
         if self.lines.len() == LINES {
             self.lines.pop_front();
+            self.pager.dropped();
         }
         self.lines.push_back(line);
     }
@@ -269,6 +278,10 @@ impl RowModel {
                 }
             }
             Happening::Status(status, _) => self.take_status(status),
+            Happening::Event(EventLine::Newer { is_alarm: true }, line) => {
+                self.advice = Some(format!("{line}: this program is older than the firmware"));
+                self.zones.clear();
+            }
             Happening::Event(event, _) => self.take_event(event),
             Happening::Settings(settings, _) => self.settings = settings,
             Happening::Answered { refusal, .. } => {

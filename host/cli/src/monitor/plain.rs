@@ -4,19 +4,24 @@
 //! the row's name. A `hold` to all goes to all rows at the same moment, and its result includes the time of the last
 //! row.
 
+use super::input::{self, Line};
 use super::{addressed, send};
 use crate::output::tell;
 use crate::ports::Chosen;
 use crate::program::Finding;
 use crate::record::Logs;
-use anyhow::{Error, Result, ensure};
+use anyhow::{Result, ensure};
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
 use link::session::Happening;
-use std::io::{self, BufRead, ErrorKind, Write};
+use link::settings::other_version;
+use std::io::{self, ErrorKind, Write};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
+
+/// Lines that are read ahead. The others wait in the pipe.
+const READ_AHEAD: usize = 64;
 
 /// Time between two checks of the input.
 const LOOK: Duration = Duration::from_millis(20);
@@ -25,13 +30,13 @@ const LOOK: Duration = Duration::from_millis(20);
 /// says which rows were there when they were opened.
 ///
 /// # Errors
-/// If a line is no command, an Uno goes away with commands unanswered, or output or log fail.
+/// If a line was not sent, an Uno goes away with commands unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
-    let (sender, commands) = mpsc::channel();
+    let (sender, commands) = mpsc::sync_channel(READ_AHEAD);
     // Reading blocks until the operator types, so it has its own thread. The thread ends with the process.
-    thread::spawn(move || io::stdin().lock().lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    thread::spawn(move || input::read(io::stdin().lock(), |line| sender.send(line).is_ok()));
     let standing = are_there.iter().map(|&is_there| Standing { is_there, ..Standing::default() }).collect();
-    let talk = Talk { rows, chosen, logs, standing, hold: None, finding: Finding::Good };
+    let talk = Talk { rows, chosen, logs, standing, hold: None, unsent: Vec::new(), finding: Finding::Good };
     match talk.run(&commands, &mut io::stdout().lock()) {
         // The reader has closed the pipe: it has read enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
@@ -61,17 +66,19 @@ struct Talk<'a> {
     standing: Vec<Standing>,
     /// A pending `hold` to all of several rows.
     hold: Option<Hold>,
+    /// The numbers of lines that could not be sent.
+    unsent: Vec<String>,
     finding: Finding,
 }
 
 impl Talk<'_> {
-    fn run(mut self, commands: &Receiver<String>, output: &mut impl Write) -> Result<Finding> {
+    fn run(mut self, commands: &Receiver<Line>, output: &mut impl Write) -> Result<Finding> {
         let mut ended = false;
         loop {
             // One at a time, so that the other commands wait in the pipe.
             if self.is_idle() && !ended {
                 match commands.try_recv() {
-                    Ok(line) => self.command(line.trim(), output)?,
+                    Ok(line) => self.command(&line, output)?,
                     Err(TryRecvError::Disconnected) => ended = true,
                     Err(TryRecvError::Empty) => {}
                 }
@@ -96,12 +103,22 @@ impl Talk<'_> {
         let failed = self.chosen.rows.iter().zip(&self.standing).filter(|(_, standing)| standing.has_failed);
         let failed: Vec<&str> = failed.map(|(row, _)| row.name.as_str()).collect();
         ensure!(failed.is_empty(), "not all was answered by {}", failed.join(", "));
+        let lines = if self.unsent.len() == 1 { "line" } else { "lines" };
+        ensure!(self.unsent.is_empty(), "not sent: {lines} {}", self.unsent.join(", "));
         Ok(self.finding)
     }
 
-    /// Types a line to the addressed rows.
-    fn command(&mut self, line: &str, output: &mut impl Write) -> Result<()> {
-        let (to, command) = addressed(line, &self.chosen.names(), None).map_err(Error::msg)?;
+    /// Types a line to the addressed rows. A line that cannot be sent is reported, and the next one may be `hold`.
+    fn command(&mut self, line: &Line, output: &mut impl Write) -> Result<()> {
+        let names = self.chosen.names();
+        let (to, command) = match addressed(&line.text, &names, None) {
+            Ok(sent) => sent,
+            Err(why) => {
+                tell!("error: line {} was not sent: {why}", line.number);
+                self.unsent.push(line.number.to_string());
+                return Ok(());
+            }
+        };
         // The machine does not answer a line without a word.
         if command.is_empty() {
             return Ok(());
@@ -134,7 +151,12 @@ impl Talk<'_> {
         }
         let mut print = |line: &str| writeln!(output, "{}", self.chosen.under_name(row, line));
         match &heard.what {
-            What::Happened(Happening::Connected { .. }) => standing.is_there = true,
+            What::Happened(Happening::Connected { version, shown, .. }) => {
+                standing.is_there = true;
+                if let Some(other) = other_version(version, shown) {
+                    tell!("{}", self.chosen.under_name(row, &other));
+                }
+            }
             What::Happened(
                 Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_) | Happening::Late(_),
             ) => {}

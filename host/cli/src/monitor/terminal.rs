@@ -66,10 +66,15 @@ fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
             model.line.clear();
             hold_all(model, rows);
         }
-        KeyCode::PageUp => model.choose(false),
-        KeyCode::PageDown => model.choose(true),
+        KeyCode::PageUp if model.are_several() => model.choose(false),
+        KeyCode::PageDown if model.are_several() => model.choose(true),
+        KeyCode::PageUp => model.pager.back(model.lines.len()),
+        KeyCode::PageDown => model.pager.forward(model.lines.len()),
+        KeyCode::Up if key.modifiers == KeyModifiers::CONTROL => model.pager.back(model.lines.len()),
+        KeyCode::Down if key.modifiers == KeyModifiers::CONTROL => model.pager.forward(model.lines.len()),
         _ => {
             let Some(line) = model.line.key(key) else { return };
+            model.pager.follow();
             match addressed(&line, &model.names(), model.target) {
                 Err(why) => model.say(format!("-- {why}; nothing was sent")),
                 Ok((_, "")) => {}

@@ -111,16 +111,21 @@ fn symbol(ground: &Ground) -> char {
     }
 }
 
-/// The last lines of the console's output, as many as there is room for.
-fn last_lines(model: &Model, room: u16) -> Paragraph<'_> {
-    let lines = model.lines.iter().skip(model.lines.len().saturating_sub(usize::from(room)));
-    Paragraph::new(lines.map(|line| Line::raw(line.as_str())).collect::<Vec<_>>())
+/// The part of the console's output that is shown, as many lines as there is room for.
+fn shown_lines<'a>(model: &'a Model, area: Rect) -> Paragraph<'a> {
+    let lines: Vec<&str> = model.lines.iter().map(String::as_str).collect();
+    let rows = model.pager.rows(&lines, area.width, area.height);
+    Paragraph::new(rows.into_iter().map(Line::raw).collect::<Vec<_>>())
 }
 
 /// The same, in a frame.
 fn draw_said(model: &Model, frame: &mut Frame, area: Rect) {
-    let block = Block::bordered().title(" console ");
-    frame.render_widget(last_lines(model, block.inner(area).height).block(block), area);
+    let title = match model.pager.below(model.lines.len()) {
+        0 => " console ".to_owned(),
+        below => format!(" console, {below} more below: {} ", if model.are_several() { "Ctrl-Down" } else { "PgDn" }),
+    };
+    let block = Block::bordered().title(title);
+    frame.render_widget(shown_lines(model, block.inner(area)).block(block), area);
 }
 
 /// The line that is being typed and its addressee. Below it is the result of HOLD, the completions, or the list of
@@ -139,9 +144,9 @@ fn draw_line(model: &Model, to: &str, frame: &mut Frame, area: Rect, hint: Rect)
         let colour = if hold.is_obeyed() { Color::Green } else { Color::Red };
         Line::raw(hold.summary(&model.names())).style(bold(colour))
     } else if model.are_several() {
-        Line::raw("PgUp, PgDn: to whom; Tab completes, Up and Down go through the history, Ctrl-C ends").dim()
+        Line::raw("PgUp, PgDn: to whom; Ctrl-Up: earlier lines; Tab completes, Up and Down recall, Ctrl-C ends").dim()
     } else {
-        Line::raw("Tab completes, Up and Down go through the history, Ctrl-C ends").dim()
+        Line::raw("PgUp: earlier lines; Tab completes, Up and Down recall, Ctrl-C ends").dim()
     };
     frame.render_widget(text, hint);
 }

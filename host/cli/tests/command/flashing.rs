@@ -315,26 +315,146 @@ fn without_ravedude_avrdude_does_it() {
     assert_refused(&command.env("PATH", folder.path()).output().unwrap(), "avrdude cannot be started");
 }
 
+/// Flashes an ELF of 100 bytes with this script in avrdude's place.
+fn flash_with(folder: &Path, port: &Path, script: &str) -> Command {
+    avrdude(folder, script);
+    let mut command = weeder();
+    command.args(["flash", "--unproved", "--elf"]).arg(elf_of(folder, 100)).arg("--port").arg(port);
+    // The script takes its own commands from the system's folders.
+    command.env("PATH", format!("{}:/usr/bin:/bin", folder.display()));
+    command
+}
+
 #[test]
 fn the_advice_comes_after_each_of_avrdude_s_words_once() {
     let folder = tempfile::tempdir().unwrap();
-    avrdude(
-        folder.path(),
-        "for n in 1 2 3 4 5 6 7 8 9 10; do\n\
-         echo \"avrdude: stk500_getsync() attempt $n of 10: not in sync: resp=0x0$n\" >&2\ndone\nexit 1\n",
-    );
     let pty = Pty::open().unwrap();
-    let elf = elf_of(folder.path(), 100);
-    let output = weeder()
-        .args(["flash", "--unproved", "--elf"])
-        .arg(&elf)
-        .arg("--port")
-        .arg(pty.path())
-        .env("PATH", folder.path())
-        .output();
-    let output = output.unwrap();
-    assert_refused(&output, "or try with --old-bootloader");
-    assert_eq!(String::from_utf8_lossy(&output.stderr).matches("not in sync").count(), 1);
+    let script = "for n in 1 2 3 4 5 6 7 8 9 10; do\n\
+         echo \"avrdude: stk500_getsync() attempt $n of 10: not in sync: resp=0x0$n\" >&2\ndone\nexit 1\n";
+    let output = flash_with(folder.path(), pty.path(), script).output().unwrap();
+    // No bootloader answers at the other rate, so the other option is no help.
+    assert_refused(&output, "no bootloader answers at 115200 or 57600 baud: pull D0 and D1 free");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(message.matches("not in sync").count(), 1);
+    assert!(!message.contains("--old-bootloader"), "{message}");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("The servo has no signal for 3 s, and the tool may fall"), "{said}");
+}
+
+#[test]
+fn another_chip_is_named_by_its_signature() {
+    let folder = tempfile::tempdir().unwrap();
+    let pty = Pty::open().unwrap();
+    for (signature, chip) in [("0x1e9516 (probably m328pb)", "ATmega328PB"), ("1E 95 14 (ATmega328)", "ATmega328")] {
+        let script = format!("echo 'avrdude: device signature = {signature}' >&2\nexit 1\n");
+        let output = flash_with(folder.path(), pty.path(), &script).output().unwrap();
+        assert_refused(&output, &format!("the board has another chip, {chip}: nothing was written"));
+    }
+}
+
+/// A bootloader with a chip of this signature, on its own thread. It answers at any rate, as a terminal has none.
+fn answering(
+    signature: [u8; 3],
+    mut is_over: impl FnMut() -> bool + Send + 'static,
+) -> (PathBuf, thread::JoinHandle<()>) {
+    let mut pty = Pty::open().unwrap();
+    let path = pty.path().to_owned();
+    let bootloader = thread::spawn(move || {
+        let (mut asked, mut bytes) = (Vec::new(), [0; 64]);
+        while !is_over() {
+            let count = pty.read(&mut bytes).unwrap();
+            asked.extend_from_slice(&bytes[..count]);
+            if asked.ends_with(&[0x30, 0x20]) {
+                pty.write(&[0x14, 0x10]).unwrap();
+                asked.clear();
+            } else if asked.ends_with(&[0x75, 0x20]) {
+                pty.write(&[&[0x14], &signature[..], &[0x10]].concat()).unwrap();
+                asked.clear();
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+    });
+    (path, bootloader)
+}
+
+#[test]
+fn after_a_failure_the_bootloader_is_asked_what_is_wrong() {
+    for (signature, words) in [
+        ([0x1E, 0x98, 0x01], "the board has another chip, ATmega2560 (Mega): nothing was written"),
+        ([0x1E, 0x95, 0x0F], "the bootloader answers now: flash it again"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let over = folder.path().join("over");
+        let (port, bootloader) = answering(signature, {
+            let over = over.clone();
+            move || over.exists()
+        });
+        let output = flash_with(folder.path(), &port, "exit 1\n").output().unwrap();
+        fs::write(over, "").unwrap();
+        bootloader.join().unwrap();
+        assert_refused(&output, words);
+    }
+}
+
+#[test]
+fn two_flashes_of_one_port_are_kept_apart() {
+    let [first, second] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let mut pty = Pty::open().unwrap();
+    let link = first.path().join("uno");
+    pty.link(&link).unwrap();
+    let script = "touch \"${0%/*}/began\"\nwhile test ! -e \"${0%/*}/end\"; do sleep 0.1; done\n";
+    let mut writing = flash_with(first.path(), &link, script).stdout(Stdio::null()).spawn().unwrap();
+    while !first.path().join("began").exists() && writing.try_wait().unwrap().is_none() {
+        thread::sleep(Duration::from_millis(20));
+    }
+    let port = fs::canonicalize(&link).unwrap();
+    let refused = flash_with(second.path(), &port, "touch \"${0%/*}/began\"\n").output().unwrap();
+    let monitor = weeder().args(["monitor", "--plain", "--port"]).arg(&port).output().unwrap();
+    fs::write(first.path().join("end"), "").unwrap();
+    assert!(writing.wait().unwrap().success());
+    assert_refused(&refused, "is being flashed by another program: wait until that has ended");
+    assert_refused(&monitor, "is being flashed by another program");
+    assert!(!second.path().join("began").exists());
+}
+
+#[test]
+fn a_port_that_vanishes_while_it_is_written_ends_avrdude() {
+    let folder = tempfile::tempdir().unwrap();
+    // The system gives the lowest free number: another test's terminal must not take this one's place.
+    let mut ptys: Vec<Pty> = (0..40).map(|_| Pty::open().unwrap()).collect();
+    let mut pty = ptys.pop().unwrap();
+    drop(ptys);
+    let link = folder.path().join("uno");
+    pty.link(&link).unwrap();
+    // It prints its progress for ever, as if the port were there.
+    let script = "touch \"${0%/*}/began\"\nwhile true; do printf '#' >&2; sleep 0.1; done\n";
+    let writing =
+        flash_with(folder.path(), &link, script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while !folder.path().join("began").exists() {
+        thread::sleep(Duration::from_millis(20));
+    }
+    // The link stays, as after a pulled cable.
+    let device = fs::canonicalize(&link).unwrap();
+    drop(pty);
+    std::os::unix::fs::symlink(device, &link).unwrap();
+    assert_refused(&writing.wait_with_output().unwrap(), "is gone while the Uno was written: plug it in, and flash it");
+}
+
+#[test]
+fn an_elf_for_another_chip_is_refused_also_unproved() {
+    let folder = tempfile::tempdir().unwrap();
+    let pty = Pty::open().unwrap();
+    let (source, elf) = (folder.path().join("main.c"), folder.path().join("other.elf"));
+    fs::write(&source, "int main(void) { for (;;); }\n").unwrap();
+    for chip in ["atmega2560", "atmega168"] {
+        let mut compiler = Command::new("avr-gcc");
+        compiler.arg(format!("-mmcu={chip}")).arg("-o").args([&elf, &source]);
+        assert!(compiler.status().expect("avr-gcc is there: setup.sh installs it").success());
+        let mut command = weeder();
+        command.args(["flash", "--unproved", "--elf"]).arg(&elf).arg("--port").arg(pty.path());
+        let output = command.env("PATH", folder.path()).output().unwrap();
+        assert_refused(&output, &format!("is for the {chip}: the Uno has an atmega328p"));
+    }
 }
 
 #[test]

@@ -91,7 +91,7 @@ fn uno() -> Background {
 }
 
 /// Runs `weeder` with these words, then `--port` and the port, and this input.
-fn weeder(words: &[&str], port: &Path, input: &str) -> Output {
+fn weeder(words: &[&str], port: &Path, input: impl AsRef<[u8]>) -> Output {
     typed(Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg("--port").arg(port), input)
 }
 
@@ -272,6 +272,31 @@ fn the_plain_monitor_answers_line_by_line_and_its_status_shows_errors() {
     assert_eq!(beside.matches("source number class, and five features").count(), 1, "{beside}");
     let wrong = printed(&weeder(&["monitor", "--plain"], uno.path(), "h\u{e4}lt\n"), 2);
     assert!(wrong.contains("is no command: it has to be one line of at most 80 printable ASCII characters"), "{wrong}");
+}
+
+#[test]
+fn a_line_that_cannot_be_sent_is_refused_by_its_number_and_hold_behind_it_is_sent() {
+    let uno = uno();
+    let too_long = format!("frobnicate\n{}\nhold\n", "x".repeat(100));
+    let utf16: Vec<u8> = "\u{feff}version\r\nHOLD\r\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let cases: [(&[u8], i32, usize, &str); 6] = [
+        (b"status\nset margin_mm 60 # caf\xe9\nhold\nget margin_mm\n", 2, 3, "not sent: line 2"),
+        (b"\xef\xbb\xbfstatus\r\nhold\r\n", 0, 2, ""),
+        (b"version\rhold\r", 0, 2, ""),
+        (too_long.as_bytes(), 2, 1, "not sent: line 2"),
+        (b"nowhere: hold\nhold.\n\x00\xff\n", 2, 1, "not sent: line 3"),
+        (&utf16, 0, 2, ""),
+    ];
+    for (input, status, done, words) in cases {
+        let log = tempfile::tempdir().expect("there is room for a file");
+        let log = log.path().join("log.csv");
+        let output = weeder(&["monitor", "--plain", "--log", log.to_str().expect("it is text")], uno.path(), input);
+        let printed = printed(&output, status);
+        let sent = fs::read_to_string(&log).expect("it was written");
+        assert!(sent.contains(",command,hold\n"), "{sent}{printed}");
+        assert_eq!(printed.lines().filter(|line| *line == "ok").count(), done, "{printed}");
+        assert!(printed.contains(words), "{printed}");
+    }
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Checks of plain language. The manual and the help have short sentences, narrow tables, and lines that fit a terminal. No word in
-//! them hides who acts, nor in comments and names of tests in the sources.
+//! them hides who acts.
 
 use crate::common::said;
 use std::fs;
@@ -10,12 +10,6 @@ const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
 /// Words that hide who acts, or that chain clauses. They are not used.
 const BANNED: [&str; 8] = ["nobody", "whoever", "whatever", "somebody", "anew", "whenever", "of which", "by which"];
-
-/// Sources with comments, by the endings of their names.
-const SOURCES: [&str; 4] = ["rs", "ts", "toml", "sh"];
-
-/// Folders of built files, and of installed packages.
-const BUILT: [&str; 5] = [".git", "build", "dist", "node_modules", "target"];
 
 /// The longest sentence, in words.
 const SENTENCE: usize = 30;
@@ -38,62 +32,6 @@ fn pages() -> Vec<(String, String)> {
     paths.sort();
     let name = |path: &Path| path.strip_prefix(root).expect("it is in the repository").display().to_string();
     paths.iter().map(|path| (name(path), fs::read_to_string(path).expect("a page is text"))).collect()
-}
-
-/// The sources of the repository.
-fn sources() -> Vec<(String, String)> {
-    let (mut sources, mut folders) = (Vec::new(), vec![PathBuf::from(ROOT)]);
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).expect("it is a folder") {
-            let path = entry.expect("it is listed").path();
-            let is_built = path.file_name().is_some_and(|name| BUILT.iter().any(|built| name == *built));
-            let is_source = path.extension().is_some_and(|ending| SOURCES.iter().any(|source| ending == *source));
-            if path.is_dir() && !is_built {
-                folders.push(path);
-            } else if is_source && path.is_file() {
-                let name = path.strip_prefix(ROOT).expect("it is below the root").display().to_string();
-                sources.push((name, fs::read_to_string(&path).expect("a source is text")));
-            }
-        }
-    }
-    sources.sort();
-    sources
-}
-
-/// The prose of a source, a line each: its comments and its names of tests. Lines of code are empty.
-fn prose(name: &str, source: &str) -> Vec<String> {
-    let mark = if name.ends_with(".rs") || name.ends_with(".ts") { "//" } else { "#" };
-    let (mut is_test, mut in_block) = (false, false);
-    let prose = source.lines().map(|line| {
-        let code = line.trim_start();
-        let begins_block = mark == "//" && code.starts_with("/*");
-        let is_comment = in_block || begins_block || code.starts_with(mark);
-        in_block = (in_block || begins_block) && !line.contains("*/");
-        let test = code.strip_prefix("fn ").filter(|_| is_test).or_else(|| code.strip_prefix("test(\""));
-        is_test = code == "#[test]" || is_test && code.starts_with(['#', '/']);
-        match (is_comment, test, line.split_once(&format!(" {mark} "))) {
-            (true, ..) => code,
-            (false, Some(name), _) => name,
-            (false, None, Some((_, comment))) => comment,
-            (false, None, None) => "",
-        }
-        .replace('_', " ")
-    });
-    prose.collect()
-}
-
-/// The banned words in the prose of a source, each with its file and line. A phrase may go on in the next line.
-fn banned_in_source(name: &str, source: &str) -> Vec<String> {
-    let lines = prose(name, source);
-    let next = lines.iter().skip(1).map(String::as_str).chain([""]);
-    let mut found = Vec::new();
-    for (number, (line, next)) in (1..).zip(lines.iter().zip(next)) {
-        let (here, later) = (banned(line), banned(next));
-        let both =
-            banned(&format!("{line} {next}")).into_iter().filter(|word| here.contains(word) || !later.contains(word));
-        found.extend(both.map(|word| format!("{name}:{number}: {word}")));
-    }
-    found
 }
 
 /// Every command of `weeder` with its help, subcommands included.
@@ -188,14 +126,6 @@ fn no_page_and_no_help_has_a_word_that_hides_who_acts() {
 }
 
 #[test]
-fn no_comment_and_no_name_of_a_test_has_a_word_that_hides_who_acts() {
-    let sources = sources();
-    assert!(sources.len() > 500, "only {} sources were found", sources.len());
-    let found: Vec<String> = sources.iter().flat_map(|(name, source)| banned_in_source(name, source)).collect();
-    assert!(found.is_empty(), "say who or what acts, in these comments and names of tests:\n{}", found.join("\n"));
-}
-
-#[test]
 fn no_sentence_of_the_manual_or_of_the_help_is_long() {
     let in_pages = pages().into_iter().map(|(name, text)| (name, paragraphs(&text)));
     // Lines of help that are indented alike are one paragraph, as they are wrapped. A line with columns is one of its own.
@@ -260,20 +190,4 @@ fn a_long_sentence_a_banned_word_and_a_paragraph_are_found() {
     let page = "# A page\n\nOne\nparagraph.\n- an item\n  of two lines\n\n```sh\nno text\n```\n| a | cell |\n";
     let found: Vec<String> = paragraphs(page).into_iter().filter(|part| !part.is_empty()).collect();
     assert_eq!(found, ["# A page", "One paragraph.", "an item of two lines", "a", "cell"]);
-}
-
-#[test]
-fn a_banned_word_is_found_in_comments_and_names_of_tests_and_not_in_code() {
-    // `%` stands for the mark of a comment, so that this file passes.
-    let rust = "%! Rows of\n%! which one is lost.\nlet nobody = 1; % anew\n#[test]\nfn it_stops_whenever_it_may() {}\nfn anew() {}\n";
-    assert_eq!(
-        banned_in_source("a.rs", &rust.replace('%', "//")),
-        ["a.rs:1: of which", "a.rs:3: anew", "a.rs:5: whenever"]
-    );
-    let script = "/**\n * Whatever\n */\ntest(\"somebody types\", () => {});\nconst nobody = 1;\n";
-    assert_eq!(banned_in_source("a.ts", script), ["a.ts:2: whatever", "a.ts:4: somebody"]);
-    assert_eq!(
-        banned_in_source("a.toml", "# by which\nanew = 1 # whoever\n"),
-        ["a.toml:1: by which", "a.toml:2: whoever"]
-    );
 }

@@ -15,6 +15,7 @@ mod flashing;
 mod host_tools;
 mod language;
 mod manual;
+mod newer;
 mod plan;
 mod printing;
 mod serve;

@@ -4,11 +4,11 @@ use std::io::Write;
 use std::process::{Command, Output, Stdio};
 
 /// Runs it with this input to its end.
-pub fn typed(weeder: &mut Command, input: &str) -> Output {
+pub fn typed(weeder: &mut Command, input: impl AsRef<[u8]>) -> Output {
     let weeder = weeder.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut weeder = weeder.spawn().expect("cargo has built the command");
     // A command that fails at once reads no input.
-    let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_bytes());
+    let _ = weeder.stdin.take().expect("it is piped").write_all(input.as_ref());
     weeder.wait_with_output().expect("it ends")
 }
 

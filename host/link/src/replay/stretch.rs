@@ -3,11 +3,12 @@
 
 use super::{DETECTION_TICKS, ReplayError};
 use crate::examples::{Taught, taught};
-use crate::follower::{Followed, Follower};
 use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
-use crate::{EventLine, Mode, Status};
+use crate::{ConsoleLine, EventLine, Mode, Status};
 use control::say::command::{self, Command};
+use files::in_a_line;
+use std::collections::VecDeque;
 
 /// The content of a log line.
 pub(super) enum Happened<'a> {
@@ -27,56 +28,86 @@ pub(super) struct Stretch<'a> {
     /// The first of its statuses.
     pub(super) first: Status,
     pub(super) happened: Vec<(&'a Entry, Happened<'a>)>,
+    /// Notes on lines that only a newer version knows.
+    pub(super) notes: Vec<String>,
 }
 
 impl<'a> Stretch<'a> {
     /// Reads a stretch. `None` if the machine sent nothing.
     pub(super) fn read(entries: &'a [Entry]) -> Result<Option<Self>, ReplayError> {
-        let mut follower = Follower::default();
-        let mut settings = None;
+        let mut settings = Settings::new();
         let (mut examples, mut built_in) = (Vec::new(), 0);
-        let mut happened: Vec<(&Entry, Happened<'_>)> = Vec::new();
+        let mut happened = Vec::new();
+        let mut notes: Vec<String> = Vec::new();
+        let mut skip = |entry: &Entry, what: &str| {
+            let name = entry.text.split([' ', '=']).next().unwrap_or_default();
+            let note = format!("{what} `{}`, which this version does not know, is left out", in_a_line(name));
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        };
+        // Indices in `happened` of commands without an answer so far. Answers come in the order of commands.
+        let mut unanswered = VecDeque::new();
         for entry in entries {
             let wrong = |problem: &str| {
                 let problem = format!("`{}` is {problem}", entry.text);
                 ReplayError::Line { line: entry.number, problem }
             };
-            let followed = follower.take(entry);
-            if entry.kind == Kind::Command || matches!(followed, Followed::Status(..) | Followed::Event(_)) {
-                // The replayed controller follows all later changes by itself.
-                settings.get_or_insert_with(|| follower.in_use().settings().clone());
-            }
-            match followed {
-                Followed::Status(status, _) => happened.push((entry, Happened::Status(status))),
-                Followed::Event(event) => happened.push((entry, Happened::Event(event))),
-                Followed::Answered(command, false) => {
-                    let refused = happened.iter_mut().rev().find(|(entry, _)| entry.number == command.number);
-                    refused.into_iter().for_each(|(_, happened)| *happened = Happened::Refused);
-                }
-                Followed::Unread => {
-                    return Err(wrong(match entry.kind {
-                        Kind::Setting if shown(&entry.text).is_some() => "out of range",
-                        Kind::Setting => "no setting of this version",
-                        Kind::Status => "no status",
-                        _ => "no event",
-                    }));
-                }
-                _ => {}
-            }
             match entry.kind {
-                Kind::Command => happened.push((entry, Happened::Command(&entry.text))),
-                // The list may end with the number of damaged examples.
-                Kind::Example if !entry.text.starts_with("spoiled=") => {
+                Kind::Setting => {
+                    let Some((setting, value)) = shown(&entry.text) else {
+                        let name = entry.text.split('=').next().unwrap_or_default();
+                        if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
+                            return Err(wrong("no setting"));
+                        }
+                        skip(entry, "the setting");
+                        continue;
+                    };
+                    // With another value than the machine's, the decisions are others.
+                    settings.set(setting, value).map_err(|_| wrong("out of the range of this version"))?;
+                }
+                Kind::Example => {
+                    // The list may end with the number of damaged examples.
+                    if entry.text.starts_with("spoiled=") {
+                        continue;
+                    }
+                    if matches!(EventLine::parse(&entry.text), Some(EventLine::Newer { .. })) {
+                        skip(entry, "the event");
+                        continue;
+                    }
                     let (from_field, _, example) = taught(&entry.text).ok_or_else(|| wrong("no example"))?;
                     examples.push(example);
                     built_in += usize::from(!from_field);
                 }
-                _ => {}
+                Kind::Status => {
+                    let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
+                    happened.push((entry, Happened::Status(status)));
+                }
+                Kind::Event => {
+                    let event = EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
+                    if let EventLine::Newer { .. } = event {
+                        skip(entry, "the event");
+                        continue;
+                    }
+                    happened.push((entry, Happened::Event(event)));
+                }
+                Kind::Command => {
+                    unanswered.push_back(happened.len());
+                    happened.push((entry, Happened::Command(&entry.text)));
+                }
+                Kind::Answer => {
+                    let ConsoleLine::End { error } = ConsoleLine::parse(&entry.text) else { continue };
+                    if let (Some(place), Some(_)) = (unanswered.pop_front(), error) {
+                        happened[place] = (happened[place].0, Happened::Refused);
+                    }
+                }
+                Kind::Connected | Kind::Lost => {}
+                // Satellite positions have no effect on the machine's decisions.
+                Kind::Antenna | Kind::GpsFound | Kind::GpsLost | Kind::Gps | Kind::GpsDamaged | Kind::GpsMark => {}
             }
         }
-        let settings = settings.unwrap_or_default();
         let first = happened.iter().find_map(status).cloned();
-        Ok(first.map(|first| Self { settings, examples, built_in, first, happened }))
+        Ok(first.map(|first| Self { settings, examples, built_in, first, happened, notes }))
     }
 
     /// The position from which the machine is replayed. If the log shows where watching began, it is that, or a little

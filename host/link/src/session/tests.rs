@@ -86,7 +86,7 @@ fn settings_are_asked_for_again_after_every_change() {
         assert!(talk.command(command));
         let happened = talk.second();
         let Some(Happening::Settings(settings, shown)) = happened.last() else { panic!("{command}: {happened:?}") };
-        assert_eq!(settings.get(settings::Setting::WheelMm), wheel_mm, "{command}");
+        assert_eq!(settings.get(crate::settings::Setting::WheelMm), wheel_mm, "{command}");
         let line = format!("wheel_mm={wheel_mm} mm ");
         assert!(shown.iter().any(|shown| shown.starts_with(&line)), "{shown:?}");
     }

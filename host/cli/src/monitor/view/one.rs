@@ -2,7 +2,7 @@
 //! screen shows only the state and the ground, in a few lines.
 
 use super::{
-    HOLD_KEY, HOLD_STYLE, URGENT, bold, colour, draw_line, draw_said, draw_top, ground, last_lines, tool_column,
+    HOLD_KEY, HOLD_STYLE, URGENT, bold, colour, draw_line, draw_said, draw_top, ground, shown_lines, tool_column,
 };
 use crate::monitor::model::{Connection, Model, RowModel, Seen};
 use link::names;
@@ -76,7 +76,7 @@ fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
     let lines = vec![self::ground(row, columns).green().into(), marks(row, columns).into()];
     frame.render_widget(Text::from(lines), ground);
     frame.render_widget(Line::raw(speed_and_place(row)), speed);
-    frame.render_widget(last_lines(model, said.height), said);
+    frame.render_widget(shown_lines(model, said), said);
     draw_line(model, "", frame, line, hint);
 }
 

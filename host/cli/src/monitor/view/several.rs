@@ -2,7 +2,7 @@
 //! tool, and the state of the last command. If there is not room for all, rows that are lost or in alarm come first,
 //! and the rest are counted by state.
 
-use super::{URGENT, bold, colour, draw_line, draw_said, draw_top, ground, last_lines};
+use super::{URGENT, bold, colour, draw_line, draw_said, draw_top, ground, shown_lines};
 use crate::monitor::model::{Answer, Connection, Model, RowModel};
 use link::{Mode, advice};
 use ratatui::Frame;
@@ -43,7 +43,7 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     if is_roomy {
         draw_said(model, frame, said);
     } else {
-        frame.render_widget(last_lines(model, said.height), said);
+        frame.render_widget(shown_lines(model, said), said);
     }
     let to = model.target.map_or("all", |row| rows[row].name.as_str());
     draw_line(model, to, frame, line, hint);

@@ -1,0 +1,238 @@
+//! The plain monitor's input: bytes from a shell, a script or another program, as lines.
+//!
+//! CR, LF or both end a line. A byte order mark is dropped, and UTF-16 is read, because some shells write both. A byte
+//! that is no text spoils its own line only. Lines are bounded, so that input without line ends is refused too.
+
+use std::io::{ErrorKind, Read};
+
+/// The greatest length of a line in characters: more than a row's name and a command.
+const LIMIT: usize = 200;
+
+/// A line of the input.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// Its number, counted from 1.
+    pub number: usize,
+    /// Its text. A character that the console does not take is U+FFFD. The end of a long line is missing.
+    pub text: String,
+}
+
+/// How the input writes its characters.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Encoding {
+    /// A byte each; bytes outside of ASCII are no characters of the console.
+    Bytes,
+    /// UTF-16 with the low byte first, or last.
+    LittleEndian,
+    BigEndian,
+}
+
+impl Encoding {
+    /// The encoding that the first bytes show, and the length of their byte order mark. `None` if more bytes are needed.
+    fn of(first: &[u8], is_all: bool) -> Option<(Self, usize)> {
+        Some(match *first {
+            [0xEF, 0xBB, 0xBF, ..] => (Self::Bytes, 3),
+            [0xFF, 0xFE, ..] => (Self::LittleEndian, 2),
+            [0xFE, 0xFF, ..] => (Self::BigEndian, 2),
+            // UTF-16 without a mark: a command begins with an ASCII character.
+            [1..=0x7F, 0, ..] => (Self::LittleEndian, 0),
+            [0, 1..=0x7F, ..] => (Self::BigEndian, 0),
+            [] | [_] | [0xEF, 0xBB] if !is_all => return None,
+            _ => (Self::Bytes, 0),
+        })
+    }
+}
+
+/// Collects bytes to lines.
+#[derive(Default)]
+struct Lines {
+    encoding: Option<Encoding>,
+    /// Bytes that are no whole character yet.
+    begun: Vec<u8>,
+    text: String,
+    length: usize,
+    number: usize,
+    /// Whether the last character was a CR. It makes one line end with an LF behind it.
+    after_return: bool,
+    complete: Vec<Line>,
+}
+
+impl Lines {
+    /// Takes bytes; `is_all` where no more will come. Returns the lines that they complete.
+    fn take(&mut self, bytes: &[u8], is_all: bool) -> Vec<Line> {
+        self.begun.extend_from_slice(bytes);
+        if self.encoding.is_none()
+            && let Some((encoding, mark)) = Encoding::of(&self.begun, is_all)
+        {
+            self.encoding = Some(encoding);
+            self.begun.drain(..mark);
+        }
+        let width = match self.encoding {
+            None => return Vec::new(),
+            Some(Encoding::Bytes) => 1,
+            Some(_) => 2,
+        };
+        let begun = std::mem::take(&mut self.begun);
+        let (whole, rest) = begun.split_at(begun.len() - begun.len() % width);
+        for character in whole.chunks(width) {
+            let code = match (self.encoding, character) {
+                (Some(Encoding::LittleEndian), &[low, high]) => u16::from_le_bytes([low, high]),
+                (_, &[high, low]) => u16::from_be_bytes([high, low]),
+                (_, bytes) => bytes.first().copied().unwrap_or_default().into(),
+            };
+            self.character(code);
+        }
+        if is_all {
+            // A last line without an end is a line too.
+            (!rest.is_empty()).then(|| self.push(char::REPLACEMENT_CHARACTER));
+            (self.length > 0).then(|| self.end());
+        } else {
+            self.begun = rest.to_vec();
+        }
+        std::mem::take(&mut self.complete)
+    }
+
+    fn character(&mut self, code: u16) {
+        let after_return = std::mem::replace(&mut self.after_return, code == u16::from(b'\r'));
+        match u8::try_from(code) {
+            Ok(b'\n') if after_return => {}
+            Ok(b'\r' | b'\n') => self.end(),
+            Ok(b'\t') => self.push(' '),
+            Ok(printable @ b' '..=b'~') => self.push(char::from(printable)),
+            _ => self.push(char::REPLACEMENT_CHARACTER),
+        }
+    }
+
+    fn push(&mut self, character: char) {
+        self.length += 1;
+        if self.length <= LIMIT {
+            self.text.push(character);
+        }
+    }
+
+    fn end(&mut self) {
+        self.number += 1;
+        self.length = 0;
+        self.complete.push(Line { number: self.number, text: std::mem::take(&mut self.text) });
+    }
+}
+
+/// Reads lines until the input ends, and passes each on at once. Ends early where `pass_on` returns false.
+pub fn read(mut from: impl Read, mut pass_on: impl FnMut(Line) -> bool) {
+    let (mut lines, mut bytes) = (Lines::default(), [0; 1024]);
+    loop {
+        let count = match from.read(&mut bytes) {
+            Ok(count) => count,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            // An input that is gone has ended. What came before is sent.
+            Err(_) => 0,
+        };
+        if !lines.take(&bytes[..count], count == 0).into_iter().all(&mut pass_on) || count == 0 {
+            return;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    /// The lines of an input that comes in pieces of this length.
+    fn lines(input: &[u8], piece: usize) -> Vec<(usize, String)> {
+        let mut lines = Lines::default();
+        let mut all: Vec<Line> = input.chunks(piece).flat_map(|bytes| lines.take(bytes, false)).collect();
+        all.extend(lines.take(&[], true));
+        all.into_iter().map(|line| (line.number, line.text)).collect()
+    }
+
+    #[test]
+    fn a_line_is_passed_on_before_the_next_byte_comes() {
+        for end in ["\n", "\r", "\r\n"] {
+            let mut lines = Lines::default();
+            let hold = lines.take(format!("hold{end}").as_bytes(), false);
+            assert_eq!(hold, [Line { number: 1, text: "hold".to_owned() }], "{end:?}");
+        }
+    }
+
+    #[test]
+    fn endless_input_is_bounded_and_what_follows_is_read() {
+        let mut input = vec![b'x'; 100_000];
+        input.extend(b"\nhold\n");
+        assert_eq!(lines(&input, 1000), [(1, "x".repeat(LIMIT)), (2, "hold".to_owned())]);
+        assert_eq!(lines(&[0; 5000], 7).len(), 1);
+    }
+
+    /// A line's text. Some characters have a line end among their bytes in UTF-16.
+    fn any_text() -> impl Strategy<Value = String> {
+        prop_oneof![
+            4 => "[ -~]{0,90}",
+            1 => "[a-z #]{0,20}[\u{e4}\u{e9}\u{20ac}\u{10a}\u{a0a}\u{200b}\u{1f33f}]{1,3}[a-z ]{0,9}",
+        ]
+    }
+
+    /// What shells do with a text: how they encode it, mark it, end its lines, and whether they end the last one.
+    #[derive(Clone, Copy, Debug)]
+    struct Habit {
+        encoding: &'static str,
+        marked: bool,
+        end: &'static str,
+        last_ended: bool,
+        piece: usize,
+    }
+
+    fn any_habit() -> impl Strategy<Value = Habit> {
+        let encoding = prop::sample::select(vec!["utf-8", "latin-1", "utf-16le", "utf-16be"]);
+        let end = prop::sample::select(vec!["\n", "\r\n", "\r"]);
+        (encoding, any::<bool>(), end, any::<bool>(), 1..9_usize)
+            .prop_map(|(encoding, marked, end, last_ended, piece)| Habit { encoding, marked, end, last_ended, piece })
+    }
+
+    /// The bytes of a character.
+    fn encoded(character: char, encoding: &str) -> Vec<u8> {
+        let units = || character.encode_utf16(&mut [0; 2]).to_vec();
+        match encoding {
+            "utf-8" => character.to_string().into_bytes(),
+            "latin-1" => vec![u8::try_from(u32::from(character)).unwrap_or(b'\x80')],
+            "utf-16le" => units().into_iter().flat_map(u16::to_le_bytes).collect(),
+            _ => units().into_iter().flat_map(u16::to_be_bytes).collect(),
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_habit_of_a_shell_leaves_every_line_its_number_and_a_strange_character_spoils_its_line_only(
+            texts in vec(any_text(), 0..6), habit in any_habit(),
+        ) {
+            // Without a mark, only a first ASCII character shows that it is UTF-16.
+            let is_shown = habit.marked || texts.first().is_none_or(|text| text.starts_with(|c: char| c.is_ascii()));
+            prop_assume!(!habit.encoding.starts_with("utf-16") || is_shown);
+            let mut script = texts.join(habit.end);
+            if habit.last_ended && !texts.is_empty() {
+                script.push_str(habit.end);
+            }
+            if habit.marked && habit.encoding != "latin-1" {
+                script.insert(0, '\u{feff}');
+            }
+            let input: Vec<u8> = script.chars().flat_map(|character| encoded(character, habit.encoding)).collect();
+            let mut found = lines(&input, habit.piece).into_iter();
+            for (number, text) in (1..).zip(&texts) {
+                let is_last = number == texts.len();
+                match found.next() {
+                    Some((at, line)) => {
+                        prop_assert_eq!(at, number);
+                        if text.is_ascii() {
+                            prop_assert_eq!(&line, text);
+                        } else {
+                            prop_assert!(!link::is_command(&line), "{:?} became {:?}", text, line);
+                        }
+                    }
+                    // Only a last line that is empty and has no end is no line.
+                    None => prop_assert!(is_last && text.is_empty() && !habit.last_ended, "line {} is lost", number),
+                }
+            }
+            prop_assert_eq!(found.next(), None);
+        }
+    }
+}

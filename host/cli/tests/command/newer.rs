@@ -1,0 +1,151 @@
+//! The tools at a machine whose firmware is newer than they are: it has an event, an alarm, settings and words that they do
+//! not know.
+
+use crate::typed::{printed, typed};
+use control::settings::Setting;
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+use uno::pty::Pty;
+
+/// The answer to `get`: `wheel_mm` has a wider range, `k` is gone, and two settings are new.
+fn settings(lamp: &str) -> String {
+    let line = |setting: Setting| {
+        let (name, wanted) = (setting.text(), setting.description());
+        let unit = setting.unit();
+        match name.to_string().as_str() {
+            "wheel_mm" => "wheel_mm=900 mm from 200 to 1200, default 400\r\n".to_owned(),
+            "k" => String::new(),
+            _ if setting.is_switched() => format!("{name}=off on or off, default off\r\n"),
+            _ => {
+                let (value, least, greatest) = (wanted.default, wanted.least, wanted.greatest);
+                format!("{name}={value}{unit} from {least} to {greatest}, default {value}\r\n")
+            }
+        }
+    };
+    let known: String = Setting::all().map(line).collect();
+    format!("{known}tilt_mm=7 mm from 0 to 99, default 5, saved 5\r\nlamp={lamp} on or off, default off\r\n")
+}
+
+/// The machine at a port, until it is dropped.
+struct Newer {
+    port: PathBuf,
+    is_over: Arc<AtomicBool>,
+    machine: Option<thread::JoinHandle<()>>,
+}
+
+impl Newer {
+    fn start() -> Self {
+        let mut pty = Pty::open().expect("there is a pseudo terminal");
+        let (port, is_over) = (pty.path().to_owned(), Arc::new(AtomicBool::new(false)));
+        let over = Arc::clone(&is_over);
+        let machine = thread::spawn(move || {
+            let (mut line, mut bytes, mut lamp) = (String::new(), [0; 64], "off");
+            while !over.load(Ordering::Relaxed) {
+                let count = pty.read(&mut bytes).expect("the terminal works");
+                for &byte in &bytes[..count] {
+                    match byte {
+                        b'\n' => {
+                            if line == "set lamp on" {
+                                lamp = "on";
+                            }
+                            let said = answer(&line, lamp);
+                            let mut said = said.as_bytes();
+                            while !said.is_empty() {
+                                said = &said[pty.write(said).expect("the terminal works")..];
+                            }
+                            line.clear();
+                        }
+                        b' '..=b'~' => line.push(char::from(byte)),
+                        _ => {}
+                    }
+                }
+                thread::sleep(Duration::from_millis(2));
+            }
+        });
+        Self { port, is_over, machine: Some(machine) }
+    }
+
+    fn weeder(&self, words: &[&str], input: &str) -> std::process::Output {
+        typed(Command::new(env!("CARGO_BIN_EXE_weeder")).args(words).arg("--port").arg(&self.port), input)
+    }
+}
+
+impl Drop for Newer {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        let ended = self.machine.take().map(thread::JoinHandle::join);
+        assert!(thread::panicking() || ended.is_none_or(|ended| ended.is_ok()));
+    }
+}
+
+fn answer(line: &str, lamp: &str) -> String {
+    let answer = match line {
+        "" => return String::new(),
+        "version" => "weeder 99.1.0 (abc)\r\n".to_owned(),
+        "get" => settings(lamp),
+        "examples" => "tilt deg=4 pos=9\r\nbuilt_in 0 plant 1 2 3 4 5\r\n".to_owned(),
+        "status" => "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=450 mood=good\r\nlost=0 moon=full\r\n"
+            .to_owned(),
+        "hold" => "alarm code=9-1 name=boredom pos=9 why=rain\r\n".to_owned(),
+        _ => String::new(),
+    };
+    format!("{answer}ok\r\n")
+}
+
+#[test]
+fn hold_status_and_log_work_with_a_newer_firmware_and_the_newer_side_is_named() {
+    let machine = Newer::start();
+    let folder = tempfile::tempdir().expect("there is room for files");
+    let log = folder.path().join("log.csv");
+    let log_name = log.to_str().expect("it is text");
+    let said = printed(&machine.weeder(&["monitor", "--plain", "--log", log_name], "status\nhold\n"), 0);
+    for words in [
+        "state=hold tool=out",
+        "mood=good",
+        "tilt deg=4 pos=9",
+        "alarm code=9-1 name=boredom pos=9 why=rain",
+        "the firmware 99.1.0 (abc) is newer than this program",
+        "only the firmware knows wheel_mm, tilt_mm, lamp; the firmware lacks k",
+    ] {
+        assert!(said.contains(words), "{words:?} is not in {said}");
+    }
+    let text = fs::read_to_string(&log).expect("it was written");
+    for line in [
+        ",setting,wheel_mm=900\n",
+        ",setting,tilt_mm=7\n",
+        ",event,tilt deg=4 pos=9\n",
+        ",event,alarm code=9-1 name=boredom pos=9 why=rain\n",
+        ",example,built_in 0 plant 1 2 3 4 5\n",
+    ] {
+        assert!(text.contains(line), "{line:?} is not in {text}");
+    }
+    assert!(!text.contains(",setting,k="), "{text}");
+}
+
+#[test]
+fn settings_of_a_newer_firmware_are_pulled_compared_and_pushed() {
+    let machine = Newer::start();
+    let folder = tempfile::tempdir().expect("there is room for a file");
+    let file = folder.path().join("machine.toml");
+    let name = file.to_str().expect("it is text");
+    printed(&machine.weeder(&["settings", "pull", name], ""), 0);
+    let text = fs::read_to_string(&file).expect("it was written");
+    assert!(text.contains("wheel_mm = 900\n") && text.contains("tilt_mm = 7\n"), "{text}");
+    assert!(text.contains("lamp = false\n") && !text.contains("\nk = "), "{text}");
+    let same = printed(&machine.weeder(&["settings", "diff", name], ""), 0);
+    assert!(same.starts_with("The machine has the settings of "), "{same}");
+    fs::write(&file, "lamp = true\n").expect("it can be written");
+    let differs = printed(&machine.weeder(&["settings", "diff", name, "--json"], ""), 1);
+    assert!(differs.contains("\"setting\": \"lamp\""), "{differs}");
+    fs::write(&file, "lmap = true\n").expect("it can be written");
+    let unknown = printed(&machine.weeder(&["settings", "push", name], ""), 2);
+    assert!(
+        unknown.contains("line 1: there is no setting `lmap`") && unknown.contains("nothing was sent"),
+        "{unknown}"
+    );
+}
