@@ -4,6 +4,7 @@
 // types commands. It makes no decisions.
 
 import { download, Parts } from "../dom.ts";
+import type { EventLine } from "../link/console_line.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
 import { type Ask, type Happening, type Link, NoMachine, Refused } from "../link/session.ts";
@@ -250,10 +251,11 @@ export class Panel {
 
     /** Gives the operator audible signals for events that must be noticed without looking. */
     #signal(happening: Happening, isOtherAlarm: boolean): void {
-        if (isOtherAlarm && this.machine.alarm !== undefined) signal("alarm");
+        const isNew = happening.is === "event" && happening.event.is === "newer" && happening.event.isAlarm;
+        if ((isOtherAlarm && this.machine.alarm !== undefined) || isNew) signal("alarm");
         if (happening.is === "lost" && !happening.isWanted) signal("lost");
         const event = happening.is === "event" ? happening.event : undefined;
-        if (event?.is !== "state" && event?.is !== "alarm" && happening.is !== "lost") return;
+        if (event?.is !== "state" && !(event && isAlarm(event)) && happening.is !== "lost") return;
         // By its switch, or by another page's HOLD. This page's own HOLD is signalled by its answer, which comes before
         // or after this.
         if (event?.is === "state" && event.mode === "hold" && !this.#isHolding) signal("held");
@@ -322,6 +324,11 @@ export class Panel {
 }
 
 /** The line of the console about an event, and its kind. */
+/** Whether an event is an alarm, also one that only a newer firmware knows. */
+function isAlarm(event: EventLine): boolean {
+    return event.is === "alarm" || (event.is === "newer" && event.isAlarm);
+}
+
 function inConsole(happening: Happening): Parameters<Console["add"]> | undefined {
     switch (happening.is) {
         case "started":
@@ -332,7 +339,7 @@ function inConsole(happening: Happening): Parameters<Console["add"]> | undefined
             return [happening.why, "happened"];
         case "event":
             if (happening.event.is === "plot") return undefined;
-            return [happening.line, happening.event.is === "alarm" ? "error" : ""];
+            return [happening.line, isAlarm(happening.event) ? "error" : ""];
         case "command":
             return [`> ${happening.line}`, "typed"];
         case "answer":
