@@ -153,7 +153,7 @@ fn a_state_that_is_not_understood_for_a_second_is_unknown_and_so_is_that_before_
     model.turn(began);
     model.turn(began + Duration::from_secs(2));
     let drawn = screen_of(&model, 80, 24);
-    assert!(drawn.contains("1 LOST 2 ?") && !drawn.contains("work") && !drawn.contains("hold "), "{drawn}");
+    assert!(drawn.contains("1 LOST 2 ?") && drawn.contains("row 2 ?       ?"), "{drawn}");
 }
 
 #[test]
