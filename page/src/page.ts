@@ -12,6 +12,7 @@ import { Connection } from "./panel/connection.ts";
 import { Panel } from "./panel/panel.ts";
 import { showServed } from "./panel/served.ts";
 import { chosen, isStill, keep, STILL_MS } from "./preferences.ts";
+import { Cancelled, type Work } from "./record/picture.ts";
 import { RecordView } from "./record/record.ts";
 import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
@@ -37,6 +38,9 @@ import {
 const CHIP_SHARE = 0.8;
 /** Longest time that passes in a frame: a page that was hidden does not catch up. */
 const LONGEST_FRAME_S = 0.1;
+/** Where the tool of "Try it" has to be for an example of a log, and the time after which a standing one has none. */
+const EXAMPLE_MM = 4000;
+const EXAMPLE_CYCLES = 3 * CYCLES_PER_SECOND;
 /** Time over which the pace is measured. */
 const PACE_S = 1;
 /** The views, by their sections and the address behind #. */
@@ -84,7 +88,21 @@ function startWork(): void {
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
 
-new RecordView(new Parts(page.html("view-record")));
+new RecordView(new Parts(page.html("view-record")), tryLog);
+
+/** The log of "Try it", which weeds on until some plants are in it. */
+async function tryLog({ progress, cancel }: Work): Promise<File> {
+    for (;;) {
+        if (cancel.aborted) throw new Cancelled();
+        const share = trial.machine.toolMm / EXAMPLE_MM;
+        progress(Math.min(Math.max(share, 0), 1));
+        // A machine that stands makes the log no longer.
+        if (share >= 1 || (Number(speed.value) <= 0 && trial.uno.cycle > EXAMPLE_CYCLES)) return trialPanel.log;
+        trial.advance(LONGEST_FRAME_S, Number.POSITIVE_INFINITY);
+        trialPanel.turn(trialMs());
+        await new Promise((done) => setTimeout(done));
+    }
+}
 
 /** The panels of real machines. */
 let workPanels: Panel[] = [];
@@ -175,7 +193,8 @@ wakeOnTouch(showSound);
 // A browser may remember an earlier state.
 for (const form of ["drive", "bench"]) page.get(form, HTMLFormElement).reset();
 // Under reduced motion the machine stands until the operator drives it.
-if (isStill()) page.get("speed", HTMLInputElement).value = "0";
+const speed = page.get("speed", HTMLInputElement);
+if (isStill()) speed.value = "0";
 
 /** Shows a slider's value beside it, in a text if there is one, and makes its change, now and after each move. */
 function slider(id: string, unit: string, digits: number, change: (value: number) => Change, text?: "ofGaps"): void {

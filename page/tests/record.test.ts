@@ -277,3 +277,15 @@ test("a log of a day opens, is moved through with only what is in the window, an
     assert(before < 1 && (await inView(page, "log-busy").isHidden()));
     await close(opened);
 });
+
+test("without a log of its own, the page offers the log of Try, which is drawn and replayed", async () => {
+    const opened = await open(browser, "record");
+    const { page } = opened;
+    await page.getByRole("button", { name: "An example" }).click();
+    await page
+        .locator("[data-part=log-said]", { hasText: /weeder-log\.csv: .*[1-9]\d* detections, [1-9]\d* swings/ })
+        .waitFor();
+    await page.getByRole("button", { name: "Replay it" }).click();
+    await page.locator("[data-part=log-replayed]", { hasText: "The decisions are those of this version" }).waitFor();
+    await close(opened);
+});

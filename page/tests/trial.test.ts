@@ -150,7 +150,7 @@ test("a supply that sags at work takes the tool out until the switch is thrown a
     tried.roll(2, 3000);
     assert.match(tried.heard, /reset by brown_out/);
     assert(tried.trial.machine.isClear);
-    assert.equal(tried.damaged, 0);
+    assert.equal(tried.reached, 0);
 });
 
 test("a machine that rolls too fast has the tool out, and says why", () => {
@@ -159,7 +159,7 @@ test("a machine that rolls too fast has the tool out, and says why", () => {
     tried.roll(7, 4000);
     assert.match(tried.heard, /^alarm code=3-1 name=too_fast/m);
     assert(tried.trial.machine.isClear);
-    assert.equal(tried.damaged, 0);
+    assert.equal(tried.reached, 0);
 });
 
 test("spacing and weeds are sown as they are asked for, ahead of what is sown already", () => {

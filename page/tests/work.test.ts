@@ -224,7 +224,7 @@ test("a device that is no weeder is told by what it says, and the port is let go
 test("a port that another program has is told with the way out", async () => {
     const refuses = { name: "NetworkError", message: "Failed to open serial port." };
     const opened = await connect(new Foreign(() => [], "", refuses));
-    await opened.page.getByText(/Not connected: .*close the serial monitor/).waitFor();
+    await opened.page.getByText(/Not connected: .*close the other tab first, then the serial monitor/).waitFor();
     await close(opened);
 });
 
@@ -370,5 +370,34 @@ test("the console follows again after another tab, unless it was scrolled back",
     await said.evaluate((it) => it.scrollTo(0, 0));
     await type(page, "get k");
     assert.equal(await said.evaluate((it) => it.scrollTop), 0);
+    await close({ page, errors });
+});
+
+test("the steps of the set-up take a value each, set and save it, and keep what is being typed", async (test) => {
+    const { page, errors } = await atHold(test, PHONE, "--stand");
+    await page.getByRole("tab", { name: "Calibrate" }).click();
+    const steps = part(page, "set-up-steps");
+    const beam = steps.locator("[data-step=beam_to_tool_mm]");
+    assert.equal(await beam.inputValue(), "400");
+    const step = steps.locator("li").filter({ has: page.locator("[data-step=beam_to_tool_mm]") });
+    await beam.fill("4000");
+    await step.getByRole("button", { name: "Set and save" }).click();
+    await step.getByText("beam_to_tool_mm takes a whole number from").waitFor();
+    assert.equal(await beam.inputValue(), "4000");
+    await beam.fill("430");
+    await step.getByRole("button", { name: "Set and save" }).click();
+    await step.getByText("Saved.").waitFor();
+    await inspect(page, "phone-set-up");
+    await type(page, "revert");
+    await type(page, "get beam_to_tool_mm");
+    await part(page, "said")
+        .getByText(/^beam_to_tool_mm=430/)
+        .first()
+        .waitFor();
+    await page.getByRole("tab", { name: "Calibrate" }).click();
+    await steps.getByRole("button", { name: "Swing six times" }).click();
+    await steps.getByText("The tool swings in and out six times.").waitFor();
+    await page.locator("#language").selectOption("fr");
+    assert.equal(await beam.inputValue(), "430");
     await close({ page, errors });
 });

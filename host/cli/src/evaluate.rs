@@ -62,6 +62,7 @@ fn write_report(analysis: &Analysis, file: &Path, folder: &OutFolder) -> Result<
     let page = Page {
         title: &format!("Field trial: {name}"),
         summary: analysis.findings(),
+        paper: analysis.against_the_paper(),
         command: &output::command_line()?,
         parameters: &[
             ("plots from".to_owned(), name.to_string()),

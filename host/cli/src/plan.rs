@@ -13,6 +13,7 @@ use experiments::table::distinct;
 #[command(after_help = "\
 Examples:
   weeder plan --out trial.csv                       the paper's speeds and spacings in three blocks
+  weeder plan --out trial.csv --sheets sheets.html  with a sheet for each plot, to print
   weeder plan --speeds 1,2 --spacings 50 --blocks 5 --seed 7
   weeder evaluate trial.csv                         after you have filled it in")]
 pub struct Arguments {
@@ -37,6 +38,9 @@ pub struct Arguments {
     /// Write the table into this file instead of printing it.
     #[arg(long, value_name = "FILE.csv")]
     out: Option<OutName>,
+    /// Also write a page to print, with a sheet for each plot.
+    #[arg(long, value_name = "FILE.html")]
+    sheets: Option<OutName>,
     #[command(flatten)]
     replace: Replace,
 }
@@ -44,6 +48,7 @@ pub struct Arguments {
 /// Creates the plan and prints or writes it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.as_ref().map(|out| out.file(arguments.replace)).transpose()?;
+    let sheets = arguments.sheets.as_ref().map(|sheets| sheets.file(arguments.replace)).transpose()?;
     let plan = Plan {
         speeds_km_h: distinct(arguments.speeds.clone()),
         spacings_cm: distinct(arguments.spacings.clone()),
@@ -60,6 +65,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .to_owned(),
         "Then: weeder evaluate THIS_FILE".to_owned(),
     ];
+    if let Some(sheets) = &sheets {
+        sheets.write(|to| plan.write_sheets(to))?;
+    }
     match &out {
         None => {
             let mut table = Vec::new();

@@ -293,8 +293,6 @@ fn show(
     let alarms: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
     let damaged: u32 = of(&totals, Treatment::Firmware).map(|total| total.plots.effect.injured_of_seen().0).sum();
     if let Some(folder) = folder {
-        // Only the report has the comparison with the paper.
-        let summary = [summary, against_the_paper(outcomes)].concat();
         write_report(folder, study, picture()?, outcomes, &totals, &analysis, summary)?;
         if !json {
             say!("\nWritten: report.html, trial.csv and controllers.csv in {}", folder.path().display())?;
@@ -531,6 +529,7 @@ fn write_report(
     let page = Page {
         title: "Field trial of the intra-row weeder, simulated",
         summary,
+        paper: against_the_paper(outcomes),
         command: &shlex::try_join(words.iter().map(String::as_str))?,
         parameters: &parameters,
         analysis,

@@ -108,6 +108,11 @@ impl Analysis {
         Ok(analysis)
     }
 
+    /// Damaged plants of all plots together.
+    pub fn damage(&self) -> Share {
+        damaged(&self.records)
+    }
+
     /// The plots by treatment, slow and narrow first.
     pub fn treatments(&self) -> Vec<Treatment> {
         let plots = self.records.iter().zip(&self.performances).zip(&self.levels_km_h);

@@ -10,11 +10,12 @@ mod figure;
 use crate::evaluation::published::{Coefficients, MACHINES};
 use crate::evaluation::{Analysis, Response, ResponseAnalysis};
 use crate::experiment::{Total, Treatment};
-use crate::statistics::NoModel;
+use crate::statistics::{Mean, NoModel};
 use crate::table::{Table, distinct, fixed, optional, short, significant};
 use anyhow::{Context, Result};
 use askama::Template;
 use field::budget::Part;
+use field::counted;
 use figure::{Curve, Figure};
 
 /// A trial's report.
@@ -24,6 +25,8 @@ pub struct Page<'a> {
     pub title: &'a str,
     /// The results in sentences, the most important one first.
     pub summary: Vec<String>,
+    /// What differs from the paper's figures, in sentences.
+    pub paper: Vec<String>,
     /// The command line that makes the same report again.
     pub command: &'a str,
     /// The other parameters of the trial, by name: the field, its seed, the engine, the version.
@@ -35,6 +38,9 @@ pub struct Page<'a> {
     /// The first metres of a row, as SVG by [`trial::picture::draw`]; `None` for a real trial.
     pub row: Option<&'a str>,
 }
+
+/// Sentences on the first screen.
+const LEAD: usize = 2;
 
 impl Page<'_> {
     /// The page as HTML, a complete file.
@@ -52,6 +58,60 @@ impl Page<'_> {
             chapters: analysis.responses.iter().map(chapter).collect::<Result<_>>()?,
         };
         sheet.render().context("the page cannot be put together")
+    }
+
+    /// The sentences of the first screen.
+    fn lead(&self) -> &[String] {
+        &self.summary[..self.summary.len().min(LEAD)]
+    }
+
+    /// The sentences below it.
+    fn further(&self) -> &[String] {
+        &self.summary[self.summary.len().min(LEAD)..]
+    }
+
+    /// The results with their intervals, and where they are from.
+    fn results(&self) -> Table {
+        let Analysis { records, performances, .. } = self.analysis;
+        let damage = self.analysis.damage();
+        let mut rows = vec![vec![
+            "plants damaged".to_owned(),
+            format!("{} %", damage.shown()),
+            format!("{} %, {}, of {} plants", damage, damage.kind(), damage.of),
+        ]];
+        let efficiencies: Vec<f64> = performances.iter().filter_map(|plot| plot.weeding_efficiency_percent).collect();
+        if !efficiencies.is_empty() {
+            let Mean { mean, within } = Mean::of(&efficiencies);
+            let within = within
+                .map_or_else(String::new, |within| format!("± {} points, two-sided 95 % interval, ", fixed(within, 1)));
+            rows.push(vec![
+                "weeds gone, as counted".to_owned(),
+                format!("{} %", fixed(mean, 1)),
+                format!("{within}mean of {}", counted(efficiencies.len(), "plot")),
+            ]);
+        }
+        for total in self.totals.iter().filter(|total| total.plots.controller == Treatment::Firmware) {
+            rows.push(vec![
+                format!("row's ground weeded at {} km/h", short(total.speed_km_h())),
+                format!("{} %", fixed(100.0 * total.plots.weeded_share, 1)),
+                format!("with all margins kept at most {} %", fixed(100.0 * total.plots.weedable_share, 1)),
+            ]);
+        }
+        let area: f64 = records.iter().filter_map(|record| record.area_m2).sum();
+        if area > 0.0 {
+            let plots = counted(records.len(), "plot");
+            rows.push(vec!["ground".to_owned(), format!("{} m²", fixed(area, 0)), format!("in {plots}")]);
+        }
+        let from = self.parameters.iter().find(|(name, _)| ["field", "plots from"].contains(&name.as_str()));
+        if let Some((name, value)) = from {
+            let assumed = if self.totals.is_empty() {
+                "counted by hand"
+            } else {
+                "simulated; its assumptions are under Repeat it"
+            };
+            rows.push(vec![name.clone(), value.clone(), assumed.to_owned()]);
+        }
+        Table { rows, is_prose: true, ..Table::new("Result", ["measure", "value", "interval and basis"]) }
     }
 
     fn parameters(&self) -> Table {

@@ -3,7 +3,7 @@
 //! A block has each treatment once, in random order. Neighbouring plots are alike, so the differences between blocks
 //! can be separated from the treatments. Blocks are the replications of the table that [`crate::evaluation`] reads.
 
-use crate::evaluation::COLUMNS;
+use crate::evaluation::{COLUMNS, PlotRecord};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -73,6 +73,47 @@ impl Plan {
         }
         Ok(())
     }
+
+    /// Writes a page to print, with a sheet for each plot: where it is, what to do, and a box for each count.
+    ///
+    /// # Errors
+    /// The errors of the writer.
+    pub fn write_sheets(&self, mut to: impl io::Write) -> io::Result<()> {
+        /// Columns that the plan fills in.
+        const PLANNED: usize = 3;
+        writeln!(
+            to,
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>Field trial, a sheet for each plot</title>"
+        )?;
+        writeln!(
+            to,
+            "<style>body {{ font: 14pt sans-serif; margin: 2em }} section {{ break-after: page; margin-bottom: 3em }} \
+             th {{ text-align: left; padding-right: 2em }} td {{ border: 1px solid; width: 12em; height: 1.8em; padding: 0 0.5em }}</style>"
+        )?;
+        let plots = self.plots();
+        let known =
+            [self.width_m, self.power_hp].map(|value| value.map_or_else(String::new, |value| value.to_string()));
+        for PlannedPlot { plot, block, speed_km_h, spacing_cm } in &plots {
+            writeln!(to, "<section>\n<h1>Plot {plot} of {}</h1>", plots.len())?;
+            writeln!(
+                to,
+                "<p>Block {block}. Weed it at <b>{speed_km_h} km/h</b>. Plants stand {spacing_cm} cm apart.</p>"
+            )?;
+            writeln!(
+                to,
+                "<p>Count weeds on the same marked ground before and after. Leave a box empty if you did not count.</p>\n<table>"
+            )?;
+            let (headings, columns) = (&PlotRecord::HEADINGS[PLANNED..], &COLUMNS[PLANNED..]);
+            for (index, (heading, column)) in headings.iter().zip(columns).enumerate() {
+                // The last two are the machine's.
+                let value =
+                    (index + known.len()).checked_sub(columns.len()).map_or("", |known_index| &known[known_index]);
+                writeln!(to, "<tr><th>{heading} <small>({column})</small></th><td>{value}</td></tr>")?;
+            }
+            writeln!(to, "<tr><th>remarks, who counted, when</th><td></td></tr>\n</table>\n</section>")?;
+        }
+        writeln!(to, "</html>")
+    }
 }
 
 #[cfg(test)]
@@ -114,5 +155,24 @@ mod tests {
         let slow = (0..800).filter(|&seed| (first(seed).speed_km_h, first(seed).spacing_cm) == (1.0, 50.0)).count();
         // One of eight, within four standard deviations.
         assert!((62..=138).contains(&slow), "{slow} of 800");
+    }
+
+    #[test]
+    fn each_plot_has_a_sheet_with_a_box_for_each_count() {
+        let mut page = Vec::new();
+        plan(1).write_sheets(&mut page).unwrap();
+        let page = String::from_utf8(page).unwrap();
+        let sheets: Vec<&str> = page.split("<section>").skip(1).collect();
+        assert_eq!(sheets.len(), 24);
+        for (sheet, plot) in sheets.iter().zip(plan(1).plots()) {
+            let speed = format!(
+                "<h1>Plot {} of 24</h1>\n<p>Block {}. Weed it at <b>{} km/h</b>",
+                plot.plot, plot.block, plot.speed_km_h
+            );
+            assert!(sheet.contains(&speed), "{sheet}");
+            assert_eq!(sheet.matches("<td></td>").count(), 8, "six counts and times, the power, and remarks: {sheet}");
+            assert!(COLUMNS[3..].iter().all(|column| sheet.contains(&format!("({column})"))), "{sheet}");
+            assert!(sheet.contains("(width_m)</small></th><td>0.4</td>"), "{sheet}");
+        }
     }
 }

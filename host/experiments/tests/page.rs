@@ -91,6 +91,7 @@ fn full_page() -> String {
     let page = Page {
         title: "A trial",
         summary: vec!["No plant was damaged.".to_owned(), "Most weeds are gone.".to_owned()],
+        paper: Vec::new(),
         command: "weeder trial --seed 7",
         parameters: &parameters,
         analysis: &analysis,
@@ -102,8 +103,16 @@ fn full_page() -> String {
 
 /// A real trial's page, which has no comparison and no row.
 fn plain_page(title: &str, parameters: &[(String, String)], analysis: &Analysis) -> String {
-    let page =
-        Page { title, summary: Vec::new(), command: "weeder evaluate", parameters, analysis, totals: &[], row: None };
+    let page = Page {
+        title,
+        summary: analysis.findings(),
+        paper: Vec::new(),
+        command: "weeder evaluate",
+        parameters,
+        analysis,
+        totals: &[],
+        row: None,
+    };
     page.html().unwrap()
 }
 
@@ -351,7 +360,20 @@ fn a_real_trial_is_evaluated_without_comparison_and_row() {
     let xml = closed(&html);
     let page = parse(&xml);
     let headings: Vec<String> = page.descendants().filter(|node| node.has_tag_name("h2")).map(text).collect();
-    assert_eq!(headings, ["Performance against speed", "Models", "Plots", "What is what", "Repeat it"]);
+    assert_eq!(
+        headings,
+        ["Performance against speed", "Findings", "Models", "Beside the paper", "Plots", "What is what", "Repeat it"]
+    );
+    // The first screen has the results with their intervals, before the first chart.
+    let results = cells(&page, "Result");
+    // 60 of 24 times 97 plants.
+    assert_eq!(results[0][..2], ["plants damaged", "2.6 %"]);
+    assert!(
+        results[0][2].contains("two-sided 95 % interval") && results[1][2].contains("mean of 24 plots"),
+        "{results:?}"
+    );
+    let (first, _) = html.split_once("<main>").unwrap();
+    assert!(first.contains("24 plots of 8 treatments") && !first.contains("Weeding efficiency falls"), "{first}");
 }
 
 #[test]
@@ -383,6 +405,7 @@ fn words_from_outside_stay_words() {
     let page = Page {
         title: hostile,
         summary: vec![hostile.to_owned()],
+        paper: vec![hostile.to_owned()],
         command: hostile,
         parameters: &parameters,
         analysis: &analysis,

@@ -48,7 +48,7 @@ const PRESETS: &[(&str, &str)] = &[
 ];
 
 /// The preset that every study takes if the user names no other: a machine that a person walks behind.
-pub const DEFAULT: &str = "straight";
+pub const DEFAULT: &str = "walked";
 
 /// The presets' names.
 pub fn presets() -> impl Iterator<Item = &'static str> {

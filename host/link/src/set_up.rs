@@ -4,12 +4,18 @@
 //! [`Step`]: to measure once more, to set the worst measured lead, or to set the least margin. It begins with the first
 //! `calibrate`, so it asks for nothing on a machine that is already set up. It sets nothing itself.
 //!
-//! The margin is a sum of three parts. The first is the scatter of slip over the distance from the last detection of
-//! the plant to the tool. The second is the distance travelled in the servo's scatter, at the paper's fastest speed.
-//! The third is the firmware's own worst error. Beside a stem zone half of the sum is enough. The margin covers only
-//! measured values: if one is missing there is no sum, and the default margin stays. A few measurements do not show the
+//! Around whole canopies the leads are the worst measured times. The margin is a sum of three parts. The first is the
+//! scatter of slip over the distance from the last detection of the plant to the tool. The second is the distance
+//! travelled in the servo's scatter, at the paper's fastest speed. The third is the firmware's own worst error.
+//!
+//! Beside a stem zone the leads are shorter by what the zone's [`circle`] allows at the highest speed, and by the servo's
+//! scatter. The margin pays for that scatter. It is calculated for 1 km/h, where speed gives no slack, and has a fourth
+//! part: stems stand beyond the zone's middle.
+//!
+//! The margin covers only measured values: if one is missing there is no sum, and the default margin stays. A few measurements do not show the
 //! worst case, so each scatter has a least value. Times that were measured over another stroke do not count.
 
+pub mod circle;
 mod steps;
 
 pub use steps::{ManualStep, Task, steps};
@@ -41,15 +47,23 @@ const SPEED_M_S: f64 = 2.5 / 3.6;
 /// The firmware's own worst error of a swing, in millimetres: measured by `weeder bench-uno`, rounded up.
 const FIRMWARE_MM: f64 = 5.0;
 
-/// Share of the worst sum that a margin beside a stem's zone covers.
-const STEM_SHARE: f64 = 0.5;
+/// Beside a stem zone the margin is calculated for this speed, 1 km/h.
+const SLOW_M_S: f64 = 1.0 / 3.6;
+
+/// How far a stem's protected ground may reach beyond its zone, as a share of the zone. In the field `walked` it is 10 of
+/// 110 mm.
+const STEM_SHARE: f64 = 0.06;
+
+/// What the two measured leads differ by beside the stroke: the longest wait of a command, and the scatter of a hobby
+/// servo's dead time.
+const BESIDE_STROKE_MS: f64 = 40.0;
 
 /// The next step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     /// Time the servo. It has been timed this many times.
     TimeServo(usize),
-    /// Set a lead to the worst measured value, which is this one.
+    /// Set a lead to the one that follows from the measured times.
     SetLead(Setting, u16),
     /// Measure the wheel. It has been measured this many times.
     MeasureWheel(usize),
@@ -68,23 +82,19 @@ pub struct Margin {
     pub slip_mm: f64,
     /// The servo's.
     pub servo_mm: f64,
-    /// Whether it is added to a stem zone, not to the whole canopy.
-    pub keeps_stems: bool,
+    /// The firmware's.
+    pub firmware_mm: f64,
+    /// The stems', beside a stem zone. `None` around whole canopies.
+    pub stems_mm: Option<f64>,
     /// The margin in use.
     pub in_use_mm: u16,
 }
 
 impl Margin {
-    /// The least sufficient margin, in whole millimetres: the sum, or half of it beside a stem zone.
-    ///
-    /// The sum is the worst case of all three parts at once. Beside a canopy it is needed, so that the tool never
-    /// reaches a canopy. Beside a stem zone the tool may use up half of it, because it meets leaves there. A plant is
-    /// damaged only if the other half is used up as well and its stem stands off the middle on that side. Trials of the
-    /// field `set-up` confirm this.
+    /// The least sufficient margin, in whole millimetres: the sum.
     pub fn least_mm(&self) -> u16 {
-        let sum_mm = self.slip_mm + self.servo_mm + FIRMWARE_MM;
-        let share = if self.keeps_stems { STEM_SHARE } else { 1.0 };
-        (share * sum_mm).ceil() as u16
+        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, .. } = self;
+        (slip_mm + servo_mm + firmware_mm + stems_mm.unwrap_or(0.0)).ceil() as u16
     }
 }
 
@@ -93,7 +103,7 @@ impl Step {
     fn name(&self) -> &'static str {
         match self {
             Self::TimeServo(_) => "time the servo",
-            Self::SetLead(..) => "set the worst lead",
+            Self::SetLead(..) => "set the lead",
             Self::MeasureWheel(_) => "measure the wheel",
             Self::PassPlants(_) => "pass some plants",
             Self::SetMargin(_) | Self::Ready(_) => "set the margin",
@@ -105,7 +115,7 @@ impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TimeServo(done) => write!(f, "time the servo: `calibrate servo` ({done} of {TIMINGS} done)"),
-            Self::SetLead(lead, worst_ms) => write!(f, "take the worst time: `set {} {worst_ms}`", lead.text()),
+            Self::SetLead(lead, lead_ms) => write!(f, "take the calculated lead: `set {} {lead_ms}`", lead.text()),
             Self::MeasureWheel(done) => {
                 let all = SetUp::STRETCHES;
                 write!(f, "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)")
@@ -124,9 +134,12 @@ impl fmt::Display for Step {
 
 impl fmt::Display for Margin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { slip_mm, servo_mm, .. } = self;
-        let sum = format!("slip {slip_mm:.0} + servo {servo_mm:.0} + {FIRMWARE_MM:.0}");
-        if self.keeps_stems { write!(f, "({sum})/2 mm, 2.5 km/h") } else { write!(f, "{sum} mm at 2.5 km/h") }
+        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, .. } = self;
+        let sum = format!("slip {slip_mm:.0} + servo {servo_mm:.0}");
+        match stems_mm {
+            Some(stems_mm) => write!(f, "{sum} + stem {stems_mm:.0} + {firmware_mm:.0} mm"),
+            None => write!(f, "{sum} + {firmware_mm:.0} mm at 2.5 km/h"),
+        }
     }
 }
 
@@ -256,11 +269,14 @@ impl SetUp {
         if timings.len() < TIMINGS {
             missing.push(Step::TimeServo(timings.len()));
         } else {
-            let (outs, ins) = extremes(&timings);
-            let longest = outs.max().filter(|&longest| longest > settings.get(Setting::LeadOutMs));
-            let shortest = ins.min().filter(|&shortest| shortest < settings.get(Setting::LeadInMs));
-            missing.extend(longest.map(|worst| Step::SetLead(Setting::LeadOutMs, worst)));
-            missing.extend(shortest.map(|worst| Step::SetLead(Setting::LeadInMs, worst)));
+            for (lead, lead_ms) in leads(&timings, settings) {
+                let set_ms = settings.get(lead);
+                let is_unsafe = if lead == Setting::LeadOutMs { set_ms < lead_ms } else { set_ms > lead_ms };
+                // Around whole canopies, safer leads are the operator's.
+                if is_unsafe || keeps_stems(settings) && set_ms != lead_ms {
+                    missing.push(Step::SetLead(lead, lead_ms));
+                }
+            }
         }
         // Until two plants have measured the slip, only the wheel counts, also with a second beam. If the machine has
         // no measured value, the measurements were of another wheel.
@@ -299,9 +315,15 @@ impl SetUp {
         let timings = self.timed(settings);
         let (outs, ins) = extremes(&timings);
         let scatter_ms = range(outs).max(range(ins)).max(SERVO_MS);
-        let servo_mm = f64::from(scatter_ms) * SPEED_M_S;
-        let keeps_stems = settings.get(Setting::StemZoneMm) > 0;
-        Ok(Margin { slip_mm, servo_mm, keeps_stems, in_use_mm: settings.get(Setting::MarginMm) })
+        let speed_m_s = if keeps_stems(settings) { SLOW_M_S } else { SPEED_M_S };
+        let stems_mm = keeps_stems(settings).then(|| STEM_SHARE * f64::from(settings.get(Setting::StemZoneMm)));
+        Ok(Margin {
+            slip_mm,
+            servo_mm: f64::from(scatter_ms) * speed_m_s,
+            firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
+            stems_mm,
+            in_use_mm: settings.get(Setting::MarginMm),
+        })
     }
 
     /// The next step with these settings. `None` before the first `calibrate`.
@@ -332,6 +354,40 @@ impl SetUp {
             }),
         }
     }
+}
+
+/// Whether the firmware keeps stem zones, not whole canopies.
+fn keeps_stems(settings: &Settings) -> bool {
+    settings.get(Setting::StemZoneMm) > 0
+}
+
+/// The leads that follow from the times. None if the operator sets them by eye.
+fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u16)> {
+    let (outs, ins) = extremes(timings);
+    let (Some(longest_ms), Some(shortest_ms)) = (outs.max(), ins.min()) else { return Vec::new() };
+    let saved_ms = if keeps_stems(settings) {
+        let (in_us, out_us) = pulses(settings);
+        let travel_ms = (f64::from(longest_ms.saturating_sub(shortest_ms)) - BESIDE_STROKE_MS).max(0.0);
+        saved_ms(
+            settings.get(Setting::TopSpeedMmS).into(),
+            travel_ms,
+            settings.get(Setting::StemZoneMm).into(),
+            circle::aside_mm(in_us.abs_diff(out_us)),
+        )
+    } else {
+        0
+    };
+    vec![
+        (Setting::LeadOutMs, longest_ms.saturating_sub(saved_ms)),
+        (Setting::LeadInMs, shortest_ms.saturating_add(saved_ms)),
+    ]
+}
+
+/// By how much each lead beside a stem zone is shorter than the worst time: what the circle allows at the highest speed,
+/// and the servo's scatter, at most a quarter of the stroke. The margin pays for the scatter.
+pub fn saved_ms(top_speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -> u16 {
+    let scatter_ms = f64::from(SERVO_MS).min(travel_ms / 4.0);
+    (circle::overlap_ms(top_speed_mm_s, travel_ms, zone_mm, aside_mm) + scatter_ms) as u16
 }
 
 /// The leads out and in that were timed.
@@ -430,11 +486,12 @@ mod tests {
     }
 
     #[test]
-    fn beside_a_stem_s_zone_the_margin_covers_half_of_the_worst() {
+    fn beside_a_stem_s_zone_leads_and_margin_go_up_to_its_circle() {
         let set_up = heard(&[TIMED, MEASURED, THIRD, &["slip permille=12"; PLANTS]]);
         // 3 % of 200 mm, 15 ms at 2.5 km/h and the firmware's 5 mm: 21.4.
-        for (zone_mm, least_mm) in [(0, 22), (100, 11)] {
+        for (zone_mm, least_mm, leads) in [(0, 22, (158, 52)), (100, 19, (132, 78))] {
             let mut changes = worst_leads(Setting::TicksPerM, 1930);
+            (changes[0].1, changes[1].1) = leads;
             changes.extend([(Setting::SecondBeamMm, 200), (Setting::StemZoneMm, zone_mm)]);
             let margin = set_up.margin(&settings(&changes)).expect("all was measured");
             assert_eq!(margin.least_mm(), least_mm, "{margin:?}");
@@ -491,7 +548,8 @@ mod tests {
 
     #[test]
     fn every_step_fits_on_a_line_of_80_characters() {
-        let margin = Margin { slip_mm: 123.0, servo_mm: 123.0, keeps_stems: true, in_use_mm: 50 };
+        let margin =
+            Margin { slip_mm: 123.0, servo_mm: 123.0, firmware_mm: 123.0, stems_mm: Some(123.0), in_use_mm: 50 };
         let steps = [
             Step::TimeServo(1),
             Step::SetLead(Setting::LeadOutMs, 158),

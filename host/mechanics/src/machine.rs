@@ -193,6 +193,8 @@ sections! {
         stem_off: Length = 10.0, MM, 0.0 to 100.0;
         /// Room between the tool that is out and that canopy or zone: plants off the row's line, and a machine that strays.
         room: Length = 10.0, MM, 0.0 to 300.0;
+        /// How the arm hangs: 0 as a pendulum across the row, 1 if it trails along the row behind its pivot.
+        arm_trails: u32 = 0.0, COUNT, 0.0 to 1.0;
         /// From the row's line to the nearest sweep's edge.
         sweep_from: Length = 50.0, MM, 5.0 to 1000.0;
         /// Time that the servo takes for 60 degrees without load, as its data sheet has it.

@@ -2,8 +2,9 @@
 //!
 //! The angle is the smallest that clears the widest canopy, or the zone round a stem. Its time follows from the servo's
 //! torque-speed line. A shorter stroke takes less time and leaves more ground weeded. With a stem zone, its settings
-//! follow as well. The zone is longer than the protected width, because a stem may stand off the middle. The margin
-//! covers a wheel and a servo that were not measured yet.
+//! follow as well. The zone is longer than the protected width, because a stem may stand off the middle. Its leads are
+//! shorter, by what its circle allows at the firmware's default top speed. The margin covers a wheel and a servo that
+//! were not measured yet.
 //!
 //! The arm swings sideways about a pivot beside the row: at an angle the tool's middle is `arm * sin(angle)` from the
 //! row's line. A servo turns at full speed without load. Its speed falls in a straight line to zero at the stall
@@ -11,6 +12,8 @@
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
+use link::set_up::{circle, saved_ms};
+use link::settings::Setting;
 use serde::Serialize;
 use uom::si::f64::Torque;
 use uom::si::time::second;
@@ -42,6 +45,10 @@ pub struct Swing {
     pub lead_out_ms: u32,
     /// Lead of the command to come back, ms.
     pub lead_in_ms: u32,
+    /// How much wider the margin has to be because a trailing arm carries the tool along the row, mm; 0 for a pendulum.
+    pub arm_margin_mm: u32,
+    /// Height by which a pendulum lifts the blade over the stroke, mm; 0 for a trailing arm.
+    pub lift_mm: f64,
     /// Width on either side of the row that neither tool nor sweeps weed, mm.
     pub unweeded_strip_mm: f64,
     /// Width of a tool that would fill it, mm.
@@ -86,6 +93,19 @@ impl Swing {
         let lead_out_ms = dead_ms(inputs.most_dead_time.max(inputs.least_dead_time)) + loaded_ms + PULSE_AND_GAP_MS;
         let protected_mm = MM.value(inputs.protected);
         let stem_zone_mm = if protected_mm > 0.0 { protected_mm + MM.value(inputs.stem_off) } else { 0.0 };
+        let top_speed_mm_s = f64::from(Setting::TopSpeedMmS.description().default);
+        let aside_of_stroke_mm = arm_mm * angle_degrees.to_radians().sin();
+        let saved_ms = match stem_zone_mm > 0.0 {
+            true => f64::from(saved_ms(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm)),
+            false => 0.0,
+        };
+        let carried_mm = arm_mm * (1.0 - angle_degrees.to_radians().cos());
+        let (arm_margin_mm, lift_mm) = match (inputs.arm_trails > 0, stem_zone_mm > 0.0) {
+            (false, _) => (0.0, carried_mm),
+            (true, true) => (circle::carried_mm(arm_mm, tool_mm, stem_zone_mm), 0.0),
+            // Over a whole canopy the tool is fully out.
+            (true, false) => (carried_mm, 0.0),
+        };
         Ok(Self {
             stem_zone_mm: stem_zone_mm.ceil() as u32,
             angle_degrees,
@@ -94,8 +114,10 @@ impl Swing {
             load,
             unloaded_ms,
             loaded_ms,
-            lead_out_ms: lead_out_ms.ceil() as u32,
-            lead_in_ms: dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)).floor() as u32,
+            lead_out_ms: (lead_out_ms - saved_ms).ceil() as u32,
+            lead_in_ms: (dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)) + saved_ms).floor() as u32,
+            arm_margin_mm: arm_margin_mm.ceil() as u32,
+            lift_mm,
             unweeded_strip_mm: (from_mm - tool_mm / 2.0).max(0.0),
             filling_tool_mm: 2.0 * from_mm,
         })
@@ -126,6 +148,14 @@ impl Swing {
                 100.0 * self.load
             ),
         ];
+        said.push(if self.arm_margin_mm > 0 {
+            format!(
+                "The trailing arm carries the tool towards the plant: add {} mm to the margin that `weeder set-up` calculates.",
+                self.arm_margin_mm
+            )
+        } else {
+            format!("The pendulum lifts the blade by {:.0} mm over the stroke.", self.lift_mm)
+        });
         if self.unweeded_strip_mm <= 0.0 {
             said.push("Tool and sweeps leave no strip between them.".to_owned());
             return said;
@@ -164,7 +194,7 @@ mod tests {
         machine.swing.protected = MM.of(90.0);
         let stem = Swing::with_tool(&machine, torque, 100.0).expect("it swings");
         // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees.
-        let lines = ["set servo_out_us 1695", "set lead_out_ms 143", "set stem_zone_mm 100"];
+        let lines = ["set servo_out_us 1695", "set lead_out_ms 116", "set stem_zone_mm 100"];
         assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
         assert!(
             stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),

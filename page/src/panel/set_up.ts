@@ -1,12 +1,12 @@
-// Setting up the machine: the steps of the manual, the next measurement, and the least margin. The project's Rust has
+// Setting up the machine: the steps of the manual with their inputs, the next measurement, and the least margin. The project's Rust has
 // the steps, remembers the measurements and calculates the margin (host/page/src/console.rs).
 
 import { module } from "../core.ts";
-import { make, type Parts } from "../dom.ts";
+import { make, makeButton, type Parts } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
 import { Rust } from "../rust.ts";
-import { quantity, say, step, told } from "../words/words.ts";
+import { language, quantity, say, show, step, told, type Word } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** The results of the session for the steps. */
@@ -24,11 +24,14 @@ export class SetUp {
     /** An instance for the measurements of this machine. */
     readonly #rust = new Rust(module);
     #marginMm: number | null = null;
+    /** The language of the steps that are shown, and their inputs by setting. */
+    #language: string | undefined;
+    readonly #inputs = new Map<string, HTMLInputElement>();
 
     constructor(
         private readonly parts: Parts,
         private readonly machine: Machine,
-        ask: Ask,
+        private readonly ask: Ask,
     ) {
         parts.button("margin-set", () => {
             const set = ask(`set margin_mm ${this.#marginMm}`).then(() => ask("save"));
@@ -52,18 +55,75 @@ export class SetUp {
         const settings = Object.fromEntries(this.machine.settings.map(({ name, value }) => [name, value]));
         const { steps, next, missing, marginMm, warning } = this.#rust.ask<Advice>({ setUp: { lines, settings } });
         this.#marginMm = marginMm;
-        this.parts.html("set-up-steps").replaceChildren(
-            ...steps.map((manual) => {
-                const [title, how] = step(manual.title, manual.how);
-                const codes = manual.tasks.flatMap((task) => [" ", make("code", "", task)]);
-                return make("li", "", make("b", "", title), ". ", how, ...codes);
-            }),
-        );
+        // Built once for each language, because the operator may be typing.
+        if (this.#language !== language()) this.#build(steps);
+        for (const [name, input] of this.#inputs)
+            if (input.dataset.typed === undefined) input.value = String(this.machine.setting(name));
         const before = () => say("beforeMargin", { steps: missing.map((step) => `${told(step)}.`).join(" ") });
         this.parts.write("margin-said", next === null ? before() : say("next", { step: told(next) }));
         this.parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
         const button = this.parts.get("margin-set", HTMLButtonElement);
         button.hidden = marginMm === null || marginMm === this.machine.setting("margin_mm");
         if (marginMm !== null) button.textContent = say("setMargin", { margin: quantity(marginMm, "millimeter") });
+    }
+
+    #build(steps: Advice["steps"]): void {
+        this.#language = language();
+        this.#inputs.clear();
+        this.parts.html("set-up-steps").replaceChildren(
+            ...steps.map((manual) => {
+                const [title, how] = step(manual.title, manual.how);
+                return make(
+                    "li",
+                    "stack",
+                    make("span", "", make("b", "", title), ". ", how),
+                    ...this.#tasks(manual.tasks),
+                );
+            }),
+        );
+    }
+
+    /** The inputs and buttons for the tasks of a step. */
+    #tasks(tasks: readonly string[]): HTMLElement[] {
+        const said = make("p", "");
+        said.role = "status";
+        const does = (text: string, use: () => Promise<unknown>, done: Word) => {
+            const button = makeButton("needs-machine", () => {
+                use().then(
+                    () => show(said, () => say(done as "isSavedNow")),
+                    (error) => show(said, () => told(error)),
+                );
+            });
+            button.textContent = text;
+            button.disabled = this.machine.version === undefined;
+            return button;
+        };
+        const names: string[] = [];
+        const parts: HTMLElement[] = tasks.flatMap((task) => {
+            if (task === "calibrate servo") return [does(say("swingSix"), () => this.ask(task), "swingsSix")];
+            const [, name, unit] = /^(\w+) = \d+ (\S+)$/.exec(task) ?? [];
+            if (name === undefined) return /^[\w.]+ = /.test(task) ? [make("code", "", task)] : [];
+            names.push(name);
+            const input = make("input", "");
+            [input.type, input.inputMode, input.dataset.step] = ["number", "numeric", name];
+            input.addEventListener("input", () => {
+                input.dataset.typed = "";
+            });
+            this.#inputs.set(name, input);
+            return [make("label", "", make("span", "", `${name} (${unit})`), input)];
+        });
+        if (names.length > 0) parts.push(does(say("setAndSave"), () => this.#save(names), "isSavedNow"));
+        return [...parts, said];
+    }
+
+    /** Sets and saves the values of a step. */
+    async #save(names: readonly string[]): Promise<void> {
+        for (const name of names) {
+            const input = this.#inputs.get(name);
+            if (input?.dataset.typed === undefined) continue;
+            await this.ask(`set ${name} ${input.value}`);
+            delete input.dataset.typed;
+        }
+        await this.ask("save");
     }
 }

@@ -57,9 +57,14 @@ export class RecordView {
     #isToBeDrawn = false;
     #work = new AbortController();
 
-    constructor(private readonly parts: Parts) {
+    /** `example` makes a log to look at, and takes a function to tell how far it is. */
+    constructor(
+        private readonly parts: Parts,
+        private readonly example: (work: Work) => Promise<File>,
+    ) {
         this.#place = parts.get("log-place", HTMLInputElement);
         parts.files("log-open", "log-file", (files) => void this.#open(files));
+        parts.button("log-example", () => void this.#openExample());
         for (const [name, by] of Object.entries({ "log-back": -STEP, "log-on": STEP }))
             parts.button(name, () => this.#go(this.#middleMm + by * this.#windowMm));
         parts.button("log-closer", () => this.#zoom(1 / ZOOM));
@@ -105,6 +110,14 @@ export class RecordView {
         if (!isWhole) return;
         this.parts.say("log-said", () => texts.map((text) => text()).join(" "));
         this.#show(rows);
+    }
+
+    async #openExample(): Promise<void> {
+        let log: File | undefined;
+        const isWhole = await this.#eachOf([new File([], "weeder-log.csv")], "log-said", async (_, work) => {
+            log = await this.example(work);
+        });
+        if (isWhole && log) await this.#open([log]);
     }
 
     /**

@@ -105,6 +105,10 @@ export const en = {
 
         // The machine.
         atWork: "At work",
+        stateUnknown: "state unknown",
+        notTold: "The machine does not tell its state.",
+        restarted: "Restarted ({cause}) while at work.",
+        notWeeded: "Not weeded from here until the machine works again.",
         stateNone: "no machine",
         stateWork: "work",
         stateAlarm: "alarm",
@@ -199,7 +203,8 @@ export const en = {
 
         // Calibration.
         steps: "The steps",
-        stepsLead: "In any order, and the margin last. The values are the simulated machine's: type what you measure.",
+        stepsLead: "Step by step: type what you measure on your machine. The margin comes last.",
+        setAndSave: "Set and save",
         beforeMargin: "Before the margin is lowered: {steps}",
         next: "Next, {step}.",
         setMargin: "Set the margin to {margin} and save",
@@ -286,6 +291,7 @@ export const en = {
         cancelled: "Cancelled.",
         notRead: "{file} cannot be read: {why}",
         openLog: "Open a log",
+        logExample: "An example: the log of Try",
         logFile: "A log file",
         noLog: "{file} is no log: {why}",
         emptyLog: "{file} has no machine in it.",

@@ -102,6 +102,10 @@ export const es: Language = {
         hasNoSuch: "Este firmware no tiene {names}.",
 
         atWork: "En el trabajo",
+        stateUnknown: "estado desconocido",
+        notTold: "La máquina no dice su estado.",
+        restarted: "Se reinició ({cause}) durante el trabajo.",
+        notWeeded: "Sin deshierbe desde aquí hasta que la máquina trabaje otra vez.",
         stateNone: "sin máquina",
         stateWork: "trabajo",
         stateAlarm: "alarma",
@@ -195,8 +199,8 @@ export const es: Language = {
             "{file}: {count} es distinto del de la máquina. Mírelo y envíelo.|{file}: {count} son distintos de los de la máquina. Mírelos y envíelos.",
 
         steps: "Los pasos",
-        stepsLead:
-            "En cualquier orden, y el margen al final. Los valores son de la máquina simulada: escriba lo que mida.",
+        stepsLead: "Paso a paso: escriba lo que mida en su máquina. El margen va al final.",
+        setAndSave: "Fijar y guardar",
         beforeMargin: "Antes de bajar el margen: {steps}",
         next: "Ahora: {step}.",
         setMargin: "Poner el margen en {margin} y guardar",
@@ -282,6 +286,7 @@ export const es: Language = {
         cancelled: "Cancelado.",
         notRead: "{file} no se puede leer: {why}",
         openLog: "Abrir un registro",
+        logExample: "Un ejemplo: el registro de Probar",
         logFile: "Un archivo de registro",
         noLog: "{file} no es un registro: {why}",
         emptyLog: "{file} no tiene ninguna máquina.",

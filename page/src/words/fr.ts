@@ -103,6 +103,10 @@ export const fr: Language = {
         hasNoSuch: "Ce micrologiciel n'a pas {names}.",
 
         atWork: "Au travail",
+        stateUnknown: "état inconnu",
+        notTold: "La machine ne dit pas son état.",
+        restarted: "Redémarrée ({cause}) pendant le travail.",
+        notWeeded: "Pas désherbé à partir d'ici jusqu'à ce que la machine travaille à nouveau.",
         stateNone: "pas de machine",
         stateWork: "travail",
         stateAlarm: "alarme",
@@ -195,8 +199,8 @@ export const fr: Language = {
             "{file} : {count} diffère de celui de la machine. Regardez-le, puis envoyez-le.|{file} : {count} diffèrent de ceux de la machine. Regardez-les, puis envoyez-les.",
 
         steps: "Les étapes",
-        stepsLead:
-            "Dans n'importe quel ordre, et la marge en dernier. Les valeurs sont celles de la machine simulée : tapez ce que vous mesurez.",
+        stepsLead: "Pas à pas : tapez ce que vous mesurez sur votre machine. La marge vient en dernier.",
+        setAndSave: "Régler et enregistrer",
         beforeMargin: "Avant de baisser la marge : {steps}",
         next: "Ensuite : {step}.",
         setMargin: "Mettre la marge à {margin} et enregistrer",
@@ -282,6 +286,7 @@ export const fr: Language = {
         cancelled: "Arrêté.",
         notRead: "{file} ne peut pas être lu : {why}",
         openLog: "Ouvrir un journal",
+        logExample: "Un exemple : le journal d'Essayer",
         logFile: "Un fichier de journal",
         noLog: "{file} n'est pas un journal : {why}",
         emptyLog: "{file} n'a aucune machine.",

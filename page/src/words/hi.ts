@@ -102,6 +102,10 @@ export const hi: Language = {
         hasNoSuch: "इस फ़र्मवेयर में {names} नहीं है।",
 
         atWork: "काम पर",
+        stateUnknown: "स्थिति अज्ञात",
+        notTold: "मशीन अपनी स्थिति नहीं बताती।",
+        restarted: "काम के बीच रीसेट हुई ({cause})।",
+        notWeeded: "मशीन के फिर काम करने तक यहाँ से निराई नहीं हुई।",
         stateNone: "मशीन नहीं",
         stateWork: "काम चालू",
         stateAlarm: "अलार्म",
@@ -193,7 +197,8 @@ export const hi: Language = {
             "{file}: {count} मान मशीन से अलग है। उसे देखें, फिर भेजें।|{file}: {count} मान मशीन से अलग हैं। उन्हें देखें, फिर भेजें।",
 
         steps: "चरण",
-        stepsLead: "किसी भी क्रम में, पर हाशिया सबसे अंत में। मान सिमुलेटेड मशीन के हैं: जो आप मापें, वह लिखें।",
+        stepsLead: "एक-एक चरण करें: अपनी मशीन पर जो मापें, वह लिखें। हाशिया सबसे अंत में।",
+        setAndSave: "सेट करके सहेजें",
         beforeMargin: "हाशिया घटाने से पहले: {steps}",
         next: "आगे: {step}।",
         setMargin: "हाशिया {margin} करें और सहेजें",
@@ -275,6 +280,7 @@ export const hi: Language = {
         cancelled: "रोक दिया गया।",
         notRead: "{file} पढ़ी नहीं जा सकती: {why}",
         openLog: "लॉग खोलें",
+        logExample: "उदाहरण: “आज़माएँ” का लॉग",
         logFile: "लॉग की फ़ाइल",
         noLog: "{file} लॉग नहीं है: {why}",
         emptyLog: "{file} में कोई मशीन नहीं है।",

@@ -119,7 +119,7 @@ fn a_lead_that_is_too_short_for_the_stroke_would_be_seen() {
 
 #[test]
 fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
-    let set_up = Conditions::preset("straight").expect("there is one").expect("it is right");
+    let set_up = Conditions::preset("walked").expect("there is one").expect("it is right");
     let mut novice = Novice::new(the_box(), SEED);
     for step in steps() {
         novice.follow(&step).expect("the field knows it");

@@ -10,7 +10,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 impl Analysis {
     /// The findings, a sentence each: the plots, the damage, the effects on each measure, and impossible values.
     pub fn findings(&self) -> Vec<String> {
-        let mut findings = vec![self.size(), self.damage()];
+        let mut findings = vec![self.size(), self.damage_in_words()];
         for response in &self.responses {
             findings.push(response.finding());
             findings.extend(response.odds());
@@ -96,8 +96,8 @@ impl Analysis {
     }
 
     /// The damage, and the plots with most of it.
-    fn damage(&self) -> String {
-        let share = super::damaged(&self.records);
+    fn damage_in_words(&self) -> String {
+        let share = self.damage();
         let Share { count, of, .. } = share;
         if of == 0 {
             return "Damaged plants were counted in no plot.".to_owned();

@@ -32,7 +32,7 @@ macro_rules! plot_record {
 
         impl PlotRecord {
             /// The headings of a report's columns.
-            pub(super) const HEADINGS: &[&str] = &[$($heading),+];
+            pub(crate) const HEADINGS: &[&str] = &[$($heading),+];
 
             /// The cells of a report.
             pub(super) fn cells(&self) -> Vec<String> {

@@ -1,0 +1,86 @@
+//! How much of the servo's time a stem zone's circle saves.
+//!
+//! The zone is a circle: at its ends on the row's line it has no width. The tool's edge leaves the line while the machine
+//! rolls by `k = v T r / A`. Here `v` is the speed, `T` the time of the stroke, `r` half of the zone and `A` how far the
+//! tool swings aside. A straight path of the edge then touches the circle if the swing ends `k + r - sqrt(k^2 + r^2)`
+//! inside the zone. The faster the machine, the longer is this distance and the shorter its time. So leads for the
+//! highest speed hold below it.
+
+/// The arm of the paper's machine. A longer arm swings farther aside.
+const ARM_MM: f64 = 350.0;
+
+/// Pulse for a degree of a servo with 1000 us for 90 degrees.
+const US_A_DEGREE: f64 = 1000.0 / 90.0;
+
+/// How far a stroke of this pulse carries the paper's arm aside, mm.
+pub fn aside_mm(pulse_us: u16) -> f64 {
+    ARM_MM * (f64::from(pulse_us) / US_A_DEGREE).to_radians().sin()
+}
+
+/// How far a swing may overlap either end of a zone, mm. The stroke takes `travel_ms`.
+pub fn overlap_mm(speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -> f64 {
+    let half_mm = zone_mm / 2.0;
+    let rolled_mm = speed_mm_s * travel_ms / 1000.0 * (half_mm / aside_mm.max(half_mm));
+    rolled_mm + half_mm - rolled_mm.hypot(half_mm)
+}
+
+/// The same as a time, ms.
+pub fn overlap_ms(speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -> f64 {
+    if zone_mm <= 0.0 { 0.0 } else { 1000.0 * overlap_mm(speed_mm_s, travel_ms, zone_mm, aside_mm) / speed_mm_s }
+}
+
+/// How much farther a trailing arm's margin has to be, mm: it carries the tool towards the zone before the edge has left
+/// the line far enough. At a crawl, where the machine's own speed gives no slack.
+pub fn carried_mm(arm_mm: f64, tool_mm: f64, zone_mm: f64) -> f64 {
+    let half_mm = zone_mm / 2.0;
+    let steps = (0..=100).map(|step| half_mm * f64::from(step) / 100.0);
+    let needed = steps.map(|edge_mm| {
+        let sin = ((edge_mm + tool_mm / 2.0) / arm_mm).min(1.0);
+        let forward_mm = arm_mm * (1.0 - (1.0 - sin * sin).sqrt());
+        forward_mm - (half_mm - (half_mm * half_mm - edge_mm * edge_mm).sqrt())
+    });
+    needed.fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_point_of_a_swing_that_overlaps_as_much_enters_the_circle_and_some_would_with_a_millimetre_more() {
+        for (speed_mm_s, travel_ms, zone_mm, aside_mm) in [
+            (278.0, 60.0, 110.0, 134.0),
+            (1111.0, 70.0, 110.0, 134.0),
+            (694.0, 50.0, 90.0, 105.0),
+            (2000.0, 30.0, 60.0, 70.0),
+        ] {
+            let overlap_mm = overlap_mm(speed_mm_s, travel_ms, zone_mm, aside_mm);
+            let half_mm = zone_mm / 2.0;
+            // The edge is clear of the zone at `overlap` behind the zone's end, and nearer to the line before that.
+            let deepest_mm = (0..=10_000).map(|step| {
+                let before_s = travel_ms / 1000.0 * f64::from(step) / 10_000.0;
+                let edge_mm = half_mm - aside_mm * before_s / (travel_ms / 1000.0);
+                let from_middle_mm = half_mm - (overlap_mm - speed_mm_s * before_s);
+                half_mm - from_middle_mm.hypot(edge_mm.max(0.0))
+            });
+            let deepest_mm = deepest_mm.fold(f64::NEG_INFINITY, f64::max);
+            assert!((-0.01..0.01).contains(&deepest_mm), "{deepest_mm} at {speed_mm_s} mm/s");
+        }
+    }
+
+    #[test]
+    fn the_faster_the_machine_the_shorter_is_the_saved_time_and_a_crawl_saves_no_distance() {
+        let ms = |speed_mm_s: f64| overlap_ms(speed_mm_s, 60.0, 110.0, 134.0);
+        assert!(ms(278.0) > ms(694.0) && ms(694.0) > ms(1300.0) && ms(1300.0) > 10.0);
+        assert!(overlap_mm(1.0, 60.0, 110.0, 134.0) < 0.1);
+        assert_eq!(overlap_ms(694.0, 60.0, 0.0, 134.0), 0.0);
+        assert!((aside_mm(250) - 133.9).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_trailing_arm_needs_some_millimetres_more() {
+        // 350 mm and a tool of 130 mm: 65 mm aside, the tool is 6.1 mm farther ahead.
+        let carried_mm = carried_mm(350.0, 130.0, 110.0);
+        assert!((6.1..8.0).contains(&carried_mm), "{carried_mm}");
+    }
+}
