@@ -17,7 +17,6 @@ use crate::record::{self, Logs};
 use anyhow::Result;
 use clap::Args;
 use link::row_names::ALL;
-use link::rows::Rows;
 use link::session::HOLD;
 use std::path::PathBuf;
 
@@ -70,14 +69,6 @@ fn row(name: &str, names: &[String]) -> Result<Option<usize>, String> {
     match names.iter().position(|known| known == name) {
         None if name != ALL => Err(format!("there is no row {name}: there are {}", names.join(", "))),
         row => Ok(row),
-    }
-}
-
-/// Sends a command to a row. `hold` comes before all waiting commands.
-fn send(rows: &Rows, row: usize, command: &str) {
-    match command {
-        HOLD => rows.hold(row),
-        _ => rows.command(row, command),
     }
 }
 

@@ -8,6 +8,7 @@ use crate::receiver::GpsArguments;
 use anyhow::{Result, bail, ensure};
 use clap::Args;
 use gps::recorder::Lines;
+use link::advice;
 use link::log::{LogError, LogWriter};
 use link::rows::{Rows, What};
 use link::session::Happening;
@@ -78,6 +79,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 if let Some(other) = other_version(&version, &shown) {
                     tell!("{}", chosen.under_name(heard.row, &other));
                 }
+            }
+            Happening::Started { while_at_work: Some(cause), .. } => {
+                tell!("\x07{}", chosen.under_name(heard.row, &advice::restarted(&cause)));
             }
             Happening::Lost(why) => tell!("{}", chosen.under_name(heard.row, &why)),
             _ => {}

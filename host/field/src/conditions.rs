@@ -16,11 +16,11 @@ use crate::servo::{Scatter, Servo};
 use crate::trial::{Start, Trial};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
-use files::FileError;
 use files::toml_entry::{self, Entry};
+use files::{FileError, text_file};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
-use std::fs;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::Path;
 use thiserror::Error;
@@ -67,10 +67,14 @@ impl Conditions {
             None => {
                 let presets = presets().collect::<Vec<_>>().join(", ");
                 let problem = format!("is none of the presets ({presets}), and as a file it cannot be read");
-                Self::parse(
-                    path,
-                    &fs::read_to_string(path).map_err(|source| FileError::unusable(path, problem, source))?,
-                )
+                // A file that is there has an error of its own.
+                let text = match text_file::read(path) {
+                    Err(FileError::File { source, .. }) if source.kind() == ErrorKind::NotFound => {
+                        return Err(FileError::unusable(path, problem, source));
+                    }
+                    read => read?,
+                };
+                Self::parse(path, &text)
             }
         }
     }
@@ -82,6 +86,7 @@ impl Conditions {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, FileError> {
+        text_file::check_nesting(path, text)?;
         let conditions: Self = toml::from_str(text).map_err(|error| {
             let byte = error.span().map_or(0, |span| span.start);
             FileError::at_byte(path, text, byte, explain(text, byte, &error))

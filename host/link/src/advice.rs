@@ -8,6 +8,11 @@ pub fn name(alarm: Alarm) -> String {
     format!("{first}-{second} {}", alarm.text())
 }
 
+/// What a restart at work means, by its cause.
+pub fn restarted(cause: &str) -> String {
+    format!("restarted ({cause}) while at work: not weeded from here")
+}
+
 /// What to check after an alarm, before it is cleared.
 pub fn alarm(alarm: Alarm) -> &'static str {
     match alarm {

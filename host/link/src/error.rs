@@ -73,6 +73,13 @@ pub enum LinkError {
     NoCommand(String),
 }
 
+impl LinkError {
+    /// Whether it may be the fault of one answer: the same question may succeed.
+    pub(crate) fn is_of_an_answer(&self) -> bool {
+        matches!(self, Self::Silent { .. } | Self::NotTheWeeder(_) | Self::Restarted(_) | Self::Refused { .. })
+    }
+}
+
 /// The other ports, for the message that none of them is an Uno's.
 fn others(ports: &[String]) -> String {
     if ports.is_empty() { String::new() } else { format!(" (there is {})", ports.join(", ")) }

@@ -4,7 +4,7 @@
 //! them, and from commands that the machine has carried out, as the firmware does it (`control::operate`). After
 //! `revert` the values may be missing from the log: they are then unknown until the machine shows them.
 //!
-//! Distances are millimetres by the wheel since the first status of a stretch. A stretch ends with the link, where the
+//! Distances are millimetres by the wheel since the first position of a stretch. A stretch ends with the link, where the
 //! log has a gap, and where the wheel is unknown. With another wheel the distance goes on.
 
 use crate::log::{Entry, Kind};
@@ -46,6 +46,16 @@ impl Default for InUse {
 }
 
 impl InUse {
+    /// The settings of a new machine.
+    pub fn factory() -> Self {
+        Self { unknown: Vec::new(), ..Self::default() }
+    }
+
+    /// Whether all values are known.
+    pub fn is_known(&self) -> bool {
+        self.unknown.is_empty()
+    }
+
     /// The settings. Unknown ones have their last or their default value.
     pub fn settings(&self) -> &Settings {
         &self.settings
@@ -80,7 +90,7 @@ impl InUse {
                     self.unknown.retain(|&unknown| !is_set(unknown) && !is_reset(unknown));
                 }
             }
-            Command::Save => self.saved = self.unknown.is_empty().then(|| self.settings.clone()),
+            Command::Save => self.saved = self.is_known().then(|| self.settings.clone()),
             Command::Defaults => (self.settings, self.unknown) = (Settings::new(), Vec::new()),
             Command::Revert => match &self.saved {
                 Some(saved) => (self.settings, self.unknown) = (saved.clone(), Vec::new()),
@@ -130,6 +140,17 @@ pub enum Followed {
     Unread,
 }
 
+/// The machine's position in an event.
+fn position(event: &EventLine) -> Option<i32> {
+    match *event {
+        EventLine::Detection { position, .. }
+        | EventLine::Guarded { position }
+        | EventLine::Swing { position, .. }
+        | EventLine::Alarm { position, .. } => Some(position),
+        _ => None,
+    }
+}
+
 /// Follows a machine, see the module's words.
 #[derive(Clone, Debug, Default)]
 pub struct Follower {
@@ -148,7 +169,7 @@ impl Follower {
                 (self.unanswered, self.distance) = (VecDeque::new(), Distance::default());
                 if entry.kind == Kind::Connected {
                     // The settings follow. A log of an earlier version lacks those that came later.
-                    self.in_use = InUse { unknown: Vec::new(), ..InUse::default() };
+                    self.in_use = InUse::factory();
                 }
                 Followed::Linked
             }
@@ -161,7 +182,16 @@ impl Follower {
                 }
                 None => Followed::Unread,
             },
-            Kind::Event => EventLine::parse(&entry.text).map_or(Followed::Unread, Followed::Event),
+            Kind::Event => match EventLine::parse(&entry.text) {
+                Some(event) => {
+                    // A stretch may begin with an event.
+                    if let (Some(position), None) = (position(&event), self.distance.last) {
+                        self.distance.take(position, self.tick_mm);
+                    }
+                    Followed::Event(event)
+                }
+                None => Followed::Unread,
+            },
             Kind::Command => {
                 self.unanswered.push_back(entry.clone());
                 Followed::Other

@@ -98,6 +98,8 @@ pub struct Link {
     /// Lines that came before an answer and do not belong to it.
     events: VecDeque<String>,
     version: String,
+    /// The greeting of the last restart, until a caller takes it.
+    greeting: Option<String>,
     /// The serial port again, to discard what it has not sent.
     #[cfg(not(target_arch = "wasm32"))]
     serial: Option<Box<dyn serialport::SerialPort>>,
@@ -127,33 +129,48 @@ impl Link {
             lines: LineReader::default(),
             events: VecDeque::new(),
             version: String::new(),
+            greeting: None,
             #[cfg(not(target_arch = "wasm32"))]
             serial: None,
         };
         if resets {
             link.greeting()?;
         }
-        // Deletes the beginning of a line that could not be typed whole: ended now, it would be a late command.
-        link.type_line(ERASE)?;
-        link.wait_until_quiet()?;
-        let mut answer = link.ask("version");
+        link.check_firmware()?;
+        Ok(link)
+    }
+
+    /// Empties the line, and makes sure that the weeder's firmware answers. Asks again if another answer came: it may
+    /// belong to an earlier question, or its beginning may be lost.
+    pub(crate) fn check_firmware(&mut self) -> Result<(), LinkError> {
         let mut retries = 0;
-        // The Uno may be starting right now for another reason than this opening. Characters that came before are lost.
-        while retries < RETRIES
-            && matches!(answer, Err(LinkError::Restarted(_) | LinkError::Silent { .. } | LinkError::Refused { .. }))
-        {
-            answer = link.ask("version");
+        loop {
+            // Deletes the beginning of a line that could not be typed whole: ended now, it would be a late command.
+            self.type_line(ERASE)?;
+            self.wait_until_quiet()?;
+            let error = match self.ask("version") {
+                Ok(answer) => match answer.last().map(|line| ConsoleLine::parse(line)) {
+                    Some(ConsoleLine::Version { version }) => {
+                        self.version = version;
+                        break;
+                    }
+                    _ => LinkError::NotTheWeeder(answer.join(" ")),
+                },
+                // The Uno may be starting right now for another reason than this opening.
+                Err(error) if error.is_of_an_answer() => error,
+                Err(error) => return Err(error),
+            };
+            if retries == RETRIES {
+                return Err(error);
+            }
             retries += 1;
         }
-        let answer = answer?;
-        match answer.last().map(|line| ConsoleLine::parse(line)) {
-            Some(ConsoleLine::Version { version }) => link.version = version,
-            _ => return Err(LinkError::NotTheWeeder(answer.join(" "))),
-        }
-        if retries > 0 {
-            link.drop_late_answers(retries)?;
-        }
-        Ok(link)
+        if retries > 0 { self.drop_late_answers(retries) } else { Ok(()) }
+    }
+
+    /// The greeting of the last restart since the last call.
+    pub(crate) fn take_greeting(&mut self) -> Option<String> {
+        self.greeting.take()
     }
 
     /// The firmware's version.
@@ -193,7 +210,10 @@ impl Link {
                 ConsoleLine::End { error: Some(_) } => {
                     return Err(LinkError::Refused { command: command.to_owned(), answer: line });
                 }
-                ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
+                ConsoleLine::Greeting { .. } => {
+                    self.greeting = Some(line);
+                    return Err(LinkError::Restarted(command.to_owned()));
+                }
                 // The form of an event is no answer's. A newer firmware may send one at any time.
                 ConsoleLine::Event(_) => self.events.push_back(line),
                 _ => answer.push(line),
@@ -259,7 +279,8 @@ impl Link {
     /// If the port is gone.
     pub fn greeting(&mut self) -> Result<bool, LinkError> {
         for _ in 0..BOOT_READS {
-            if self.next_line()?.is_some_and(|line| is_greeting(&line)) {
+            if let Some(line) = self.next_line()?.filter(|line| is_greeting(line)) {
+                self.greeting = Some(line);
                 return Ok(true);
             }
         }
@@ -313,8 +334,16 @@ impl Link {
         let deadline = Instant::now() + Duration::from_secs(1);
         let mut quiet_reads = 0;
         while quiet_reads < 2 && Instant::now() < deadline {
-            quiet_reads = if let Received::Nothing = self.hear()? { quiet_reads + 1 } else { 0 };
+            quiet_reads = match self.hear()? {
+                Received::Nothing => quiet_reads + 1,
+                Received::Line(line) if is_greeting(&line) => {
+                    self.greeting = Some(line);
+                    0
+                }
+                _ => 0,
+            };
         }
+        self.lines = LineReader::default();
         Ok(())
     }
 }

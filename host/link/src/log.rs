@@ -20,6 +20,8 @@ use thiserror::Error;
 pub enum Kind {
     /// The Uno is connected; the version.
     Connected,
+    /// The firmware has started; its greeting, with the cause.
+    Started,
     /// The Uno is gone; why.
     Lost,
     /// One of its settings, `name=value`.
@@ -139,6 +141,7 @@ impl LogWriter {
                 }
                 examples.iter().try_for_each(|example| self.line(time_ms, Kind::Example, example))
             }
+            Happening::Started { greeting, .. } => self.line(time_ms, Kind::Started, greeting),
             Happening::Lost(why) => self.line(time_ms, Kind::Lost, why),
             Happening::Status(_, line) => self.line(time_ms, Kind::Status, line),
             Happening::Event(_, line) => self.line(time_ms, Kind::Event, line),
@@ -386,7 +389,7 @@ mod tests {
     fn a_line_that_is_none_of_a_log_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
         for (line, wrong) in [
-            ("0,gossip,hello", "line 2: kind is `gossip`: it has to be one of connected, lost, setting"),
+            ("0,gossip,hello", "line 2: kind is `gossip`: it has to be one of connected, started, lost, setting"),
             ("soon,event,swing", "line 2: time_ms is `soon`: it has to be a whole number of milliseconds"),
         ] {
             fs::write(file.path(), format!("{HEADER}\n{line}\n")).unwrap();

@@ -9,7 +9,7 @@
 use super::port::{calling_out, is_same, is_uno, listed};
 use super::settings_file::no_toml;
 use super::{Link, LinkError, find_uno};
-use files::{FileError, whole_file};
+use files::{FileError, text_file, whole_file};
 use serialport::{SerialPortInfo, SerialPortType};
 use std::fs;
 use std::io::ErrorKind;
@@ -295,6 +295,7 @@ impl Names {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> {
+    text_file::check_nesting(path, text)?;
     let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let mut rows: Vec<Row> = Vec::new();
     for (name, item) in document.iter() {

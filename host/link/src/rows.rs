@@ -8,7 +8,7 @@
 //! carry their times.
 
 use super::moment::Moment;
-use super::session::{HOLD, Happening, Session};
+use super::session::{HOLD, Happening, PAUSE, Session};
 use super::settings::SettingsError;
 use super::{Link, LinkError, is_hold};
 use std::cmp::Reverse;
@@ -158,6 +158,9 @@ impl Talk {
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
+            }
+            if !session.is_connected() {
+                thread::sleep(PAUSE);
             }
             for happening in session.turn(Moment::now()) {
                 let what = match happening {

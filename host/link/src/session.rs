@@ -1,17 +1,18 @@
 //! A session: polls the machine over a link, and opens the link again if it is lost.
 //!
 //! The caller calls [`Session::turn`] in a loop. It types one command at a time, polls the status when no command waits,
-//! and returns what happened. It waits for one read at most; only opening a port also waits for the Uno to start. After
-//! every start it asks for settings and examples, and turns the events on. After a command that changes either, it asks
-//! for them again. [`Session::hold`] does not wait. If the Uno is lost, unanswered commands are lost too.
+//! and returns what happened. It waits for one read at most; only opening a port also waits for the Uno to start. Without
+//! a link it does not wait, and the caller does. After every start it asks for settings and examples, and turns the
+//! events on. After a command that changes either, it asks for them again. [`Session::hold`] does not wait. If the Uno is
+//! lost, unanswered commands are lost too.
 //!
 //! A command has a deadline: it is typed before that, or not at all. A machine must not start because a command was
 //! delayed behind others, by a port that stalled, or by a computer that slept. Such a sleep does not count as silence of
 //! the machine.
 
 use super::moment::Moment;
-use super::settings::{Settings, SettingsError, Shown};
-use super::{ConsoleLine, EventLine, Link, LinkError, Status, is_greeting};
+use super::settings::{self, Settings, SettingsError, Shown};
+use super::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
 use control::say::command::{Command, parse};
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -21,6 +22,12 @@ const POLL: Duration = Duration::from_millis(100);
 
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
+
+/// Further tries to ask for everything, if an answer is missing or belongs to another question.
+const RETRIES: usize = 2;
+
+/// Pause of a caller between two turns without a link.
+pub const PAUSE: Duration = Duration::from_millis(20);
 
 /// Time between two tries to open the port again.
 const RETRY: Duration = Duration::from_secs(1);
@@ -43,6 +50,13 @@ const WAITING: usize = 256;
 /// Something that happened in a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Happening {
+    /// The firmware has started. An Uno that starts when its port is opened reports this too.
+    Started {
+        /// Its greeting, with the cause.
+        greeting: String,
+        /// The cause, if the machine was at work before: it has not weeded since.
+        while_at_work: Option<String>,
+    },
     /// The Uno is connected, or has restarted.
     Connected {
         /// The firmware's version.
@@ -110,6 +124,8 @@ pub struct Session {
     /// The waiting time in all turns so far, and the moment of the last turn.
     waited: Duration,
     turned: Option<Moment>,
+    /// Whether the machine was at work, as far as it has told.
+    is_at_work: bool,
     /// Whether the reason for the missing Uno was not reported yet.
     is_loss_unreported: bool,
     happened: VecDeque<Happening>,
@@ -130,6 +146,7 @@ impl Session {
             retry_at: None,
             waited: Duration::ZERO,
             turned: None,
+            is_at_work: false,
             is_loss_unreported: true,
             happened: VecDeque::new(),
         }
@@ -189,10 +206,7 @@ impl Session {
                 // The reason was reported when it was lost.
                 if is_loss_reported { Ok(()) } else { opened }
             }
-            None => {
-                std::thread::sleep(Duration::from_millis(20));
-                Ok(())
-            }
+            None => Ok(()),
         };
         if let Err(error) = result {
             self.retry_at = Some(self.waited + RETRY);
@@ -211,18 +225,45 @@ impl Session {
         self.happened.push_back(Happening::Lost(why));
     }
 
-    /// Takes a link whose firmware has just started.
+    /// Reports a start of the firmware.
+    fn start(&mut self, greeting: String) {
+        let ConsoleLine::Greeting { cause, .. } = ConsoleLine::parse(&greeting) else { return };
+        let while_at_work = std::mem::take(&mut self.is_at_work).then_some(cause);
+        self.happened.push_back(Happening::Started { greeting, while_at_work });
+    }
+
+    /// Takes a link whose firmware has just started. Asks again if an answer belongs to another question, because the
+    /// firmware may have restarted in the middle of one.
     fn connect(&mut self, mut link: Link) -> Result<(), SettingsError> {
-        let shown = link.ask(SETTINGS)?;
-        let settings = Shown::by(&shown).settings;
-        let examples = link.ask(EXAMPLES)?;
-        link.ask(EVENTS)?;
-        self.happened.push_back(Happening::Connected { version: link.version().to_owned(), settings, shown, examples });
+        let mut introduced = introduce(&mut link);
+        for _ in 0..RETRIES {
+            if introduced.as_ref().err().is_none_or(|error| !error.is_of_an_answer()) {
+                break;
+            }
+            introduced = link.check_firmware().map_err(SettingsError::from).and_then(|()| introduce(&mut link));
+        }
+        if let Some(greeting) = link.take_greeting() {
+            self.start(greeting);
+        }
+        let (connected, status) = introduced?;
+        self.happened.push_back(connected);
         // Before the first command, so that a log begins with the machine's state.
-        self.happened.extend(parse_answer(STATUS, link.ask(STATUS)?)?);
+        status.into_iter().for_each(|status| self.report(status));
         self.link = Some(link);
         (self.poll_at, self.is_loss_unreported) = (None, false);
         Ok(())
+    }
+
+    /// Reports an event, and stores whether the machine is at work.
+    fn report(&mut self, happening: Happening) {
+        match &happening {
+            Happening::Status(Status { mode, .. }, _) | Happening::Event(EventLine::State { mode }, _) => {
+                self.is_at_work = *mode == Mode::Work;
+            }
+            Happening::Event(EventLine::Alarm { .. }, _) => self.is_at_work = false,
+            _ => {}
+        }
+        self.happened.push_back(happening);
     }
 
     fn listen(&mut self, mut link: Link, now: Moment) -> Result<(), SettingsError> {
@@ -230,8 +271,9 @@ impl Session {
         let mut line = link.next_line()?;
         let is_more_to_read = line.is_some();
         while let Some(read) = line {
-            if is_greeting(&read) {
-                self.lose("the Uno was reset".to_owned());
+            if let ConsoleLine::Greeting { cause, .. } = ConsoleLine::parse(&read) {
+                self.start(read);
+                self.lose(format!("the Uno was reset ({cause})"));
                 return self.connect(link);
             }
             self.take(read);
@@ -278,7 +320,7 @@ impl Session {
             if let EventLine::CalibratedBySwitch { is_set: true, .. } = event {
                 self.own.insert(SETTINGS.to_owned());
             }
-            self.happened.push_back(Happening::Event(event, line));
+            self.report(Happening::Event(event, line));
             return;
         }
         let is_end = matches!(said, ConsoleLine::End { .. });
@@ -292,9 +334,7 @@ impl Session {
                 _ => drop(self.own.insert(asked.line.clone())),
             },
             // At once, not at the answer's end: a log and a map take the machine's position from it.
-            Some(_) if let ConsoleLine::Status(status) = said => {
-                self.happened.push_back(Happening::Status(status, line))
-            }
+            Some(_) if let ConsoleLine::Status(status) = said => self.report(Happening::Status(status, line)),
             Some(lines) => lines.push(line),
             None => {
                 if is_done {
@@ -311,6 +351,21 @@ impl Session {
             self.asked.pop_front();
         }
     }
+}
+
+/// Asks a machine for all that a session reports at its connection. The second is its status, if it is understood.
+fn introduce(link: &mut Link) -> Result<(Happening, Option<Happening>), SettingsError> {
+    let shown = link.ask(SETTINGS)?;
+    if !shown.iter().any(|line| settings::shown(line).is_some()) {
+        return Err(LinkError::Refused { command: SETTINGS.to_owned(), answer: shown.join(" ") }.into());
+    }
+    let settings = Shown::by(&shown).settings;
+    let examples = link.ask(EXAMPLES)?;
+    link.ask(EVENTS)?;
+    let status = link.ask(STATUS)?;
+    let connected = Happening::Connected { version: link.version().to_owned(), settings, shown, examples };
+    // A newer firmware's status may be unknown here.
+    Ok((connected, parse_answer(STATUS, status)?))
 }
 
 /// Parses the answer to one of the session's own questions.

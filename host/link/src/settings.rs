@@ -26,6 +26,16 @@ pub enum SettingsError {
     NotTaken { setting: String, wanted: u16, found: u16 },
 }
 
+impl SettingsError {
+    /// Whether it may be the fault of one answer: the same question may succeed.
+    pub(super) fn is_of_an_answer(&self) -> bool {
+        match self {
+            Self::Link(error) => error.is_of_an_answer(),
+            _ => false,
+        }
+    }
+}
+
 /// A setting's name.
 pub fn name(setting: Setting) -> String {
     setting.text().to_string()

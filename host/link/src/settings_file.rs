@@ -5,7 +5,7 @@
 //! is checked against the table. The first error gives its line and what would be right.
 
 use super::settings::{Foreign, OtherSetting, Setting, Settings, Shown, help, name, range};
-use files::{FileError, whole_file};
+use files::{FileError, text_file, whole_file};
 use std::fs;
 use std::path::Path;
 use toml_edit::{Decor, DocumentMut, Item, Key, TomlError, Value};
@@ -66,6 +66,7 @@ pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
+    text_file::check_nesting(path, text)?;
     let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let (mut settings, mut foreign) = (Vec::new(), Vec::new());
     let mut old_merge_gap = None;

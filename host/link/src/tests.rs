@@ -68,6 +68,21 @@ fn an_answer_that_comes_late_and_slowly_belongs_to_its_own_question() {
 }
 
 #[test]
+fn a_line_that_is_cut_before_an_answer_is_no_other_firmware() {
+    for cut in ["state=wo", "weeder 0.2.0, re", "plant pos=12 vot", "ok", "error: no su", "\0\u{1B}"] {
+        let mut machine = machine();
+        let mut asked = 0;
+        let answer = move |line: &str| {
+            asked += usize::from(line == "version");
+            let cut = if asked == 1 && line == "version" { cut } else { "" };
+            (cut.to_owned() + &machine(line).join("\r\n") + "\r\n").into_bytes()
+        };
+        let link = Link::over(script("", answer), false);
+        assert!(link.is_ok(), "{cut}: {:?}", link.err());
+    }
+}
+
+#[test]
 fn events_before_an_answer_are_kept_and_do_not_belong_to_it() {
     let mut link = link(|_| b"swing tool=out pos=7\r\nstate=hold tool=out\r\nlost=0\r\nok\r\n".to_vec());
     assert_eq!(link.ask("status").unwrap(), ["state=hold tool=out", "lost=0"]);

@@ -6,20 +6,18 @@
 //! Distances are millimetres of the tool's travel since the start of the log, by the wheel. After a reset, or for
 //! another machine, the ground continues one metre farther. An event without a position has that of the line before.
 //!
-//! The picture follows the settings by the typed commands and all answers. After `revert` the values can be missing: a
-//! log of an earlier version has them only if `save` was typed before. Then the picture stops, and says when. It goes on
-//! where `get` has shown the values, or at the next connection.
+//! After `revert` the settings can be missing ([`link::follower`]): a log of an earlier version has them only if `save`
+//! was typed before. Then the picture stops, and says when. It goes on where `get` has shown the values, or at the next
+//! connection.
 
-use control::say::command::{self, Command};
 use gps::job::{Job, Wanted};
 use gps::picture::{Words, draw};
-use link::follower::tick_mm;
+use link::follower::{Followed, Follower};
 use link::log::{Entry, Kind, Pieces};
-use link::settings::{Setting, Settings, shown};
-use link::{Class, EventLine, Mode, Status, Values, replay};
+use link::settings::Setting;
+use link::{Class, EventLine, Mode, Values, replay};
 use serde_json::{Value, json};
 use std::cell::RefCell;
-use std::collections::VecDeque;
 use std::path::Path;
 
 /// Distance between two stored speeds, and the time after a status in which others are skipped.
@@ -29,66 +27,14 @@ const SPEED_MS: u64 = 300;
 /// Ground between two stretches of a log.
 const APART_MM: f64 = 1000.0;
 
-/// The settings that make a count a position.
-const SCALE: [Setting; 4] = [Setting::TicksPerRev, Setting::WheelMm, Setting::TicksPerM, Setting::BeamToToolMm];
-
-/// How a machine's count becomes ground.
-#[derive(Default)]
-struct Ground {
-    settings: Settings,
-    /// The saved settings, if the log has them.
-    saved: Option<Settings>,
-    /// The settings of [`SCALE`] whose values the log does not have.
-    unknown: Vec<Setting>,
-    /// The last status: its count, and the tool's position. `None` before the first position of a stretch. With another
-    /// wheel the ground goes on from here.
-    here: Option<(i32, f64)>,
-    /// The farthest position so far.
-    end_mm: f64,
-}
-
-impl Ground {
-    /// Takes a value that the machine has shown or accepted. One that this version does not accept is ignored.
-    fn take(&mut self, setting: Setting, value: u16) {
-        if self.settings.set(setting, value).is_ok() {
-            self.unknown.retain(|&unknown| unknown != setting);
-        }
-    }
-
-    /// Follows a command that the machine has carried out, as the firmware does (`control::operate::configuration`).
-    fn follow(&mut self, command: Command) {
-        match command {
-            Command::Set(setting, value) => {
-                self.take(setting, value);
-                if setting.is_of_the_wheel() {
-                    self.take(Setting::TicksPerM, 0);
-                }
-            }
-            Command::Save => self.saved = self.unknown.is_empty().then(|| self.settings.clone()),
-            Command::Defaults => (self.settings, self.unknown) = (Settings::new(), Vec::new()),
-            Command::Revert => match &self.saved {
-                Some(saved) => (self.settings, self.unknown) = (saved.clone(), Vec::new()),
-                None => self.unknown = SCALE.to_vec(),
-            },
-            _ => {}
-        }
-    }
-
-    /// The tool's position at a count.
-    fn tool_mm(&mut self, position: i32) -> f64 {
-        let (here, here_mm) = *self.here.get_or_insert((position, self.end_mm));
-        let tool_mm = here_mm + f64::from(position.wrapping_sub(here)) * tick_mm(&self.settings);
-        self.end_mm = self.end_mm.max(tool_mm);
-        tool_mm
-    }
-}
-
 /// The picture of a log, in the form of `page/src/record/picture.ts`.
 #[derive(Default)]
 struct Picture {
-    ground: Ground,
-    /// Commands that are not answered yet; `None` for a parse error.
-    unanswered: VecDeque<Option<Command>>,
+    follower: Follower,
+    /// Where the ground of the stretch begins, its last status, and the farthest position so far.
+    start_mm: f64,
+    here_mm: Option<f64>,
+    end_mm: f64,
     /// Position and state of the last stored speed of the stretch.
     shown: Option<(f64, Mode)>,
     /// Whether nothing is drawn, because settings are unknown; and the times at which that began.
@@ -113,37 +59,24 @@ const WORKED: usize = 2;
 impl Picture {
     fn take(&mut self, entry: &Entry) {
         self.time_ms = entry.time_ms;
-        match entry.kind {
-            Kind::Connected => {
-                self.end_stretch();
-                self.unanswered.clear();
-                (self.ground.settings, self.ground.saved) = (Settings::new(), None);
-                self.ground.unknown.clear();
-            }
-            Kind::Command => self.unanswered.push_back(command::parse(entry.text.as_bytes()).ok()),
-            Kind::Answer if entry.text == "ok" || entry.text.starts_with("error") => {
-                if let Some(Some(command)) = self.unanswered.pop_front()
-                    && entry.text == "ok"
-                {
-                    self.ground.follow(command);
-                }
-            }
-            Kind::Setting | Kind::Answer => {
-                if let Some((setting, value)) = shown(&entry.text) {
-                    self.ground.take(setting, value);
-                }
-            }
-            Kind::Status | Kind::Event if !self.ground.unknown.is_empty() => {
+        self.has_places |= entry.kind == Kind::Gps;
+        let followed = self.follower.take(entry);
+        let is_known = self.follower.knows_wheel() && self.follower.in_use().knows(&[Setting::BeamToToolMm]);
+        match followed {
+            Followed::Linked => self.end_stretch(),
+            Followed::Status(..) | Followed::Event(_) if !is_known => {
                 if !std::mem::replace(&mut self.is_stopped, true) {
                     self.unknown_ms.push(entry.time_ms);
                     self.end_stretch();
                 }
             }
-            Kind::Status => {
+            Followed::Status(status, goes_on) => {
                 self.is_stopped = false;
-                let Some(status) = Status::parse(&entry.text) else { return };
-                let here_mm = self.ground.tool_mm(status.position);
-                self.ground.here = Some((status.position, here_mm));
+                if !goes_on {
+                    self.end_stretch();
+                }
+                let here_mm = self.tool_mm(status.position);
+                self.here_mm = Some(here_mm);
                 let is_near = |(mm, mode): (f64, Mode)| (here_mm - mm).abs() < SPEED_MM && mode == status.mode;
                 if self.shown.is_some_and(is_near) {
                     return;
@@ -153,36 +86,38 @@ impl Picture {
                 }
                 self.tables[SPEEDS].extend([here_mm, entry.time_ms as f64, f64::from(status.speed_mm_s)]);
             }
-            Kind::Event => {
-                if let Some(event) = EventLine::parse(&entry.text) {
-                    self.take_event(&event, &entry.text, entry.time_ms);
-                }
-            }
-            Kind::Gps => self.has_places = true,
+            Followed::Event(event) => self.take_event(&event, &entry.text, entry.time_ms),
             _ => {}
         }
     }
 
+    /// The tool's position at a count.
+    fn tool_mm(&mut self, position: i32) -> f64 {
+        let tool_mm = self.start_mm + self.follower.mm(position).unwrap_or_default();
+        self.end_mm = self.end_mm.max(tool_mm);
+        tool_mm
+    }
+
     /// Ends the ground of a wheel's counts. What follows begins farther on.
     fn end_stretch(&mut self) {
-        if self.ground.here.take().is_some() {
-            self.changes.push((self.ground.end_mm, true));
-            self.ground.end_mm += APART_MM;
+        if self.here_mm.take().is_some() {
+            self.changes.push((self.end_mm, true));
+            self.end_mm += APART_MM;
         }
-        self.shown = None;
+        (self.start_mm, self.shown) = (self.end_mm, None);
     }
 
     fn take_event(&mut self, event: &EventLine, line: &str, time_ms: u64) {
         let name = Values(line).text("name").unwrap_or_default();
         let trouble =
             |mm: f64, is_warning: bool| json!({ "name": name, "mm": mm, "timeMs": time_ms, "isWarning": is_warning });
-        let ground = &mut self.ground;
         match *event {
             EventLine::Detection { class, position, delay, hold, .. } => {
-                let from_mm = ground.tool_mm(position) + f64::from(ground.settings.get(Setting::BeamToToolMm));
+                let from_mm =
+                    self.tool_mm(position) + f64::from(self.follower.in_use().settings().get(Setting::BeamToToolMm));
                 // The tool reaches the zone after this number of counts.
-                let zone_mm = ground.tool_mm(position.wrapping_add(delay));
-                let zone_end_mm = zone_mm + f64::from(hold) * tick_mm(&ground.settings);
+                let zone_mm = self.tool_mm(position.wrapping_add(delay));
+                let zone_end_mm = zone_mm + f64::from(hold) * self.follower.tick_mm();
                 let class = match class {
                     Class::Plant => 0.0,
                     Class::Weed => 1.0,
@@ -194,15 +129,16 @@ impl Picture {
             }
             EventLine::Swing { out, position } => {
                 self.swings += 1;
-                self.changes.push((ground.tool_mm(position), out));
+                let mm = self.tool_mm(position);
+                self.changes.push((mm, out));
             }
             EventLine::Alarm { position, .. } => {
-                let mm = ground.tool_mm(position);
+                let mm = self.tool_mm(position);
                 self.alarms.push(trouble(mm, false));
                 self.changes.push((mm, true));
             }
             EventLine::Warning { .. } => {
-                let mm = ground.here.map_or(ground.end_mm, |(_, here_mm)| here_mm);
+                let mm = self.here_mm.unwrap_or(self.end_mm);
                 self.alarms.push(trouble(mm, true));
             }
             // An alarm puts the tool out, and a start may let it in: the swing reports it.
@@ -222,7 +158,7 @@ impl Picture {
             }
         }
         if let Some(start_mm) = start_mm {
-            self.tables[WORKED].extend([start_mm, self.ground.end_mm]);
+            self.tables[WORKED].extend([start_mm, self.end_mm]);
         }
     }
 }
@@ -309,11 +245,11 @@ fn ended(answer: impl FnOnce(&mut Log) -> Result<Value, String>) -> Value {
 pub fn picture() -> Value {
     ended(|log| {
         log.picture.worked();
-        let Picture { ground, unknown_ms, time_ms, swings, has_places, alarms, tables, .. } =
+        let Picture { end_mm, unknown_ms, time_ms, swings, has_places, alarms, tables, .. } =
             std::mem::take(&mut log.picture);
         tables.into_iter().enumerate().for_each(|(number, table)| crate::put(number, table));
         Ok(json!({
-            "lengthMm": ground.end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
+            "lengthMm": end_mm, "timeMs": time_ms, "swings": swings, "alarms": alarms, "hasPlaces": has_places,
             "unknownMs": unknown_ms,
         }))
     })
@@ -375,7 +311,7 @@ mod tests {
 
     const BEGIN: &str = "time_ms,kind,line\n0,connected,0.2.0\n";
 
-    /// What `get` answers about [`SCALE`].
+    /// What `get` answers about the wheel and the tool.
     const SETTINGS: &str = "1300,answer,ticks_per_rev=2400
 1300,answer,wheel_mm=400
 1300,answer,ticks_per_m=1000

@@ -35,6 +35,8 @@ pub struct Hub {
 }
 
 struct State {
+    /// The greeting after each machine's last restart at work, until it works again.
+    restarted: Vec<Option<String>>,
     /// Each machine's state, as the first message to a new page.
     machines: Vec<Value>,
     knowledge: Knowledge,
@@ -47,7 +49,7 @@ impl Hub {
         let lost = (0..machines).map(|machine| lost(machine, "its port is being opened")).collect();
         Self {
             clock,
-            state: Mutex::new(State { machines: lost, knowledge }),
+            state: Mutex::new(State { restarted: vec![None; machines], machines: lost, knowledge }),
             pages: broadcast::channel(BEHIND * machines.max(2)).0,
         }
     }
@@ -91,6 +93,22 @@ impl Hub {
         self.send(&mut self.state.lock(), &json!({ "machine": machine, "is": "event", "said": line }));
     }
 
+    /// The machine has restarted at work, with this greeting. Every page shows this until it works again.
+    pub fn restarted(&self, machine: usize, greeting: &str) {
+        let mut state = self.state.lock();
+        if let Some(restarted) = state.restarted.get_mut(machine) {
+            *restarted = Some(greeting.to_owned());
+        }
+        self.send(&mut state, &json!({ "machine": machine, "is": "restarted", "said": greeting }));
+    }
+
+    /// The machine works.
+    pub fn works(&self, machine: usize) {
+        if let Some(restarted) = self.state.lock().restarted.get_mut(machine) {
+            *restarted = None;
+        }
+    }
+
     /// The machine is to hold, or holds: commands of senders that do not know this yet are refused.
     pub fn hold(&self, machine: usize) {
         let mut state = self.state.lock();
@@ -122,10 +140,16 @@ impl Hub {
     /// The present state of all machines, and the receiver of later messages.
     pub fn listen(&self) -> (Vec<Message>, Receiver<Message>) {
         let mut state = self.state.lock();
-        let State { machines, knowledge } = &mut *state;
+        let State { machines, knowledge, restarted } = &mut *state;
         let now = self.now();
-        let message = |known: &Value| Message { number: knowledge.number(now), text: known.to_string().into() };
-        (machines.iter().map(message).collect(), self.pages.subscribe())
+        let mut message = |known: &Value| Message { number: knowledge.number(now), text: known.to_string().into() };
+        let mut messages: Vec<Message> = machines.iter().map(&mut message).collect();
+        for (machine, greeting) in restarted.iter().enumerate() {
+            if let Some(greeting) = greeting {
+                messages.push(message(&json!({ "machine": machine, "is": "restarted", "said": greeting })));
+            }
+        }
+        (messages, self.pages.subscribe())
     }
 
     fn change(&self, machine: usize, message: Value) {

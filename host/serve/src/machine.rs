@@ -3,10 +3,12 @@
 
 use super::hub::Hub;
 use super::knowledge::Stale;
+use super::rules::Order;
 use control::say::command::{Command, parse};
+use link::advice;
 use link::moment::Moment;
 use link::rows::Opener;
-use link::session::{HOLD, Happening, Session};
+use link::session::{HOLD, Happening, PAUSE, Session};
 use link::settings::other_version;
 use link::{EventLine, Mode};
 use std::collections::VecDeque;
@@ -66,6 +68,7 @@ struct Asked {
 pub struct Machine {
     /// The operator's name for it.
     pub name: String,
+    number: usize,
     commands: mpsc::Sender<Asked>,
     holds: mpsc::Sender<Asked>,
 }
@@ -82,16 +85,27 @@ impl Machine {
             session.keeps_hold = true;
             talk.run(session, commands_to_type, holds_to_type);
         });
-        Self { name, commands, holds }
+        Self { name, number, commands, holds }
+    }
+
+    /// Carries out a client's line, if the client has seen a message that is recent enough. HOLD needs none.
+    pub async fn take(&self, hub: &Hub, order: Order, line: String, seen: u64) -> Answer {
+        match order {
+            Order::Hold => {
+                hub.hold(self.number);
+                self.hold().await
+            }
+            Order::Type => self.command(line, hub.deadline(self.number, seen)?).await,
+        }
     }
 
     /// Types a command after the commands before it have been answered, if that is before a deadline.
-    pub async fn command(&self, line: String, deadline: Moment) -> Answer {
+    async fn command(&self, line: String, deadline: Moment) -> Answer {
         ask(&self.commands, line, deadline).await
     }
 
     /// Types `hold` before all waiting commands. A lost machine gets it when it is back.
-    pub async fn hold(&self) -> Answer {
+    async fn hold(&self) -> Answer {
         ask(&self.holds, HOLD.to_owned(), Moment::default()).await
     }
 }
@@ -127,7 +141,11 @@ struct Talk {
 
 impl Talk {
     fn run(mut self, mut session: Session, mut commands: mpsc::Receiver<Asked>, mut holds: mpsc::Receiver<Asked>) {
-        while self.turn(&mut session, &mut commands, &mut holds) {}
+        while self.turn(&mut session, &mut commands, &mut holds) {
+            if !session.is_connected() {
+                thread::sleep(PAUSE);
+            }
+        }
     }
 
     /// Returns false when the machine is dropped.
@@ -207,6 +225,11 @@ impl Talk {
                     (self.tell)(&format!("{}: {other}.", self.name));
                 }
             }
+            Happening::Started { greeting, while_at_work: Some(cause) } => {
+                (self.tell)(&format!("{}: {}.", self.name, advice::restarted(&cause)));
+                self.hub.restarted(self.number, &greeting);
+            }
+            Happening::Started { .. } => {}
             Happening::Lost(why) => {
                 self.hub.lost(self.number, &why);
                 (self.tell)(&format!("{}: {why}.", self.name));
@@ -220,6 +243,9 @@ impl Talk {
                 | EventLine::Newer { is_alarm: true } = event
                 {
                     self.hub.hold(self.number);
+                }
+                if let EventLine::State { mode: Mode::Work } = event {
+                    self.hub.works(self.number);
                 }
                 self.hub.event(self.number, &line);
             }
@@ -252,6 +278,9 @@ impl Talk {
         }
     }
 }
+
+#[cfg(test)]
+mod any_order;
 
 #[cfg(test)]
 mod tests {

@@ -246,21 +246,16 @@ async fn command(
         Err(Forbidden::NoLine) => return no_line(),
         Err(why) => return refused(StatusCode::FORBIDDEN, why),
     };
-    let answer = match order {
-        Order::Hold => {
+    let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
+    let seen = match (order, seen) {
+        (Order::Hold, _) => {
             visitor.enter(Stage::Holding);
-            served.hub.hold(number);
-            machine.hold().await
+            0
         }
-        Order::Type => {
-            let seen = headers.get(SEEN).and_then(|seen| seen.to_str().ok()?.parse().ok());
-            let Some(seen) = seen else { return refused(StatusCode::PRECONDITION_REQUIRED, NO_KNOWLEDGE) };
-            match served.hub.deadline(number, seen) {
-                Ok(deadline) => machine.command(line, deadline).await,
-                Err(stale) => Err(stale.into()),
-            }
-        }
+        (Order::Type, Some(seen)) => seen,
+        (Order::Type, None) => return refused(StatusCode::PRECONDITION_REQUIRED, NO_KNOWLEDGE),
     };
+    let answer = machine.take(&served.hub, order, line, seen).await;
     match answer {
         Ok(lines) => (lines.join("\n") + "\n").into_response(),
         Err(why @ NoAnswer::Stale(_)) => refused(StatusCode::PRECONDITION_FAILED, why),
@@ -277,8 +272,11 @@ const NO_KNOWLEDGE: &str = "send the `id` of the last message of /events as the 
 async fn hold_all(State(served): State<Arc<Served>>, Extension(visitor): Extension<Visitor>) -> impl IntoResponse {
     visitor.enter(Stage::Holding);
     let since = Instant::now();
-    (0..served.machines.len()).for_each(|number| served.hub.hold(number));
-    let holds = served.machines.iter().map(|machine| async move { (machine.hold().await, since.elapsed()) });
+    let hub = &served.hub;
+    let holds = served.machines.iter().map(|machine| async move {
+        let answer = machine.take(hub, Order::Hold, String::new(), 0).await;
+        (answer, since.elapsed())
+    });
     let (mut machines, mut last_ms) = (Vec::new(), None);
     for (Machine { name, .. }, (answer, time)) in served.machines.iter().zip(join_all(holds).await) {
         let error = match answer {

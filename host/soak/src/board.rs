@@ -15,7 +15,8 @@ use control::say::command::{Command, parse};
 use control::settings::{Setting, Settings};
 use field::machine::{channels, encoder_edge};
 use field::wiring;
-use link::{Values, settings};
+use link::Values;
+use link::follower::InUse;
 use model_test::Failure;
 use model_test::decisions::from_the_field;
 use model_test::drive::is_end;
@@ -83,8 +84,7 @@ pub struct Board {
     current: Option<String>,
     /// Received text: whole lines and the beginning of the next.
     heard: String,
-    settings: Settings,
-    in_doubt: bool,
+    in_use: InUse,
     /// Whether the firmware is timing its servo. It may then change its leads.
     times_the_servo: bool,
     state: State,
@@ -119,8 +119,7 @@ impl Board {
             typed: VecDeque::new(),
             current: None,
             heard: String::new(),
-            settings: Settings::new(),
-            in_doubt: false,
+            in_use: InUse::factory(),
             times_the_servo: false,
             state: State::Hold,
             unseen_mm: 0,
@@ -164,10 +163,11 @@ impl Board {
             self.rests_since = rests.then(|| self.rests_since.unwrap_or(self.uno.cycle()));
             self.times_the_servo &= self.state == State::Hold;
         } else if line.contains("calibrated") {
-            (self.times_the_servo, self.in_doubt) = (false, true);
-        } else if let Some((setting, value)) = settings::shown(line) {
+            self.times_the_servo = false;
+            self.in_use.forget();
+        } else {
             // A value out of range would differ later, and be found.
-            let _ = self.settings.set(setting, value);
+            self.in_use.show(line);
         }
         Ok(())
     }
@@ -175,24 +175,25 @@ impl Board {
     /// The line that was begun was answered.
     fn end(&mut self, line: &str, is_ok: bool) {
         let (true, Ok(command)) = (is_ok, parse(line.as_bytes())) else { return };
+        self.in_use.carry_out(&command);
         match command {
-            Command::Set(setting, value) => {
-                let _ = self.settings.change(setting, value);
-                self.begin_rest();
-            }
-            Command::Defaults | Command::Revert => self.in_doubt = true,
-            Command::GetAll => {
-                self.in_doubt = false;
-                self.begin_rest();
-            }
+            Command::Set(..) | Command::GetAll => self.begin_rest(),
+            Command::Defaults | Command::Revert => self.in_use.forget(),
             Command::CalibrateServo => self.times_the_servo = true,
             Command::Hold | Command::Start { .. } | Command::Servo(_) | Command::ServoIn | Command::ServoOut => {
-                self.in_doubt |= std::mem::take(&mut self.times_the_servo);
+                self.end_of_timing();
                 // The tool has yet to come back from a manual move.
                 self.begin_rest();
             }
-            Command::TestRow { .. } => self.in_doubt |= std::mem::take(&mut self.times_the_servo),
+            Command::TestRow { .. } => self.end_of_timing(),
             _ => {}
+        }
+    }
+
+    /// The firmware may have measured its servo by now.
+    fn end_of_timing(&mut self) {
+        if std::mem::take(&mut self.times_the_servo) {
+            self.in_use.forget();
         }
     }
 
@@ -291,11 +292,11 @@ impl Machine for Board {
     }
 
     fn settings(&self) -> &Settings {
-        &self.settings
+        self.in_use.settings()
     }
 
     fn settings_are_in_doubt(&self) -> bool {
-        self.in_doubt || self.times_the_servo
+        !self.in_use.is_known() || self.times_the_servo
     }
 
     fn state(&self) -> State {
@@ -307,11 +308,11 @@ impl Machine for Board {
     }
 
     fn tool_out(&self) -> bool {
-        self.is_sent_out() || !self.servo.is(self.settings.get(Setting::ServoInUs))
+        self.is_sent_out() || !self.servo.is(self.in_use.settings().get(Setting::ServoInUs))
     }
 
     fn is_sent_out(&self) -> bool {
-        self.servo.is(self.settings.get(Setting::ServoOutUs))
+        self.servo.is(self.in_use.settings().get(Setting::ServoOutUs))
     }
 
     fn put(&mut self, text: &str, lines: &[String]) {
@@ -399,7 +400,6 @@ impl Machine for Board {
         for line in ask(&mut self.uno, "get")? {
             self.hear(&line)?;
         }
-        self.in_doubt = false;
         let (told, kept) = (self.listed_examples()?, self.examples().len());
         if told != kept {
             return Err(Failure::fail(format!("it tells {told} examples, and {kept} are kept")));

@@ -53,7 +53,8 @@ fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Ve
     let wrong = |problem: String| FileError::new(path, problem);
     let mut file = file;
     let head = head(&mut file).map_err(read_error)?;
-    let mut parser = Parser::new(head.chain(file));
+    // The reader wants a line end behind the last change.
+    let mut parser = Parser::new(head.chain(file).chain(&b"\n"[..]));
     let header = parser.parse_header().map_err(read_error)?;
     let timescale =
         header.timescale.ok_or_else(|| wrong("has no $timescale: export the recording as VCD once more".to_owned()))?;
@@ -76,7 +77,14 @@ fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Ve
                 return Err(wrong(format!("goes back in time at line {}", parser.line())));
             }
             Command::Timestamp(later) => time = later,
-            Command::ChangeScalar(wire, value) => {
+            Command::ChangeScalar(..) | Command::ChangeVector(..) => {
+                let (wire, value) = match &command {
+                    Command::ChangeScalar(wire, value) => (*wire, Some(*value)),
+                    // Some programs write a single wire as a vector, too.
+                    Command::ChangeVector(wire, bits) => (*wire, bits.iter().last()),
+                    _ => continue,
+                };
+                let (Some(value), true) = (value, wires.contains_key(&wire)) else { continue };
                 let Some(channel) = wires.get_mut(&wire) else { continue };
                 let high = match value {
                     Value::V0 => false,
@@ -165,7 +173,7 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
             match word {
                 b"$scope" => scopes += 1,
                 b"$upscope" => scopes = scopes.saturating_sub(1),
-                b"$enddefinitions" => return Ok(io::Cursor::new(head)),
+                b"$enddefinitions" => return Ok(io::Cursor::new(plain(&head))),
                 _ => {}
             }
             if scopes > MOST_SCOPES {
@@ -174,7 +182,42 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
         }
     }
     // The reader reports an error in a shorter head.
-    if rest.limit() == 0 { wrong("its first MiB has no $enddefinitions".to_owned()) } else { Ok(io::Cursor::new(head)) }
+    if rest.limit() == 0 {
+        wrong("its first MiB has no $enddefinitions".to_owned())
+    } else {
+        Ok(io::Cursor::new(plain(&head)))
+    }
+}
+
+/// Stands for a blank within a channel's name.
+const BLANK: char = '\u{a0}';
+
+/// The head as the reader takes it: UTF-8 without a byte order mark, and each channel's name in one word.
+fn plain(head: &[u8]) -> Vec<u8> {
+    let text = String::from_utf8_lossy(head);
+    let mut words =
+        text.strip_prefix('\u{feff}').unwrap_or(&text).split_inclusive(|letter: char| letter.is_ascii_whitespace());
+    let mut plain = String::new();
+    while let Some(word) = words.next() {
+        plain += word;
+        if word.trim_end() != "$var" {
+            continue;
+        }
+        // Kind, bits and code; then the name, perhaps its bits in brackets, and the end.
+        words.by_ref().take(3).for_each(|word| plain += word);
+        let rest: Vec<&str> = words
+            .by_ref()
+            .map(str::trim_ascii)
+            .take_while(|word| *word != "$end")
+            .filter(|word| !word.is_empty())
+            .collect();
+        let (name, bits) = match rest.split_last() {
+            Some((bits, name)) if bits.starts_with('[') && !name.is_empty() => (name, *bits),
+            _ => (&rest[..], ""),
+        };
+        plain += &format!("{} {bits} $end\n", name.join(&BLANK.to_string()));
+    }
+    plain.into_bytes()
 }
 
 /// The nearest cycle to a time of the file.
@@ -185,10 +228,14 @@ fn to_cycles(time: u64, (count, unit): (u32, TimescaleUnit)) -> u64 {
 }
 
 /// Every channel with its scopes, as `scope.name`.
-fn list_channels<'a>(scope: &str, items: &'a [ScopeItem], known: &mut Vec<(String, &'a Var)>) {
+fn list_channels(scope: &str, items: &[ScopeItem], known: &mut Vec<(String, Var)>) {
     for item in items {
         match item {
-            ScopeItem::Var(channel) => known.push((format!("{scope}{}", channel.reference), channel)),
+            ScopeItem::Var(channel) => {
+                let mut channel = channel.clone();
+                channel.reference = channel.reference.replace(BLANK, " ");
+                known.push((format!("{scope}{}", channel.reference), channel));
+            }
             ScopeItem::Scope(Scope { identifier, items, .. }) => {
                 list_channels(&format!("{scope}{identifier}."), items, known);
             }
@@ -198,7 +245,7 @@ fn list_channels<'a>(scope: &str, items: &'a [ScopeItem], known: &mut Vec<(Strin
 }
 
 /// The wire of the channel `name`.
-fn find_channel(path: &Path, name: &str, known: &[(String, &Var)]) -> Result<IdCode, FileError> {
+fn find_channel(path: &Path, name: &str, known: &[(String, Var)]) -> Result<IdCode, FileError> {
     let matching: Vec<_> =
         known.iter().filter(|(full_name, channel)| full_name == name || channel.reference == name).collect();
     let list = |names: Vec<&str>| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
@@ -244,6 +291,24 @@ mod tests {
             let expected = [(0, a, false), (0, b, true), (16_000, a, true), (48_000, b, false)];
             assert_eq!(levels(&file, &CHANNELS).unwrap(), expected, "{timescale}");
         }
+    }
+
+    #[test]
+    fn what_other_programs_write_is_read() {
+        let expected = levels(&recording("1 us", "#0 0! 1\" #5 1!"), &CHANNELS).unwrap();
+        let read = |file: &[u8], channels: &[(Pin, &str)]| {
+            let changes = parse(Path::new("pins.vcd"), file, channels).unwrap();
+            changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect::<Vec<_>>()
+        };
+        let vector = recording("1 us", "#0 b0 ! b1 \"\n#5 b1 !");
+        assert_eq!(read(vector.as_bytes(), &CHANNELS), expected);
+        let plain = recording("1 us", "#0 0! 1\"\n#5 1!");
+        assert_eq!(read(plain.trim_end().as_bytes(), &CHANNELS), expected);
+        assert_eq!(read(("\u{feff}".to_owned() + &plain).as_bytes(), &CHANNELS), expected);
+        let latin1 = [b"$date 4. M\xE4rz 2026 $end\n", plain.as_bytes()].concat();
+        assert_eq!(read(&latin1, &CHANNELS), expected);
+        let blank = plain.replace("! A", "! Channel 0").replace("\" B", "\" Channel 1");
+        assert_eq!(read(blank.as_bytes(), &[(Pin::D2, "Channel 0"), (Pin::D3, "analyser.Channel 1")]), expected);
     }
 
     #[test]

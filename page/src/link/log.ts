@@ -38,7 +38,7 @@ export class Log {
         } else if (happening.is === "lost") write("lost", happening.why);
         // Of `revert`, and of a change at another computer, no typed line has the values.
         else if (happening.is === "settings") for (const line of happening.lines) write("answer", line);
-        else if ("line" in happening && happening.is !== "started") write(happening.is, happening.line);
+        else if ("line" in happening) write(happening.is, happening.line);
     }
 
     /** The file's text, for saving it. */

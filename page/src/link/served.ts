@@ -55,7 +55,7 @@ type About =
       }
     | { is: "lost"; why: string }
     | { is: "settings" | "examples"; said: string[] }
-    | { is: "status" | "event"; said: string };
+    | { is: "status" | "event" | "restarted"; said: string };
 
 type Message = (About & { machine: number }) | { is: "beat" | "dropped" | "held" };
 
@@ -201,6 +201,9 @@ export class ServedMachine implements Link {
             }
             case "examples":
                 this.onHappening({ is: "examples", examples: message.said });
+                break;
+            case "restarted":
+                this.onHappening({ is: "started", line: message.said, wasAtWork: true });
                 break;
             default:
                 this.#read(message.said);

@@ -31,7 +31,7 @@ const TRIES = 2;
 
 export type Happening =
     /** The firmware has started; its greeting has the reason. */
-    | { is: "started"; line: string }
+    | { is: "started"; line: string; wasAtWork?: boolean }
     /** The machine is connected, and has shown its settings and examples. */
     | { is: "connected"; version: string; settings: readonly Setting[]; examples: readonly string[] }
     /** The machine is lost: for good, as the operator wanted or not, or until it has restarted. */

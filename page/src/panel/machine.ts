@@ -3,7 +3,7 @@
 import faults from "faults.json";
 import { plain } from "../dom.ts";
 import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
-import { tickMm } from "../link/grammar.ts";
+import { read, tickMm } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
 import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
 
@@ -26,7 +26,16 @@ const REASONS: Readonly<Record<string, Plain>> = {
     too_fast: "reasonTooFast",
     encoder_doubtful: "reasonEncoder",
 };
-const STATES = { none: "stateNone", hold: "hold", work: "stateWork", alarm: "stateAlarm" } as const;
+const STATES = {
+    none: "stateNone",
+    unknown: "stateUnknown",
+    hold: "hold",
+    work: "stateWork",
+    alarm: "stateAlarm",
+} as const;
+
+/** Time after a status in which it counts as the present one. */
+const FRESH_MS = 1000;
 
 export class Machine {
     /** The firmware's version, if the machine is connected. */
@@ -37,8 +46,13 @@ export class Machine {
     #lost: string = english("noneConnected");
     /** Whether it may be weeding without a connection. */
     #mayWeedOn = false;
-    mode: Mode = "hold";
-    toolOut = true;
+    /** The last known ones. */
+    mode: Mode | undefined;
+    toolOut: boolean | undefined;
+    /** The cause of a restart at work, until the machine works again. */
+    restarted: string | undefined;
+    /** The present time, as `statusMs`. */
+    nowMs = 0;
     /** The latched alarm's name. */
     alarm: string | undefined;
     warning: string | undefined;
@@ -60,8 +74,15 @@ export class Machine {
                 this.settings = happening.settings;
                 this.examples = happening.examples;
                 [this.objects, this.zones] = [[], []];
-                [this.warning, this.status] = [undefined, undefined];
+                [this.warning, this.status, this.mode, this.toolOut] = [undefined, undefined, undefined, undefined];
                 break;
+            case "started": {
+                const said = read(happening.line);
+                if (said.is === "greeting" && (happening.wasAtWork || this.mode === "work"))
+                    this.restarted = said.cause;
+                this.mode = undefined;
+                break;
+            }
             case "lost":
                 this.version = undefined;
                 this.lost = happening.why;
@@ -83,6 +104,7 @@ export class Machine {
                 this.status = status;
                 this.statusMs = nowMs;
                 [this.mode, this.toolOut, this.alarm] = [status.mode, status.toolOut, status.alarm];
+                if (status.mode === "work") this.restarted = undefined;
                 const behind = this.ticks(this.setting("beam_to_tool_mm"));
                 this.zones = this.zones.filter(
                     ({ position, delay, hold }) => position + delay + hold > status.position - behind,
@@ -105,6 +127,7 @@ export class Machine {
                 break;
             case "state":
                 this.mode = event.mode;
+                if (event.mode === "work") this.restarted = undefined;
                 if (event.mode !== "alarm") this.alarm = undefined;
                 if (event.mode === "hold") this.warning = undefined;
                 break;
@@ -152,8 +175,9 @@ export class Machine {
         [this.#lost, this.#mayWeedOn] = [why, false];
     }
 
-    get state(): Mode | "none" {
-        return this.version === undefined ? "none" : this.mode;
+    get state(): Mode | "none" | "unknown" {
+        if (this.version === undefined) return "none";
+        return this.status && this.mode && this.nowMs - this.statusMs <= FRESH_MS ? this.mode : "unknown";
     }
 
     /** The same in a word for the operator. */
@@ -167,14 +191,14 @@ export class Machine {
      * out, as they would never end.
      */
     get heard(): string {
-        if (this.version !== undefined && this.mode === "work" && !this.#isKeptOut) return sentence(this.stateWord);
+        if (this.state === "work" && !this.#isKeptOut) return sentence(this.stateWord);
         return `${sentence(this.stateWord)} ${this.#reason}`;
     }
 
     /** The tool's state and its reason, in a sentence or two. */
     get why(): string {
         const { status } = this;
-        const isUnseen = this.mode === "work" && this.#isKeptOut && status?.reason === "unseen_ground";
+        const isUnseen = this.state === "work" && this.#isKeptOut && status?.reason === "unseen_ground";
         return isUnseen
             ? `${this.#reason} ${say("toGo", { distance: quantity(status.unseenMm / 1000, "meter", 2) })}`
             : this.#reason;
@@ -182,12 +206,13 @@ export class Machine {
 
     /** Whether the tool is out at work for another reason than a plant. */
     get #isKeptOut(): boolean {
-        return this.toolOut && (this.status?.reason ?? "plant") !== "plant";
+        return this.toolOut === true && (this.status?.reason ?? "plant") !== "plant";
     }
 
     get #reason(): string {
         if (this.version === undefined)
             return `${sentence(told(this.#lost))}${this.#mayWeedOn ? ` ${say("weedsOn")}` : ""}`;
+        if (this.state === "unknown") return say("notTold");
         if (this.mode === "alarm") return say("outUntilCleared");
         if (this.mode === "hold" && !this.toolOut) return say("movedByHand");
         if (this.mode === "hold") return say(this.mayStart ? "outUntilStart" : "outUntilSwitch");

@@ -4,6 +4,7 @@
 // types commands. It makes no decisions.
 
 import { download, Parts } from "../dom.ts";
+import type { EventLine } from "../link/console_line.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
 import { type Ask, type Happening, type Link, NoMachine, Refused } from "../link/session.ts";
@@ -180,7 +181,7 @@ export class Panel {
 
     /** Goes on, at the machine's time. */
     turn(nowMs: number): void {
-        this.#now = nowMs;
+        this.#now = this.machine.nowMs = nowMs;
         const pending = this.#holdPending;
         if (pending?.againMs !== undefined && nowMs >= pending.againMs) void this.#sendHold(pending);
         this.#link?.turn?.(nowMs);
@@ -196,17 +197,23 @@ export class Panel {
         parts.write("why", machine.why);
         this.#tell();
         parts.write("speed", status ? number(status.speedMmS * 0.0036, 1) : "-");
-        parts.write("tool", machine.version === undefined ? "-" : say(machine.toolOut ? "toolOut" : "toolIn"));
+        const isKnown = machine.state !== "none" && machine.state !== "unknown";
+        parts.write("tool", isKnown ? say(machine.toolOut ? "toolOut" : "toolIn") : "-");
         parts.write("place", status ? quantity((status.position * machine.tickMm) / 1000, "meter", 2) : "-");
         parts.write("zones", status ? String(status.zones) : "-");
         const trouble = machine.alarm ?? machine.warning;
-        parts.html("alarm").hidden = trouble === undefined;
-        parts.html("alarm").classList.toggle("warning", machine.alarm === undefined);
+        const { restarted } = machine;
+        const restart = restarted === undefined ? "" : say("restarted", { cause: restarted });
+        parts.html("alarm").hidden = trouble === undefined && restarted === undefined;
+        parts.html("alarm").classList.toggle("warning", machine.alarm === undefined && restarted === undefined);
         parts.html("clear").hidden = machine.alarm === undefined;
         if (trouble !== undefined) {
             const { title, advice } = fault(trouble);
             parts.write("alarm-name", say(machine.alarm === undefined ? "warning" : "alarm", { title }));
-            parts.write("alarm-advice", sentence(advice));
+            parts.write("alarm-advice", [restart, sentence(advice)].join(" ").trim());
+        } else if (restarted !== undefined) {
+            parts.write("alarm-name", restart);
+            parts.write("alarm-advice", say("notWeeded"));
         }
         const nowMs = performance.now();
         if (!isStill() || nowMs - this.#drawnMs > STILL_MS) {
@@ -221,9 +228,10 @@ export class Panel {
     }
 
     #take(happening: Happening): void {
-        const { alarm } = this.machine;
+        const { alarm, restarted } = this.machine;
         this.machine.take(happening, this.#now);
         this.#signal(happening, this.machine.alarm !== alarm);
+        if (this.machine.restarted !== undefined && this.machine.restarted !== restarted) signal("alarm");
         this.#log.add(happening, this.#now);
         this.#setUp.take(happening);
         const { is } = happening;
@@ -243,10 +251,11 @@ export class Panel {
 
     /** Gives the operator audible signals for events that must be noticed without looking. */
     #signal(happening: Happening, isOtherAlarm: boolean): void {
-        if (isOtherAlarm && this.machine.alarm !== undefined) signal("alarm");
+        const isNew = happening.is === "event" && happening.event.is === "newer" && happening.event.isAlarm;
+        if ((isOtherAlarm && this.machine.alarm !== undefined) || isNew) signal("alarm");
         if (happening.is === "lost" && !happening.isWanted) signal("lost");
         const event = happening.is === "event" ? happening.event : undefined;
-        if (event?.is !== "state" && event?.is !== "alarm" && happening.is !== "lost") return;
+        if (event?.is !== "state" && !(event && isAlarm(event)) && happening.is !== "lost") return;
         // By its switch, or by another page's HOLD. This page's own HOLD is signalled by its answer, which comes before
         // or after this.
         if (event?.is === "state" && event.mode === "hold" && !this.#isHolding) signal("held");
@@ -315,6 +324,11 @@ export class Panel {
 }
 
 /** The line of the console about an event, and its kind. */
+/** Whether an event is an alarm, also one that only a newer firmware knows. */
+function isAlarm(event: EventLine): boolean {
+    return event.is === "alarm" || (event.is === "newer" && event.isAlarm);
+}
+
 function inConsole(happening: Happening): Parameters<Console["add"]> | undefined {
     switch (happening.is) {
         case "started":
@@ -325,7 +339,7 @@ function inConsole(happening: Happening): Parameters<Console["add"]> | undefined
             return [happening.why, "happened"];
         case "event":
             if (happening.event.is === "plot") return undefined;
-            return [happening.line, happening.event.is === "alarm" ? "error" : ""];
+            return [happening.line, isAlarm(happening.event) ? "error" : ""];
         case "command":
             return [`> ${happening.line}`, "typed"];
         case "answer":

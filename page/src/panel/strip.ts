@@ -46,7 +46,8 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
         const size = height * 0.2;
         return draw("text", { class: "note", x, y: height * 0.95, "font-size": size, "text-anchor": "middle" }, words);
     };
-    const toolY = machine.toolOut ? height * 0.1 : height * 0.4;
+    const isKnown = machine.state !== "none" && machine.state !== "unknown";
+    const toolY = height * (isKnown ? (machine.toolOut ? 0.1 : 0.4) : 0.25);
     svg.setAttribute("viewBox", `${left} 0 ${length} ${height}`);
     svg.replaceChildren(
         draw("rect", { fill: "var(--pale)", x: left, width: length, y: height * 0.62, height: height * 0.06 }),
@@ -61,12 +62,12 @@ export function drawStrip(svg: SVGSVGElement, machine: Machine, nowMs: number): 
             "stroke-width": length / 150,
         }),
         draw("path", {
-            fill: machine.toolOut ? "none" : "var(--ink)",
+            fill: isKnown && !machine.toolOut ? "var(--ink)" : "none",
             stroke: "var(--ink)",
             d: `M${-length * 0.025} ${toolY}h${length * 0.05}l${-length * 0.025} ${height * 0.26}z`,
             "stroke-width": length / 200,
         }),
-        text(say(machine.toolOut ? "toolDrawnOut" : "toolDrawnIn"), 0),
+        text(isKnown ? say(machine.toolOut ? "toolDrawnOut" : "toolDrawnIn") : "?", 0),
         text(say("beam"), beamMm),
     );
 }

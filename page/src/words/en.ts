@@ -105,6 +105,10 @@ export const en = {
 
         // The machine.
         atWork: "At work",
+        stateUnknown: "state unknown",
+        notTold: "The machine does not tell its state.",
+        restarted: "Restarted ({cause}) while at work.",
+        notWeeded: "Not weeded from here until the machine works again.",
         stateNone: "no machine",
         stateWork: "work",
         stateAlarm: "alarm",

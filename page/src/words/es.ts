@@ -102,6 +102,10 @@ export const es: Language = {
         hasNoSuch: "Este firmware no tiene {names}.",
 
         atWork: "En el trabajo",
+        stateUnknown: "estado desconocido",
+        notTold: "La máquina no dice su estado.",
+        restarted: "Se reinició ({cause}) durante el trabajo.",
+        notWeeded: "Sin deshierbe desde aquí hasta que la máquina trabaje otra vez.",
         stateNone: "sin máquina",
         stateWork: "trabajo",
         stateAlarm: "alarma",

@@ -103,6 +103,10 @@ export const fr: Language = {
         hasNoSuch: "Ce micrologiciel n'a pas {names}.",
 
         atWork: "Au travail",
+        stateUnknown: "état inconnu",
+        notTold: "La machine ne dit pas son état.",
+        restarted: "Redémarrée ({cause}) pendant le travail.",
+        notWeeded: "Pas désherbé à partir d'ici jusqu'à ce que la machine travaille à nouveau.",
         stateNone: "pas de machine",
         stateWork: "travail",
         stateAlarm: "alarme",

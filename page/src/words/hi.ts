@@ -102,6 +102,10 @@ export const hi: Language = {
         hasNoSuch: "इस फ़र्मवेयर में {names} नहीं है।",
 
         atWork: "काम पर",
+        stateUnknown: "स्थिति अज्ञात",
+        notTold: "मशीन अपनी स्थिति नहीं बताती।",
+        restarted: "काम के बीच रीसेट हुई ({cause})।",
+        notWeeded: "मशीन के फिर काम करने तक यहाँ से निराई नहीं हुई।",
         stateNone: "मशीन नहीं",
         stateWork: "काम चालू",
         stateAlarm: "अलार्म",

@@ -10,10 +10,14 @@ use link::set_up::{SetUp, Step};
 use link::settings::{self, Setting, Settings};
 use link::{Class, EventLine, Mode, Status};
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 
 /// Objects and lines that are remembered.
 const OBJECTS: usize = 50;
 const LINES: usize = 500;
+
+/// Time after a status in which it counts as the present one.
+const FRESH: Duration = Duration::from_secs(1);
 
 /// Whether the Uno is there.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,14 +63,21 @@ pub struct RowModel {
     /// The operator's name for it.
     pub name: String,
     pub connection: Connection,
-    pub status: Status,
+    /// The last status that was understood.
+    pub status: Option<Status>,
+    /// Whether that is the present state.
+    pub is_known: bool,
+    /// When it came; `None` if it came since the last turn.
+    status_at: Option<Instant>,
     pub settings: Settings,
     /// The last objects, the newest first.
     pub objects: VecDeque<Seen>,
     /// The canopies in keep-out zones: those of `objects` since the zones were last emptied.
     pub zones: VecDeque<Seen>,
     /// Advice for the operator.
-    pub advice: Option<String>,
+    advice: Option<String>,
+    /// The message of a restart at work, until the machine works again.
+    pub restarted: Option<String>,
     pub answer: Answer,
     /// The measurements since the start, and the last step that was shown.
     set_up: SetUp,
@@ -99,7 +110,15 @@ impl Model {
         Self { rows: names.into_iter().map(RowModel::new).collect(), ..Self::default() }
     }
 
-    /// Whether to ring the bell: since the last call an alarm was latched or a row was lost.
+    /// Goes on to a time: a status that is too old is no longer the present one.
+    pub fn turn(&mut self, now: Instant) {
+        for row in &mut self.rows {
+            let at = *row.status_at.get_or_insert(now);
+            row.is_known &= now.saturating_duration_since(at) <= FRESH;
+        }
+    }
+
+    /// Whether to ring the bell: since the last call an alarm was latched, or a row was lost or restarted at work.
     pub fn take_ring(&mut self) -> bool {
         std::mem::take(&mut self.rings)
     }
@@ -163,6 +182,7 @@ impl Model {
         let said = match &happening {
             Happening::Connected { version, .. } => Some(format!("-- connected to weeder {version}")),
             Happening::Lost(why) => Some(format!("-- {why}")),
+            Happening::Started { while_at_work: Some(cause), .. } => Some(format!("-- {}", advice::restarted(cause))),
             Happening::Event(EventLine::Plot, _) => None,
             Happening::Event(
                 EventLine::Alarm { .. } | EventLine::Warning { .. } | EventLine::State { .. } | EventLine::Newer { .. },
@@ -188,7 +208,8 @@ impl Model {
         }
         let row = &mut self.rows[number];
         self.rings |= match &happening {
-            Happening::Event(EventLine::Alarm { .. } | EventLine::Newer { is_alarm: true }, _) => true,
+            Happening::Event(EventLine::Alarm { .. } | EventLine::Newer { is_alarm: true }, _)
+            | Happening::Started { while_at_work: Some(_), .. } => true,
             Happening::Lost(_) => row.is_there(),
             _ => false,
         };
@@ -226,8 +247,10 @@ impl RowModel {
         Self {
             name,
             connection: Connection::Down("looking for it".to_owned()),
-            // As every machine starts.
-            status: Status { tool_out: true, ..Status::default() },
+            status: None,
+            is_known: false,
+            status_at: None,
+            restarted: None,
             settings: Settings::new(),
             objects: VecDeque::new(),
             zones: VecDeque::new(),
@@ -260,16 +283,34 @@ impl RowModel {
         matches!(self.connection, Connection::Up(_))
     }
 
+    /// The present status; `None` if it is unknown.
+    pub fn present(&self) -> Option<&Status> {
+        self.status.as_ref().filter(|_| self.is_known)
+    }
+
+    /// The last known mode.
+    fn mode(&self) -> Option<Mode> {
+        self.status.as_ref().map(|status| status.mode)
+    }
+
+    /// What the operator must notice: a restart at work, and the advice for an alarm or a warning.
+    pub fn advice(&self) -> Option<String> {
+        let parts: Vec<&str> = [&self.restarted, &self.advice].into_iter().flatten().map(String::as_str).collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+
     fn update(&mut self, happening: Happening) {
         self.set_up.take(&happening);
         match happening {
             Happening::Connected { version, settings, .. } => {
                 self.settings = settings;
                 self.connection = Connection::Up(version);
+                self.is_known = false;
                 self.zones.clear();
             }
             Happening::Lost(why) => {
                 self.connection = Connection::Down(why);
+                self.is_known = false;
                 // It rolls on unseen.
                 self.zones.clear();
                 // A command that is unanswered now stays unanswered.
@@ -287,7 +328,12 @@ impl RowModel {
             Happening::Answered { refusal, .. } => {
                 self.answer = if refusal.is_some() { Answer::Refused } else { Answer::Done };
             }
-            Happening::Late(_) | Happening::Command(_) | Happening::Answer(_) | Happening::Examples(_) => {}
+            Happening::Started { while_at_work: Some(cause), .. } => self.restarted = Some(advice::restarted(&cause)),
+            Happening::Started { .. }
+            | Happening::Late(_)
+            | Happening::Command(_)
+            | Happening::Answer(_)
+            | Happening::Examples(_) => {}
         }
     }
 
@@ -299,13 +345,16 @@ impl RowModel {
     fn take_status(&mut self, status: Status) {
         if let Some(alarm) = status.alarm {
             self.advice = Some(format!("alarm {}: {}", advice::name(alarm), advice::alarm(alarm)));
-        } else if self.status.mode == Mode::Alarm {
+        } else if self.mode() == Some(Mode::Alarm) {
             self.advice = None;
+        }
+        if status.mode == Mode::Work {
+            self.restarted = None;
         }
         let behind = self.settings.ticks(Setting::BeamToToolMm).0;
         let tool = status.position.wrapping_sub(behind);
         self.zones.retain(|seen| seen.leading.wrapping_add(seen.width).wrapping_sub(tool) > -behind);
-        self.status = status;
+        (self.status, self.is_known, self.status_at) = (Some(status), true, None);
     }
 
     fn take_event(&mut self, event: EventLine) {
@@ -321,6 +370,7 @@ impl RowModel {
                 self.zones.truncate(OBJECTS);
             }
             EventLine::Alarm { .. } => self.zones.clear(),
+            EventLine::State { mode: Mode::Work } => self.restarted = None,
             EventLine::Warning { warning } => {
                 self.advice = Some(format!("warning {}: {}", warning.text(), advice::warning(warning)));
             }

@@ -4,13 +4,14 @@
 //! the row's name. A `hold` to all goes to all rows at the same moment, and its result includes the time of the last
 //! row.
 
+use super::addressed;
 use super::input::{self, Line};
-use super::{addressed, send};
 use crate::output::tell;
 use crate::ports::Chosen;
 use crate::program::Finding;
 use crate::record::Logs;
 use anyhow::{Result, ensure};
+use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
 use link::session::Happening;
@@ -124,7 +125,7 @@ impl Talk<'_> {
             return Ok(());
         }
         let to = to.map_or(0..self.rows.count(), |row| row..row + 1);
-        if self.chosen.are_several && to.len() == self.rows.count() && command == "hold" {
+        if self.chosen.are_several && to.len() == self.rows.count() && link::is_hold(command) {
             self.hold = Some(Hold::new(Instant::now(), self.standing.iter().map(|row| row.is_there)));
         }
         for row in to {
@@ -132,13 +133,13 @@ impl Talk<'_> {
             if !standing.is_there {
                 standing.has_failed = true;
                 writeln!(output, "{}", self.chosen.under_name(row, "error: the row is not there"))?;
-                if command == "hold" {
+                if link::is_hold(command) {
                     self.rows.hold(row);
                 }
                 continue;
             }
             (standing.unanswered, standing.statuses) = (standing.unanswered + 1, 0);
-            send(self.rows, row, command);
+            self.rows.command(row, command);
         }
         self.report_hold(output)
     }
@@ -161,6 +162,12 @@ impl Talk<'_> {
                 Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_) | Happening::Late(_),
             ) => {}
             What::Happened(Happening::Status(..)) => standing.statuses += 1,
+            What::Happened(Happening::Started { while_at_work, .. }) => {
+                if let Some(cause) = while_at_work {
+                    standing.has_failed = true;
+                    print(&format!("error: {}", advice::restarted(cause)))?;
+                }
+            }
             What::Happened(Happening::Lost(why)) => {
                 let was_idle = standing.unanswered == 0;
                 standing.has_failed |= !was_idle;

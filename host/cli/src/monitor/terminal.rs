@@ -1,7 +1,7 @@
 //! The monitor on a terminal: keys go in, the screen comes out.
 
 use super::model::{Model, RowModel};
-use super::{addressed, send, view};
+use super::{addressed, view};
 use crate::record::Logs;
 use anyhow::{Context, Result};
 use link::rows::{Hold, Rows, What};
@@ -36,6 +36,7 @@ fn watch(terminal: &mut DefaultTerminal, rows: &Rows, mut model: Model, logs: &m
             }
             model.take(heard);
         }
+        model.turn(Instant::now());
         terminal.draw(|frame| view::draw(&model, frame))?;
         ring(&mut model, terminal.backend_mut())?;
         while event::poll(Duration::ZERO)? {
@@ -78,10 +79,10 @@ fn take_key(model: &mut Model, rows: &Rows, key: KeyEvent) {
             match addressed(&line, &model.names(), model.target) {
                 Err(why) => model.say(format!("-- {why}; nothing was sent")),
                 Ok((_, "")) => {}
-                Ok((None, "hold")) => hold_all(model, rows),
+                Ok((None, command)) if link::is_hold(command) => hold_all(model, rows),
                 Ok((to, command)) => {
                     model.sent(to, command);
-                    model.targets(to).into_iter().for_each(|row| send(rows, row, command));
+                    model.targets(to).into_iter().for_each(|row| rows.command(row, command));
                 }
             }
         }

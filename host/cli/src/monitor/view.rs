@@ -81,8 +81,10 @@ fn ground(row: &RowModel, columns: usize) -> String {
     let beam_to_tool = f64::from(row.settings.get(Setting::BeamToToolMm));
     let mut ground = vec![Ground::Bare; columns];
     let margin = f64::from(row.settings.get(Setting::MarginMm));
-    for seen in &row.zones {
-        let from = row.millimetres(seen.leading.wrapping_sub(row.status.position)) + beam_to_tool;
+    // Zones move with the machine.
+    let position = row.status.as_ref().map(|status| status.position);
+    for (seen, position) in row.zones.iter().filter_map(|seen| Some((seen, position?))) {
+        let from = row.millimetres(seen.leading.wrapping_sub(position)) + beam_to_tool;
         let to = from + row.millimetres(seen.width);
         let mut paint = |from: f64, to: f64, what: Ground| {
             let (from, to) = (column_of(row, columns, from).round(), column_of(row, columns, to).round());

@@ -101,7 +101,7 @@ impl<'a> Stretch<'a> {
                         happened[place] = (happened[place].0, Happened::Refused);
                     }
                 }
-                Kind::Connected | Kind::Lost => {}
+                Kind::Connected | Kind::Started | Kind::Lost => {}
                 // Satellite positions have no effect on the machine's decisions.
                 Kind::Antenna | Kind::GpsFound | Kind::GpsLost | Kind::Gps | Kind::GpsDamaged | Kind::GpsMark => {}
             }

@@ -4,6 +4,7 @@ use super::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::ScriptedBoard;
+use std::io::Write;
 
 /// A session with a board, at a time.
 struct Talk {
@@ -205,6 +206,74 @@ fn after_a_reset_everything_is_asked_again_and_commands_from_before_it_are_not_e
     assert!(talk.command("start"));
     talk.board.say(b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
     let happened = talk.second();
-    assert!(matches!(happened.as_slice(), [Happening::Lost(_), Happening::Connected { .. }]), "{happened:?}");
+    assert!(
+        matches!(happened.as_slice(), [Happening::Started { .. }, Happening::Lost(_), Happening::Connected { .. }]),
+        "{happened:?}"
+    );
     assert!(talk.session.is_idle());
+}
+
+/// Whether a restart at work was reported, by its cause.
+fn restart_at_work(happened: &[Happening]) -> Option<&str> {
+    happened.iter().find_map(|happening| match happening {
+        Happening::Started { while_at_work, .. } => while_at_work.as_deref(),
+        _ => None,
+    })
+}
+
+#[test]
+fn a_restart_at_work_is_reported_with_its_cause_and_one_in_hold_is_not() {
+    let greeting = b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n";
+    let mut talk = Talk::connected();
+    talk.board.say(greeting);
+    assert_eq!(restart_at_work(&talk.second()), None);
+    for at_work in [&b"state is=work\r\n"[..], b"state is=hold\r\nstate is=work\r\n"] {
+        // The line before it may be cut.
+        talk.board.say(&[at_work, b"state=wo", greeting].concat());
+        let happened = talk.second();
+        assert_eq!(restart_at_work(&happened), Some("brown_out"), "{happened:?}");
+        assert_eq!(restart_at_work(&talk.second()), None);
+    }
+    talk.board.say(&[&b"state is=work\r\nalarm code=3-1 name=too_fast pos=1\r\n"[..], greeting].concat());
+    assert_eq!(restart_at_work(&talk.second()), None);
+}
+
+#[test]
+fn an_answer_to_an_earlier_question_is_taken_for_no_other_and_the_machine_is_asked_again() {
+    let late = b"state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n";
+    let greeting = b"weeder 0.2.0, reset by watchdog, state hold, tool out; help lists the commands\r\n";
+    for count in 0..4 {
+        let mut talk = Talk::connected();
+        talk.board.say(&[&greeting[..], &late.repeat(count)].concat());
+        let happened = [talk.second(), talk.second()].concat();
+        let connected = happened.iter().filter(|happening| matches!(happening, Happening::Connected { .. })).count();
+        assert!(connected == 1 && talk.session.is_connected(), "{count}: {happened:?}");
+    }
+}
+
+#[test]
+fn a_command_is_typed_before_its_deadline_or_not_at_all() {
+    let mut talk = Talk::connected();
+    assert!(talk.command("silence"));
+    talk.turn();
+    let deadline = talk.now.after(Duration::from_secs(1));
+    assert!(talk.session.command("start", deadline) && talk.session.command("clear", Moment::NEVER));
+    talk.second();
+    talk.now = talk.now.after(Duration::from_millis(20));
+    talk.board.say(b"ok\r\n");
+    let happened = talk.second();
+    let expected = [answered("ok"), Happening::Late("start".to_owned()), typed("clear"), answered("ok")];
+    assert_eq!(happened, expected);
+    assert!(!talk.board.typed().contains(&"start".to_owned()));
+}
+
+#[test]
+fn half_a_line_that_was_typed_before_is_deleted_and_not_ended() {
+    let board = ScriptedBoard::plugged_in();
+    let mut port = board.open().unwrap();
+    // The port stalled in the middle of a command.
+    port.write_all(b"start").unwrap();
+    let mut link = Link::over(port, false).unwrap();
+    assert_eq!(board.typed(), [""; 0]);
+    assert!(link.ask("status").unwrap()[0].starts_with("state=hold "));
 }

@@ -26,13 +26,9 @@ pub fn draw(model: &Model, row: &RowModel, frame: &mut Frame) {
     }
 }
 
-/// The state, with the tool and the reason for its being out. For a lost machine, the last known state.
+/// The state, with the tool and the reason for its being out. If it is unknown, the last known state.
 fn state(row: &RowModel) -> Line<'static> {
-    let status = &row.status;
-    if !row.is_there() {
-        let tool = if status.tool_out { "out" } else { "in" };
-        return Line::raw(format!("state unknown, last heard: {}, tool {tool}", status.mode.name())).dim();
-    }
+    let Some(status) = row.present() else { return Line::raw(unknown(row)).dim() };
     let reason = status.reason.as_deref().map_or_else(String::new, |reason| format!(" for {reason}"));
     Line::from(vec![
         Span::raw("state "),
@@ -41,21 +37,33 @@ fn state(row: &RowModel) -> Line<'static> {
     ])
 }
 
+/// The state of a machine whose present state is unknown.
+fn unknown(row: &RowModel) -> String {
+    match &row.status {
+        None => "state unknown, tool unknown".to_owned(),
+        Some(status) => {
+            let tool = if status.tool_out { "out" } else { "in" };
+            format!("state unknown, last heard: {}, tool {tool}", status.mode.name())
+        }
+    }
+}
+
 fn speed_and_place(row: &RowModel) -> String {
-    let place_m = row.millimetres(row.status.position) / 1000.0;
-    if !row.is_there() {
+    let Some(status) = &row.status else { return "speed unknown      place unknown".to_owned() };
+    let place_m = row.millimetres(status.position) / 1000.0;
+    if row.present().is_none() {
         return format!("speed unknown      last place {place_m:8.2} m");
     }
-    let km_h = f64::from(row.status.speed_mm_s) * 0.0036;
+    let km_h = f64::from(status.speed_mm_s) * 0.0036;
     format!("speed {km_h:5.2} km/h   place {place_m:8.2} m")
 }
 
 fn draw_small(model: &Model, row: &RowModel, frame: &mut Frame) {
     let area = frame.area();
     // Two lines are enough for every advice, three for why there is no machine.
-    let urgent = match (&row.connection, &row.advice) {
-        (Connection::Down(why), _) => Some(why.clone()),
-        (Connection::Up(_), advice) => advice.clone(),
+    let urgent = match &row.connection {
+        Connection::Down(why) => Some(why.clone()),
+        Connection::Up(_) => row.advice(),
     };
     let wrapped = urgent.as_ref().map_or(0, |text| text.chars().count().div_ceil(usize::from(area.width.max(10)) - 5));
     // The first parts in this list have priority if there is not room for all.
@@ -93,8 +101,8 @@ fn draw_all(model: &Model, row: &RowModel, frame: &mut Frame) {
     let [objects, said] = Layout::horizontal([Constraint::Length(40), Constraint::Min(10)]).areas(middle);
     draw_machine(row, frame, machine);
     draw_ground(row, frame, ground);
-    if let Some(text) = &row.advice {
-        frame.render_widget(Line::styled(text.as_str(), URGENT), advice);
+    if let Some(text) = row.advice() {
+        frame.render_widget(Line::styled(text, URGENT), advice);
     }
     draw_objects(row, frame, objects);
     draw_said(model, frame, said);
@@ -106,11 +114,13 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
         Connection::Up(version) => format!(" weeder {version} "),
         Connection::Down(why) => format!(" no weeder: {why} "),
     };
-    let status = &row.status;
-    let slip = status.slip_permille.map_or_else(String::new, |slip| format!("   slip {:.1} %", f64::from(slip) / 10.0));
-    let second = match row.is_there() {
-        true => format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.zones, status.unseen_mm),
-        false => speed_and_place(row),
+    let second = match row.present() {
+        Some(status) => {
+            let slip = status.slip_permille;
+            let slip = slip.map_or_else(String::new, |slip| format!("   slip {:.1} %", f64::from(slip) / 10.0));
+            format!("{}   windows {}   unseen {} mm{slip}", speed_and_place(row), status.zones, status.unseen_mm)
+        }
+        None => speed_and_place(row),
     };
     let key = Line::styled(format!(" {HOLD_KEY} "), HOLD_STYLE).right_aligned();
     let block = Block::bordered().title(title).title(key);
@@ -120,10 +130,10 @@ fn draw_machine(row: &RowModel, frame: &mut Frame, area: Rect) {
 /// The marks of tool and beam.
 fn marks(row: &RowModel, columns: usize) -> String {
     let tool_at = tool_column(row, columns);
-    let tool = match (row.is_there(), row.status.tool_out) {
-        (false, _) => "? tool",
-        (true, true) => "△ tool out",
-        (true, false) => "▲ tool in",
+    let tool = match row.present().map(|status| status.tool_out) {
+        None => "? tool",
+        Some(true) => "△ tool out",
+        Some(false) => "▲ tool in",
     };
     let tool = format!("{:tool_at$}{tool}", "");
     let mut marks: Vec<char> = tool.chars().take(columns).collect();

@@ -37,7 +37,7 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     .areas(area);
     draw_top(counted(rows), frame, top);
     draw_list(model, rows, frame, list);
-    if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice.as_ref()?))) {
+    if let Some((row, text)) = rows.iter().find_map(|row| Some((row, row.advice()?))) {
         frame.render_widget(Line::styled(format!("{}: {text}", row.name), URGENT), advice);
     }
     if is_roomy {
@@ -49,28 +49,52 @@ pub fn draw(model: &Model, rows: &[RowModel], frame: &mut Frame) {
     draw_line(model, to, frame, line, hint);
 }
 
-/// The state of a row; `None` for a lost one.
-fn state(row: &RowModel) -> Option<Mode> {
-    row.is_there().then_some(row.status.mode)
+/// The state of a row.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    Lost,
+    /// It is there, and does not tell its state.
+    Unknown,
+    Known(Mode),
 }
 
-fn name(state: Option<Mode>) -> &'static str {
-    match state {
-        None => "LOST",
-        Some(Mode::Alarm) => "ALARM",
-        Some(Mode::Work) => "work",
-        Some(Mode::Hold) => "hold",
+/// All states, the worst first.
+const STATES: [State; 5] =
+    [State::Lost, State::Unknown, State::Known(Mode::Alarm), State::Known(Mode::Work), State::Known(Mode::Hold)];
+
+fn state(row: &RowModel) -> State {
+    match row.present() {
+        _ if !row.is_there() => State::Lost,
+        None => State::Unknown,
+        Some(status) => State::Known(status.mode),
     }
 }
 
-fn style(state: Option<Mode>) -> Style {
-    state.map_or(URGENT, |mode| bold(colour(mode)))
+fn is_urgent(state: State) -> bool {
+    matches!(state, State::Lost | State::Unknown | State::Known(Mode::Alarm))
+}
+
+fn name(state: State) -> &'static str {
+    match state {
+        State::Lost => "LOST",
+        State::Unknown => "?",
+        State::Known(Mode::Alarm) => "ALARM",
+        State::Known(Mode::Work) => "work",
+        State::Known(Mode::Hold) => "hold",
+    }
+}
+
+fn style(state: State) -> Style {
+    match state {
+        State::Known(mode) => bold(colour(mode)),
+        State::Lost | State::Unknown => URGENT,
+    }
 }
 
 /// How many rows are in each state, the worst first.
 fn counts<'a>(rows: impl Iterator<Item = &'a RowModel> + Clone) -> Vec<Span<'static>> {
     let count = |of| rows.clone().filter(|row| state(row) == of).count();
-    let counts = [None, Some(Mode::Alarm), Some(Mode::Work), Some(Mode::Hold)].map(|state| (state, count(state)));
+    let counts = STATES.map(|state| (state, count(state)));
     let counts = counts.into_iter().filter(|&(_, count)| count > 0);
     counts.map(|(state, count)| Span::styled(format!("{count} {} ", name(state)), style(state))).collect()
 }
@@ -84,8 +108,7 @@ fn draw_list(model: &Model, rows: &[RowModel], frame: &mut Frame, area: Rect) {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     if room < rows.len() {
         // If all rows fit, they keep their order, so that each is easy to find.
-        let is_urgent = |row: usize| matches!(state(&rows[row]), None | Some(Mode::Alarm));
-        order.sort_by_key(|&row| (!is_urgent(row), model.target != Some(row)));
+        order.sort_by_key(|&row| (!is_urgent(state(&rows[row])), model.target != Some(row)));
     }
     let shown = if room < rows.len() { room.saturating_sub(1) } else { room };
     let longest = rows.iter().map(|row| row.name.chars().count()).max().unwrap_or_default();
@@ -114,11 +137,17 @@ fn line(row: &RowModel, name: usize, columns: u16, is_target: bool) -> Line<'sta
     let shown = if is_target { shown.reversed() } else { shown };
     let state = Span::styled(format!("{:<5} ", self::name(mode)), style(mode));
     let room = usize::from(columns).saturating_sub(name + 13);
-    let (tool, rest) = match (&row.connection, row.status.alarm) {
+    let (tool, rest) = match (&row.connection, row.present()) {
         (Connection::Down(why), _) => ("   ", Span::styled(why.clone(), style(mode))),
-        (Connection::Up(_), Some(alarm)) => ("out", Span::styled(advice::name(alarm), URGENT)),
-        (Connection::Up(_), None) => {
-            (if row.status.tool_out { "out" } else { "in " }, Span::raw(ground(row, room)).green())
+        (Connection::Up(_), None) => ("?  ", Span::styled(row.advice().unwrap_or_default(), URGENT)),
+        (Connection::Up(_), Some(status)) => {
+            let tool = if status.tool_out { "out" } else { "in " };
+            let rest = match (status.alarm, &row.restarted) {
+                (Some(alarm), _) => Span::styled(advice::name(alarm), URGENT),
+                (None, Some(restarted)) => Span::styled(restarted.clone(), URGENT),
+                (None, None) => Span::raw(ground(row, room)).green(),
+            };
+            (tool, rest)
         }
     };
     Line::from(vec![shown, state, Span::raw(format!("{mark} {tool} ")), rest])

@@ -110,7 +110,7 @@ fn an_alarm_is_shown_with_advice_until_it_is_cleared() {
     lines.push("state=alarm code=1-1 name=beam_blocked tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
     insta::assert_snapshot!(screen(&machine(&lines)));
     lines.push("state=hold tool=out pos=2700 speed_mm_s=0 windows=0 unseen_mm=400");
-    assert_eq!(machine(&lines).rows[0].advice, None);
+    assert_eq!(machine(&lines).rows[0].advice(), None);
 }
 
 #[test]
@@ -128,6 +128,58 @@ fn a_lost_machine_is_shown_as_lost() {
     let mut model = machine(&ROW);
     model.update(0, Happening::Lost("the port is gone: plug the Uno in again".to_owned()));
     insta::assert_snapshot!(screen(&model));
+}
+
+#[test]
+fn a_state_that_is_not_understood_for_a_second_is_unknown_and_so_is_that_before_the_first() {
+    let at_work = "state=work tool=in pos=2196 speed_mm_s=694 windows=1 unseen_mm=0";
+    for lines in [(90, 22), (40, 10)] {
+        let known = |model: &Model| !screen_of(model, lines.0, lines.1).contains("state unknown");
+        let began = Instant::now();
+        let mut model = machine(&[]);
+        // A newer firmware's state, and nothing else.
+        tell(&mut model, 0, &["state=rest tool=away pos=1 speed_mm_s=2 windows=0 unseen_mm=0"]);
+        model.turn(began);
+        assert!(!known(&model) && screen_of(&model, lines.0, lines.1).contains("? tool"));
+        tell(&mut model, 0, &[at_work]);
+        model.turn(began);
+        model.turn(began + Duration::from_secs(1));
+        assert!(known(&model));
+        model.turn(began + Duration::from_millis(1001));
+        assert!(!known(&model));
+    }
+    let mut model = rows(3);
+    let began = Instant::now();
+    model.turn(began);
+    model.turn(began + Duration::from_secs(2));
+    let drawn = screen_of(&model, 80, 24);
+    assert!(drawn.contains("1 LOST 2 ?") && drawn.contains("row 2 ?       ?"), "{drawn}");
+}
+
+#[test]
+fn a_restart_at_work_is_shown_until_the_machine_works_again() {
+    let message = "restarted (brown_out) while at work: not weeded from here";
+    let in_hold = "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400";
+    let mut model = machine(&ROW);
+    model.take_ring();
+    let restart = |while_at_work: Option<&str>| Happening::Started {
+        greeting: "weeder 0.2.0, reset by brown_out, state hold".to_owned(),
+        while_at_work: while_at_work.map(str::to_owned),
+    };
+    model.update(0, restart(Some("brown_out")));
+    assert!(model.take_ring());
+    for _ in 0..10 {
+        model.update(0, Happening::Lost("the Uno was reset".to_owned()));
+        model.update(0, restart(None));
+        tell(&mut model, 0, &[in_hold]);
+    }
+    tell(&mut model, 0, &[IN_ALARM]);
+    for (columns, lines) in [(90, 22), (60, 16)] {
+        let drawn = screen_of(&model, columns, lines);
+        assert!(drawn.contains(message), "{drawn}");
+    }
+    tell(&mut model, 0, &["state is=work"]);
+    assert_eq!(model.rows[0].restarted, None);
 }
 
 #[test]

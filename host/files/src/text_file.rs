@@ -1,0 +1,137 @@
+//! Reads a text file that people made, up to a limit: a device or a recording without end is refused. [`check_nesting`]
+//! refuses TOML that would exhaust the parser's stack.
+
+use crate::FileError;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+
+/// The longest file, in MiB. Those that people write have some KiB.
+const MOST_MIB: u64 = 16;
+
+/// The deepest nesting of tables, lists and dotted keys in TOML. No file of the tools nests more than three.
+const MOST_NESTED: usize = 40;
+
+/// Reads a file of UTF-8, without its byte order mark.
+///
+/// # Errors
+/// If it cannot be read, is a folder, is too long, or is no UTF-8: with the line.
+pub fn read(path: &Path) -> Result<String, FileError> {
+    let unread = |source| FileError::unread(path, source);
+    let wrong = |problem: String| FileError::Line { path: path.into(), line: 0, problem };
+    let file = File::open(path).map_err(unread)?;
+    if file.metadata().is_ok_and(|there| there.is_dir()) {
+        return Err(FileError::unusable(
+            path,
+            "is a folder, and a file is needed",
+            io::Error::from(ErrorKind::IsADirectory),
+        ));
+    }
+    let mut bytes = Vec::new();
+    file.take((MOST_MIB << 20) + 1).read_to_end(&mut bytes).map_err(unread)?;
+    if bytes.len() as u64 > MOST_MIB << 20 {
+        return Err(wrong(format!("longer than {MOST_MIB} MiB: no such file is read")));
+    }
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return Err(wrong("saved as UTF-16: save it as UTF-8".to_owned()));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let valid = String::from_utf8_lossy(&error.as_bytes()[..error.utf8_error().valid_up_to()]).into_owned();
+        FileError::at_byte(path, &valid, valid.len(), "this is no UTF-8: save the file as UTF-8")
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
+}
+
+/// Checks the nesting of TOML before it is parsed.
+///
+/// # Errors
+/// Names the line in which it is too deep.
+pub fn check_nesting(path: &Path, text: &str) -> Result<(), FileError> {
+    let (mut depth, mut dots) = (0_usize, 0_usize);
+    let mut letters = text.char_indices().peekable();
+    while let Some((byte, letter)) = letters.next() {
+        match letter {
+            '#' => while letters.next_if(|(_, other)| *other != '\n').is_some() {},
+            '"' | '\'' => {
+                let quotes = text[byte..].chars().take_while(|other| *other == letter).count();
+                // Two are an empty text; three begin one of several lines.
+                let (ending, skipped) = if quotes >= 3 { (3, 3) } else { (1, 1) };
+                let mut rest = byte + skipped;
+                let end = letter.to_string().repeat(ending);
+                loop {
+                    let Some(at) = text[rest..].find(|other: char| {
+                        other == letter || other == '\\' && letter == '"' || other == '\n' && ending == 1
+                    }) else {
+                        rest = text.len();
+                        break;
+                    };
+                    rest += at;
+                    if text[rest..].starts_with('\\') {
+                        rest += 1 + text[rest + 1..].chars().next().map_or(0, char::len_utf8);
+                    } else if text[rest..].starts_with('\n') {
+                        break;
+                    } else if text[rest..].starts_with(&end) {
+                        rest += ending;
+                        break;
+                    } else {
+                        rest += 1;
+                    }
+                }
+                while letters.next_if(|(other, _)| *other < rest).is_some() {}
+            }
+            '[' | '{' => (depth, dots) = (depth + 1, 0),
+            ']' | '}' => (depth, dots) = (depth.saturating_sub(1), 0),
+            '=' | ',' | '\n' => dots = 0,
+            '.' => dots += 1,
+            _ => {}
+        }
+        if depth + dots > MOST_NESTED {
+            let problem = format!("more than {MOST_NESTED} tables or lists lie within each other");
+            return Err(FileError::at_byte(path, text, byte, problem));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deep_nesting_is_refused_with_its_line_and_brackets_in_texts_do_not_count() {
+        let check = |text: &str| check_nesting(Path::new("my.toml"), text).map_err(|error| error.to_string());
+        let deep = [
+            "a = ".to_owned() + &"{ a = ".repeat(400),
+            "a = ".to_owned() + &"[".repeat(100_000),
+            "a".to_owned() + &".a".repeat(400) + " = 1",
+            "[".to_owned() + &"a.".repeat(400) + "a]",
+            "\"\\\"\" = \"\"\nb = ".to_owned() + &"[".repeat(41),
+        ];
+        for text in deep {
+            assert!(check(&text).unwrap_err().contains("more than 40 tables or lists"), "{text:.40}");
+        }
+        assert!(
+            check(&format!("k = 1\n# {0}\na = \"{0}\"\nb = '{0}'\nc = \"\"\"{0}\n\"{0}\"\"\"\n", "[".repeat(99)))
+                .is_ok()
+        );
+        assert!(check("a = 1.5\n".repeat(99).as_str()).is_ok());
+    }
+
+    #[test]
+    fn a_file_that_is_no_text_is_refused_by_what_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |bytes: &[u8]| {
+            let path = folder.path().join("my.toml");
+            std::fs::write(&path, bytes).unwrap();
+            read(&path).unwrap_err().to_string()
+        };
+        assert!(read(folder.path()).unwrap_err().to_string().contains("is a folder"));
+        assert!(refused(b"\xFF\xFEk\0").contains("saved as UTF-16"));
+        assert!(refused(b"k = 3\nm = \"\xE4\"").contains("line 2: this is no UTF-8"));
+        assert!(refused(&vec![b' '; (16 << 20) + 1]).contains("longer than 16 MiB"));
+        std::fs::write(folder.path().join("bom"), "\u{feff}k = 3").unwrap();
+        assert_eq!(read(&folder.path().join("bom")).unwrap(), "k = 3");
+        #[cfg(unix)]
+        assert!(read(Path::new("/dev/zero")).unwrap_err().to_string().contains("longer than 16 MiB"));
+    }
+}
