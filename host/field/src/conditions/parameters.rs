@@ -138,11 +138,11 @@ parameters! {
         stop_s: f64 = 5.0, 0 to 600, "mean length of a stop", "assumed";
         turn_m: f64 = 2.8, 0 to 100, "distance of a turn at a row's end, at the working speed", "fitted: with this, turn_s and the stops the field efficiency is the paper's Eq. 31";
         turn_s: f64 = 1.0, 0 to 600, "mean time that a turn takes beside its way", "fitted, as turn_m";
-        steering_mm: f64 = 0.0, 0 to 150, "the machine strays within this of the row's line, evenly spread, gradually over a metre or two", "none: guided. Hoes that a GPS guided had standard deviations of 9 to 28 mm (Nørremark and others, Autonomous inter-row hoeing using GPS-based side-shift control)";
+        steering_mm: f64 = 0.0, 0 to 150, "the machine strays within this of the row's line, evenly spread, gradually over a metre or two", "none: guided. Hoes guided by GPS had standard deviations of 9 to 28 mm (Griepentrog and others 2007)";
     }
     /// Disturbances of the sensors.
     sensors: Sensors {
-        unseen_percent: f64 = 0.0, 0 to 100, "share of the plants that the beam does not see though they are as high as the others: bent, eaten, planted late", "none: no controller can spare them. A light beam with an encoder found 98 % of tomato transplants (Martínez-Guanter and others, Sensors 17(5) 1096, 2017), its false counts among the errors";
+        unseen_percent: f64 = 0.0, 0 to 100, "share of the plants that the beam does not see though they are as high as the others: bent, eaten, planted late", "none: no controller can spare them. A light beam with an encoder found 98 % of tomato transplants (Martínez-Guanter and others 2017, Sensors 17(5) 1096)";
         beam_height_mm: f64 = 150.0, 5 to 1000, "height of the beam above the ground", "assumed: half way up the mean plant, three times as high as most weeds";
         beam_mm: f64 = 2.0, 0 to 30, "diameter of the beam, which is broken while more than half of it is covered", "assumed, for a laser";
         beam_response_ms: f64 = 1.0, 0 to 50, "time after which the sensor reports a change; shorter ones it does not", "through-beam switches: 0.5 to 2 ms";
