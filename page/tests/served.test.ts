@@ -63,7 +63,8 @@ test("a phone is paired by the code, sees the machine, and holds it", async (tes
     await page.getByRole("link", { name: "Flash" }).click();
     await page.getByText(/comes from weeder serve, which .* flashes nothing/).waitFor();
     assert(await page.getByRole("button", { name: "Flash it" }).isDisabled());
-    await close(opened);
+    // The browser itself writes down the HOLDs to the lost machine.
+    await close({ page, errors: opened.errors.filter((error) => !error.includes("status of 503")) });
 });
 
 test("the address with the code pairs by itself, and machines side by side are started and held one by one", async (test) => {
@@ -94,7 +95,7 @@ test("the address with the code pairs by itself, and machines side by side are s
     await part(page, "right", "drive-said").filter({ hasText: "so this was not sent" }).waitFor();
     isLost = false;
     await part(here.page, "right", "state").filter({ hasText: "hold" }).waitFor();
-    await part(page, "right", "drive-said").filter({ hasText: /^$/ }).waitFor();
+    await part(page, "right", "drive-said").filter({ hasText: /^$/ }).waitFor({ state: "attached" });
 
     // A change on one page is visible on another, and on a page opened later, with its help.
     await part(here.page, "right", "typed").fill("set k 5");
