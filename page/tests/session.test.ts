@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { Log } from "../src/link/log.ts";
-import { type Happening, Refused, Session, type Wire } from "../src/link/session.ts";
+import { type Happening, isHold, Refused, Session, type Wire } from "../src/link/session.ts";
 import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
 import { wokenUp } from "./operator.ts";
 
@@ -139,6 +139,21 @@ test("what was typed and waits is not sent behind a HOLD, and says so", async ()
     for (const dropped of [examples, start]) await assert.rejects(dropped, Refused);
     for (let turn = 0; turn < 50; turn++) await machine.turn();
     assert.equal(machine.mode, "hold");
+});
+
+test("a command that waited while the computer slept is not sent", async () => {
+    const connected = new Connected();
+    for (let turns = 0; turns < TURNS; turns++) await connected.turn();
+    const refused = assert.rejects(connected.session.ask("start now"), Refused);
+    connected.sleptMs += 4000;
+    for (let turns = 0; turns < 10; turns++) await connected.turn();
+    await refused;
+    assert(!connected.happened.some((happening) => happening.is === "command" && happening.line === "start now"));
+});
+
+test("HOLD is understood however it is typed", () => {
+    for (const line of ["hold", "HOLD", " Hold ", "hold.", "hold!!"]) assert(isHold(line), line);
+    for (const line of ["", "holder", "hold 5", "start"]) assert(!isHold(line), line);
 });
 
 test("what a command has changed is asked for behind it", async () => {

@@ -26,6 +26,8 @@ const PATIENCE_MS = 2000;
 const LONGEST_TURN_MS = 200;
 /** Longest time from a reset to the greeting: old bootloaders wait for two seconds. */
 const BOOT_MS = 3000;
+/** Longest time that the operator's command waits to be sent, by the wire's own clock: then it may surprise. */
+const WAIT_MS = 3000;
 /** Further tries from the beginning, after missing or damaged answers. */
 const TRIES = 2;
 
@@ -52,6 +54,9 @@ export class Refused extends Error {}
 
 /** Whether an error is the refusal of a command that the machine takes with `force`. */
 export const mayForce = (error: unknown): boolean => error instanceof Refused && error.message.includes("force");
+
+/** Whether a typed line means `hold`, as `is_hold` of host/link/src/lib.rs has it: in any case, with any punctuation. */
+export const isHold = (line: string): boolean => /^\s*hold[\s!-/:-@[-`{-~]*$/i.test(line);
 
 /** No machine answers, and what to do. */
 export class NoMachine extends Error {}
@@ -97,6 +102,8 @@ interface Question {
     /** Whether the operator typed it. */
     readonly isTyped: boolean;
     readonly since: number;
+    /** The wire's time of the last turn before it was typed. A sleep of the computer counts. */
+    readonly typedAt: number;
     readonly answer: string[];
     readonly done: (answer: string[]) => void;
     readonly failed: (error: Error) => void;
@@ -144,9 +151,7 @@ export class Session implements Link {
 
     /** Keeps the page's own questions. */
     async hold(): Promise<void> {
-        const dropped = this.#waiting.filter(({ isTyped }) => isTyped);
-        this.#waiting = this.#waiting.filter(({ isTyped }) => !isTyped);
-        for (const { failed } of dropped) failed(new Refused(english("holdFirst")));
+        this.#drop(({ isTyped }) => isTyped, "holdFirst");
         await this.#ask("hold", true, (question) => this.#send(question));
     }
 
@@ -154,6 +159,7 @@ export class Session implements Link {
         this.#now += Math.min(now - this.#turnedAt, LONGEST_TURN_MS);
         this.#turnedAt = now;
         if (this.#ended) return;
+        this.#drop(({ isTyped, typedAt }) => isTyped && now - typedAt > WAIT_MS, "waitedTooLong");
         if (this.#now >= this.#greetingBy) {
             this.#greetingBy = Number.POSITIVE_INFINITY;
             void this.#begin();
@@ -169,6 +175,13 @@ export class Session implements Link {
         if (next) this.#send({ ...next, since: this.#now });
     }
 
+    /** Drops waiting commands, which were not sent. */
+    #drop(which: (question: Question) => boolean, why: "holdFirst" | "waitedTooLong"): void {
+        const dropped = this.#waiting.filter(which);
+        if (dropped.length > 0) this.#waiting = this.#waiting.filter((question) => !dropped.includes(question));
+        for (const { failed } of dropped) failed(new Refused(english(why)));
+    }
+
     async close(): Promise<void> {
         this.end("No machine is connected.", true);
         await this.wire.close();
@@ -182,7 +195,7 @@ export class Session implements Link {
     ): Promise<string[]> {
         return new Promise((done, failed) => {
             if (this.#ended) failed(new NoMachine(english("noneConnected")));
-            else take({ command, isTyped, since: this.#now, answer: [], done, failed });
+            else take({ command, isTyped, since: this.#now, typedAt: this.#turnedAt, answer: [], done, failed });
         });
     }
 

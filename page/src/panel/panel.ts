@@ -7,7 +7,7 @@ import { download, Parts } from "../dom.ts";
 import type { EventLine } from "../link/console_line.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
-import { type Ask, type Happening, type Link, NoMachine, Refused } from "../link/session.ts";
+import { type Ask, type Happening, isHold, type Link, NoMachine, Refused } from "../link/session.ts";
 import { isStill, STILL_MS } from "../preferences.ts";
 import { signal } from "../signals.ts";
 import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
@@ -169,6 +169,7 @@ export class Panel {
         if (!this.#link) return Promise.reject(new NoMachine(english("noneConnected")));
         if (this.#holdPending && command.startsWith("start"))
             return Promise.reject(new Refused(english("holdPending")));
+        if (isHold(command)) return this.#link.hold().then(() => []);
         return this.#link.ask(command);
     }
 

@@ -357,6 +357,7 @@ export const en = {
         servedUnknown: "{why}. The machine may have done this, or may still do it: look at it",
         holdPending: "HOLD has not come through yet, so this was not sent",
         holdFirst: "hold came first, so this was not sent",
+        waitedTooLong: "this waited for 3 s, so it was not sent: try again",
         wasReset: "the Uno was reset",
         resetWhileAsked: "the Uno was reset while it was asked",
         noSettings: "the firmware shows no settings: flash this page's, and try again",

@@ -351,6 +351,7 @@ export const es: Language = {
         servedUnknown: "{why}. Puede que la máquina lo haya hecho, o que aún lo haga: mírela",
         holdPending: "la PAUSA aún no ha llegado, así que esto no se envió",
         holdFirst: "la pausa fue antes, así que esto no se envió",
+        waitedTooLong: "esperó 3 s y no se envió: inténtelo de nuevo",
         wasReset: "el Uno se reinició",
         resetWhileAsked: "el Uno se reinició mientras se le preguntaba",
         noSettings: "el firmware no muestra ajustes: grabe el de esta página e inténtelo otra vez",

@@ -351,6 +351,7 @@ export const fr: Language = {
         servedUnknown: "{why}. La machine l'a peut-être fait, ou le fera peut-être encore : regardez-la",
         holdPending: "la PAUSE n'est pas encore passée, ceci n'a donc pas été envoyé",
         holdFirst: "la pause est passée avant, ceci n'a donc pas été envoyé",
+        waitedTooLong: "la commande a attendu 3 s et n'a pas été envoyée : réessayez",
         wasReset: "l'Uno a redémarré",
         resetWhileAsked: "l'Uno a redémarré pendant la question",
         noSettings: "le micrologiciel ne montre aucun réglage : flashez celui de cette page, et réessayez",
