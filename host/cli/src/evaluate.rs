@@ -25,7 +25,7 @@ pub struct Arguments {
     /// area_m2, time_s, width_m, power_hp; - for standard input.
     #[arg(value_name = "FILE.csv", value_parser = source::file)]
     file: PathBuf,
-    /// Nominal speeds in km/h, where the table has measured ones: means and analysis of variance take the nearest.
+    /// Nominal speeds in km/h, 0.1 to 15, where the table has measured ones: means and analysis of variance take the nearest.
     #[arg(long, value_delimiter = ',', value_parser = number_within(0.1..=15.0))]
     speeds: Vec<f64>,
     /// Print JSON instead of tables.

@@ -221,7 +221,7 @@ mod tests {
 
     /// Each argument that names an output, a command line that has it, and its files. One of these files is enough to
     /// stop the command. `DIR` is a folder with the required inputs.
-    const WRITERS: [(&str, &str, &[&str]); 21] = [
+    const WRITERS: [(&str, &str, &[&str]); 22] = [
         ("check-board:page", "check-board --simulated --page DIR/new", &["new"]),
         ("evaluate:out", "evaluate DIR/filled.csv --out DIR/reports", &["reports/report.html"]),
         ("examples.pull:file", "examples pull --port /dev/no-such-port DIR/new", &["new"]),
@@ -232,6 +232,7 @@ mod tests {
         ("merge:out", "merge DIR/trial.part --out DIR/reports", &TRIAL),
         ("merge:out", "merge DIR/sweep.part --out DIR/new", &["new"]),
         ("plan:out", "plan --out DIR/new", &["new"]),
+        ("plan:sheets", "plan --out DIR/table --sheets DIR/new", &["new"]),
         ("settings.pull:file", "settings pull --port /dev/no-such-port DIR/new", &["new"]),
         (
             "settings.pull:file",

@@ -310,7 +310,7 @@ fn a_log_without_a_machine_or_with_a_line_that_cannot_be_is_refused() {
     let entry = |kind, text: &str| Entry { number: 7, time_ms: 0, kind, text: text.to_owned() };
     assert!(replay(&[]).unwrap_err().to_string().starts_with("the log has no machine in it"));
     for (kind, text, wrong) in [
-        (Kind::Setting, "k=99", "line 7 of the log: `k=99` is out of range"),
+        (Kind::Setting, "k=99", "line 7 of the log: `k=99` is out of the range of this version"),
         (Kind::Setting, "wheel=4", "`wheel=4` is no setting of this version"),
         (Kind::Example, "field 3 tree 1 2 3 4 5", "is no example"),
         (Kind::Status, "state=asleep", "is no status"),
