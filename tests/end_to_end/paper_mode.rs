@@ -30,9 +30,9 @@ fn without_leads_the_tool_comes_deeper_into_the_canopies_the_faster_the_machine(
 }
 
 #[test]
-fn without_leads_plants_are_damaged_at_speed_and_with_them_none_is() {
+fn without_leads_zones_are_reached_at_speed_and_with_them_none_is() {
     let paper = judgement(Timing::as_in_the_paper(), 2.5);
-    assert_eq!(paper.count(Verdict::Damaged), paper.plants.len());
+    assert_eq!(paper.count(Verdict::Reached), paper.plants.len());
     let led = judgement(Timing::default(), 2.5);
     assert_eq!(led.count(Verdict::Kept), led.plants.len());
 }

@@ -152,9 +152,9 @@ fn decoded(bytes: Vec<u8>) -> Result<String, (u64, String)> {
 fn declared_separator(text: &str) -> Option<u8> {
     let first = text.lines().next()?.trim_start_matches('"');
     let (key, value) = first.split_at_checked(4)?;
-    let separator = *value.as_bytes().first()?;
+    let separator = *value.as_bytes().first().filter(|byte| byte.is_ascii())?;
     let is_rest_empty = value[1..].bytes().all(|byte| byte == separator || matches!(byte, b'"' | b',' | b';' | b' '));
-    (key.eq_ignore_ascii_case("sep=") && separator.is_ascii() && is_rest_empty).then_some(separator)
+    (key.eq_ignore_ascii_case("sep=") && is_rest_empty).then_some(separator)
 }
 
 /// The separator with which the header has most of the columns, or at least most cells.

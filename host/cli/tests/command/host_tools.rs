@@ -253,10 +253,10 @@ fn a_virtual_uno_prints_the_next_command() {
 fn a_wrong_file_is_refused_before_the_port_is_opened() {
     let folder = tempfile::tempdir().expect("there is room for a file");
     let file = folder.path().join("machine.toml");
-    fs::write(&file, "k = 3\nwheel_mm = 4000\n").expect("it can be written");
+    fs::write(&file, "k = 3\nwheel_mm = 400.5\n").expect("it can be written");
     let words = ["settings", "push", file.to_str().expect("it is text")];
     let error = printed(&weeder(&words, Path::new("/dev/no-such-port"), ""), 2);
-    assert!(error.contains("line 2: wheel_mm is `4000`: it has to be a whole number, 200 to 800 mm"), "{error}");
+    assert!(error.contains("line 2: wheel_mm is `400.5`: it has to be a whole number, 200 to 800 mm"), "{error}");
 }
 
 #[test]

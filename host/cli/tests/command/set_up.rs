@@ -245,6 +245,6 @@ fn the_terminal_leads_through_the_steps_is_stopped_and_goes_on() {
     // 1909.86 counts a metre, and 5 % of slip: 2010.4. 50 to 80 ms of dead time, and up to 56 ms for the stroke.
     assert!((2005..=2016).contains(&value(Setting::TicksPerM)), "{json:#}");
     assert!((95..=155).contains(&value(Setting::LeadOutMs)), "{json:#}");
-    assert!((50..=75).contains(&value(Setting::LeadInMs)), "{json:#}");
-    assert!((8..=18).contains(&value(Setting::MarginMm)), "{json:#}");
+    assert!((60..=100).contains(&value(Setting::LeadInMs)), "{json:#}");
+    assert!((20..=30).contains(&value(Setting::MarginMm)), "{json:#}");
 }

@@ -153,7 +153,7 @@ parameters! {
     machine: Mechanism {
         beam_to_tool_mm: f64 = 400.0, 100 to 2000, "X, from the beam back to the tool", "assumed: the paper does not say it";
         second_beam_mm: f64 = 0.0, 0 to 900, "from the beam back to a second one; 0 for none", "none: the paper's machine has one";
-        arm: Arm = Arm::Pendulum, 0 to 1, "how the arm hangs: as a pendulum across the row, or it trails along the row behind its pivot (in a sweep 0 or 1)", "the paper: soil force times shank length is the servo's torque";
+        arm: Arm = Arm::Pendulum, 0 to 1, "a pendulum hangs across the row, a trailing arm lies along it (in a sweep 0 or 1)", "the paper: soil force times shank length is the servo's torque";
         arm_mm: f64 = 350.0, 100 to 1000, "length of the arm that swings the tool aside", "the paper's Table 1";
         tool_width_mm: f64 = 55.0, 10 to 200, "width of the tool in the row", "the paper's Table 1";
         side_play_mm: f64 = 0.0, 0 to 20, "the tool strays within this across the row, by the backlash of servo and shank, evenly spread, from plant to plant", "none. Half a degree to one degree on the arm of 350 mm is 3 to 6 mm";
