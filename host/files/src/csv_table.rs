@@ -292,6 +292,14 @@ mod tests {
     }
 
     #[test]
+    fn a_first_line_that_no_separator_follows_declares_none() {
+        for text in ["sep=\u{2028}", "sep=", "sep", "abcd\u{2028}x", ""] {
+            assert_eq!(declared_separator(text), None, "{text:?}");
+        }
+        assert_eq!(declared_separator("sep=;"), Some(b';'));
+    }
+
+    #[test]
     fn lines_are_counted_alike_however_they_end() {
         let text = "# measured in May\nplace_mm,width_mm\n\n7,1\n# a gap\n\n8,1\n";
         for end in ["\n", "\r\n", "\r"] {
