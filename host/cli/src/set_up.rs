@@ -6,6 +6,7 @@
 
 mod simulated;
 
+use crate::numbers::whole_within;
 use crate::output::{say, tell};
 use crate::ports::Port;
 use anyhow::{Context, Result, bail};
@@ -29,6 +30,7 @@ The next call continues at the open step.
 Examples:
   weeder set-up --port /dev/ttyACM0
   weeder set-up --state left.txt --port left      each row has its own file
+  weeder set-up --trailing-arm 130                with the margin that this arm needs
   weeder set-up --simulated                       what each step brings in the simulated field")]
 pub struct Arguments {
     #[command(flatten)]
@@ -39,8 +41,11 @@ pub struct Arguments {
     /// Start again at the first step, and forget the measurements.
     #[arg(long)]
     again: bool,
+    /// The arm is no pendulum: it trails along the row behind its pivot, with a tool of this width in mm.
+    #[arg(long, value_name = "TOOL_MM", value_parser = whole_within(10..=200_u16))]
+    trailing_arm: Option<u16>,
     /// Do the steps on the simulated machine, and print what each of them brings.
-    #[arg(long, conflicts_with_all = ["port", "state", "again"])]
+    #[arg(long, conflicts_with_all = ["port", "state", "again", "trailing_arm"])]
     simulated: bool,
 }
 
@@ -65,7 +70,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let kept_state =
         State::parse(&kept).with_context(|| format!("{} is no file of `weeder set-up`", path.display()))?;
-    let state = if arguments.again { State::parse("")? } else { kept_state };
+    let mut state = if arguments.again { State::parse("")? } else { kept_state };
+    state.measured.trailing_tool_mm = arguments.trailing_arm;
     let link = arguments.port.open()?;
     Guide { link, state, path: path.clone() }.lead()
 }

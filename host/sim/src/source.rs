@@ -2,8 +2,10 @@
 //! completion offers them.
 
 use clap::builder::{PossibleValue, TypedValueParser};
+use crate::output::tell;
 use clap::{Arg, Command};
-use field::conditions::presets;
+use field::conditions::{Conditions, presets};
+use files::FileError;
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
@@ -36,6 +38,16 @@ pub fn named(name: &str) -> Result<String, String> {
 /// A field's preset, or a file; a shell that completes offers the presets.
 pub fn preset_or_file() -> impl TypedValueParser<Value = String> {
     offering(|| presets().collect(), named)
+}
+
+/// The conditions of a field. Prints what is likely wrong with them.
+///
+/// # Errors
+/// If it is neither a preset nor a valid file.
+pub fn field(preset_or_file: &str) -> Result<Conditions, FileError> {
+    let conditions = Conditions::load(preset_or_file)?;
+    conditions.warnings().iter().for_each(|warning| tell!("Warning: {warning}"));
+    Ok(conditions)
 }
 
 /// A value that `parser` reads. A shell's completion offers these names, but other words are also accepted.
