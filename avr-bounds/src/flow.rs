@@ -27,9 +27,9 @@ use crate::error::{BoundsError, Problem};
 use crate::paths;
 use crate::proved::{self, Found, Frame};
 use crate::reach::Reach;
-use crate::routine::{Edge, Entry, Kind, Node, Place, Routine};
+use crate::routine::{Edge, Entry, Kind, Node, Place, Routine, bytes};
 use crate::targets::{Targets, Where};
-use crate::values::{Constants, DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
+use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
