@@ -36,8 +36,8 @@
 //! | `[Example<F>; n]` | n (F + 1) | |
 //! | [`Table<F, N>`](Table) | N (F + 1) + 2 | `add_example` O(1), `remove` O(n) |
 //! | [`Scale<F>`](Scale) | 5 F | `quantise`: F subtractions, shifts and multiplications |
-//! | [`Nearest`] for k, which may be kept | 4 k + 7 + 2 C | |
-//! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
+//! | [`Nearest`] for k, which may be kept | 4 k + 1 | |
+//! | [`classify`] | about 100 + 2 C of stack | n F multiplications of 8 x 8 bits; k comparisons an example; k + C to vote |
 //!
 //! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. The calls and the vote take about 500 cycles, and
 //! each example that is loaded 19 to 67. An example that is among the k nearest at that moment takes some 75 more. In random order
@@ -53,7 +53,6 @@
 #![forbid(unsafe_code)]
 
 mod answer;
-mod ballot;
 mod classify;
 mod distance;
 mod examples;
@@ -65,7 +64,7 @@ mod table;
 pub use answer::{Answer, ClassifyError, Kind, MAX_K};
 pub use classify::classify;
 pub use distance::{MAX_FEATURES, squared_distance};
-pub use examples::{Example, Examples, VACANT};
+pub use examples::{Example, Examples};
 pub use nearest::Nearest;
 pub use neighbour::Neighbour;
 pub use scale::{Range, Scale};

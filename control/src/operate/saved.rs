@@ -22,9 +22,6 @@ const END: usize = HEADER + 2 * Setting::COUNT as usize;
 /// Bytes of a copy with its CRC.
 pub const COPY: usize = END + 2;
 
-/// A save writes each byte once, and the first twice.
-const STEPS: u8 = COPY as u8 + 1;
-
 /// Each copy has half of the memory, so the table can grow without moving a copy.
 const STRIDE: u16 = SIZE as u16 / 2;
 
@@ -39,8 +36,10 @@ pub struct SavedSettings<M> {
     sequence: u8,
     /// The bytes to write: the settings at the time of the save.
     image: [u8; COPY],
-    /// Writes left: the first byte wrong, the others, the first byte right.
+    /// Steps left of the save: make the first byte wrong, write the others, write the first.
     left: u8,
+    /// The next byte of that step.
+    next: u8,
     /// Whether there is a valid copy.
     exists: bool,
 }
@@ -48,7 +47,7 @@ pub struct SavedSettings<M> {
 impl<M: Memory> SavedSettings<M> {
     /// The settings before [`load`](Self::load).
     pub const fn new(memory: M) -> Self {
-        Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, exists: false }
+        Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, next: 0, exists: false }
     }
 
     /// Loads the newest valid copy; `None` if there is none.
@@ -80,27 +79,26 @@ impl<M: Memory> SavedSettings<M> {
         self.older ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
         self.image = image(settings, self.sequence);
-        self.left = STEPS;
+        // A first byte that is already wrong stays: a power loss while it is written can leave any value, also the right one.
+        self.left = if self.memory.read(self.newest()) == self.image[0] { 3 } else { 2 };
+        self.next = 0;
     }
 
     /// Writes the next byte, if the memory is ready. Returns whether all is written.
     pub fn carry_on(&mut self) -> bool {
-        if !self.memory.is_ready() {
-            return false;
-        }
-        while self.left > 0 {
-            let invalidates = self.left == STEPS;
-            let place = if self.left > 1 { STEPS - self.left } else { 0 };
-            let (address, right) = (self.newest() + u16::from(place), self.image[usize::from(place)]);
-            self.left -= 1;
-            // Correct bytes are not written again, because an EEPROM wears out. Nor is a first byte that is already wrong: a power
-            // loss during a write can leave any value.
-            if (self.memory.read(address) == right) == invalidates {
-                self.memory.write(address, if invalidates { !right } else { right });
-                return false;
+        if self.left > 0 {
+            let wrong = [!self.image[0]];
+            let (offset, bytes) = match self.left {
+                3 => (0, &wrong[..]),
+                2 => (1, &self.image[1..]),
+                _ => (0, &self.image[..1]),
+            };
+            let address = address(self.older ^ 1) + offset;
+            if self.memory.update(address, bytes, &mut self.next) {
+                self.left -= 1;
             }
         }
-        true
+        self.left == 0
     }
 
     /// The saved value of a setting, if settings are saved. Not valid during a save.

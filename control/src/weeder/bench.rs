@@ -69,7 +69,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
     pub fn calibrate_start(&mut self) -> Result<(), CommandError> {
         self.expect_hold()?;
-        self.distance.begin(self.sensors.readings.position);
+        self.distance.begin(self.sensors.position);
         Ok(())
     }
 
@@ -79,7 +79,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set). Nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), CommandError> {
         let nominal = self.configuration.settings().nominal_ticks_per_m();
-        let counted = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force)?;
+        let counted = self.distance.end(self.sensors.position, distance_mm, nominal, force)?;
         self.set(Setting::TicksPerM, counted)
     }
 
@@ -127,10 +127,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets the leads from the measured times, if the settings allow them, and reports the result.
     fn finish_swings(&mut self, outcome: Outcome) {
         let fits = match outcome {
-            Outcome::Measured(SwingTimes { out_ms, in_ms }) => self
-                .configuration
-                .change(&[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)], self.is_working())
-                .is_ok(),
+            Outcome::Measured(SwingTimes { out_ms, in_ms }) => {
+                self.set(Setting::LeadOutMs, out_ms).is_ok() && self.set(Setting::LeadInMs, in_ms).is_ok()
+            }
             _ => false,
         };
         self.events.announce(Event::Calibrated { outcome, fits });

@@ -341,7 +341,7 @@ fn jumps_at_rest_move_nothing_and_many_are_an_alarm() {
             drive.machine.readings.jumps += 1;
             drive.place += 2.0;
             drive.roll(0.0, f64::from(every_ms) / 1000.0);
-            assert_eq!(drive.machine.readings().position.count(), 0, "jump {jump}");
+            assert_eq!(drive.machine.position().count(), 0, "jump {jump}");
         }
         assert_eq!(drive.alarm(), alarm, "a jump every {every_ms} ms");
     }
@@ -352,7 +352,7 @@ fn jumps_count_for_a_wheel_so_fast_that_an_edge_can_be_missed() {
     for (speed_m_s, believed) in [(7.0, false), (15.0, true)] {
         let mut drive = Drive::in_hold();
         drive.roll(speed_m_s, 3.0);
-        let before = drive.machine.readings().position;
+        let before = drive.machine.position();
         let (place, jumps) = (drive.place, 5);
         for _ in 0..jumps {
             drive.machine.readings.jumps += 1;
@@ -360,6 +360,6 @@ fn jumps_count_for_a_wheel_so_fast_that_an_edge_can_be_missed() {
         }
         let counted = drive.place.floor() as i32 - place.floor() as i32;
         let doubted = if believed { 0 } else { 2 * jumps };
-        assert_eq!(drive.machine.readings().position - before, Ticks(counted - doubted), "{speed_m_s} m/s");
+        assert_eq!(drive.machine.position() - before, Ticks(counted - doubted), "{speed_m_s} m/s");
     }
 }
