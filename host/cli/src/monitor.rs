@@ -1,6 +1,6 @@
 //! `weeder monitor`: the machine's state, live, with its console below; for several rows, an overview of all.
 //!
-//! [`Rows`] talk to the machine, [`model`] stores its state, [`view`] draws that, and [`terminal`]
+//! [`link::rows::Rows`] talk to the machine, [`model`] stores its state, [`view`] draws that, and [`terminal`]
 //! adds the keyboard. [`plain`] works without a screen: lines in, lines out.
 
 mod command_line;
