@@ -65,10 +65,8 @@ impl<M: Memory> FieldExamples<M> {
             return None;
         }
         let mut bytes = [0; SLOT];
-        let mut address = Self::address(number);
-        for byte in &mut bytes {
+        for (address, byte) in (Self::address(number)..).zip(&mut bytes) {
             *byte = self.memory.read(address);
-            address += 1;
         }
         let [a, b, c, d, e, label, low, high] = bytes;
         (check(&mut bytes) == u16::from_le_bytes([low, high])).then_some(Example::new([a, b, c, d, e], label))
