@@ -180,6 +180,11 @@ impl SetUp {
         self.ticks_per_m.len()
     }
 
+    /// Forgets the measurements of another wheel.
+    pub fn forget_stretches(&mut self) {
+        self.ticks_per_m.clear();
+    }
+
     /// Reads the lines of a session. Typed lines begin with `> `.
     pub fn of_lines<'a>(lines: impl IntoIterator<Item = &'a str>) -> Self {
         let mut set_up = Self::default();
@@ -323,6 +328,30 @@ impl SetUp {
             firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
             stems_mm,
             in_use_mm: settings.get(Setting::MarginMm),
+        })
+    }
+
+    /// Why the tasks of a step are not done with these settings. `None` if they are, or if no setting and no
+    /// measurement shows it.
+    pub fn open(&self, tasks: &[Task], settings: &Settings) -> Option<String> {
+        let first_missing =
+            |is_it: fn(&Step) -> bool| self.missing(settings).into_iter().find(is_it).map(|step| step.to_string());
+        tasks.iter().find_map(|task| match *task {
+            Task::Set(setting @ (Setting::SecondBeamMm | Setting::StemZoneMm), _) => {
+                (settings.get(setting) == 0).then(|| format!("{} is 0", setting.text()))
+            }
+            Task::TimeServo => first_missing(|step| matches!(step, Step::TimeServo(_) | Step::SetLead(..))),
+            Task::MeasureWheel(_) => first_missing(|step| matches!(step, Step::MeasureWheel(_))),
+            Task::SetMargin => match self.margin(settings) {
+                Err(missing) => missing.first().map(Step::to_string),
+                Ok(margin) => {
+                    let default_mm = Setting::MarginMm.description().default;
+                    let is_done = margin.in_use_mm == margin.least_mm()
+                        || (margin.least_mm()..default_mm).contains(&margin.in_use_mm);
+                    (!is_done).then(|| Step::SetMargin(margin).to_string())
+                }
+            },
+            Task::Fit(..) | Task::Set(..) => None,
         })
     }
 
