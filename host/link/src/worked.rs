@@ -53,13 +53,14 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
     let mut plants_mm: Vec<f64> = Vec::new();
     for entry in log {
         let followed = follower.take(entry);
+        let mut now_mm = None;
         let mode = match &followed {
             Followed::Linked => None,
             Followed::Status(status, goes_on) => {
                 if !goes_on {
                     plants_mm.clear();
                 }
-                let now_mm = follower.mm(status.position);
+                now_mm = follower.mm(status.position);
                 if let Some(open) = &mut open {
                     let since_ms = entry.time_ms.saturating_sub(open.worked.time_ms.end);
                     if status.speed_mm_s != 0 {
@@ -87,7 +88,7 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
             (open.worked.time_ms.end, open.worked.lines.end) = (entry.time_ms, entry.number + 1);
         }
         match (mode == Some(Mode::Work), open.is_some()) {
-            (true, false) => open = Some(Open::at(entry)),
+            (true, false) => open = Some(Open::at(entry, now_mm)),
             (false, true) => {
                 let beam_to_tool_mm = follower.in_use().settings().get(Setting::BeamToToolMm).into();
                 stretches.extend(open.take().map(|open| open.end(&plants_mm, beam_to_tool_mm)));
@@ -104,7 +105,7 @@ pub fn worked(log: &[Entry]) -> Vec<Worked> {
 }
 
 impl Open {
-    fn at(entry: &Entry) -> Self {
+    fn at(entry: &Entry, now_mm: Option<f64>) -> Self {
         let worked = Worked {
             lines: entry.number..entry.number + 1,
             time_ms: entry.time_ms..entry.time_ms,
@@ -113,7 +114,7 @@ impl Open {
             plants: None,
             swings: 0,
         };
-        Self { worked, beam_mm: None, goes_on: true }
+        Self { worked, beam_mm: now_mm.map(|mm| mm..mm), goes_on: true }
     }
 
     /// Takes the beam's place at a status.

@@ -181,13 +181,13 @@ mod tests {
 
     #[test]
     fn a_speed_far_from_the_plan_is_told_and_an_unknown_distance_leaves_the_table_as_it_is() {
-        let mut records = [plot(1, 2.5)];
+        let mut records = [plot(1, 3.0)];
         let joined = join(&mut records, &[stretch(0, 60, 30.0)], &[]).expect("they match");
-        assert!(joined[0].warning().is_some_and(|said| said.contains("the log has 1.80 km/h, and the table 2.5")));
-        let mut records = [plot(1, 2.5)];
+        assert!(joined[0].warning().is_some_and(|said| said.contains("the log has 1.80 km/h, and the table 3:")));
+        let mut records = [plot(1, 3.0)];
         let unknown = Worked { distance_mm: None, plants: None, ..stretch(0, 60, 30.0) };
         let joined = join(&mut records, &[unknown], &[]).expect("they match");
         assert_eq!((joined[0].speed_km_h, joined[0].warning()), (None, None));
-        assert_eq!((records[0].speed_km_h, records[0].plants, records[0].area_m2), (2.5, None, None));
+        assert_eq!((records[0].speed_km_h, records[0].plants, records[0].area_m2), (3.0, None, None));
     }
 }
