@@ -99,7 +99,11 @@ impl Change {
             let default = || Setting::find(name.as_bytes()).map(|setting| f64::from(setting.description().default));
             parameter.or_else(set).or_else(default).map_or_else(String::new, |value| written(name, value))
         };
-        [lines(&|name, _| name.to_owned()), lines(&|name, value| written(name, value)), lines(&|name, _| of_field(name))]
+        [
+            lines(&|name, _| name.to_owned()),
+            lines(&|name, value| written(name, value)),
+            lines(&|name, _| of_field(name)),
+        ]
     }
 }
 

@@ -194,6 +194,11 @@ impl SetUp {
         self.ticks_per_m.len()
     }
 
+    /// Forgets the measurements of another wheel.
+    pub fn forget_stretches(&mut self) {
+        self.ticks_per_m.clear();
+    }
+
     /// Reads the lines of a session. Typed lines begin with `> `.
     pub fn of_lines<'a>(lines: impl IntoIterator<Item = &'a str>) -> Self {
         let mut set_up = Self::default();
@@ -348,6 +353,30 @@ impl SetUp {
         })
     }
 
+    /// Why the tasks of a step are not done with these settings. `None` if they are, or if no setting and no
+    /// measurement shows it.
+    pub fn open(&self, tasks: &[Task], settings: &Settings) -> Option<String> {
+        let first_missing =
+            |is_it: fn(&Step) -> bool| self.missing(settings).into_iter().find(is_it).map(|step| step.to_string());
+        tasks.iter().find_map(|task| match *task {
+            Task::Set(setting @ (Setting::SecondBeamMm | Setting::StemZoneMm), _) => {
+                (settings.get(setting) == 0).then(|| format!("{} is 0", setting.text()))
+            }
+            Task::TimeServo => first_missing(|step| matches!(step, Step::TimeServo(_) | Step::SetLead(..))),
+            Task::MeasureWheel(_) => first_missing(|step| matches!(step, Step::MeasureWheel(_))),
+            Task::SetMargin => match self.margin(settings) {
+                Err(missing) => missing.first().map(Step::to_string),
+                Ok(margin) => {
+                    let default_mm = Setting::MarginMm.description().default;
+                    let is_done = margin.in_use_mm == margin.least_mm()
+                        || (margin.least_mm()..default_mm).contains(&margin.in_use_mm);
+                    (!is_done).then(|| Step::SetMargin(margin).to_string())
+                }
+            },
+            Task::Fit(..) | Task::Set(..) => None,
+        })
+    }
+
     /// The next step with these settings. `None` before the first `calibrate`.
     pub fn next(&self, settings: &Settings) -> Option<Step> {
         if self.timings.is_empty() && self.ticks_per_m.is_empty() {
@@ -407,7 +436,8 @@ fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u16)> {
 /// The time of the stroke, from the times that were measured; 0 if it was timed by eye.
 fn travel_ms(timings: &[Timing]) -> f64 {
     let (outs, ins) = extremes(timings);
-    let differ_ms = outs.max().zip(ins.min()).map_or(0, |(longest_ms, shortest_ms)| longest_ms.saturating_sub(shortest_ms));
+    let differ_ms =
+        outs.max().zip(ins.min()).map_or(0, |(longest_ms, shortest_ms)| longest_ms.saturating_sub(shortest_ms));
     (f64::from(differ_ms) - BESIDE_STROKE_MS).max(0.0)
 }
 
@@ -585,8 +615,14 @@ mod tests {
 
     #[test]
     fn every_step_fits_on_a_line_of_80_characters() {
-        let margin =
-            Margin { slip_mm: 123.0, servo_mm: 123.0, firmware_mm: 123.0, stems_mm: Some(123.0), arm_mm: 0.0, in_use_mm: 50 };
+        let margin = Margin {
+            slip_mm: 123.0,
+            servo_mm: 123.0,
+            firmware_mm: 123.0,
+            stems_mm: Some(123.0),
+            arm_mm: 0.0,
+            in_use_mm: 50,
+        };
         let steps = [
             Step::TimeServo(1),
             Step::SetLead(Setting::LeadOutMs, 158),

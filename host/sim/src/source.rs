@@ -1,8 +1,8 @@
 //! Input files of commands: `-` is standard input. Some words are known names instead of files, and a shell's
 //! completion offers them.
 
-use clap::builder::{PossibleValue, TypedValueParser};
 use crate::output::tell;
+use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
 use field::conditions::{Conditions, presets};
 use files::FileError;
