@@ -127,8 +127,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     });
     let changed = changed.collect::<Result<Vec<Experiment>>>()?;
     let header = ["assumption", "here", "in the\nfield"].map(str::to_owned).into_iter();
-    let weeded = speeds.iter().map(|speed| format!("weeded, %,\nat {speed} km/h"));
-    let damaged = ["seen plants\ndamaged, %", "unseen plants\ndamaged, %", "rows with\nan alarm"].map(str::to_owned);
+    let weeded = speeds.iter().map(|speed| format!("weeded\nat {speed}\nkm/h\nin %"));
+    let damaged =
+        ["seen\nplants\ndamaged\nin %", "unseen\nplants\ndamaged\nin %", "rows\nwith\nan\nalarm"].map(str::to_owned);
     let mut table = number_table(header.chain(weeded).chain(damaged), 0);
     table.column_iter_mut().take(1).for_each(|column| column.set_cell_alignment(CellAlignment::Left));
     let count = changed.len() as f64;
