@@ -213,7 +213,7 @@ mod tests {
         machine.swing.protected = MM.of(90.0);
         let stem = Swing::with_tool(&machine, torque, 100.0).expect("it swings");
         // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees.
-        let lines = ["set servo_out_us 1695", "set lead_out_ms 111", "set stem_zone_mm 100"];
+        let lines = ["set servo_out_us 1695", "set lead_out_ms 112", "set stem_zone_mm 100"];
         assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
         assert!(
             stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),
