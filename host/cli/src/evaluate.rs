@@ -23,7 +23,7 @@ const REPORT: &str = "report.html";
 pub struct Arguments {
     /// CSV file with a line for each plot: replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged,
     /// area_m2, time_s, width_m, power_hp; - for standard input.
-    #[arg(value_name = "FILE.csv", value_parser = source::file)]
+    #[arg(value_name = "FILE.csv", value_parser = source::file())]
     file: PathBuf,
     /// Nominal speeds in km/h, 0.1 to 15, where the table has measured ones: means and analysis of variance take the nearest.
     #[arg(long, value_delimiter = ',', value_parser = number_within(0.1..=15.0))]

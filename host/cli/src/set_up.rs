@@ -10,13 +10,12 @@ use crate::output::{say, tell};
 use crate::ports::Port;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use files::whole_file;
+use files::{bounded_file, whole_file};
 use link::set_up::{ManualStep, SetUp, Step, Task, steps};
 use link::settings::{self, Setting, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
 use std::collections::BTreeSet;
-use std::fs;
-use std::io::{self, BufRead, ErrorKind, Write};
+use std::io::{self, BufRead, Write};
 use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -58,10 +57,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return say!("{}\n{}", simulated::table()?, simulated::about());
     }
     let path = &arguments.state;
-    let kept = match fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
-        Err(error) => return Err(error).with_context(|| format!("{} cannot be read", path.display())),
+    let kept = match bounded_file::text(path) {
+        Err(error) if error.is_absence() => String::new(),
+        text => text?,
     };
     let kept_state =
         State::parse(&kept).with_context(|| format!("{} is no file of `weeder set-up`", path.display()))?;
@@ -205,9 +203,9 @@ impl Guide {
 
     /// Sets and saves.
     fn push(&mut self, wanted: &[(Setting, u16)]) -> Result<()> {
-        let set = settings::push(&mut self.link, wanted, true)?;
+        let set = settings::push(&mut self.link, wanted, &[], true)?;
         for setting in set {
-            say!("  {} is set and saved", name(setting))?;
+            say!("  {setting} is set and saved")?;
         }
         self.state.measured.settings = settings::read(&mut self.link)?;
         Ok(())

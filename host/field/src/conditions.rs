@@ -17,7 +17,7 @@ use crate::trial::{Start, Trial};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 use files::toml_entry::{self, Entry};
-use files::{FileError, text_file};
+use files::{FileError, bounded_file};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
 use std::io::ErrorKind;
@@ -68,7 +68,7 @@ impl Conditions {
                 let presets = presets().collect::<Vec<_>>().join(", ");
                 let problem = format!("is none of the presets ({presets}), and as a file it cannot be read");
                 // A file that is there has an error of its own.
-                let text = match text_file::read(path) {
+                let text = match bounded_file::text(path) {
                     Err(FileError::File { source, .. }) if source.kind() == ErrorKind::NotFound => {
                         return Err(FileError::unusable(path, problem, source));
                     }
@@ -86,7 +86,7 @@ impl Conditions {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, FileError> {
-        text_file::check_nesting(path, text)?;
+        bounded_file::check_nesting(path, text)?;
         let conditions: Self = toml::from_str(text).map_err(|error| {
             let byte = error.span().map_or(0, |span| span.start);
             FileError::at_byte(path, text, byte, explain(text, byte, &error))

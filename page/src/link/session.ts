@@ -261,8 +261,19 @@ export class Session implements Link {
         if (this.#isReady) this.#beginAgain(error, error.message);
         else {
             this.#asked.shift();
-            question.failed(error);
+            this.#failSent(question, error);
         }
+    }
+
+    /** Fails a sent question. The machine may have obeyed an operator's command, or may do so later. */
+    #failSent({ failed, isTyped }: Question, error: Error): void {
+        failed(isTyped ? new NoMachine(english("mayBeDone", { why: error.message })) : error);
+    }
+
+    /** Fails all questions. */
+    #failAll(sent: readonly Question[], waiting: readonly Question[], error: Error): void {
+        for (const question of sent) this.#failSent(question, error);
+        for (const { failed } of waiting) failed(error);
     }
 
     /** Why no valid answer came, and what to do. */
@@ -307,11 +318,11 @@ export class Session implements Link {
 
     /** Drops all questions, and asks for version, settings and examples. */
     #beginAgain(error: Error, why: string): void {
-        const dropped = [...this.#asked.splice(0), ...this.#waiting.splice(0)];
+        const [sent, waiting] = [this.#asked.splice(0), this.#waiting.splice(0)];
         this.#beginnings++;
         if (this.#isReady) this.onHappening({ is: "lost", why, forGood: false, isWanted: false });
         this.#isReady = false;
-        for (const { failed } of dropped) failed(error);
+        this.#failAll(sent, waiting, error);
         this.#greetingBy = this.#now;
     }
 
@@ -330,8 +341,7 @@ export class Session implements Link {
         if (this.#ended) return;
         this.#ended = true;
         this.#isReady = false;
-        const error = new NoMachine(why);
-        for (const { failed } of [...this.#asked.splice(0), ...this.#waiting.splice(0)]) failed(error);
+        this.#failAll(this.#asked.splice(0), this.#waiting.splice(0), new NoMachine(why));
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
         void this.wire.close();
     }
