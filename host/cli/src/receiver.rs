@@ -4,7 +4,7 @@
 
 use crate::numbers::{number_within, whole_within};
 use crate::ports::{Chosen, Named, named};
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Result, anyhow, bail, ensure};
 use clap::Args;
 use files::bounded_file;
 use gps::playback::{self, Piece};

@@ -257,9 +257,12 @@ export class Session implements Link {
 
     /** An answer is missing: a connected machine is asked for everything again. */
     #giveUp(question: Question): void {
-        const error = new NoMachine(this.#whyNoAnswer());
-        if (this.#isReady) this.#beginAgain(error, error.message);
-        else {
+        if (this.#isReady) {
+            const { command } = question;
+            const error = new NoMachine(english("unanswered", { command, seconds: PATIENCE_MS / 1000 }));
+            this.#beginAgain(error, error.message);
+        } else {
+            const error = new NoMachine(this.#whyNoAnswer());
             this.#asked.shift();
             this.#failSent(question, error);
         }

@@ -369,6 +369,7 @@ export const en = {
         servedSilent:
             "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there",
         servedDropped: "this page could not keep up with the machines' output: it connects again",
+        unanswered: "no answer to `{command}` for {seconds} s: see to the Uno's cable and supply",
         servedGone: "the port is gone: plug the Uno in again",
         servedNoAnswer: "the machine does not answer",
         servedNotThere: "the machine is not there",

@@ -362,6 +362,7 @@ export const es: Language = {
         servedSilent:
             "el ordenador que tiene el puerto de la máquina no responde: mire que este aparato esté en su red, y que weeder serve funcione allí",
         servedDropped: "esta página no pudo seguir lo que dicen las máquinas: se conecta otra vez",
+        unanswered: "`{command}` sin respuesta durante {seconds} s: revise el cable y la alimentación del Uno",
         servedGone: "el puerto ya no está: enchufe el Uno otra vez",
         servedNoAnswer: "la máquina no responde",
         servedNotThere: "la máquina no está",

@@ -363,6 +363,7 @@ export const fr: Language = {
         servedSilent:
             "l'ordinateur qui a le port de la machine ne répond pas : voyez que cet appareil est dans son réseau, et que weeder serve y tourne",
         servedDropped: "cette page n'a pas pu suivre ce que disent les machines : elle se reconnecte",
+        unanswered: "pas de réponse à `{command}` depuis {seconds} s : vérifiez le câble et l'alimentation de l'Uno",
         servedGone: "le port a disparu : rebranchez l'Uno",
         servedNoAnswer: "la machine ne répond pas",
         servedNotThere: "la machine n'est pas là",

@@ -352,6 +352,7 @@ export const hi: Language = {
         servedSilent:
             "जिस कंप्यूटर के पास मशीन का पोर्ट है वह उत्तर नहीं देता: देखें कि यह उपकरण उसके नेटवर्क में हो, और वहाँ weeder serve चल रहा हो",
         servedDropped: "यह पेज मशीनों की बातों के साथ नहीं चल सका: वह फिर से जुड़ता है",
+        unanswered: "`{command}` का {seconds} s से कोई उत्तर नहीं: Uno का केबल और बिजली देखें",
         servedGone: "पोर्ट चला गया: Uno को फिर से लगाएँ",
         servedNoAnswer: "मशीन उत्तर नहीं देती",
         servedNotThere: "मशीन वहाँ नहीं है",

@@ -266,8 +266,7 @@ impl<'a> Talk<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ports::Row;
-    use link::row_names::Board;
+    use link::row_names::{Board, Row};
     use link::rows::Opener;
     use link::{Link, LinkError};
     use rig::ScriptedBoard;
