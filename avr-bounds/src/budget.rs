@@ -86,7 +86,10 @@ impl Budgets {
         let unread = |error: FileError| BoundsError(with_reason(&error));
         let text = bounded_file::text(path).map_err(unread)?;
         bounded_file::check_nesting(path, &text).map_err(unread)?;
-        toml::from_str(&text).map_err(|reason| BoundsError(format!("{}: {reason}", path.display())))
+        toml::from_str(&text).map_err(|error| {
+            let byte = error.span().map_or(0, |span| span.start);
+            unread(FileError::at_byte(path, &text, byte, error.message().trim().replace('\n', ", ")))
+        })
     }
 
     /// Holds bounds against the budgets that there are.

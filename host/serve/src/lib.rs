@@ -68,9 +68,8 @@ const READER_TIME: Duration = Duration::from_secs(5);
 /// after a second.
 const BACKLOG: u32 = 1024;
 
-/// Turns of a connection's task in which it reads what has come: one to hear of it, one to read it, and one that the door
-/// gives to the others.
-const TURNS_TO_READ: usize = 3;
+/// Turns of a connection's task in which it reads what has come. Its head, its body and the door take some.
+const TURNS_TO_READ: usize = 16;
 
 /// Time between two checks whether to stop.
 const LOOK: Duration = Duration::from_millis(100);

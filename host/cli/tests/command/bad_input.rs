@@ -70,7 +70,7 @@ fn a_row_that_no_machine_can_roll_along_is_refused_with_its_line() {
 const READERS: [&str; 16] = [
     "evaluate FILE",
     "trial --field FILE",
-    "sweep --field FILE",
+    "sweep --x speed=1..2:1 --field FILE",
     "sim --row FILE",
     "sim --capture FILE --channel-a A --channel-b B",
     "design --machine FILE",
@@ -79,7 +79,7 @@ const READERS: [&str; 16] = [
     "train FILE",
     "classify FILE",
     "replay FILE",
-    "map FILE",
+    "map FILE --out map.geojson",
     "merge FILE",
     "set-up --state FILE --port uno",
     "hex weeder.hex --elf FILE",
