@@ -130,7 +130,9 @@ impl Place {
         let is_first = matches!(*later, Later::MayCome);
         if let Some(taken) = table.leave(self.number) {
             table.enter(Taken { stage, client, ..taken });
-            *later = Later::Over;
+            if is_first {
+                *later = Later::Over;
+            }
         } else if is_first {
             let (end, ended) = oneshot::channel();
             table.enter(Taken { number: self.number, client, stage, _end: end });
@@ -247,6 +249,8 @@ mod tests {
         let places = Places::default();
         let mut connections: Vec<_> = (0..=PLACES as u8).map(|last| take(&places, last)).collect();
         let phone = &mut connections[0];
+        // A request goes through two stages before its connection's end is heard of.
+        phone.0.enter(Stage::Asking, Client::Phone(1));
         phone.0.enter(Stage::Holding, Client::Phone(1));
         phone.1 = phone.0.next_end().expect("it has a place again");
         let mut attack: Vec<_> =

@@ -56,7 +56,7 @@ export class Refused extends Error {}
 export const mayForce = (error: unknown): boolean => error instanceof Refused && error.message.includes("force");
 
 /** Whether a typed line means `hold`, as `is_hold` of host/link/src/lib.rs has it: in any case, with any punctuation. */
-export const isHold = (line: string): boolean => /^\s*hold[\s!-/:-@[-`{-~]*$/i.test(line);
+export const isHold = (line: string): boolean => /^\s*hold[\s!-/:-@[-\x60{-~]*$/i.test(line);
 
 /** No machine answers, and what to do. */
 export class NoMachine extends Error {}

@@ -443,7 +443,7 @@ export const en = {
 
         // The next step of the set-up (host/link/src/set_up.rs).
         timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
-        takeWorst: "take the worst time: `set {name} {worst}`",
+        takeLead: "take the calculated lead: `set {name} {lead}`",
         measureWheel: "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)",
         passPlants: "measure the slip with both beams: roll past {all} plants ({done} done)",
         lowerMargin: "lower the margin: `set margin_mm {margin}`: {sum}",

@@ -433,7 +433,7 @@ export const es: Language = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms y top_speed_mm_s piden juntos un beam_to_tool_mm de {needed} o más: súbalo, o baje uno de ellos",
         timeServo: "mida el tiempo del servo: `calibrate servo` ({done} de {all} hechas)",
-        takeWorst: "tome el peor tiempo: `set {name} {worst}`",
+        takeLead: "tome el adelanto calculado: `set {name} {lead}`",
         measureWheel: "mida 10 m: `calibrate start`, avance, `calibrate 10000` ({done} de {all} hechas)",
         passPlants: "deje que los haces digan el patinaje: pase {all} plantas ({done} hechas)",
         lowerMargin: "baje el margen: `set margin_mm {margin}`: {sum}",

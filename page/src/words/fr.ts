@@ -435,7 +435,7 @@ export const fr: Language = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms et top_speed_mm_s demandent ensemble un beam_to_tool_mm de {needed} ou plus : augmentez-le, ou baissez l'un d'eux",
         timeServo: "chronométrez le servo : `calibrate servo` ({done} sur {all} faits)",
-        takeWorst: "prenez le pire temps : `set {name} {worst}`",
+        takeLead: "prenez l'avance calculée : `set {name} {lead}`",
         measureWheel: "mesurez 10 m : `calibrate start`, avancez, `calibrate 10000` ({done} sur {all} faits)",
         passPlants: "laissez les faisceaux dire le patinage : passez {all} plantes ({done} faites)",
         lowerMargin: "baissez la marge : `set margin_mm {margin}` : {sum}",

@@ -419,7 +419,7 @@ export const hi: Language = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms और top_speed_mm_s को मिलाकर beam_to_tool_mm {needed} या अधिक चाहिए: उसे बढ़ाएँ, या उनमें से एक घटाएँ",
         timeServo: "सर्वो का समय नापें: `calibrate servo` ({all} में से {done} हुए)",
-        takeWorst: "सबसे ख़राब समय लें: `set {name} {worst}`",
+        takeLead: "गणना किया हुआ अग्रिम समय लें: `set {name} {lead}`",
         measureWheel: "10 मीटर नापें: `calibrate start`, चलाएँ, `calibrate 10000` ({all} में से {done} हुए)",
         passPlants: "किरणों को फिसलन बताने दें: {all} पौधों से गुज़रें ({done} हुए)",
         lowerMargin: "हाशिया घटाएँ: `set margin_mm {margin}`: {sum}",
