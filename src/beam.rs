@@ -13,7 +13,6 @@
 use crate::{
     encoder,
     handler::handler,
-    loop_bound,
     ring::Ring,
     shared::{Byte, Shared},
 };
@@ -22,7 +21,7 @@ use control::{measure::readings::Edge, units::Position};
 
 /// Edges in the queue. A sensor with a response of 1 ms needs at least 8 ms for these. A turn of the loop takes less than a tenth
 /// of that (tests/end_to_end/turns_of_the_loop.rs). The longest proved turn sees as many edges as the queue holds.
-const SLOTS: usize = 8;
+pub const SLOTS: usize = 8;
 
 /// The queue of stamps: the first beam's level in bit 0, 14 bits of the count, the second beam's level in bit 15.
 static EDGES: Ring<SLOTS> = Ring::new();
@@ -65,30 +64,10 @@ impl<'a> Beam<'a> {
     pub fn is_broken(&self) -> bool {
         self.port.pinb.read().bits() & BEAM == 0
     }
-
-    /// The queued edges, and then [`Edge::Lost`] if edges were dropped.
-    pub fn edges(&mut self) -> impl Iterator<Item = Edge> {
-        // Read before the edges. Then all edges queued before the loss come first, and none follows the level read at the end.
-        let mut lost = take_lost();
-        // At most as many as the queue holds, so that edges which keep coming cannot stop the loop.
-        let mut left = SLOTS as u8;
-        core::iter::from_fn(move || {
-            // The edges, the loss, and the end.
-            loop_bound::at_most::<{ SLOTS as u8 + 2 }>();
-            if left > 0 {
-                left -= 1;
-                if let Some(edge) = next_edge() {
-                    return Some(edge);
-                }
-                left = 0;
-            }
-            core::mem::take(&mut lost).then(|| Edge::Lost { broken: self.is_broken() })
-        })
-    }
 }
 
 /// The oldest queued edge.
-fn next_edge() -> Option<Edge> {
+pub fn next_edge() -> Option<Edge> {
     let stamp = EDGES.take(|slot| STAMPS[slot].get())?;
     let now = encoder::position();
     // Both in quarters of a tick, so that the processor's sign bit is the count's.
@@ -99,7 +78,7 @@ fn next_edge() -> Option<Edge> {
 }
 
 /// Whether edges were dropped since the last call.
-fn take_lost() -> bool {
+pub fn take_lost() -> bool {
     let lost = LOST.get() != 0;
     if lost {
         // An edge dropped just before this line belongs to the same loss.

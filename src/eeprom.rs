@@ -1,4 +1,4 @@
-//! The EEPROM, in two halves: one for the settings, one for the field examples.
+//! The EEPROM. The settings have its first half, the field examples the second.
 //!
 //! A byte takes 3.4 ms to write (data sheet, 8.4.2), and during a write nothing can be read. Only [`finish`] waits for a write,
 //! once, before the loop starts. This file does not interpret the bytes.
@@ -10,25 +10,19 @@ use avr_device::{
 use control::memory::{Memory, SIZE};
 use core::arch::asm;
 
-/// The half of the EEPROM that begins at address `BASE`.
-pub struct Half<const BASE: u16>(());
-
-/// The half with the settings.
-pub type Lower = Half<0>;
-
-/// The half with the field examples.
-pub type Upper = Half<{ SIZE as u16 }>;
+/// The chip's EEPROM.
+pub struct Eeprom(());
 
 /// Waits at most 3.4 ms for a write that a reset interrupted: the chip completes it (data sheet, 8.4.3).
 pub fn finish(eeprom: &EEPROM) {
     while eeprom.eecr.read().eepe().bit_is_set() {}
 }
 
-impl<const BASE: u16> Half<BASE> {
-    /// The half.
+impl Eeprom {
+    /// The EEPROM.
     ///
     /// # Safety
-    /// The caller makes at most one for each `BASE`, and uses it from the loop only. No other code writes the EEPROM before.
+    /// The caller uses all of them from the loop only. No other code writes the EEPROM before.
     pub const unsafe fn new() -> Self {
         Self(())
     }
@@ -39,11 +33,13 @@ impl<const BASE: u16> Half<BASE> {
     }
 
     fn choose(&self, address: u16) {
-        self.registers().eear.write(|w| w.bits(BASE + address));
+        self.registers().eear.write(|w| w.bits(address));
     }
 }
 
-impl<const BASE: u16> Memory for Half<BASE> {
+impl Memory for Eeprom {
+    const EXAMPLES: u16 = SIZE as u16;
+
     fn read(&self, address: u16) -> u8 {
         self.choose(address);
         self.registers().eecr.modify(|_, w| w.eere().set_bit());

@@ -30,37 +30,43 @@ mod watchdog;
 use avr_device::{atmega328p::Peripherals, interrupt};
 use control::{
     ground::nearest::Nearest,
-    measure::readings::{Readings, Startup},
+    measure::{
+        readings::{Edge, Readings},
+        reset::Cause,
+    },
     say::{Console, command::LineBuffer},
     units::Position,
     weeder::{Controller, Uninit},
 };
+use eeprom::Eeprom;
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::Read;
 use ufmt::uWrite;
 
 /// The decisions, with this machine's classifier and memories.
-type Weeder = Controller<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
-type UninitWeeder = Uninit<Nearest<examples::BuiltIn, eeprom::Upper>, eeprom::Lower>;
+type Weeder = Controller<Nearest<examples::BuiltIn, Eeprom>, Eeprom>;
+type UninitWeeder = Uninit<Nearest<examples::BuiltIn, Eeprom>, Eeprom>;
 
 /// Most bytes that a turn reads or writes: more than the line carries in that time.
 const CONSOLE_BYTES: u8 = 8;
 
 #[avr_device::entry]
 fn main() -> ! {
-    let (console, uninit) = (&raw mut CONSOLE, &raw mut UNINIT);
+    let (console, uninit, typed) = (&raw mut CONSOLE, &raw mut UNINIT, &raw mut TYPED);
     // SAFETY: no other code names these statics, and the entry point runs once.
-    let (console, uninit) = unsafe { (&mut *console, &mut *uninit) };
+    let (console, uninit, typed) = unsafe { (&mut *console, &mut *uninit, &mut *typed) };
     // In a stack frame of its own: bytes more than 63 from a frame's end take five more instructions to access.
-    run(&mut LineBuffer::new(), console, uninit)
+    run(typed, console, uninit)
 }
 
 static mut CONSOLE: Console = Console::new();
 
+static mut TYPED: LineBuffer = LineBuffer::new();
+
 static mut UNINIT: UninitWeeder = {
-    // SAFETY: these are the only halves, and only the entry point takes the static, once.
-    let (settings, examples) = unsafe { (eeprom::Lower::new(), eeprom::Upper::new()) };
-    Uninit::new(Nearest::uninit(examples::BuiltIn, examples), settings)
+    // SAFETY: only the entry point takes the static, once, and passes it to the loop.
+    let (settings, examples) = unsafe { (Eeprom::new(), Eeprom::new()) };
+    Uninit::new(Nearest::new(examples::BuiltIn, examples), settings)
 };
 
 /// Sets up the peripherals and runs the loop.
@@ -73,7 +79,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
     let board::Pins { mut lamp, mut work_switch, mut end_switch } = board::pins(&peripherals.PORTB, &peripherals.PORTD);
     let clock = clock::Clock::new(peripherals.TC0);
     encoder::watch(&peripherals.EXINT, &peripherals.PORTD, &peripherals.CPU);
-    let mut beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB);
+    let beam = beam::Beam::new(&peripherals.EXINT, &peripherals.PORTB);
     let mut serial = serial::Serial::new(peripherals.USART0);
     idle::allow(&peripherals.CPU);
     watchdog::start();
@@ -81,15 +87,17 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
     unsafe { interrupt::enable() };
 
     let mut stack = stack::Stack::new();
-    let mut read = move || {
-        let now = clock.now();
+    let mut read = move |readings: &mut Readings| {
+        readings.now = clock.now();
         let encoder::Counts { position, lost, jumps } = encoder::counts();
+        (readings.position, readings.lost, readings.jumps) = (Position::new(position), lost, jumps);
         let (Ok(switch_on), Ok(end_switch_on)) = (work_switch.is_low(), end_switch.is_low());
-        let stack_free = stack.free();
-        Readings { now, position: Position::new(position), switch_on, lost, jumps, end_switch_on, stack_free }
+        (readings.switch_on, readings.end_switch_on) = (switch_on, end_switch_on);
+        readings.stack_free = stack.free();
     };
     eeprom::finish(&peripherals.EEPROM);
-    let controller = init(uninit, Startup { readings: read(), beam_broken: beam.is_broken(), cause });
+    read(uninit.readings());
+    let controller = init(uninit, beam.is_broken(), cause);
     // The pulse for "tool out" is a setting, so the servo starts after the settings are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
@@ -97,9 +105,20 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
         watchdog::feed();
         idle::begin_turn();
         // Read first: an edge that is still queued then has no later position than the next readings.
-        let readings = read();
+        read(controller.next_readings());
         beam.watch_second(controller.has_second_beam());
-        let orders = controller.turn(readings, beam.edges());
+        // Read before the edges. Then all edges queued before the loss come first, and none follows the level read at the end.
+        let lost = beam::take_lost();
+        // At most as many as the queue holds, so that edges which keep coming cannot stop the loop.
+        for _ in 0..beam::SLOTS as u8 {
+            loop_bound::at_most::<{ beam::SLOTS as u8 + 1 }>();
+            let Some(edge) = beam::next_edge() else { break };
+            controller.take_edge(edge);
+        }
+        if lost {
+            controller.take_edge(Edge::Lost { broken: beam.is_broken() });
+        }
+        let orders = controller.step();
         if controller.has_heartbeat() {
             heartbeat::beat(orders.pulse_out);
         }
@@ -121,9 +140,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
                 && let Ok(byte) = serial.read()
             {
                 if typed.collect(byte) {
-                    if let Some(line) = typed.read() {
-                        console.take(line);
-                    }
+                    console.take(typed);
                     break;
                 }
             } else {
@@ -139,6 +156,6 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
 
 /// Starts the controller with the EEPROM's contents. A separate function, so that its stack frame is not part of the loop's.
 #[inline(never)]
-fn init(uninit: &mut UninitWeeder, startup: Startup) -> &mut Weeder {
-    uninit.init(startup)
+fn init(uninit: &mut UninitWeeder, beam_broken: bool, cause: Cause) -> &mut Weeder {
+    uninit.init(beam_broken, cause)
 }

@@ -34,7 +34,7 @@ use self::{
 };
 use crate::{
     settings::Settings,
-    units::{Length, Position, Ticks, TicksPerSecond, Wheel, WrappedPosition},
+    units::{Length, Position, Speed, Ticks, Wheel, WrappedPosition},
 };
 
 /// The known ground around the machine.
@@ -130,9 +130,9 @@ impl Ground {
     /// positions invalid, so the ground is then forgotten.
     pub fn follow(&mut self, settings: &Settings, position: Position) {
         let scale = self.geometry.scale;
-        let guard_spacing = self.geometry.guard_spacing;
+        let guard_spacing = self.geometry.guard_spacing();
         self.correct(settings);
-        if self.geometry.guard_spacing != guard_spacing {
+        if self.geometry.guard_spacing() != guard_spacing {
             self.guard = Guard::NONE;
         }
         if self.geometry.scale != scale {
@@ -153,8 +153,8 @@ impl Ground {
         let (excess, last) = self.corrected_by;
         self.geometry.follow(settings, excess);
         // A slip that is no longer trusted may still be right. The margin grows so that the zones hold for both values.
-        let doubted = u32::from(self.geometry.beam_to_tool.0 as u16) * u32::from(excess.abs_diff(last));
-        self.geometry.margin = self.geometry.margin + Length((doubted >> 8) as i16);
+        let doubted = u32::from(self.geometry.beam_to_tool().0 as u16) * u32::from(excess.abs_diff(last));
+        self.geometry.widen_margin(Length((doubted >> 8) as i16));
     }
 
     /// Forgets the second beam's measurements: the wheel or the beams' distance may have changed. The second beam ignores earlier
@@ -164,19 +164,19 @@ impl Ground {
     }
 
     /// Recalculates the leads for another speed, see [`Leads::at`].
-    pub fn lead(&mut self, settings: &Settings, speed: TicksPerSecond, expected: TicksPerSecond) {
-        self.leads = Leads::at(speed, expected, settings, self.geometry.scale);
+    pub fn lead(&mut self, settings: &Settings, speed: Speed, expected: Speed) {
+        self.leads = Leads::at(speed, expected, settings);
     }
 
     /// Takes a beam edge and its position. Returns the detection that was complete before this edge.
     pub fn edge(&mut self, position: Position, broken: bool) -> Option<Detection> {
         let wrapped = self.geometry.scale.wrap(position) - self.leads.response;
-        self.detector.edge(wrapped, broken, self.geometry.merge_gap)
+        self.detector.edge(wrapped, broken, self.geometry.merge_gap())
     }
 
     /// Takes the second beam's level at a position of the machine. Returns its detection, unless a known canopy explains it.
     pub fn match_second_beam(&mut self, position: Position, broken: bool) -> Option<Detection> {
-        let Geometry { scale, second_beam: apart, merge_gap, .. } = self.geometry;
+        let (scale, apart, merge_gap) = (self.geometry.scale, self.geometry.second_beam(), self.geometry.merge_gap());
         let least = self.geometry.least_seen();
         let wrapped = scale.wrap(position) - self.leads.response - apart;
         if broken != self.second_beam.is_broken() {
@@ -215,11 +215,11 @@ impl Ground {
         if is_beyond_memory {
             self.begin_here(self.detector.is_broken());
         }
-        let complete = self.detector.roll_to(self.beam - self.leads.response, self.geometry.merge_gap);
+        let complete = self.detector.roll_to(self.beam - self.leads.response, self.geometry.merge_gap());
         // Counted from the frontier: the beam is at most the memory behind it. From the tool, the distance could exceed the range
         // of a position.
         let farthest = self.detector.frontier() - memory;
-        self.keep_out.leave(farthest - self.geometry.beam_to_tool);
+        self.keep_out.leave(farthest - self.geometry.beam_to_tool());
         if farthest.is_ahead_of(self.last_plant) {
             self.last_plant = farthest;
         }
@@ -264,13 +264,13 @@ impl Ground {
     pub fn assume_bare(&mut self) {
         if self.is_unseen() {
             // Unknown ground has a margin ahead of it. The second margin keeps the tool off its border.
-            self.keep_out.set_known_from(self.tool() - self.geometry.margin - self.geometry.margin);
+            self.keep_out.set_known_from(self.tool() - self.geometry.margin() - self.geometry.margin());
         }
     }
 
     /// Closes the ground from the start of a detection until it is classified.
     pub fn await_class(&mut self, detection: Detection, of_second: bool) {
-        let zone = if self.detector.is_parted() { Length::ZERO } else { self.geometry.stem_zone };
+        let zone = if self.detector.is_parted() { Length::ZERO } else { self.geometry.stem_zone() };
         self.unclassified =
             Unclassified { detection, canopy: Canopy::of(&detection, zone), of_second, known: Known::Canopy };
         // A wide detection reaches the second beam before the first has seen its end.
@@ -307,12 +307,12 @@ impl Ground {
         }
         self.guard.see(detection, &self.geometry);
         let canopy = *canopy;
-        self.keep_out.push(canopy, self.tool(), self.geometry.margin)
+        self.keep_out.push(canopy, self.tool(), self.geometry.margin())
     }
 
     /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
     fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, end: End) -> bool {
-        let within = Length(self.geometry.second_beam.0 >> 2);
+        let within = Length(self.geometry.second_beam().0 >> 2);
         if self.unclassified.known == Known::Canopy {
             self.unclassified.canopy.widen(from, to, within, within, end);
         }
@@ -329,7 +329,7 @@ impl Ground {
         // A detection in the beam, or one that is being classified, may be the expected plant.
         let seen_to = self.open().unwrap_or(self.detector.frontier());
         let guarded = self.guard.pass(seen_to, &self.geometry)?;
-        let pushed = self.keep_out.push(guarded, self.tool(), self.geometry.margin);
+        let pushed = self.keep_out.push(guarded, self.tool(), self.geometry.margin());
         Some(pushed.map(|()| guarded.leading + self.geometry.guarded))
     }
 
@@ -353,6 +353,16 @@ impl Ground {
         self.geometry.wheel.millimetres(distance)
     }
 
+    /// Ticks in a unit of remembered ground.
+    pub fn scale(&self) -> crate::units::LengthScale {
+        self.geometry.scale
+    }
+
+    /// A position of the machine on remembered ground.
+    pub fn wrap(&self, position: Position) -> WrappedPosition {
+        self.geometry.scale.wrap(position)
+    }
+
     /// A length in ticks.
     pub fn ticks(&self, length: Length) -> Ticks {
         self.geometry.scale.ticks(length)
@@ -366,7 +376,7 @@ impl Ground {
     /// Whether there is a second beam.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn has_second_beam(&self) -> bool {
-        self.geometry.second_beam > Length::ZERO
+        self.geometry.second_beam() > Length::ZERO
     }
 
     /// The second beam's last known level.
@@ -388,7 +398,7 @@ impl Ground {
     /// Whether the beam has been broken for longer than the widest canopy.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn is_blocked(&self) -> bool {
-        let too_wide = |leading| self.detector.frontier() - leading > self.geometry.max_width;
+        let too_wide = |leading| self.detector.frontier() - leading > self.geometry.max_width();
         self.detector.is_broken() && self.detector.open().is_some_and(too_wide)
     }
 
@@ -401,18 +411,18 @@ impl Ground {
     /// Whether unseen ground, or the margin ahead of it, keeps the tool out.
     pub fn is_unseen(&self) -> bool {
         let (from, to) = self.leads.stretch(true);
-        self.keep_out.open_from(self.geometry.margin).is_ahead_of(self.tool() + from.min(to))
+        self.keep_out.open_from(self.geometry.margin()).is_ahead_of(self.tool() + from.min(to))
     }
 
     /// The distance until the tool has left unseen ground and its margin.
     pub fn unseen(&self) -> Ticks {
-        self.ticks((self.keep_out.open_from(self.geometry.margin) - self.tool()).max(Length::ZERO))
+        self.ticks((self.keep_out.open_from(self.geometry.margin()) - self.tool()).max(Length::ZERO))
     }
 
     /// The number of keep-out zones at the tool or ahead of it, with an open detection and an unclassified one.
     pub fn zones(&self) -> u8 {
         let unclassified = self.unclassified.known == Known::Canopy;
-        self.keep_out.ahead(self.tool(), self.geometry.margin)
+        self.keep_out.ahead(self.tool(), self.geometry.margin())
             + u8::from(unclassified)
             + u8::from(self.detector.open().is_some())
     }
@@ -433,7 +443,7 @@ impl Ground {
     /// Why the tool is in or out at its position, if the odometer shows `position`.
     pub fn at_tool(&self, position: Position) -> AtTool {
         let of = |wrapped| self.position_of(wrapped, position);
-        match self.keep_out.zone_at(self.tool(), self.geometry.margin) {
+        match self.keep_out.zone_at(self.tool(), self.geometry.margin()) {
             Some((begin, end)) => AtTool::Kept { tool: of(self.tool()), begin: of(begin), end: of(end) },
             None if self.is_closed_at_tool() => AtTool::Unknown,
             None => AtTool::Open,
@@ -446,14 +456,14 @@ impl Ground {
         let out = self.leads.out;
         // Hysteresis: the machine has to slow down by an eighth.
         let lead = if tool_out { out + Length(out.0 / 8) } else { out };
-        (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin
+        (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin()
     }
 
     /// Whether any ground between two distances from the tool is closed: unknown, or within the margin of a canopy. An open
     /// detection, an unclassified one and an expected plant count as canopies.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn is_closed(&self, one: Length, other: Length) -> bool {
-        let margin = self.geometry.margin;
+        let margin = self.geometry.margin();
         let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
         let reaches = |leading| far - leading >= -margin;
         self.keep_out.is_closed(near, far, margin)
@@ -471,7 +481,7 @@ impl Ground {
 
     /// The tool's position.
     fn tool(&self) -> WrappedPosition {
-        self.beam - self.geometry.beam_to_tool
+        self.beam - self.geometry.beam_to_tool()
     }
 }
 
@@ -480,7 +490,7 @@ mod tests {
     use super::*;
     use crate::settings::Setting;
 
-    const SPEED: TicksPerSecond = TicksPerSecond(1000);
+    const SPEED: Speed = Speed(1000);
 
     /// Classifies a detection as a plant.
     fn keep(ground: &mut Ground, canopy: Detection) {
@@ -511,7 +521,7 @@ mod tests {
 
     /// The first tool position from `from` on where the ground is open.
     fn opens(ground: &mut Ground, from: i32) -> i32 {
-        let beam_to_tool = i32::from(ground.geometry.beam_to_tool.0);
+        let beam_to_tool = i32::from(ground.geometry.beam_to_tool().0);
         (from..from + 5000)
             .find(|&tool| {
                 ground.roll_to(Position::new(tool + beam_to_tool));
@@ -589,7 +599,7 @@ mod tests {
     #[test]
     fn a_beam_is_blocked_that_is_broken_over_more_than_the_widest_canopy() {
         let (mut ground, _) = ground();
-        let max_width = i32::from(ground.geometry.max_width.0);
+        let max_width = i32::from(ground.geometry.max_width().0);
         ground.edge(Position::new(1500), true);
         ground.roll_to(Position::new(1500 + max_width));
         assert!(!ground.is_blocked());
@@ -602,7 +612,7 @@ mod tests {
     #[test]
     fn the_end_of_remembered_ground_is_reported_once() {
         let (mut ground, _) = ground();
-        let [memory, margin] = [ground.geometry.memory, ground.geometry.margin].map(|length| i32::from(length.0));
+        let [memory, margin] = [ground.geometry.memory, ground.geometry.margin()].map(|length| i32::from(length.0));
         for position in (1400..=40_000).step_by(100) {
             ground.roll_to(Position::new(position));
             assert!(!ground.rolled_back_too_far());
@@ -654,7 +664,7 @@ mod tests {
     #[test]
     fn the_beam_is_outrun_if_the_lead_reaches_the_margin_of_unseen_ground() {
         let (mut ground, _) = ground();
-        let reach = ground.geometry.beam_to_tool - ground.geometry.margin;
+        let reach = ground.geometry.beam_to_tool() - ground.geometry.margin();
         let outruns = |ground: &mut Ground, out, tool_out| {
             ground.leads = Leads { out, ..Leads::NONE };
             ground.outruns_the_beam(tool_out)

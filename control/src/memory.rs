@@ -1,8 +1,8 @@
 //! Memory that keeps bytes without power, and the CRC for its contents.
 //!
 //! The EEPROM takes 3.4 ms to write a byte. So its users write one byte each time the memory is ready, and nothing waits. The
-//! contents belong to [`saved`](crate::operate::saved) and [`field_examples`](crate::ground::field_examples); each has [`SIZE`]
-//! bytes to itself.
+//! contents belong to [`saved`](crate::operate::saved) and [`field_examples`](crate::ground::field_examples). On the chip each has
+//! half of the EEPROM, [`SIZE`] bytes. On the host each may have a memory of its own.
 
 /// Bytes of a memory: half of an ATmega328P's EEPROM.
 pub const SIZE: usize = 512;
@@ -25,11 +25,34 @@ pub(crate) const fn checksum(mut bytes: &[u8]) -> u16 {
 
 /// Memory that keeps bytes without power.
 pub trait Memory {
+    /// Where the field examples begin. The settings begin at 0.
+    const EXAMPLES: u16 = 0;
+
     /// The byte at an address. Only if [`is_ready`](Self::is_ready): during a write nothing can be read.
     fn read(&self, address: u16) -> u8;
 
     /// Whether the memory can read, and start a write.
     fn is_ready(&self) -> bool;
+
+    /// Starts to write the first byte that differs from `bytes`, from index `next` on, if the memory is ready. Returns whether all are
+    /// written. Correct bytes are not written again, because an EEPROM wears out. Nor is a wrong byte that was just written: the
+    /// console must not wait for a cell that no longer holds it.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn update(&mut self, address: u16, bytes: &[u8], next: &mut u8) -> bool {
+        if !self.is_ready() {
+            return false;
+        }
+        while let Some(&byte) = bytes.get(usize::from(*next)) {
+            let address = address + u16::from(*next);
+            *next += 1;
+            if self.read(address) != byte {
+                self.write(address, byte);
+                return false;
+            }
+        }
+        *next = 0;
+        true
+    }
 
     /// Starts to write a byte. Only if [`is_ready`](Self::is_ready).
     fn write(&mut self, address: u16, byte: u8);
@@ -92,6 +115,52 @@ impl Memory for Volatile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::cell::Cell;
+
+    /// A memory with a cell that no longer changes. It counts the writes, and takes some calls for each.
+    struct Worn {
+        memory: Volatile,
+        cell: u16,
+        written: usize,
+        busy: Cell<u8>,
+    }
+
+    impl Memory for Worn {
+        fn read(&self, address: u16) -> u8 {
+            assert_eq!(self.busy.get(), 0, "nothing can be read during a write");
+            self.memory.read(address)
+        }
+
+        fn is_ready(&self) -> bool {
+            self.busy.set(self.busy.get().saturating_sub(1));
+            self.busy.get() == 0
+        }
+
+        fn write(&mut self, address: u16, byte: u8) {
+            if address != self.cell {
+                self.memory.write(address, byte);
+            }
+            self.written += 1;
+            self.busy.set(3);
+        }
+    }
+
+    #[test]
+    fn an_update_writes_each_wrong_byte_once_and_does_not_wait_for_a_worn_cell() {
+        let bytes = [1, 2, ERASED, 4];
+        for cell in 9..=14 {
+            let mut worn = Worn { memory: Volatile::new(), cell, written: 0, busy: Cell::new(0) };
+            for written in [3, usize::from([10, 11, 13].contains(&cell))] {
+                (worn.written, worn.busy) = (0, Cell::new(0));
+                let mut next = 0;
+                let calls = (1..).find(|_| worn.update(10, &bytes, &mut next));
+                assert!(calls <= Some(1 + 3 * 3), "{calls:?}");
+                assert_eq!((worn.written, next), (written, 0), "cell {cell}");
+            }
+            let holds = |address: u16| worn.memory.read(address) == bytes[usize::from(address - 10)];
+            assert!((10..14).all(|address| address == cell || holds(address)), "cell {cell}");
+        }
+    }
 
     #[test]
     fn the_checksum_matches_the_crc_catalogue() {

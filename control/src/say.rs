@@ -25,10 +25,7 @@ mod words;
 
 pub use self::{answer::Answer, events::write_event, execute::execute, status::write_plot, texts::Text};
 
-use self::{
-    command::{Command, ParseError},
-    line::Line,
-};
+use self::{command::LineBuffer, line::Line};
 use crate::{ground::class::Classifier, memory::Memory, weeder::Controller};
 
 /// Most characters of a line, its end included.
@@ -52,9 +49,15 @@ impl Console {
         self.answer.is_done() && self.line.is_done()
     }
 
-    /// Takes a line; a later turn runs it.
-    pub fn take(&mut self, line: Result<Command, ParseError>) {
-        self.answer = Answer::Typed(line);
+    /// Takes a line that is complete; a later turn runs it. Returns false for an empty line.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn take(&mut self, typed: &mut LineBuffer) -> bool {
+        let line = typed.read();
+        let is_one = line.is_some();
+        if let Some(line) = line {
+            self.answer = Answer::Typed(line);
+        }
+        is_one
     }
 
     /// The next byte to send.

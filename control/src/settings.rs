@@ -6,7 +6,7 @@
 use crate::{
     memory::checksum,
     named::named,
-    units::{Ticks, TicksPerSecond, Wheel},
+    units::{Speed, Ticks, Wheel},
 };
 
 /// A setting's numbers in the table.
@@ -61,6 +61,14 @@ settings! {
     /// Width kept around the middle of a single plant's canopy; 0 for the whole canopy.
     StemZoneMm "stem_zone_mm" in "mm": 0 to 300, 0, true,
         "kept round a stem; 0 the canopy";
+    MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
+        "alarm where a detection is wider";
+    MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
+        "shorter gaps belong to the canopy";
+    GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,
+        "planting distance, keeps unseen plants; 0 off";
+    GuardScatterMm "guard_scatter_mm" in "mm": 0 to 200, 30, false,
+        "how far off it an unseen plant may stand";
     /// Longest time from the command until the tool is out. The default is the default servo's slowest swing over the default
     /// stroke. It has 80 ms dead time, 144 ms for 45 degrees against the soil, and 6 ms for the running pulse.
     LeadOutMs "lead_out_ms" in "ms": 0 to 500, 230, false,
@@ -80,14 +88,6 @@ settings! {
     /// Consecutive narrow detections without a plant that raise an alarm; 0 for never.
     MisfitAfter "misfit_after": 0 to 100, 5, false,
         "alarm at so many narrow detections in a row; 0 never";
-    MaxWidthMm "max_width_mm" in "mm": 20 to 1500, 400, false,
-        "alarm where a detection is wider";
-    MergeGapMm "merge_gap_mm" in "mm": 0 to 1000, 21, false,
-        "shorter gaps belong to the canopy";
-    GuardSpacingMm "guard_spacing_mm" in "mm": 0 to 2000, 0, false,
-        "planting distance, keeps unseen plants; 0 off";
-    GuardScatterMm "guard_scatter_mm" in "mm": 0 to 200, 30, false,
-        "how far off it an unseen plant may stand";
     BeamResponseMs "beam_response_ms" in "ms": 0 to 50, 1, false,
         "time the beam takes to answer";
     /// Highest speed for work. With the default lead and margin, the default beam allows 1330 mm/s.
@@ -298,7 +298,7 @@ impl Settings {
         }
         let lead_out_ms = self.get(Setting::LeadOutMs);
         let notice_ms = lead_out_ms + lead_out_ms / 8 + self.get(Setting::BeamResponseMs) + 1;
-        let rolled = TicksPerSecond(self.get(Setting::TopSpeedMmS).into()).distance_in_ms(notice_ms);
+        let rolled = Speed(self.get(Setting::TopSpeedMmS) as i16).distance_in_ms(notice_ms);
         let needed_mm = self.get(Setting::MarginMm) + rolled.0 as u16 + 1;
         let beam_to_tool_mm = self.get(Setting::BeamToToolMm);
         if beam_to_tool_mm < needed_mm {

@@ -191,6 +191,11 @@ impl Instant {
         self.0
     }
 
+    /// The moment in steps of 1.024 ms, wrapping after 67 seconds.
+    pub const fn slow(self) -> Slow {
+        Slow((self.0 >> 8) as u16)
+    }
+
     /// The moment in coarse steps.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub const fn coarse(self) -> Coarse {
@@ -217,6 +222,25 @@ impl Coarse {
     /// Steps since an earlier moment, which must be less than 4.2 seconds ago.
     pub const fn since(self, earlier: Self) -> u16 {
         self.0.wrapping_sub(earlier.0)
+    }
+}
+
+/// A moment in steps of 1.024 ms, wrapping after 67 seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Slow(u16);
+
+impl Slow {
+    /// Power-up.
+    pub const ZERO: Self = Self(0);
+
+    /// Steps since an earlier moment, which must be less than 67 seconds ago.
+    pub const fn since(self, earlier: Self) -> u16 {
+        self.0.wrapping_sub(earlier.0)
+    }
+
+    /// The moment this many steps before.
+    pub const fn before(self, steps: u16) -> Self {
+        Self(self.0.wrapping_sub(steps))
     }
 }
 
@@ -258,25 +282,23 @@ impl Add<Interval> for Instant {
     }
 }
 
-/// A speed over the ground in ticks a second, positive forward.
+/// A speed over the ground in units of remembered ground a second, positive forward: at most 13 m/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct TicksPerSecond(pub i32);
+pub struct Speed(pub i16);
 
-impl TicksPerSecond {
-    /// Whether the machine is faster than `limit` ticks a second, forward or back.
+impl Speed {
+    /// Whether the machine is faster than `limit`, forward or back.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn is_beyond(self, limit: u16) -> bool {
-        self.0.unsigned_abs() > limit.into()
+        self.0.unsigned_abs() > limit
     }
 
-    /// The distance rolled at this speed in this many milliseconds.
-    ///
-    /// Valid if speed times milliseconds is below 2^31: up to 2.1 million ticks a second over one second.
+    /// The distance rolled at this speed in this many milliseconds, at most one second.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn distance_in_ms(self, milliseconds: u16) -> Ticks {
+    pub fn distance_in_ms(self, milliseconds: u16) -> Length {
         // Divided without its sign, so that the chip needs one division routine only, the shorter.
-        let magnitude = (self.0.unsigned_abs().wrapping_mul(u32::from(milliseconds)) / 1000) as i32;
-        Ticks(if self.0 < 0 { -magnitude } else { magnitude })
+        let magnitude = (u32::from(self.0.unsigned_abs()) * u32::from(milliseconds) / 1000) as i16;
+        Length(if self.0 < 0 { -magnitude } else { magnitude })
     }
 }
 

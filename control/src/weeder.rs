@@ -120,16 +120,20 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
         })
     }
 
+    /// The first readings: the caller writes them in place, before [`init`](Self::init).
+    pub const fn readings(&mut self) -> &mut Readings {
+        &mut self.0.sensors.readings
+    }
+
     /// Starts in HOLD, with the tool out and no known ground. Raises an alarm if the memory holds no settings, or invalid ones.
-    pub fn init(&mut self, startup: Startup) -> &mut Controller<C, M> {
-        let Startup { readings: Readings { now, position, .. }, beam_broken, cause } = startup;
+    pub fn init(&mut self, beam_broken: bool, cause: Cause) -> &mut Controller<C, M> {
         let controller = &mut self.0;
-        controller.classifier.init();
+        let Readings { now, position, .. } = controller.sensors.readings;
         controller.state = controller.configuration.load().map_or(State::Hold, State::Alarm);
         controller.follow_settings();
         controller.ground.begin(position, beam_broken);
         controller.cause = cause;
-        controller.sensors.init(startup);
+        controller.sensors.init(beam_broken, controller.ground.scale());
         controller.tool.init(now);
         controller.plant_timeout = PlantTimeout::since(position);
         controller.telemetry.init(now);
@@ -141,7 +145,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// A controller right after power-up, see [`Uninit::init`].
     pub fn new(classifier: C, memory: M, startup: Startup) -> Self {
         let mut uninit = Uninit::new(classifier, memory);
-        uninit.init(startup);
+        *uninit.readings() = startup.readings;
+        uninit.init(startup.beam_broken, startup.cause);
         uninit.0
     }
 
@@ -149,11 +154,19 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// orders. No edge may have a later position than the next turn's readings.
     #[inline(always)]
     pub fn turn(&mut self, readings: Readings, edges: impl IntoIterator<Item = Edge>) -> Orders {
+        *self.next_readings() = readings;
         edges.into_iter().for_each(|edge| self.take_edge(edge));
-        self.step(readings)
+        self.step()
     }
 
-    /// The first part of a [`turn`](Self::turn), for a test that checks the state in between.
+    /// The readings of the next turn, for a caller that writes them in place. Then follow the edges, each by
+    /// [`take_edge`](Self::take_edge), and [`step`](Self::step).
+    #[inline(always)]
+    pub const fn next_readings(&mut self) -> &mut Readings {
+        &mut self.sensors.readings
+    }
+
+    /// Takes an edge of a beam.
     #[inline(always)]
     pub fn take_edge(&mut self, edge: Edge) {
         match edge {
@@ -217,13 +230,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.raise(Alarm::BeamEdgesLost);
     }
 
-    /// The last part of a [`turn`](Self::turn), for a test that checks the state in between.
-    pub fn step(&mut self, readings: Readings) -> Orders {
-        self.sensors.readings = readings;
+    /// The last part of a turn, after the edges.
+    pub fn step(&mut self) -> Orders {
+        let readings = self.sensors.readings;
         let doubted = self.sensors.odometer.read(readings.position, readings.jumps, self.believes_jumps());
         let position = self.sensors.odometer.place(readings.position);
-        self.sensors.readings.position = position;
-        self.leads_are_old |= self.sensors.meter.read(readings.now, position);
+        self.sensors.position = position;
+        self.leads_are_old |= self.sensors.meter.read(readings.now, self.ground.wrap(position));
         match self.sensors.switch.read(readings.now, readings.switch_on) {
             // The operator clears an alarm first: with `clear`, or by turning the switch off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
@@ -281,7 +294,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         // The previous detection, a few millimetres back, is still being classified. Unclassified detections count as plants.
         self.decide(Some(Vote::UNKNOWN));
-        let position = self.sensors.readings.position;
+        let position = self.sensors.position;
         let spacing_mm = self.ground.millimetres(self.ground.spacing(&detection));
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         self.plant_timeout = PlantTimeout::since(position);
@@ -331,7 +344,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         };
         classified.vote = vote;
         let width_mm = if *of_second { 0 } else { classified.width_mm };
-        let leading = self.ground.position_of(detection.leading, self.sensors.readings.position);
+        let leading = self.ground.position_of(detection.leading, self.sensors.position);
         let (spacing, plan) = (self.ground.spacing(detection), self.ground.plan(detection));
         self.events.add(Event::Detection { vote, leading, spacing, plan });
         if self.ground.classified(vote.class).is_err() {
@@ -348,7 +361,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
-        self.events.add(Event::Alarm { alarm, position: self.sensors.readings.position });
+        self.events.add(Event::Alarm { alarm, position: self.sensors.position });
         self.enter(State::Alarm(alarm));
     }
 
@@ -361,7 +374,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.raise(Alarm::SettingsContradict);
             return;
         }
-        self.plant_timeout = PlantTimeout::since(self.sensors.readings.position);
+        self.plant_timeout = PlantTimeout::since(self.sensors.position);
         self.unknown_run = UnknownRun::NONE;
         self.enter(State::Work);
     }

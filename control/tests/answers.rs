@@ -424,8 +424,8 @@ fn events_and_curves_wait_until_an_answer_is_complete() {
         } else if console.listens()
             && let Some(&byte) = to_type.next()
         {
-            if let Some(line) = typed.take(byte) {
-                console.take(line);
+            if typed.collect(byte) {
+                console.take(&mut typed);
             }
         } else {
             console.carry_on(&mut machine);

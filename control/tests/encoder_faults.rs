@@ -345,7 +345,7 @@ fn roll(run: Run) -> Shown {
         cut: count(cut),
         alarm: alarm.map(|(alarm, _)| alarm),
         rolled: wires.edge - 1,
-        counted: i64::from(weeder.readings().position.count()),
+        counted: i64::from(weeder.position().count()),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use control::{
     measure::speed::SpeedMeter,
-    units::{Instant, Interval, Position, TicksPerSecond},
+    units::{Instant, Interval, Speed, WrappedPosition},
 };
 use proptest::prelude::*;
 
@@ -19,7 +19,7 @@ impl Run {
     }
 
     fn from(start: Instant, count: i32) -> Self {
-        Self { meter: SpeedMeter::new(Position::new(count), start), time_us: 0, start: (start, count) }
+        Self { meter: SpeedMeter::new(WrappedPosition::new(count as i16), start), time_us: 0, start: (start, count) }
     }
 
     /// Rolls for `duration_ms`; `ticks` gives the distance since the start at a time in seconds.
@@ -28,7 +28,10 @@ impl Run {
         while self.time_us < end {
             self.time_us += turn_us;
             let count = self.start.1.wrapping_add(ticks(self.time_us as f64 / 1e6).floor() as i32);
-            self.meter.read(self.start.0 + Interval::from_steps((self.time_us / 4) as u32), Position::new(count));
+            self.meter.read(
+                self.start.0 + Interval::from_steps((self.time_us / 4) as u32),
+                WrappedPosition::new(count as i16),
+            );
         }
         self
     }
@@ -47,7 +50,7 @@ proptest! {
 
     #[test]
     fn a_steady_speed_is_right_to_one_percent(
-        speed in prop_oneof![20_f64..500.0, 500_f64..5_305.0, 5_305_f64..44_000.0],
+        speed in prop_oneof![20_f64..500.0, 500_f64..5_305.0, 5_305_f64..24_000.0],
         backwards in any::<bool>(),
         turn_us in 80_u64..400,
     ) {
@@ -124,6 +127,20 @@ proptest! {
 }
 
 #[test]
+fn a_speed_that_no_machine_has_stays_the_fastest_and_does_not_turn_round() {
+    // The fastest count that the chip does not lose, forward and back.
+    for counts_per_s in [30_000.0, 100_000.0, 290_000.0, -30_000.0, -290_000.0] {
+        let mut run = Run::new();
+        for _ in 0..1000 {
+            run.roll(1, 200, |time| counts_per_s * time);
+            let (speed, expected) = (run.speed() / counts_per_s.signum(), run.expected() / counts_per_s.signum());
+            assert!(speed >= 0.0 && expected >= speed, "{speed} and {expected} at {counts_per_s}");
+        }
+        assert!(run.speed().abs() > 20_000.0, "{}", run.speed());
+    }
+}
+
+#[test]
 fn a_stop_shows_within_tens_of_milliseconds() {
     let mut run = Run::new();
     run.roll(500, 200, |time| 1326.0 * time);
@@ -164,18 +181,18 @@ fn one_tick_backwards_changes_the_speed_by_its_share() {
 
 #[test]
 fn a_reading_that_changes_a_speed_is_reported() {
-    let mut meter = SpeedMeter::new(Position::new(0), Instant::default());
+    let mut meter = SpeedMeter::new(WrappedPosition::new(0), Instant::default());
     let mut reported = 0;
     for milliseconds in 0..2000_u32 {
         // It accelerates, rolls at constant speed and stands.
         let count = (milliseconds * milliseconds / 500).min(milliseconds).min(1000);
         let now = Instant::default() + Interval::from_ms(milliseconds);
         let before = (meter.speed(), meter.expected());
-        let is_reported = meter.read(now, Position::new(count as i32));
+        let is_reported = meter.read(now, WrappedPosition::new(count as i16));
         assert!(is_reported || (meter.speed(), meter.expected()) == before, "at {milliseconds} ms");
         reported += u32::from(is_reported);
     }
-    assert_eq!((meter.speed(), meter.expected()), (TicksPerSecond(0), TicksPerSecond(0)));
+    assert_eq!((meter.speed(), meter.expected()), (Speed(0), Speed(0)));
     assert!(reported < 150, "{reported} of 2000 readings");
 }
 

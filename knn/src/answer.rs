@@ -17,10 +17,10 @@ pub enum Kind {
 /// The class of a query, and its votes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Answer<const CLASSES: usize> {
-    /// The class with the most votes. Among equals the one with the nearest example; among these the smallest label. For a
-    /// [`Kind::Tie`] or a [`Kind::Stranger`] it is only the best guess.
+    /// The class with the most votes; among equals the one with the nearest example. For a [`Kind::Tie`] or a [`Kind::Stranger`] it
+    /// is only the best guess.
     pub label: u8,
-    /// The votes of each class: k in all, and more if several examples are as far as the k-th nearest.
+    /// The votes of each class: k in all.
     pub votes: [usize; CLASSES],
     /// The squared distance to the nearest example (see [`squared_distance`](crate::squared_distance)).
     pub nearest: u32,

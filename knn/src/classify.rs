@@ -4,7 +4,8 @@ use crate::{Answer, ClassifyError, Examples, MAX_K, Nearest, Neighbour};
 
 /// The class of `features`, by the vote of its `k` nearest examples.
 ///
-/// - All examples that are as far as the k-th nearest vote, so that the order of the examples never matters.
+/// - Of examples at the same distance, those with the greater label are nearer. So the order of the examples never matters. Give the
+///   class that is the costlier to miss the greater label.
 /// - Each vote counts one, near or far; the class with the most votes wins (see [`Answer::label`] for ties).
 /// - `radius` is a squared distance: if the nearest example is farther, the answer is a [`Kind::Stranger`](crate::Kind::Stranger)
 ///   with any votes. `u32::MAX` turns this off.
@@ -36,25 +37,8 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
     k: u8,
     radius: u32,
 ) -> Result<Answer<CLASSES>, ClassifyError> {
-    // Clearing room for all 15 takes 200 cycles more than for 3 on an ATmega328P.
-    match k {
-        1..=3 => search(examples, features, k, &mut Nearest::<CLASSES, _>::new([Neighbour::NONE; 3]), radius),
-        _ => search(examples, features, k, &mut Nearest::<CLASSES, _>::new([Neighbour::NONE; MAX_K as usize]), radius),
-    }
-}
-
-/// [`classify`] with at least `k` places.
-///
-/// Out of line: AVR accesses the first 63 bytes of a stack frame by far the fastest. The places are in the caller's frame.
-#[inline(never)]
-fn search<const FEATURES: usize, const CLASSES: usize>(
-    examples: &(impl Examples<FEATURES> + ?Sized),
-    features: &[u8; FEATURES],
-    k: u8,
-    nearest: &mut Nearest<CLASSES>,
-    radius: u32,
-) -> Result<Answer<CLASSES>, ClassifyError> {
+    let nearest: &mut Nearest<CLASSES> = &mut Nearest::<CLASSES, _>::new([Neighbour::NONE; MAX_K as usize]);
     nearest.begin(k)?;
-    examples.keep_nearest(features, nearest);
+    examples.join(0..examples.len(), features, nearest);
     nearest.answer(radius)
 }

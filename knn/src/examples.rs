@@ -1,19 +1,12 @@
-//! Labelled examples, and the trait that searches them in any memory.
+//! Labelled examples, and the trait of their stores.
 //!
-//! Examples may be in flash, EEPROM or SRAM. The classifier asks a store to do one thing: to add its examples to the nearest found
-//! so far. A store that returns examples one by one gets this search from the trait. A store with a faster way, such as an assembly
-//! loop that reads flash, overrides [`Examples::keep_nearest`]. A pair of stores is a store.
+//! Examples may be in flash, EEPROM or SRAM. A store returns them one by one. A pair of stores is a store.
 
 use crate::{Nearest, Neighbour, squared_distance};
-
-/// The label of an empty place.
-pub const VACANT: u8 = u8::MAX;
+use core::ops::Range;
 
 /// A labelled example: its features, and its class.
-///
-/// In memory the features come first, then the label, for a search in assembly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(C)]
 pub struct Example<const FEATURES: usize> {
     /// The features, each scaled to a byte (see [`Scale::quantise`](crate::Scale::quantise)).
     pub features: [u8; FEATURES],
@@ -58,25 +51,10 @@ pub trait Examples<const FEATURES: usize> {
     /// The example at `index`; `None` from [`len`](Self::len) on.
     fn example(&self, index: usize) -> Option<Example<FEATURES>>;
 
-    /// Adds its examples that are near enough to `query` to the `nearest`. The result must be that of [`Nearest::join`] with each
-    /// example, in any order, and distances must equal [`squared_distance`].
-    #[inline]
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
-        for example in (0..self.len()).filter_map(|index| self.example(index)) {
-            nearest.join(example.neighbour_of(query));
-        }
-    }
-
-    /// As [`keep_nearest`](Self::keep_nearest), for examples in another store's SRAM, if this store has a faster way for them.
-    /// Skips those labelled [`VACANT`].
-    #[inline]
-    fn keep_nearest_of<const CLASSES: usize>(
-        &self,
-        others: &[Example<FEATURES>],
-        query: &[u8; FEATURES],
-        nearest: &mut Nearest<CLASSES>,
-    ) {
-        for example in others.iter().filter(|example| example.label != VACANT) {
+    /// Lets the examples of a range of indices join a search. A store whose examples are slow to load may leave one early: once its
+    /// squared distance exceeds [`Nearest::reach`], it cannot be among the nearest.
+    fn join<const CLASSES: usize>(&self, range: Range<usize>, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
+        for example in range.filter_map(|index| self.example(index)) {
             nearest.join(example.neighbour_of(query));
         }
     }
@@ -100,13 +78,6 @@ impl<const FEATURES: usize> Examples<FEATURES> for [Example<FEATURES>] {
     fn example(&self, index: usize) -> Option<Example<FEATURES>> {
         self.get(index).copied()
     }
-
-    #[inline]
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
-        for example in self {
-            nearest.join(example.neighbour_of(query));
-        }
-    }
 }
 
 impl<const FEATURES: usize, const N: usize> Examples<FEATURES> for [Example<FEATURES>; N] {
@@ -117,11 +88,6 @@ impl<const FEATURES: usize, const N: usize> Examples<FEATURES> for [Example<FEAT
     fn example(&self, index: usize) -> Option<Example<FEATURES>> {
         self.as_slice().get(index).copied()
     }
-
-    #[inline]
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
-        self.as_slice().keep_nearest(query, nearest)
-    }
 }
 
 impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURES> for &Store {
@@ -131,21 +97,6 @@ impl<const FEATURES: usize, Store: Examples<FEATURES> + ?Sized> Examples<FEATURE
 
     fn example(&self, index: usize) -> Option<Example<FEATURES>> {
         Examples::example(*self, index)
-    }
-
-    #[inline]
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
-        (**self).keep_nearest(query, nearest)
-    }
-
-    #[inline]
-    fn keep_nearest_of<const CLASSES: usize>(
-        &self,
-        others: &[Example<FEATURES>],
-        query: &[u8; FEATURES],
-        nearest: &mut Nearest<CLASSES>,
-    ) {
-        (**self).keep_nearest_of(others, query, nearest)
     }
 }
 
@@ -162,11 +113,5 @@ impl<const FEATURES: usize, First: Examples<FEATURES>, Second: Examples<FEATURES
             None => self.0.example(index),
             Some(index) => self.1.example(index),
         }
-    }
-
-    #[inline]
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
-        self.0.keep_nearest(query, nearest);
-        self.1.keep_nearest(query, nearest);
     }
 }

@@ -36,14 +36,13 @@
 //! | `[Example<F>; n]` | n (F + 1) | |
 //! | [`Table<F, N>`](Table) | N (F + 1) + 2 | `add_example` O(1), `remove` O(n) |
 //! | [`Scale<F>`](Scale) | 5 F | `quantise`: F subtractions, shifts and multiplications |
-//! | [`Nearest`] for k, which may be kept | 4 k + 7 + 2 C | |
-//! | [`classify`] | about 130 + 2 C of stack | n F multiplications of 8 x 8 bits; k steps an example within reach; k + C to vote |
+//! | [`Nearest`] for k, which may be kept | 4 k + 1 | |
+//! | [`classify`] | about 100 + 2 C of stack | n F multiplications of 8 x 8 bits; k comparisons an example; k + C to vote |
 //!
-//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. The calls and the vote take about 500 cycles, and
-//! each example that is loaded 19 to 67. An example that is among the k nearest at that moment takes some 75 more. In random order
-//! these are about k (1 + ln(n / k)) of n. If each one is a little nearer than the one before, they are all. [`classify`] clears
-//! its places first. The plain [`Examples::keep_nearest`] takes about 200 cycles an example. [`Scale::quantise`] takes 1,400
-//! cycles. `cargo bench-uno` in the weeder's workspace measures all of this in the simulator simavr.
+//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. An example that joins the nearest takes about four
+//! times the cycles of one that is left early (see [`Examples::join`]). In random order, k (1 + ln(n / k)) of n join. If each one is
+//! a little nearer than the one before, all join. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno` in the weeder's workspace
+//! measures all of this in the simulator simavr.
 //!
 //! # What it does not do
 //!
@@ -53,7 +52,6 @@
 #![forbid(unsafe_code)]
 
 mod answer;
-mod ballot;
 mod classify;
 mod distance;
 mod examples;
@@ -65,7 +63,7 @@ mod table;
 pub use answer::{Answer, ClassifyError, Kind, MAX_K};
 pub use classify::classify;
 pub use distance::{MAX_FEATURES, squared_distance};
-pub use examples::{Example, Examples, VACANT};
+pub use examples::{Example, Examples};
 pub use nearest::Nearest;
 pub use neighbour::Neighbour;
 pub use scale::{Range, Scale};

@@ -1,6 +1,6 @@
 //! Examples in SRAM, in an array of fixed capacity. They can be added and removed at run time.
 
-use crate::{Example, Examples, Nearest};
+use crate::{Example, Examples};
 
 /// Up to `CAPACITY` examples in SRAM: `CAPACITY * (FEATURES + 1)` bytes and a `usize`.
 ///
@@ -78,10 +78,5 @@ impl<const FEATURES: usize, const CAPACITY: usize> Examples<FEATURES> for Table<
 
     fn example(&self, index: usize) -> Option<Example<FEATURES>> {
         self.as_slice().get(index).copied()
-    }
-
-    #[inline]
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
-        self.as_slice().keep_nearest(query, nearest);
     }
 }

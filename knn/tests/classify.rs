@@ -1,7 +1,7 @@
 //! Compares the classifier with a plain one in floats, with smartcore's, and with itself after reordering the examples.
 //!
 //! Features come from few values, or from the extremes, as often as from all bytes. Then equal distances are common, which the
-//! rules for ties need.
+//! rule for them needs.
 
 use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Nearest, Neighbour, Scale, Table, classify};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use smartcore::{
     neighbors::knn_classifier::{KNNClassifier, KNNClassifierParameters},
 };
 
-/// The documented rules in floats: sort all, take those up to the k-th distance, count.
+/// The documented rules in floats: sort all by distance, the greatest label first, take k, count.
 fn reference<const FEATURES: usize, const CLASSES: usize>(
     examples: &[Example<FEATURES>],
     query: &[u8; FEATURES],
@@ -31,9 +31,8 @@ fn reference<const FEATURES: usize, const CLASSES: usize>(
     }
     let mut sorted: Vec<(f64, u8)> =
         examples.iter().map(|example| (float_distance(example, query), example.label)).collect();
-    sorted.sort_by(|left, right| left.partial_cmp(right).expect("distances are numbers"));
-    let kth = sorted[k - 1].0;
-    let voters: Vec<(f64, u8)> = sorted.into_iter().filter(|&(distance, _)| distance <= kth).collect();
+    sorted.sort_by(|left, right| left.0.total_cmp(&right.0).then(right.1.cmp(&left.1)));
+    let voters = &sorted[..k];
     if voters.iter().any(|&(_, label)| usize::from(label) >= CLASSES) {
         return Err(ClassifyError::UnknownLabel);
     }
@@ -125,12 +124,10 @@ fn is_the_same_by_every_store<const FEATURES: usize>(
     }
     prop_assert_eq!(classify(&(&table, left), &query, k, radius), answer);
     prop_assert_eq!(classify(&OneByOne(&shuffled), &query, k, radius), answer);
-    prop_assert_eq!(classify(&(AtOnce(left), AtOnce(right)), &query, k, radius), answer);
     let nearest: &mut Nearest<3> = &mut Nearest::<3, _>::new([Neighbour::new(99, 1); MAX_K as usize]);
     for _ in 0..2 {
         prop_assert_eq!(nearest.begin(k), Ok(()));
-        left.keep_nearest(&query, nearest);
-        AtOnce(right).keep_nearest(&query, nearest);
+        left.iter().chain(right).for_each(|example| nearest.join(example.neighbour_of(&query)));
         prop_assert_eq!(nearest.answer(radius), answer);
         prop_assert_eq!(nearest.answer(radius), answer);
     }
@@ -159,7 +156,7 @@ proptest! {
     }
 }
 
-/// A store that only returns examples, so that the trait's own search runs.
+/// A store of another type.
 struct OneByOne<'a, const FEATURES: usize>(&'a [Example<FEATURES>]);
 
 impl<const FEATURES: usize> Examples<FEATURES> for OneByOne<'_, FEATURES> {
@@ -172,35 +169,11 @@ impl<const FEATURES: usize> Examples<FEATURES> for OneByOne<'_, FEATURES> {
     }
 }
 
-/// A store that adds all its examples at once.
-struct AtOnce<'a, const FEATURES: usize>(&'a [Example<FEATURES>]);
-
-impl<const FEATURES: usize> Examples<FEATURES> for AtOnce<'_, FEATURES> {
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn example(&self, index: usize) -> Option<Example<FEATURES>> {
-        self.0.get(index).copied()
-    }
-
-    fn keep_nearest<const CLASSES: usize>(&self, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
-        let (places, free) = nearest.places();
-        let mut all = places[free..].to_vec();
-        all.extend(self.0.iter().map(|example| example.neighbour_of(query)));
-        all.sort_by_key(|neighbour| neighbour.key());
-        let found = all.len().min(places.len());
-        let free = places.len() - found;
-        for (place, neighbour) in places.iter_mut().rev().zip(&all) {
-            *place = *neighbour;
-        }
-        nearest.have_joined(free);
-        for out in &all[found..] {
-            if out.distance() == all[found - 1].distance() {
-                nearest.are_level(out.label(), 1);
-            }
-        }
-    }
+/// Whether the example after the k-th is as far as the k-th. Which of them votes is then a rule of its own.
+fn has_level<const FEATURES: usize>(examples: &[Example<FEATURES>], query: &[u8; FEATURES], k: u8) -> bool {
+    let mut distances: Vec<f64> = examples.iter().map(|example| float_distance(example, query)).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(usize::from(k)) == distances.get(usize::from(k) - 1)
 }
 
 /// smartcore's class for `query`.
@@ -234,7 +207,7 @@ fn on_fishers_irises_smartcore_gives_the_same_classes_and_few_are_wrong() {
         let mut others = examples.clone();
         let query = others.remove(left_out);
         let answer: Answer<3> = classify(others.as_slice(), &query.features, 5, u32::MAX).unwrap();
-        if answer.kind == Kind::Known && answer.votes.iter().sum::<usize>() == 5 {
+        if answer.kind == Kind::Known && !has_level(&others, &query.features, 5) {
             assert_eq!(u32::from(answer.label), smartcore_class(&others, &query.features, 5));
             compared += 1;
         }
@@ -252,17 +225,19 @@ proptest! {
         query in any::<[u8; 5]>(), k in 3_u8..=MAX_K,
     ) {
         let answer: Answer<3> = classify(examples.as_slice(), &query, k, u32::MAX).expect("k examples or more");
-        prop_assume!(answer.kind == Kind::Known && answer.votes.iter().sum::<usize>() == usize::from(k));
+        prop_assume!(answer.kind == Kind::Known && !has_level(&examples, &query, k));
         prop_assert_eq!(u32::from(answer.label), smartcore_class(&examples, &query, k));
     }
 }
 
 #[test]
-fn all_examples_level_with_the_last_neighbour_vote() {
-    let level = [[1, 0], [0, 1]].map(|features| Example::new(features, 1));
-    let near = [Example::new([0, 0], 0)];
+fn of_examples_at_the_same_distance_the_greater_label_is_nearer() {
+    let level = [([1, 0], 0), ([0, 1], 1)].map(|(features, label)| Example::new(features, label));
+    let near = [Example::new([0, 0], 1)];
     let answer: Answer<2> = classify(&(&near, &level), &[0, 0], 2, 0).unwrap();
-    assert_eq!(answer, Answer { label: 1, votes: [1, 2], nearest: 0, kind: Kind::Known });
+    assert_eq!(answer, Answer { label: 1, votes: [0, 2], nearest: 0, kind: Kind::Known });
+    let answer: Answer<2> = classify(&level, &[0, 0], 1, u32::MAX).unwrap();
+    assert_eq!(answer, Answer { label: 1, votes: [0, 1], nearest: 1, kind: Kind::Known });
 }
 
 #[test]
@@ -273,10 +248,10 @@ fn a_tie_names_the_class_of_the_nearest_example() {
 }
 
 #[test]
-fn a_tie_of_level_examples_names_the_smallest_label() {
+fn a_tie_of_level_examples_names_the_greatest_label() {
     let examples = [Example::new([12], 2), Example::new([10], 1)];
-    let answer: Answer<3> = classify(&examples, &[11], 1, u32::MAX).unwrap();
-    assert_eq!(answer, Answer { label: 1, votes: [0, 1, 1], nearest: 1, kind: Kind::Tie });
+    let answer: Answer<3> = classify(&examples, &[11], 2, u32::MAX).unwrap();
+    assert_eq!(answer, Answer { label: 2, votes: [0, 1, 1], nearest: 1, kind: Kind::Tie });
 }
 
 #[test]
@@ -318,15 +293,14 @@ fn an_error_has_advice() {
 }
 
 #[test]
-fn examples_level_with_the_kth_vote_in_any_order_and_only_while_they_are_level() {
+fn an_invalid_label_is_an_error_only_among_the_nearest() {
     let at = |place: u8, label| Example::new([place], label);
-    // Examples at 9 are level with the third until nearer ones come; an invalid label does no harm then.
     let answer = |examples: &[Example<1>]| classify::<1, 2>(examples, &[0], 3, u32::MAX).map(|answer| answer.votes);
     let far = [at(9, 1), at(9, 1), at(9, 7), at(9, 1)];
     assert_eq!(answer(&far), Err(ClassifyError::UnknownLabel));
     let near = [at(5, 0), at(5, 1), at(5, 1), at(5, 1), at(1, 0)];
-    assert_eq!(answer(&[&far[..], &near].concat()), Ok([2, 3]));
-    assert_eq!(answer(&[&near[..], &far].concat()), Ok([2, 3]));
+    assert_eq!(answer(&[&far[..], &near].concat()), Ok([1, 2]));
+    assert_eq!(answer(&[&near[..], &far].concat()), Ok([1, 2]));
 }
 
 #[test]

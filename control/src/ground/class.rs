@@ -58,9 +58,6 @@ pub struct ExamplesFull;
 
 /// Classifies detections, and learns from examples. By default it has no examples, and can be taught none.
 pub trait Classifier {
-    /// Checks the saved examples. The caller calls it once, before any other method.
-    fn init(&mut self) {}
-
     /// Classifies a detection by its `k` nearest examples.
     fn classify(&self, features: &Features, k: u8) -> Vote;
 
@@ -102,12 +99,15 @@ pub trait Classifier {
         false
     }
 
-    /// The first example from `place` on in the list of all, and the place behind it.
-    fn listed(&self, _place: u8) -> Option<(Listed, u8)> {
+    /// Forgets all field examples.
+    fn forget_all(&mut self) {}
+
+    /// The first example from an index on in the list of all, and the index behind it.
+    fn listed(&self, _from: u8) -> Option<(Listed, u8)> {
         None
     }
 
-    /// Saved examples that were invalid at start-up, and dropped.
+    /// Saved examples that are invalid, and do not count.
     fn spoiled(&self) -> u8 {
         0
     }

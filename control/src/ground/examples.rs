@@ -59,9 +59,8 @@ pub const COUNT: usize = table::TRAINED.len();
 
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
-/// The table, [sorted by speed](sorted_by_first_feature), and shuffled within each speed: neighbours are `STEP` places apart in the
-/// table. In the trained order similar examples are neighbours, and a search comes ever nearer. Each example would then enter the
-/// list of the nearest for a while.
+/// The table, shuffled: neighbours are `STEP` places apart in it. In the trained order similar examples are neighbours, and a search
+/// comes ever nearer. Each example would then enter the list of the nearest for a while.
 pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;
@@ -70,27 +69,8 @@ pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
         examples[index] = Example::new(SCALE.quantise(features), *label);
         index += 1;
     }
-    sorted_by_first_feature(examples)
-};
-
-/// Sorts examples for the search in flash: it starts with those whose first feature equals the query's, which are nearest to it.
-/// The sort is stable.
-pub const fn sorted_by_first_feature<const N: usize>(
-    mut examples: [Example<{ features::COUNT }>; N],
-) -> [Example<{ features::COUNT }>; N] {
-    let mut sorted = 1;
-    while sorted < N {
-        let example = examples[sorted];
-        let mut place = sorted;
-        while place > 0 && examples[place - 1].features[0] > example.features[0] {
-            examples[place] = examples[place - 1];
-            place -= 1;
-        }
-        examples[place] = example;
-        sorted += 1;
-    }
     examples
-}
+};
 
 /// Some five eighths of the table, coprime to its length, so that no example is left out.
 const STEP: usize = {
@@ -117,7 +97,6 @@ mod tests {
         memory::Volatile,
         settings::Setting,
     };
-    use knn::Neighbour;
     use std::vec::Vec;
 
     /// Checks the class of each canopy at each speed.
@@ -155,7 +134,7 @@ mod tests {
         let plants = table::TRAINED.iter().filter(|(_, label)| *label == label::PLANT);
         let narrowest = plants.map(|([_, _, _, hold, _], _)| hold - features::HOLD_BEYOND_WIDTH_MM).min();
         assert_eq!(narrowest.map(|width| width / 2), Some(NARROW_MM));
-        let [_, _, _, hold, _] = Features::describe(556, 500, 40).values();
+        let [_, _, _, hold, _] = *Features::describe(556, 500, 40).values();
         assert_eq!(hold - features::HOLD_BEYOND_WIDTH_MM, 40);
     }
 
@@ -178,31 +157,5 @@ mod tests {
     fn a_detection_unlike_both_classes_is_never_a_weed() {
         let widths_mm = (35..=90).chain([250, 400, 1000, 30_000]);
         check_classes(widths_mm, (0..=2000).step_by(5), |class| class != Class::Weed);
-    }
-
-    #[test]
-    fn at_most_a_third_of_the_examples_enter_the_list_of_the_nearest() {
-        let among_the_nearest = |detection: Features| {
-            let query = SCALE.quantise(&detection.values());
-            let nearest: &mut knn::Nearest<{ label::COUNT }> =
-                &mut knn::Nearest::<{ label::COUNT }, _>::new([Neighbour::NONE; K as usize]);
-            nearest.begin(K).expect("there are so many places");
-            let finds_a_place = |example: &&Example<{ features::COUNT }>| {
-                let before = (nearest.places().0.to_vec(), nearest.places().1);
-                nearest.join(example.neighbour_of(&query));
-                (nearest.places().0.to_vec(), nearest.places().1) != before
-            };
-            let own_speed = EXAMPLES.partition_point(|example| example.features[0] < query[0]);
-            let (slower, others) = EXAMPLES.split_at(own_speed);
-            others.iter().chain(slower.iter().rev()).filter(finds_a_place).count()
-        };
-        for speed in SPEED_CLASSES_MM_S {
-            for width_mm in (12..=20).chain(95..=190).step_by(4) {
-                for spacing_mm in (60..=1240).step_by(20) {
-                    let found = among_the_nearest(Features::describe(speed, spacing_mm, width_mm));
-                    assert!(found <= COUNT / 3, "{found} of {COUNT}: {speed} {spacing_mm} {width_mm}");
-                }
-            }
-        }
     }
 }

@@ -21,20 +21,15 @@ mod reference {
 /// Hold minus width, in mm.
 pub const HOLD_BEYOND_WIDTH_MM: i16 = 2 * reference::MARGIN_MM as i16;
 
-/// The feature vector of a detection.
+/// The feature vector of a detection, in the paper's order:
+///
+/// - S: the machine's speed class in mm/s.
+/// - E: distance since the last plant's leading edge, the plant spacing, in mm.
+/// - Y: delay until the command to leave the row (Eq. 1 minus the lead), in mm.
+/// - Z: hold, the distance for which the tool stays out (Eq. 2), in mm.
+/// - R: actuation, the position of the command to come back (Eq. 3 minus the lead), in mm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Features {
-    /// S: the machine's speed class in mm/s.
-    pub speed_mm_s: i16,
-    /// E: distance since the last plant's leading edge, the plant spacing, in mm.
-    pub spacing_mm: i16,
-    /// Y: delay until the command to leave the row (Eq. 1 minus the lead), in mm.
-    pub delay_mm: i16,
-    /// Z: hold, the distance for which the tool stays out (Eq. 2), in mm.
-    pub hold_mm: i16,
-    /// R: actuation, the position of the command to come back (Eq. 3 minus the lead), in mm.
-    pub actuation_mm: i16,
-}
+pub struct Features(pub [i16; COUNT]);
 
 impl Features {
     /// The features of a detection of `width_mm`, `spacing_mm` behind the last plant, in one of the speed classes.
@@ -42,20 +37,33 @@ impl Features {
     pub const fn describe(speed_class_mm_s: i16, spacing_mm: i16, width_mm: i16) -> Self {
         let delay = reference::BEAM_TO_TOOL_MM - reference::MARGIN_MM;
         let hold = width_mm as u16 + 2 * reference::MARGIN_MM;
-        Self {
-            speed_mm_s: speed_class_mm_s,
+        Self([
+            speed_class_mm_s,
             spacing_mm,
-            delay_mm: (delay - rolled(speed_class_mm_s, reference::LEAD_OUT_MS)) as i16,
-            hold_mm: limited(hold),
-            actuation_mm: limited(delay + hold - rolled(speed_class_mm_s, reference::LEAD_IN_MS)),
-        }
+            (delay - rolled(speed_class_mm_s, reference::LEAD_OUT_MS)) as i16,
+            limited(hold),
+            limited(delay + hold - rolled(speed_class_mm_s, reference::LEAD_IN_MS)),
+        ])
     }
 
     /// The features in the paper's order: speed, encoder value, delay, hold, actuation.
-    #[inline(never)]
-    pub const fn values(&self) -> [i16; COUNT] {
-        let Self { speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm } = *self;
-        [speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm]
+    pub const fn values(&self) -> &[i16; COUNT] {
+        &self.0
+    }
+
+    /// S: the machine's speed class in mm/s.
+    pub const fn speed_mm_s(&self) -> i16 {
+        self.0[0]
+    }
+
+    /// E: distance since the last plant's leading edge, the plant spacing, in mm.
+    pub const fn spacing_mm(&self) -> i16 {
+        self.0[1]
+    }
+
+    /// Z: hold, the distance for which the tool stays out (Eq. 2), in mm.
+    pub const fn hold_mm(&self) -> i16 {
+        self.0[3]
     }
 }
 
@@ -96,12 +104,12 @@ mod tests {
     fn the_features_are_the_papers_schedule_on_the_reference_machine() {
         // 150 mm of canopy at 2.5 km/h: Y = 350 mm less 124 mm of lead, Z = 250 mm, R = 600 mm less 27 mm.
         let features = Features::describe(694, 500, 150);
-        assert_eq!(features.values(), [694, 500, 226, 250, 573]);
+        assert_eq!(features.values(), &[694, 500, 226, 250, 573]);
     }
 
     #[test]
     fn features_beyond_16_bits_are_limited() {
         let features = Features::describe(278, i16::MAX, i16::MAX);
-        assert_eq!((features.hold_mm, features.actuation_mm), (i16::MAX, i16::MAX));
+        assert_eq!(features.values()[3..], [i16::MAX; 2]);
     }
 }

@@ -1,16 +1,17 @@
 //! Field examples: taught by the operator, and kept in the EEPROM.
 //!
 //! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16. The CRC covers features, label
-//! and the features' scale, because on another scale the bytes mean something else. An erased slot reads as ones. A slot with a
-//! wrong CRC, after a power loss or a flipped bit, is dropped and counted. All slots are read once at start-up into SRAM. A search
-//! in the EEPROM would take two turns of the loop, and more with the CRC. It would also wait for a byte that is being written. The
-//! bytes of a slot are written one at a time, each when the memory is ready.
+//! and the features' scale, because on another scale the bytes mean something else. A slot without a label is free, as after an
+//! unfinished save. One with a label and a wrong CRC, as after a flipped bit, is free too, and counted as spoiled.
+//!
+//! The examples stay in the EEPROM: a search reads them there, a few in each turn. It waits while a byte is being written. A change
+//! writes one byte each time the memory is ready. Until all are written, the slot counts as spoiled or as it was.
 
 use crate::{
     ground::{class::label, examples, features},
     memory::{ERASED, Memory, checksum},
 };
-use knn::{Example, Examples, VACANT};
+use knn::{Example, Examples};
 
 /// Most field examples.
 pub const CAPACITY: u8 = 32;
@@ -28,110 +29,88 @@ const SCALE_MARK: [u8; 2] = checksum(&examples::SCALE_BYTES).to_le_bytes();
 #[derive(Clone, Debug)]
 pub struct FieldExamples<M> {
     memory: M,
-    /// The example of each slot; label [`VACANT`] if it holds none.
-    examples: [Taught; CAPACITY as usize],
-    /// Number of slots up to the last example.
-    used: u8,
-    /// One bit for each slot that is yet to be written or erased.
-    pending: [u8; CAPACITY as usize / 8],
-    spoiled: u8,
-    /// The slot that is being written.
-    writing: u8,
+    /// The slots that are yet to hold `bytes`: from the first up to the second.
+    next: u8,
+    end: u8,
     bytes: [u8; SLOT],
-    /// Bytes of that slot still to write.
-    left: u8,
+    /// The next byte of the slot that is being written.
+    next_byte: u8,
 }
 
 impl<M: Memory> FieldExamples<M> {
-    /// The store before [`init`](Self::init).
-    pub const fn uninit(memory: M) -> Self {
-        // Zeros take no flash. `used` is 0, so none of them counts.
-        let examples = [Example::new([0; features::COUNT], 0); CAPACITY as usize];
-        Self {
-            memory,
-            examples,
-            used: 0,
-            pending: [0; CAPACITY as usize / 8],
-            spoiled: 0,
-            writing: 0,
-            bytes: [0; SLOT],
-            left: 0,
-        }
+    /// The store in a memory.
+    pub const fn new(memory: M) -> Self {
+        Self { memory, next: 0, end: 0, bytes: [0; SLOT], next_byte: 0 }
     }
 
-    /// Reads the examples from the memory.
-    pub fn init(&mut self) {
-        self.spoiled = 0;
-        for (number, example) in (0..).zip(&mut self.examples) {
-            let bytes: [u8; SLOT] = core::array::from_fn(|place| self.memory.read(address(number) + place as u16));
-            let (features, rest) = bytes.split_at(features::COUNT);
-            example.features.copy_from_slice(features);
-            example.label = rest[0];
-            if bytes != encode(*example) || usize::from(example.label) >= label::COUNT {
-                example.label = VACANT;
-                self.spoiled += u8::from(bytes != [ERASED; SLOT]);
-            } else {
-                self.used = number + 1;
-            }
-        }
+    /// Whether the memory can be read now.
+    pub fn is_ready(&self) -> bool {
+        self.memory.is_ready()
     }
 
-    /// Slots with a wrong CRC.
+    /// Slots with a label and a wrong CRC.
     pub fn spoiled(&self) -> u8 {
-        self.spoiled
+        (0..CAPACITY).filter(|&number| self.label(number) != ERASED && self.slot(number).is_none()).count() as u8
     }
 
-    /// The example in a slot.
+    fn label(&self, number: u8) -> u8 {
+        self.memory.read(Self::address(number) + features::COUNT as u16)
+    }
+
+    /// The example in a slot. Only if [`is_ready`](Self::is_ready).
+    #[inline(never)]
     pub fn slot(&self, number: u8) -> Option<Taught> {
-        self.examples.get(usize::from(number)).copied().filter(is_held)
+        // Most slots have no label, and need no CRC.
+        if number >= CAPACITY || usize::from(self.label(number)) >= label::COUNT {
+            return None;
+        }
+        let mut bytes = [0; SLOT];
+        for (address, byte) in (Self::address(number)..).zip(&mut bytes) {
+            *byte = self.memory.read(address);
+        }
+        let [a, b, c, d, e, label, low, high] = bytes;
+        (check(&mut bytes) == u16::from_le_bytes([low, high])).then_some(Example::new([a, b, c, d, e], label))
     }
 
-    /// Adds an example and returns its slot. [`carry_on`](Self::carry_on) writes it.
+    /// Adds an example. [`carry_on`](Self::carry_on) writes it. Returns whether there was room.
     ///
-    /// # Errors
-    /// The example, if all slots are taken.
-    pub fn add(&mut self, example: Taught) -> Result<u8, Taught> {
-        let Some(number) = self.examples.iter().position(|example| !is_held(example)) else {
-            return Err(example);
-        };
-        self.examples[number] = example;
-        *self.pending(number as u8) |= bit(number as u8);
-        self.used = self.used.max(number as u8 + 1);
-        Ok(number as u8)
+    /// Like the other changes only once the last one is written. A command's answer waits for that, so the next command comes later.
+    pub fn add(&mut self, example: Taught) -> bool {
+        let free = (0..CAPACITY).find(|&number| self.slot(number).is_none());
+        if let Some(number) = free {
+            self.write(number, number + 1, encode(example));
+        }
+        free.is_some()
     }
 
     /// Forgets the example in a slot. [`carry_on`](Self::carry_on) erases it. Returns whether there was one.
     pub fn forget(&mut self, number: u8) -> bool {
-        let Some(example) = self.examples.get_mut(usize::from(number)).filter(|example| is_held(example)) else {
-            return false;
-        };
-        example.label = VACANT;
-        *self.pending(number) |= bit(number);
-        true
+        let is_held = self.slot(number).is_some();
+        if is_held {
+            self.write(number, number + 1, [ERASED; SLOT]);
+        }
+        is_held
+    }
+
+    /// Forgets all examples. [`carry_on`](Self::carry_on) erases them.
+    pub fn forget_all(&mut self) {
+        self.write(0, CAPACITY, [ERASED; SLOT]);
+    }
+
+    fn write(&mut self, from: u8, end: u8, bytes: [u8; SLOT]) {
+        debug_assert!(self.next == self.end, "a change waits until the last one is written");
+        (self.next, self.end, self.bytes) = (from, end, bytes);
     }
 
     /// Writes the next byte, if the memory is ready. Returns whether all is written.
     pub fn carry_on(&mut self) -> bool {
-        if !self.write_next_byte() {
-            return false;
-        }
-        // The usual case, checked first because every turn comes here.
-        if self.pending == [0; CAPACITY as usize / 8] {
+        if self.next == self.end {
             return true;
         }
-        let Some(number) = (0..CAPACITY).find(|&number| *self.pending(number) & bit(number) != 0) else {
-            return true;
-        };
-        *self.pending(number) ^= bit(number);
-        let example = &self.examples[usize::from(number)];
-        let bytes = if is_held(example) { encode(*example) } else { [ERASED; SLOT] };
-        self.begin(number, bytes);
+        if self.memory.update(Self::address(self.next), &self.bytes, &mut self.next_byte) {
+            self.next += 1;
+        }
         false
-    }
-
-    /// The slots up to the last example; empty ones are [`VACANT`].
-    pub fn places(&self) -> &[Taught] {
-        self.examples.get(..self.used.into()).unwrap_or(&self.examples)
     }
 
     /// The memory, for a test or another machine.
@@ -139,46 +118,15 @@ impl<M: Memory> FieldExamples<M> {
         self.memory
     }
 
-    /// The byte that holds a slot's pending bit.
-    fn pending(&mut self, number: u8) -> &mut u8 {
-        &mut self.pending[usize::from(number / 8)]
+    /// A slot's first address.
+    const fn address(number: u8) -> u16 {
+        M::EXAMPLES + number as u16 * SLOT as u16
     }
-
-    #[inline(never)]
-    fn begin(&mut self, number: u8, bytes: [u8; SLOT]) {
-        self.writing = number;
-        self.bytes = bytes;
-        self.left = SLOT as u8;
-    }
-
-    /// Writes the next byte of the slot, if the memory is ready. Returns whether the slot is complete.
-    fn write_next_byte(&mut self) -> bool {
-        if !self.memory.is_ready() {
-            return false;
-        }
-        let Some(left) = self.left.checked_sub(1) else {
-            return true;
-        };
-        let place = SLOT as u8 - self.left;
-        self.memory.write(address(self.writing) + u16::from(place), self.bytes[usize::from(place)]);
-        self.left = left;
-        false
-    }
-}
-
-/// A slot's bit in its byte.
-const fn bit(number: u8) -> u8 {
-    1 << (number % 8)
-}
-
-/// A slot's first address.
-const fn address(number: u8) -> u16 {
-    number as u16 * SLOT as u16
 }
 
 impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     fn len(&self) -> usize {
-        self.examples.iter().filter(|example| is_held(example)).count()
+        (0..CAPACITY).filter_map(|slot| self.slot(slot)).count()
     }
 
     fn example(&self, index: usize) -> Option<Taught> {
@@ -186,16 +134,19 @@ impl<M: Memory> Examples<{ features::COUNT }> for FieldExamples<M> {
     }
 }
 
-/// Whether a slot holds an example.
-const fn is_held(example: &Taught) -> bool {
-    example.label != VACANT
-}
-
 fn encode(example: Taught) -> [u8; SLOT] {
     let [a, b, c, d, e] = example.features;
-    let [mark, scale] = SCALE_MARK;
-    let [low, high] = checksum(&[a, b, c, d, e, example.label, mark, scale]).to_le_bytes();
-    [a, b, c, d, e, example.label, low, high]
+    let mut bytes = [a, b, c, d, e, example.label, 0, 0];
+    let [low, high] = check(&mut bytes).to_le_bytes();
+    [bytes[6], bytes[7]] = [low, high];
+    bytes
+}
+
+/// The CRC of an example, with the scale in the place of the CRC.
+#[inline(never)]
+fn check(bytes: &mut [u8; SLOT]) -> u16 {
+    [bytes[6], bytes[7]] = SCALE_MARK;
+    checksum(bytes)
 }
 
 #[cfg(test)]
@@ -208,9 +159,7 @@ mod tests {
     }
 
     fn init(memory: Volatile) -> FieldExamples<Volatile> {
-        let mut store = FieldExamples::uninit(memory);
-        store.init();
-        store
+        FieldExamples::new(memory)
     }
 
     fn example(number: u8) -> Taught {
@@ -221,9 +170,9 @@ mod tests {
     fn holding(numbers: impl Iterator<Item = u8>) -> FieldExamples<Volatile> {
         let mut store = store();
         for number in numbers {
-            store.add(example(number)).unwrap();
+            assert!(store.add(example(number)));
+            while !store.carry_on() {}
         }
-        while !store.carry_on() {}
         store
     }
 
@@ -235,18 +184,20 @@ mod tests {
 
     #[test]
     fn taught_examples_survive_a_restart() {
-        let mut store = store();
-        for number in 0..CAPACITY {
-            assert_eq!(store.add(example(number)), Ok(number));
-        }
-        assert_eq!(store.add(example(99)), Err(example(99)), "a full store returns the example");
+        let mut store = holding(0..CAPACITY);
+        assert!(!store.add(example(99)), "a full store takes no example");
         let mut store = restart(store);
         assert_eq!(store.len(), usize::from(CAPACITY));
         assert!(store.forget(7));
-        assert!(!store.forget(7) && !store.forget(CAPACITY));
         let mut store = restart(store);
+        assert!(!store.forget(7) && !store.forget(CAPACITY));
         assert_eq!((store.slot(7), store.slot(8)), (None, Some(example(8))));
-        assert_eq!(store.add(example(50)), Ok(7), "the free slot is used again");
+        assert!(store.add(example(50)));
+        let mut store = restart(store);
+        assert_eq!(store.slot(7), Some(example(50)), "the free slot is used again");
+        store.forget_all();
+        let store = restart(store);
+        assert_eq!((store.len(), store.spoiled()), (0, 0));
     }
 
     #[test]
@@ -258,7 +209,7 @@ mod tests {
                 if forgetting {
                     store.forget(2);
                 } else {
-                    store.add(example(4)).unwrap();
+                    assert!(store.add(example(4)));
                 }
                 let store = restart(store);
                 for number in [0, 1, 3] {
@@ -294,23 +245,11 @@ mod tests {
         let check = checksum(&[1, 2, 3, 4, 5, 0, !SCALE_MARK[0], SCALE_MARK[1]]);
         let mut of_another_scale = encoded(0);
         of_another_scale[6..].copy_from_slice(&check.to_le_bytes());
-        for slot in [of_another_scale, encoded(label::COUNT as u8), encoded(VACANT)] {
+        for slot in [of_another_scale, encoded(label::COUNT as u8), encoded(254)] {
             let mut memory = Volatile::new();
             memory.bytes[..SLOT].copy_from_slice(&slot);
             let store = init(memory);
             assert_eq!((store.slot(0), store.len(), store.spoiled()), (None, 0, 1), "{slot:?}");
         }
-    }
-
-    #[test]
-    fn an_example_forgotten_before_it_is_written_is_erased() {
-        let mut store = store();
-        store.add(example(1)).unwrap();
-        store.add(example(2)).unwrap();
-        assert!(!store.carry_on(), "the first is being written");
-        assert!(store.forget(0) && store.forget(1));
-        assert_eq!(store.add(example(3)), Ok(0), "its slot is free, although bytes are still to be written");
-        let store = restart(store);
-        assert_eq!((store.slot(0), store.slot(1), store.spoiled()), (Some(example(3)), None, 0));
     }
 }

@@ -28,7 +28,7 @@ impl Guard {
 
     /// Takes a kept detection.
     pub fn see(&mut self, plant: &Detection, geometry: &Geometry) {
-        let (spacing, scatter) = (geometry.guard_spacing, geometry.guard_scatter);
+        let (spacing, scatter) = (geometry.guard_spacing(), geometry.guard_scatter());
         // A cut detection has no known middle.
         if spacing == Length::ZERO || plant.cut {
             return;
@@ -48,7 +48,7 @@ impl Guard {
             return None;
         }
         self.left -= 1;
-        self.due = due + geometry.guard_spacing;
+        self.due = due + geometry.guard_spacing();
         Some(Canopy { leading: due - guarded, trailing: due + guarded, trim: 0 })
     }
 

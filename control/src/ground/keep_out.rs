@@ -229,7 +229,7 @@ pub struct Plan {
 impl Plan {
     /// The schedule of a canopy of `width`. Each value is within two units of the scale of its equation.
     pub fn new(geometry: &Geometry, width: Length) -> Self {
-        let Geometry { scale, beam_to_tool, margin, .. } = *geometry;
+        let (scale, beam_to_tool, margin) = (geometry.scale, geometry.beam_to_tool(), geometry.margin());
         let delay = (beam_to_tool - margin).max(Length::ZERO);
         Self { delay: scale.ticks(delay), hold: scale.ticks(width + margin + margin) }
     }

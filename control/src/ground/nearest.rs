@@ -1,7 +1,8 @@
 //! The classifier: the vote of the nearest labelled examples.
 //!
-//! Examples are feature vectors in bytes, scaled by [`examples::scale`]. The crate `knn` searches them, in flash and in SRAM. Three
-//! cases give [`Class::Unknown`], which counts as a plant: a tie, a detection far from all examples, and fewer than k examples.
+//! Examples are feature vectors in bytes, scaled by [`examples::scale`]. They are searched in flash and in the EEPROM, some in each
+//! turn, with the crate `knn`. Three cases give [`Class::Unknown`], which counts as a plant: a tie, a detection far from all
+//! examples, and fewer than k examples. Of a plant and a weed at the same distance, the plant is nearer.
 
 use crate::{
     ground::{
@@ -12,13 +13,16 @@ use crate::{
     },
     memory::Memory,
 };
-use knn::{Answer, ClassifyError, Example, Examples, Kind, MAX_K, Neighbour};
+use knn::{Answer, Example, Examples, Kind, MAX_K, Neighbour};
 
-/// Field examples searched in one turn. This takes half a millisecond if each one is nearer than all before it.
-pub const AT_ONCE: usize = 16;
+/// Examples searched in one turn.
+pub const AT_ONCE: u8 = 8;
 
 /// The nearest examples found so far.
 type Found<Places> = knn::Nearest<{ label::COUNT }, Places>;
+
+// Of two examples at the same distance, `knn` takes that with the greater label.
+const _: () = assert!(label::PLANT > label::WEED);
 
 /// Classifies by the nearest of the built-in examples in `B` and the field examples in `M`.
 #[derive(Clone, Debug)]
@@ -28,96 +32,111 @@ pub struct Nearest<B, M> {
     /// The detection that is being classified.
     query: [u8; features::COUNT],
     found: Found<[Neighbour; MAX_K as usize]>,
-    asked: Asked,
-}
-
-/// How far a search has come.
-#[derive(Clone, Copy, Debug)]
-enum Asked {
-    Nobody,
-    /// Finished: the built-in examples, and the field examples before this slot.
-    FieldBefore(u8),
+    /// The index of the example that is asked next: the built-in ones come first, then the slots of field examples.
+    asked: u8,
 }
 
 impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     /// A classifier with the built-in examples and those in the memory.
-    pub fn new(built_in: B, memory: M) -> Self {
-        let mut nearest = Self::uninit(built_in, memory);
-        nearest.init();
-        nearest
-    }
-
-    /// A classifier that has not read its memory yet.
-    pub const fn uninit(built_in: B, memory: M) -> Self {
+    pub const fn new(built_in: B, memory: M) -> Self {
         Self {
             built_in,
-            field: FieldExamples::uninit(memory),
+            field: FieldExamples::new(memory),
             query: [0; features::COUNT],
-            found: Found::new([Neighbour::NONE; MAX_K as usize]),
-            asked: Asked::Nobody,
+            // Zeros take no flash, and `begin` clears the places.
+            found: Found::new([Neighbour::of_key(0); MAX_K as usize]),
+            asked: 0,
         }
     }
 
-    /// Adds the nearest built-in examples to those found.
-    fn search_built_in(&mut self) {
-        self.built_in.keep_nearest(&self.query, &mut self.found);
-        self.asked = Asked::FieldBefore(0);
+    /// The number of built-in examples.
+    fn built_in(&self) -> u8 {
+        self.built_in.len() as u8
     }
 
-    /// The vote of the examples found.
+    /// The number of examples and free slots.
+    fn all(&self) -> u8 {
+        self.built_in() + field_examples::CAPACITY
+    }
+
+    /// The example at an index, if there is one.
+    fn at(&self, index: u8) -> Option<Example<{ features::COUNT }>> {
+        match index.checked_sub(self.built_in()) {
+            None => self.built_in.example(index.into()),
+            Some(slot) => self.field.slot(slot),
+        }
+    }
+
+    /// Asks the next examples, up to an index.
+    #[inline(never)]
+    fn ask(&mut self, end: u8) {
+        let found: &mut Found<[Neighbour]> = &mut self.found;
+        let built_in = self.built_in.len() as u8;
+        self.built_in.join(self.asked.into()..end.min(built_in).into(), &self.query, found);
+        self.asked = self.asked.max(end.min(built_in));
+        while self.asked < end {
+            if let Some(example) = self.field.slot(self.asked - built_in) {
+                found.join(example.neighbour_of(&self.query));
+            }
+            self.asked += 1;
+        }
+    }
+
+    /// The vote of the examples found, as [`knn::Nearest::answer`] counts it, for the two labels here.
     #[inline(never)]
     fn vote(&self) -> Vote {
         let found: &Found<[Neighbour]> = &self.found;
-        vote(found.answer(examples::RADIUS))
+        let voters = found.places();
+        let (Some(nearest), Some(farthest)) = (voters.first(), voters.last()) else { return Vote::UNKNOWN };
+        if *farthest == Neighbour::NONE {
+            return Vote::UNKNOWN;
+        }
+        let plants: u8 = voters.iter().map(|example| example.label()).sum();
+        let weeds = voters.len() as u8 - plants;
+        let (class, votes) = if plants > weeds { (Class::Plant, plants) } else { (Class::Weed, weeds) };
+        let is_known = plants != weeds && nearest.distance() <= examples::RADIUS;
+        Vote { class: if is_known { class } else { Class::Unknown }, votes }
     }
 }
 
 /// The features in bytes, on the scale of the examples.
 #[inline(never)]
 fn scaled(features: &Features) -> [u8; features::COUNT] {
-    examples::scale().quantise(&features.values())
-}
-
-/// Turns an answer into a vote.
-fn vote(answer: Result<Answer<{ label::COUNT }>, ClassifyError>) -> Vote {
-    let Ok(Answer { label, votes, kind, .. }) = answer else { return Vote::UNKNOWN };
-    let class = match (kind, label) {
-        (Kind::Known, label::PLANT) => Class::Plant,
-        (Kind::Known, label::WEED) => Class::Weed,
-        _ => Class::Unknown,
-    };
-    let votes = votes.get(usize::from(label)).copied().unwrap_or(0);
-    Vote { class, votes: votes as u8 }
+    examples::scale().quantise(features.values())
 }
 
 impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
-    fn init(&mut self) {
-        self.field.init();
-    }
-
     fn classify(&self, features: &Features, k: u8) -> Vote {
-        vote(knn::classify(&(&self.built_in, &self.field), &scaled(features), k, examples::RADIUS))
+        let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(
+            &(&self.built_in, &self.field),
+            &scaled(features),
+            k,
+            examples::RADIUS,
+        );
+        let Ok(Answer { label, votes, kind, .. }) = answer else { return Vote::UNKNOWN };
+        let class = match (kind, label) {
+            (Kind::Known, label::PLANT) => Class::Plant,
+            (Kind::Known, _) => Class::Weed,
+            _ => Class::Unknown,
+        };
+        Vote { class, votes: votes[usize::from(label)] as u8 }
     }
 
     fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
         self.query = scaled(features);
-        self.asked = Asked::Nobody;
+        self.asked = 0;
         let found: &mut Found<[Neighbour]> = &mut self.found;
         found.begin(k).is_err().then_some(Vote::UNKNOWN)
     }
 
     fn go_on(&mut self) -> Option<Vote> {
-        let Asked::FieldBefore(slot) = self.asked else {
-            self.search_built_in();
-            return None;
-        };
-        let (_, rest) = self.field.places().split_at_checked(slot.into()).unwrap_or_default();
-        if rest.is_empty() {
+        if self.asked == self.all() {
             return Some(self.vote());
         }
-        let next = rest.get(..AT_ONCE).unwrap_or(rest);
-        self.built_in.keep_nearest_of(next, &self.query, &mut self.found);
-        self.asked = Asked::FieldBefore(slot + next.len() as u8);
+        // During a write the memory cannot be read.
+        if self.field.is_ready() {
+            self.ask(self.all().min(self.asked + AT_ONCE));
+        }
         None
     }
 
@@ -126,7 +145,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
         match self.begin(features, examples::K) {
             Some(vote) => vote.class,
             None => {
-                self.search_built_in();
+                self.ask(self.built_in());
                 self.vote().class
             }
         }
@@ -137,24 +156,23 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
     }
 
     fn keep(&mut self, example: Example<{ features::COUNT }>) -> Result<(), ExamplesFull> {
-        self.field.add(example).map(|_| ()).map_err(|_| ExamplesFull)
+        if self.field.add(example) { Ok(()) } else { Err(ExamplesFull) }
     }
 
     fn forget(&mut self, number: u8) -> bool {
         self.field.forget(number)
     }
 
-    fn listed(&self, place: u8) -> Option<(Listed, u8)> {
-        let built_in = self.built_in.len() as u8;
-        if let Some(example) = self.built_in.example(usize::from(place)) {
-            return Some((Listed { from_field: false, number: place, example }, place + 1));
-        }
-        for number in place - built_in..field_examples::CAPACITY {
-            if let Some(example) = self.field.slot(number) {
-                return Some((Listed { from_field: true, number, example }, built_in + number + 1));
-            }
-        }
-        None
+    fn forget_all(&mut self) {
+        self.field.forget_all();
+    }
+
+    fn listed(&self, from: u8) -> Option<(Listed, u8)> {
+        (from..self.all()).find_map(|index| {
+            let example = self.at(index)?;
+            let slot = index.checked_sub(self.built_in());
+            Some((Listed { from_field: slot.is_some(), number: slot.unwrap_or(index), example }, index + 1))
+        })
     }
 
     fn spoiled(&self) -> u8 {
@@ -189,49 +207,51 @@ mod tests {
     fn examples_in_flash_and_from_the_field_are_searched_as_one_set() {
         // Both tables full: weeds built in, and field examples that call the same detection a plant.
         let features = Features::describe(556, 300, 60);
-        let bytes = examples::scale().quantise(&features.values());
+        let bytes = examples::scale().quantise(features.values());
         let mut nearest = Nearest::new([Example::new(bytes, label::WEED); examples::CAPACITY], Volatile::new());
-        assert_eq!(nearest.classify(&features, 3), Vote { class: Class::Weed, votes: examples::CAPACITY as u8 });
+        assert_eq!(nearest.classify(&features, 3), Vote { class: Class::Weed, votes: 3 });
         for _ in 0..field_examples::CAPACITY {
             assert_eq!(nearest.teach(&features, label::PLANT), Ok(()));
+            while !nearest.carry_on() {}
         }
         assert_eq!(nearest.teach(&features, label::PLANT), Err(ExamplesFull));
         let listed = listed(&nearest);
         assert!(listed.iter().all(|&(from_field, _, label)| from_field == (label == label::PLANT)));
         assert_eq!(listed.len(), examples::CAPACITY + usize::from(field_examples::CAPACITY));
-        // All are as near as the k-th nearest, so all vote, field examples too.
-        let all = (&nearest.built_in, &nearest.field);
-        let answer = knn::classify::<{ features::COUNT }, { label::COUNT }>(&all, &bytes, 3, examples::RADIUS).unwrap();
-        assert_eq!(answer.votes.map(usize::from), [examples::CAPACITY, usize::from(field_examples::CAPACITY)]);
+        // All are at the same distance, and the plants are nearer.
+        assert_eq!(nearest.classify(&features, 3), Vote { class: Class::Plant, votes: 3 });
     }
 
     #[test]
-    fn invalid_field_examples_are_counted_at_start_up() {
+    fn invalid_field_examples_are_counted() {
         let mut memory = Volatile::new();
-        (memory.bytes[0], memory.bytes[100]) = (0, 0);
-        let mut nearest = Nearest::new([Example::new([0; features::COUNT], label::WEED); 1], memory);
-        nearest.init();
+        (memory.bytes[5], memory.bytes[8 * 12 + 5]) = (0, 1);
+        let nearest = Nearest::new([Example::new([0; features::COUNT], label::WEED); 1], memory);
         assert_eq!(nearest.spoiled(), 2);
     }
 
     #[test]
     fn a_forgotten_example_is_not_listed_and_does_not_vote() {
         let features = Features::describe(556, 300, 60);
-        let bytes = examples::scale().quantise(&features.values());
+        let bytes = examples::scale().quantise(features.values());
         let mut nearest = Nearest::new([Example::new(bytes, label::WEED); 2], Volatile::new());
         for label in [label::PLANT, label::WEED, label::PLANT] {
             assert_eq!(nearest.teach(&features, label), Ok(()));
+            while !nearest.carry_on() {}
         }
         let [built_in, second] = [(false, 0, label::WEED), (false, 1, label::WEED)];
         let field = [(true, 0, label::PLANT), (true, 1, label::WEED), (true, 2, label::PLANT)];
         assert_eq!(listed(&nearest), [built_in, second, field[0], field[1], field[2]]);
-        assert_eq!(nearest.classify(&features, 1), Vote { class: Class::Weed, votes: 3 });
-        assert!(nearest.forget(1) && !nearest.forget(1), "only the first call forgets it");
+        assert_eq!(nearest.classify(&features, 5), Vote { class: Class::Weed, votes: 3 });
+        assert!(nearest.forget(1));
+        while !nearest.carry_on() {}
+        assert!(!nearest.forget(1), "only the first call forgets it");
         assert_eq!(listed(&nearest), [built_in, second, field[0], field[2]]);
-        assert_eq!(nearest.classify(&features, 1).class, Class::Unknown, "two against two");
+        assert_eq!(nearest.classify(&features, 4).class, Class::Unknown, "two against two");
         assert!(nearest.forget(0));
+        while !nearest.carry_on() {}
         assert_eq!(listed(&nearest), [built_in, second, field[2]]);
-        assert_eq!(nearest.classify(&features, 1), Vote { class: Class::Weed, votes: 2 });
+        assert_eq!(nearest.classify(&features, 3), Vote { class: Class::Weed, votes: 2 });
         assert!(!nearest.forget(field_examples::CAPACITY));
         assert_eq!(nearest.built_in_class(&features), Class::Unknown, "fewer examples than k");
     }

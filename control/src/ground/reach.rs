@@ -3,12 +3,32 @@
 use super::slip::Slip;
 use crate::{
     settings::{Setting, Settings},
-    units::{Length, LengthScale, Ticks, TicksPerSecond, Wheel},
+    units::{Length, LengthScale, Speed, Ticks, Wheel},
 };
 
 /// Ground remembered behind the frontier, in metres. With twice the longest X and the widest canopy it stays below the 13 m of a
 /// [`Length`].
 const MEMORY_M: i16 = 8;
+
+/// The settings that are lengths on the ground: neighbours in the table of settings, so that one loop converts them.
+const LENGTHS: [Setting; 8] = [
+    Setting::BeamToToolMm,
+    Setting::SecondBeamMm,
+    Setting::MarginMm,
+    Setting::StemZoneMm,
+    Setting::MaxWidthMm,
+    Setting::MergeGapMm,
+    Setting::GuardSpacingMm,
+    Setting::GuardScatterMm,
+];
+
+const _: () = {
+    let mut index = 0;
+    while index < LENGTHS.len() {
+        assert!(LENGTHS[index] as usize == LENGTHS[0] as usize + index, "they stand in this order in the table");
+        index += 1;
+    }
+};
 
 /// Distances from the settings, for the present wheel and slip.
 #[derive(Clone, Copy, Debug)]
@@ -17,22 +37,8 @@ pub struct Geometry {
     pub wheel: Wheel,
     /// Ticks in a unit of [`Length`].
     pub scale: LengthScale,
-    /// X: from beam to tool.
-    pub beam_to_tool: Length,
-    /// From the first beam back to the second; 0 without a second beam.
-    pub second_beam: Length,
-    /// Ground to keep clear on both sides of a canopy.
-    pub margin: Length,
-    /// The widest canopy.
-    pub max_width: Length,
-    /// Width kept around a single plant's middle; 0 keeps the whole canopy.
-    pub stem_zone: Length,
-    /// Clear ground that ends a detection.
-    pub merge_gap: Length,
-    /// From the middle of a plant to the middle of the next; 0 turns guarding off.
-    pub guard_spacing: Length,
-    /// How far a plant may stand from its expected place.
-    pub guard_scatter: Length,
+    /// The settings that are lengths, [`LENGTHS`].
+    lengths: [Length; LENGTHS.len()],
     /// Ground guarded on either side of an expected plant: the scatter and half a stem zone.
     pub guarded: Length,
     /// Ground remembered behind the frontier.
@@ -44,17 +50,55 @@ impl Geometry {
     pub const NONE: Self = Self {
         wheel: Wheel::NONE,
         scale: LengthScale::TICK,
-        beam_to_tool: Length::ZERO,
-        second_beam: Length::ZERO,
-        margin: Length::ZERO,
-        max_width: Length::ZERO,
-        stem_zone: Length::ZERO,
-        merge_gap: Length::ZERO,
-        guard_spacing: Length::ZERO,
-        guard_scatter: Length::ZERO,
+        lengths: [Length::ZERO; LENGTHS.len()],
         guarded: Length::ZERO,
         memory: Length::ZERO,
     };
+
+    /// X: from beam to tool.
+    pub const fn beam_to_tool(&self) -> Length {
+        self.lengths[0]
+    }
+
+    /// From the first beam back to the second; 0 without a second beam.
+    pub const fn second_beam(&self) -> Length {
+        self.lengths[1]
+    }
+
+    /// Ground to keep clear on both sides of a canopy.
+    pub const fn margin(&self) -> Length {
+        self.lengths[2]
+    }
+
+    /// Width kept around a single plant's middle; 0 keeps the whole canopy.
+    pub const fn stem_zone(&self) -> Length {
+        self.lengths[3]
+    }
+
+    /// The widest canopy.
+    pub const fn max_width(&self) -> Length {
+        self.lengths[4]
+    }
+
+    /// Clear ground that ends a detection.
+    pub const fn merge_gap(&self) -> Length {
+        self.lengths[5]
+    }
+
+    /// From the middle of a plant to the middle of the next; 0 turns guarding off.
+    pub const fn guard_spacing(&self) -> Length {
+        self.lengths[6]
+    }
+
+    /// How far a plant may stand from its expected place.
+    pub const fn guard_scatter(&self) -> Length {
+        self.lengths[7]
+    }
+
+    /// Widens the margin.
+    pub fn widen_margin(&mut self, by: Length) {
+        self.lengths[2] = self.lengths[2] + by;
+    }
 
     /// The narrowest detection that both beams have to see: 8 mm or a tick. Less may be an insect or a clod in one beam.
     pub fn least_seen(&self) -> Length {
@@ -74,16 +118,11 @@ impl Geometry {
         self.wheel = settings.wheel();
         let metre = self.wheel.ticks(1000);
         self.scale = LengthScale::of(metre);
-        let length = |geometry: &Self, setting| geometry.length(settings, setting, excess);
-        self.beam_to_tool = length(self, Setting::BeamToToolMm);
-        self.second_beam = length(self, Setting::SecondBeamMm);
-        self.margin = length(self, Setting::MarginMm);
-        self.max_width = length(self, Setting::MaxWidthMm);
-        self.stem_zone = length(self, Setting::StemZoneMm);
-        self.merge_gap = length(self, Setting::MergeGapMm);
-        self.guard_spacing = length(self, Setting::GuardSpacingMm);
-        self.guard_scatter = length(self, Setting::GuardScatterMm);
-        self.guarded = self.guard_scatter + Length(self.stem_zone.0 >> 1);
+        for index in 0..LENGTHS.len() {
+            let Some(setting) = Setting::from_index(LENGTHS[0] as u8 + index as u8) else { break };
+            self.lengths[index] = self.length(settings, setting, excess);
+        }
+        self.guarded = self.guard_scatter() + Length(self.stem_zone().0 >> 1);
         self.memory = Length(self.scale.length(metre).0 * MEMORY_M);
     }
 
@@ -117,9 +156,9 @@ impl Leads {
 
     /// The leads at a measured speed, if the machine reaches the `expected` speed, at least as high, while the tool swings out. The
     /// way back begins in a moment, at the measured speed. A lead that is too long would let the tool in too early.
-    pub fn at(speed: TicksPerSecond, expected: TicksPerSecond, settings: &Settings, scale: LengthScale) -> Self {
+    pub fn at(speed: Speed, expected: Speed, settings: &Settings) -> Self {
         let out_ms = settings.get(Setting::LeadOutMs);
-        let rolled = move |speed: TicksPerSecond, milliseconds| scale.length(speed.distance_in_ms(milliseconds));
+        let rolled = move |speed: Speed, milliseconds| speed.distance_in_ms(milliseconds);
         // 1 ms is added for the mean delay of a command: half a tick, half a turn, half a pulse. A lead of 0 stays 0, as the paper
         // has it.
         let lead = move |speed, milliseconds: u16| rolled(speed, milliseconds + u16::from(milliseconds > 0));
@@ -191,7 +230,7 @@ mod tests {
 
     #[test]
     fn a_lead_is_the_distance_in_its_time_and_a_millisecond_and_zero_stays_zero() {
-        let (speed, expected) = (TicksPerSecond(1000), TicksPerSecond(1100));
+        let (speed, expected) = (Speed(1000), Speed(1100));
         // Only the swing out is led at the expected speed.
         for (lead_out_ms, expected_leads) in [(180, [199, 41, 7]), (0, [0, 0, 7])] {
             let settings = Settings::with(&[
@@ -199,7 +238,7 @@ mod tests {
                 (Setting::LeadInMs, 40),
                 (Setting::BeamResponseMs, 7),
             ]);
-            let Leads { out, back, response } = Leads::at(speed, expected, &settings, LengthScale::TICK);
+            let Leads { out, back, response } = Leads::at(speed, expected, &settings);
             assert_eq!([out.0, back.0, response.0], expected_leads);
         }
     }
@@ -212,8 +251,9 @@ mod tests {
                 (Setting::BeamToToolMm, 2000),
                 (Setting::MaxWidthMm, 1500),
             ]);
-            let Geometry { scale, beam_to_tool, max_width, memory, .. } = Geometry::of(&settings, 0);
-            let farthest = i32::from(memory.0) + 2 * i32::from(beam_to_tool.0) + i32::from(max_width.0);
+            let geometry = Geometry::of(&settings, 0);
+            let (scale, beam_to_tool, memory) = (geometry.scale, geometry.beam_to_tool(), geometry.memory);
+            let farthest = i32::from(memory.0) + 2 * i32::from(beam_to_tool.0) + i32::from(geometry.max_width().0);
             assert!(farthest < i16::MAX.into(), "{ticks_per_m} a metre: {farthest}");
             let error = scale.ticks(beam_to_tool).0 - 2 * i32::from(ticks_per_m);
             assert!(error <= 0 && -error < 16, "{ticks_per_m} a metre: {error}");

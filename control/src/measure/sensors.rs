@@ -6,17 +6,19 @@
 use super::{
     monitor::{BeamMonitor, EncoderMonitor},
     quadrature::Odometer,
-    readings::{Readings, Startup},
+    readings::Readings,
     speed::SpeedMeter,
     switch::Switch,
 };
-use crate::units::{Instant, Position};
+use crate::units::{Instant, LengthScale, Position};
 
 /// The machine's sensors.
 #[derive(Clone, Debug)]
 pub struct Sensors {
-    /// The last readings, with the odometer's position.
+    /// The last readings.
     pub readings: Readings,
+    /// The odometer's position: the count without the ticks that noise added.
+    pub position: Position,
     /// The work switch.
     pub switch: Switch,
     /// The end switch.
@@ -39,6 +41,7 @@ impl Sensors {
         let (start, position) = (Instant::ZERO, Position::new(0));
         Self {
             readings: Readings { stack_free: 0, ..Readings::new(start, position) },
+            position,
             switch: Switch::NONE,
             end_switch: Switch::NONE,
             odometer: Odometer::NONE,
@@ -49,16 +52,16 @@ impl Sensors {
         }
     };
 
-    /// Takes the first readings.
+    /// Starts with the first `readings`. The beam's level is `broken`.
     #[inline(always)]
-    pub const fn init(&mut self, Startup { readings, beam_broken, .. }: Startup) {
-        let Readings { now, position, jumps, .. } = readings;
-        (self.readings, self.beam_broken) = (readings, beam_broken);
-        self.switch.init(readings.switch_on);
-        self.end_switch.init(readings.end_switch_on);
+    pub const fn init(&mut self, broken: bool, scale: LengthScale) {
+        let Readings { now, position, jumps, switch_on, end_switch_on, .. } = self.readings;
+        (self.position, self.beam_broken) = (position, broken);
+        self.switch.init(now, switch_on);
+        self.end_switch.init(now, end_switch_on);
         self.odometer.init(position, jumps);
         self.encoder.init(now, position);
         self.beam.init(now);
-        self.meter.init(position, now);
+        self.meter.init(scale.wrap(position), now);
     }
 }

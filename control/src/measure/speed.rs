@@ -9,7 +9,7 @@
 //! [`SpeedMeter::expected`] adds what the machine gains in 100 ms. The gain shows in the distance of the averaging time, compared with
 //! its mean over another 80 ms.
 
-use crate::units::{Coarse, Instant, Position, TicksPerSecond};
+use crate::units::{Coarse, Instant, Speed, WrappedPosition};
 
 /// The shortest time between two samples. With their number it sets the averaging time. It is long enough that ticks and turns
 /// cause less than half a percent of error at 1 km/h. It is short enough to follow a walking person.
@@ -24,10 +24,14 @@ const STANDSTILL: u16 = Coarse::steps_in_ms(500);
 /// The patience of a meter that has shown a standing machine. It is beyond the patience of any speed.
 const STANDING: u16 = STANDSTILL + 1;
 
+/// The fastest speed, 10 m/s, and the greatest gain: their sum fits 16 bits. No weeder is as fast, but noise may look so.
+const FASTEST: u16 = 0x5FFF;
+const MOST: i16 = 0x1FFF >> 4;
+
 /// The longest averaging time has to fit a coarse moment.
 const _: () = assert!(SAMPLES as u32 * (STANDSTILL as u32) < u16::MAX as u32);
 
-/// A position and a time. The lower halves are enough: in the longest averaging time, 4 s, no machine rolls 32,767 ticks.
+/// A position and a time. In the longest averaging time, 4 s, no machine rolls the 13 m of half a counter.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
     ticks: u16,
@@ -45,10 +49,10 @@ pub struct SpeedMeter {
     last: Sample,
     /// The silence that the present speed explains.
     patience: u16,
-    speed: TicksPerSecond,
-    /// Eight times the mean distance of the last averaging times, in ticks.
+    speed: Speed,
+    /// Eight times the mean distance of the last averaging times.
     trend: i16,
-    /// The last distance above that mean, in ticks; 0 for a machine that does not become faster.
+    /// The last distance above that mean; 0 for a machine that does not become faster.
     gain: i16,
 }
 
@@ -60,26 +64,26 @@ impl SpeedMeter {
         next: 0,
         last: Sample { ticks: 0, time: Coarse::ZERO },
         patience: 0,
-        speed: TicksPerSecond(0),
+        speed: Speed(0),
         trend: 0,
         gain: 0,
     };
 
     /// A meter of a machine that stands at `position`.
-    pub const fn new(position: Position, now: Instant) -> Self {
+    pub const fn new(position: WrappedPosition, now: Instant) -> Self {
         let mut meter = Self::NONE;
         meter.init(position, now);
         meter
     }
 
     /// Starts with the machine standing at `position`.
-    pub const fn init(&mut self, position: Position, now: Instant) {
+    pub const fn init(&mut self, position: WrappedPosition, now: Instant) {
         self.last = Sample { ticks: position.count() as u16, time: now.coarse() };
         self.patience = STANDSTILL;
     }
 
     /// The speed at the last reading.
-    pub fn speed(&self) -> TicksPerSecond {
+    pub fn speed(&self) -> Speed {
         self.speed
     }
 
@@ -87,14 +91,14 @@ impl SpeedMeter {
     /// because a machine that brakes may stop braking.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn expected(&self) -> TicksPerSecond {
-        // A tick in 80 ms is 12.5 ticks a second. The machine gained them in 80 ms, and gains 16 in 100 ms.
-        TicksPerSecond(self.speed.0 + (i32::from(self.gain) << 4))
+    pub fn expected(&self) -> Speed {
+        // A unit in 80 ms is 12.5 units a second. The machine gained them in 80 ms, and gains 16 in 100 ms.
+        Speed(self.speed.0 + (self.gain << 4))
     }
 
     /// Takes a reading. Returns whether it may have changed the speeds. The caller calls it at least every few milliseconds.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn read(&mut self, now: Instant, position: Position) -> bool {
+    pub fn read(&mut self, now: Instant, position: WrappedPosition) -> bool {
         let reading = Sample { ticks: position.count() as u16, time: now.coarse() };
         if reading.ticks != self.last.ticks {
             self.moved(reading)
@@ -120,15 +124,15 @@ impl SpeedMeter {
         let distance = reading.ticks.wrapping_sub(oldest.ticks).cast_signed();
         let time = reading.time.since(oldest.time);
         let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
-        self.speed = TicksPerSecond(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
-        // It wraps beyond 51,000 ticks a second: 9 km/h with the finest encoder. The lead is then longer, and never shorter.
+        let speed = speed.min(FASTEST.into()) as u16;
+        self.speed = Speed(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
         let gain = distance.wrapping_sub(self.trend >> 3);
         self.trend = self.trend.wrapping_add(gain);
-        self.gain = if (gain ^ distance) < 0 { 0 } else { gain };
+        self.gain = if (gain ^ distance) < 0 { 0 } else { gain.clamp(-MOST, MOST) };
         // The time of two ticks, because encoders do not space their edges evenly.
         self.patience = match speed {
             0 => STANDSTILL,
-            speed => ((2 * Coarse::STEPS_PER_SECOND / speed) as u16).clamp(SPACING, STANDSTILL),
+            speed => ((2 * Coarse::STEPS_PER_SECOND) as u16 / speed).clamp(SPACING, STANDSTILL),
         };
         true
     }
@@ -147,11 +151,11 @@ impl SpeedMeter {
         // The samples no longer give the speed. Measurement restarts when the machine moves.
         (self.count, self.trend, self.gain) = (0, 0, 0);
         if silence >= STANDSTILL {
-            self.speed = TicksPerSecond(0);
+            self.speed = Speed(0);
             return core::mem::replace(&mut self.patience, STANDING) != STANDING;
         }
-        let limit = i32::from(Coarse::STEPS_PER_SECOND as u16 / silence);
-        self.speed = TicksPerSecond(self.speed.0.clamp(-limit, limit));
+        let limit = (Coarse::STEPS_PER_SECOND as u16 / silence) as i16;
+        self.speed = Speed(self.speed.0.clamp(-limit, limit));
         // The next check comes after an eighth more, so that divisions stay rare.
         self.patience = (silence + silence / 8).min(STANDSTILL);
         true

@@ -11,17 +11,17 @@ const SETTLE: u16 = Coarse::steps_in_ms(20);
 #[derive(Clone, Debug)]
 pub struct Switch {
     on: bool,
-    /// Since when the level differs from `on`.
-    differs_since: Option<Coarse>,
+    /// The last reading with the level `on`.
+    steady_at: Coarse,
 }
 
 impl Switch {
     /// A switch that is off.
-    pub const NONE: Self = Self { on: false, differs_since: None };
+    pub const NONE: Self = Self { on: false, steady_at: Coarse::ZERO };
 
     /// Takes the level at start-up.
-    pub const fn init(&mut self, on: bool) {
-        self.on = on;
+    pub const fn init(&mut self, now: Instant, on: bool) {
+        (self.on, self.steady_at) = (on, now.coarse());
     }
 
     /// Whether it is on.
@@ -32,17 +32,15 @@ impl Switch {
     /// Takes the switch's level. Returns the new state when it changes.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn read(&mut self, now: Instant, on: bool) -> Option<bool> {
-        if on == self.on {
-            self.differs_since = None;
-            return None;
-        }
         let now = now.coarse();
-        let since = *self.differs_since.get_or_insert(now);
-        if now.since(since) < SETTLE {
+        if on == self.on {
+            self.steady_at = now;
+        }
+        if now.since(self.steady_at) < SETTLE {
             return None;
         }
         self.on = on;
-        self.differs_since = None;
+        self.steady_at = now;
         Some(on)
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::{
     operate::command_error::CommandError,
-    units::{Instant, Interval, Position},
+    units::{Coarse, Instant, Position},
 };
 
 /// The shortest stretch that gives the ticks a metre to better than 0.1 %.
@@ -65,7 +65,7 @@ impl Distance {
 const ROUNDS: u8 = 6;
 
 /// Time for a swing, several times as long as any servo needs.
-const SWING: Interval = Interval::from_ms(1500);
+const SWING: u16 = Coarse::steps_in_ms(1500);
 
 /// Longest wait of a command besides the servo's gap: the longest pulse on the line, and some turns of the loop.
 const SPARE_MS: u8 = 7;
@@ -101,7 +101,7 @@ pub enum Outcome {
 pub struct Swings {
     /// Swings left, this one included; even numbers are swings in.
     left: u8,
-    since: Instant,
+    since: Coarse,
     /// Whether the switch has followed this swing.
     followed: bool,
     watched: bool,
@@ -117,7 +117,7 @@ impl Swings {
         let wait_ms = if gap_ms == 0 { FRAME_MS } else { gap_ms };
         Self {
             left: 2 * ROUNDS,
-            since: now,
+            since: now.coarse(),
             followed: false,
             watched,
             spare_ms: SPARE_MS + wait_ms,
@@ -132,14 +132,15 @@ impl Swings {
 
     /// Takes the end switch's level, on for "tool out". Returns the result once all swings are done, or one has failed.
     pub fn step(&mut self, now: Instant, switch_on: bool) -> Option<Outcome> {
-        let lasted = now - self.since;
+        let lasted = now.coarse().since(self.since);
         if self.watched && !self.followed && switch_on == self.tool_out() {
             self.followed = true;
+            // A step more, because both moments are rounded down.
+            let lasted_ms = ((u32::from(lasted) + 1) * 8 / 125) as u16;
             // No servo is that fast: the switch is stuck or in the wrong position.
-            if lasted < Interval::from_ms(5) {
+            if lasted_ms < 5 {
                 return Some(Outcome::Failed);
             }
-            let lasted_ms = (lasted.steps() / (Interval::STEPS_PER_SECOND / 1000)) as u16;
             if self.tool_out() {
                 self.leads.out_ms = self.leads.out_ms.max(lasted_ms + 1 + u16::from(self.spare_ms));
             } else {
@@ -152,7 +153,7 @@ impl Swings {
         if self.watched && !self.followed {
             return Some(Outcome::Failed);
         }
-        (self.since, self.followed) = (now, false);
+        (self.since, self.followed) = (now.coarse(), false);
         self.left -= 1;
         match (self.left, self.watched) {
             (0, true) => Some(Outcome::Measured(self.leads)),
@@ -165,7 +166,7 @@ impl Swings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::Ticks;
+    use crate::units::{Interval, Ticks};
 
     /// Ends a stretch of these ticks, where the counter wraps. A refusal comes with the count.
     fn end(ticks: i32, length_mm: u16, forced: bool) -> Result<u16, (CommandError, u16)> {

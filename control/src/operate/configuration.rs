@@ -58,27 +58,26 @@ impl<M: Memory> Configuration<M> {
         self.changed = false;
     }
 
-    /// Sets all of these settings or none. `is_working` tells whether the machine works.
+    /// Changes a setting. `is_working` tells whether the machine works.
     ///
     /// # Errors
     /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new [`Contradiction`]. Nothing is changed then.
     #[inline(never)]
-    pub fn change(&mut self, changes: &[(Setting, u16)], is_working: bool) -> Result<(), CommandError> {
-        let mut settings = self.settings.clone();
-        for &(setting, value) in changes {
-            if setting.is_hold_only() && is_working {
-                return Err(CommandError::NotInHold);
-            }
-            settings.change(setting, value).map_err(|_| CommandError::OutOfRange)?;
+    pub fn change(&mut self, setting: Setting, value: u16, is_working: bool) -> Result<(), CommandError> {
+        if setting.is_hold_only() && is_working {
+            return Err(CommandError::NotInHold);
         }
         // Settings that already contradict each other are corrected one at a time.
-        if let Some(contradiction) = settings.contradiction()
-            && self.settings.contradiction().is_none()
-        {
-            return Err(self.refusal(contradiction));
+        let contradicted = self.settings.contradiction().is_some();
+        let (old, old_calibration) = (self.settings.get(setting), self.settings.get(Setting::TicksPerM));
+        self.settings.change(setting, value).map_err(|_| CommandError::OutOfRange)?;
+        if !contradicted && let Err(refusal) = self.expect_no_contradiction() {
+            let _ = self.settings.set(Setting::TicksPerM, old_calibration);
+            let _ = self.settings.set(setting, old);
+            return Err(refusal);
         }
-        self.settings = settings;
         self.changed = true;
+        self.saved.change();
         Ok(())
     }
 
@@ -106,13 +105,13 @@ impl<M: Memory> Configuration<M> {
     /// A [`Contradiction`].
     pub fn save(&mut self) -> Result<(), CommandError> {
         self.expect_no_contradiction()?;
-        self.saved.save(&self.settings);
+        self.saved.save();
         Ok(())
     }
 
     /// Runs one step of a save, without waiting. Returns whether all is written.
     pub fn carry_on(&mut self) -> bool {
-        self.saved.carry_on()
+        self.saved.carry_on(&self.settings)
     }
 
     /// Checks that the settings fit together.
@@ -152,11 +151,11 @@ mod tests {
         let mut configuration = Configuration::new(Volatile::new());
         configuration.load();
         assert!(!configuration.has_changed(), "start-up recalculates");
-        assert_eq!(configuration.change(&[(Setting::K, 0)], false), Err(CommandError::OutOfRange));
+        assert_eq!(configuration.change(Setting::K, 0, false), Err(CommandError::OutOfRange));
         assert_eq!(configuration.take_saved(), Err(CommandError::NothingSaved));
         assert!(!configuration.has_changed(), "a refused change changes nothing");
         let changes: [fn(&mut Configuration<Volatile>); 3] = [
-            |configuration| configuration.change(&[(Setting::K, 5)], true).expect("within its range"),
+            |configuration| configuration.change(Setting::K, 5, true).expect("within its range"),
             |configuration| configuration.take_defaults(),
             |configuration| {
                 configuration.save().expect("nothing contradicts");

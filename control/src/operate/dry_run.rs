@@ -7,7 +7,7 @@
 use crate::{
     ground::reach::Leads,
     settings::{Setting, Settings},
-    units::{Instant, Interval, Length, LengthScale, TicksPerSecond},
+    units::{Instant, Length, Slow, Speed},
 };
 
 /// Plants in the row.
@@ -19,7 +19,7 @@ const CANOPY_MM: i16 = 150;
 /// A dry run in progress.
 #[derive(Clone, Copy, Debug)]
 pub struct DryRun {
-    begin: Instant,
+    begin: Slow,
     speed_mm_s: u16,
     /// In millimetres instead of ticks.
     leads: Leads,
@@ -29,16 +29,17 @@ pub struct DryRun {
 impl DryRun {
     /// Starts half a metre before the first plant, at a speed in mm/s, with the settings' margin and leads.
     pub fn new(begin: Instant, speed_mm_s: u16, settings: &Settings) -> Self {
-        let speed = TicksPerSecond(speed_mm_s.into());
-        let leads = Leads::at(speed, speed, settings, LengthScale::TICK);
-        Self { begin, speed_mm_s, leads, margin_mm: settings.get(Setting::MarginMm) as i16 }
+        let speed = Speed(speed_mm_s as i16);
+        let leads = Leads::at(speed, speed, settings);
+        Self { begin: begin.slow(), speed_mm_s, leads, margin_mm: settings.get(Setting::MarginMm) as i16 }
     }
 
     /// Whether the tool has to be out now; `was_out` is the last answer. `None` after the last plant. The caller has to ask within
-    /// a minute and a half of the end.
+    /// half a minute of the end.
     pub fn tool_out(&self, now: Instant, was_out: bool) -> Option<bool> {
-        let milliseconds = (now - self.begin).steps() / (Interval::STEPS_PER_SECOND / 1000);
-        let tool_mm = (milliseconds * u32::from(self.speed_mm_s) / 1000) as u16;
+        let time = now.slow().since(self.begin);
+        // In steps of 1.024 ms.
+        let tool_mm = (u32::from(time) * u32::from(self.speed_mm_s) * 16 / 15_625) as u16;
         let last_mm = SPACING_MM * (PLANTS + 1);
         if tool_mm > last_mm as u16 {
             return None;
@@ -55,6 +56,7 @@ impl DryRun {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Interval;
     use std::vec::Vec;
 
     /// The swings of a dry run: the position of each in mm, and whether it is a swing out.

@@ -2,13 +2,13 @@
 
 use crate::{
     settings::{Setting, Settings},
-    units::{Ticks, TicksPerSecond, Wheel},
+    units::{LengthScale, Speed, Ticks, Wheel},
 };
 
-/// Limits in ticks of the present wheel.
+/// Limits of the present wheel.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// In ticks a second, at most 60,000.
+    /// In units of remembered ground a second.
     top_speed: u16,
     /// 0 for no limit.
     no_plant: Ticks,
@@ -19,15 +19,15 @@ impl Limits {
     pub const NONE: Self = Self { top_speed: 0, no_plant: Ticks::ZERO };
 
     /// The limits of these settings with this wheel.
-    pub fn of(settings: &Settings, wheel: Wheel) -> Self {
+    pub fn of(settings: &Settings, wheel: Wheel, scale: LengthScale) -> Self {
         Self {
-            top_speed: wheel.ticks(settings.get(Setting::TopSpeedMmS)).0 as u16,
+            top_speed: scale.length(wheel.ticks(settings.get(Setting::TopSpeedMmS))).0 as u16,
             no_plant: Ticks(wheel.ticks(1000).0 * i32::from(settings.get(Setting::NoPlantM))),
         }
     }
 
     /// Whether a speed is above the top speed.
-    pub fn is_too_fast(self, speed: TicksPerSecond) -> bool {
+    pub fn is_too_fast(self, speed: Speed) -> bool {
         speed.is_beyond(self.top_speed)
     }
 

@@ -3,7 +3,7 @@
 use crate::{
     named::named,
     operate::servo::HalfMicros,
-    units::{Instant, Interval, count},
+    units::{Instant, Slow, count},
 };
 
 named! {
@@ -20,13 +20,16 @@ named! {
     }
 }
 
+/// Steps of 1.024 ms after which a pulse counts as this old, because the clock wraps: longer than any lead.
+const SETTLED: u16 = 0x7FFF;
+
 /// The tool.
 #[derive(Clone, Debug)]
 pub struct Tool {
     out: bool,
     /// The servo's pulse, and since when it has this width.
     pulse: HalfMicros,
-    since: Instant,
+    since: Slow,
     /// Whether the ground for which the tool left the row is yet to come.
     awaits_ground: bool,
     late: u16,
@@ -34,11 +37,11 @@ pub struct Tool {
 
 impl Tool {
     /// A tool before [`init`](Self::init).
-    pub const NONE: Self = Self { out: false, pulse: 0, since: Instant::ZERO, awaits_ground: false, late: 0 };
+    pub const NONE: Self = Self { out: false, pulse: 0, since: Slow::ZERO, awaits_ground: false, late: 0 };
 
     /// Starts with the tool out of the row.
     pub const fn init(&mut self, now: Instant) {
-        (self.out, self.since) = (true, now);
+        (self.out, self.since) = (true, now.slow());
     }
 
     /// Whether it is commanded out.
@@ -54,8 +57,11 @@ impl Tool {
     /// Records the servo's pulse.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub const fn order(&mut self, pulse: HalfMicros, now: Instant) {
+        let now = now.slow();
         if pulse != self.pulse {
             (self.pulse, self.since) = (pulse, now);
+        } else if now.since(self.since) > SETTLED {
+            self.since = now.before(SETTLED);
         }
     }
 
@@ -87,6 +93,26 @@ impl Tool {
     /// Whether the servo has had its pulse for this many milliseconds.
     #[cfg_attr(target_arch = "avr", inline(never))]
     fn is_settled(&self, now: Instant, milliseconds: u16) -> bool {
-        now - self.since >= Interval::from_ms(milliseconds.into())
+        now.slow().since(self.since) >= milliseconds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pulse_that_is_older_than_the_clock_counts_is_still_held() {
+        let mut tool = Tool::NONE;
+        tool.init(Instant::ZERO);
+        let at = |seconds: f64| Instant::at_ms((seconds * 1000.0) as u32);
+        for quarter in 0..1200 {
+            let seconds = 0.25 * f64::from(quarter);
+            tool.order(3000, at(seconds));
+            assert_eq!(tool.has_held(3000, at(seconds), 600), seconds >= 0.75, "{seconds} s");
+            assert!(!tool.has_held(4000, at(seconds), 0), "it has not had this pulse");
+        }
+        tool.order(4000, at(300.0));
+        assert!(!tool.has_held(4000, at(300.0), 600) && tool.has_held(4000, at(301.0), 600));
     }
 }

@@ -4,7 +4,7 @@
 //! Blanks separate words. A line with an error becomes one [`ParseError`] and has no other effect. [`say`](crate::say) runs and
 //! answers commands.
 
-use crate::{ground::class::label, operate::plot::Plot, settings::Setting};
+use crate::settings::Setting;
 use heapless::Vec;
 
 pub use super::words::{Argument, Word};
@@ -15,89 +15,45 @@ pub const LINE_LENGTH: usize = 80;
 /// Marks lost bytes in the stream: SUB, ASCII's own character for it.
 pub const GAP_MARK: u8 = 0x1A;
 
-/// A command of the operator.
+/// A command of the operator: a row of the grammar, and what its line says besides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the table of commands has the words of the others")]
-pub enum Command {
-    Help,
-    /// `help name`.
-    Explain(Setting),
-    Status,
-    GetAll,
-    /// `get name`.
-    Get(Setting),
-    /// `set name value`.
-    Set(Setting, u16),
-    Save,
-    Revert,
-    Defaults,
-    CalibrateStart,
-    /// `calibrate MM`, or `calibrate MM force`.
-    Calibrate {
-        /// The distance rolled since the start.
-        distance_mm: u16,
-        /// Accepts any difference from the wheel's diameter.
-        force: bool,
-    },
-    CalibrateServo,
-    ServoIn,
-    ServoOut,
-    /// `servo US`, in microseconds.
-    Servo(u16),
-    /// `test row`, or `test row MM_S`.
-    TestRow {
-        /// The simulated speed, in mm/s.
-        speed_mm_s: u16,
-    },
-    TestWatchdog,
-    /// `start`, or `start now`.
-    Start {
-        /// At once, also over unseen ground.
-        now: bool,
-    },
-    Hold,
-    Clear,
-    /// `events on|off`.
-    Events(bool),
-    /// `plot on|off|teleplot`.
-    Plot(Plot),
-    /// `label plant|weed`, or `label plant|weed force`.
-    Label {
-        /// The [`label`].
-        label: u8,
-        /// Accepts a label that contradicts the built-in examples.
-        force: bool,
-    },
-    /// `teach N`.
-    Feature(u8),
-    /// `teach plant|weed`: the [`label`].
-    Teach(u8),
-    Examples,
-    /// `forget N`.
-    Forget(u8),
-    ForgetAll,
-    Dump,
-    Version,
+pub struct Command {
+    /// The row.
+    pub action: Action,
+    /// The setting that it names.
+    pub setting: Setting,
+    /// Its number: a value, a distance, a pulse, a speed, a feature or a place.
+    pub number: u16,
+    /// Whether it overrides a plausibility check.
+    pub force: bool,
 }
 
 /// Speed of a dry run without an argument: 1.8 km/h.
 const TEST_SPEED_MM_S: u16 = 500;
 
-/// Why a line is not a command.
+/// What is wrong with a line, in the order of its texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ParseError {
+#[repr(u8)]
+pub enum Wrong {
     /// More than [`LINE_LENGTH`] characters.
-    TooLong,
+    TooLong = 1,
     /// Characters other than printable ASCII.
     NotText,
     /// Bytes were lost before the firmware read them.
     CharactersLost,
     /// No command begins like this.
     UnknownCommand,
-    /// The command takes other arguments.
-    Usage(Word),
     /// No setting has this name.
     UnknownSetting,
+}
+
+/// Why a line is not a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParseError {
+    /// The line says nothing that is known.
+    Line(Wrong),
+    /// The command takes other arguments.
+    Usage(Word),
     /// The setting takes a whole number within its range.
     Value(Setting),
 }
@@ -109,123 +65,147 @@ pub enum ParseError {
 #[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     let (word, rest) = split_word(line);
-    let word = Word::find(word).ok_or(ParseError::UnknownCommand)?;
+    let word = Word::find(word).ok_or(ParseError::Line(Wrong::UnknownCommand))?;
     let usage = Err(ParseError::Usage(word));
     let (first, rest) = split_word(rest);
     let (second, rest) = split_word(rest);
-    if !split_word(rest).0.is_empty() {
-        return usage;
-    }
-    if let (Word::Help | Word::Get | Word::Set, false) = (word, first.is_empty()) {
-        // `set` takes two words, the others one.
-        if second.is_empty() == matches!(word, Word::Set) {
+    let mut command = Command { action: Action::Help, setting: Setting::K, number: TEST_SPEED_MM_S, force: false };
+    let kind = if first.is_empty() {
+        NOTHING
+    } else if matches!(word, Word::Help | Word::Get | Word::Set) {
+        SETTING
+    } else if let Some(argument) = Argument::find(first) {
+        argument as u8
+    } else {
+        let Some(number) = number(first) else { return usage };
+        if number > 255 && matches!(word, Word::Teach | Word::Forget) {
             return usage;
         }
-        let setting = Setting::find(first).ok_or(ParseError::UnknownSetting)?;
-        return match word {
-            Word::Help => Ok(Command::Explain(setting)),
-            Word::Get => Ok(Command::Get(setting)),
-            _ => value(setting, second).map(|value| Command::Set(setting, value)).ok_or(ParseError::Value(setting)),
-        };
-    }
-    let argument = Argument::find(first);
-    // `force` overrides a plausibility check.
-    let force = Argument::find(second) == Some(Argument::Force);
-    let command = if first.is_empty() || argument.is_some() {
-        let Some(command) = of_words(word, argument) else { return usage };
-        command
-    } else {
-        match (word, number(first)) {
-            (Word::Forget, Some(number @ 0..=255)) => Command::Forget(number as u8),
-            (Word::Teach, Some(feature @ 0..=255)) => Command::Feature(feature as u8),
-            (Word::Servo, Some(pulse_us)) => Command::Servo(pulse_us),
-            (Word::Calibrate, Some(distance_mm)) => Command::Calibrate { distance_mm, force },
-            _ => return usage,
-        }
+        command.number = number;
+        NUMBER
     };
-    match command {
-        Command::Label { label, .. } if force => Ok(Command::Label { label, force }),
-        Command::Calibrate { .. } if force => Ok(command),
-        Command::TestRow { .. } if !second.is_empty() => match number(second) {
-            Some(speed_mm_s) => Ok(Command::TestRow { speed_mm_s }),
-            None => usage,
-        },
-        _ if second.is_empty() => Ok(command),
-        _ => usage,
-    }
-}
-
-/// The command for a word and its argument, if there is one.
-fn of_words(word: Word, argument: Option<Argument>) -> Option<Command> {
-    let words = [word as u8, argument_number(argument)];
-    let place = (0..ROWS).map(usize::from).find(|&place| WORDS.load_at(place) == words)?;
-    Some(COMMANDS.load_at(place))
-}
-
-/// An argument's number in the table; without an argument, the number after the last.
-const fn argument_number(argument: Option<Argument>) -> u8 {
-    match argument {
-        Some(argument) => argument as u8,
-        None => Argument::COUNT,
-    }
-}
-
-/// The tables of commands without a number or a setting: the numbers of a word and its argument, and the command. There are two
-/// tables, because the search reads the first row by row.
-macro_rules! commands {
-    () => { None };
-    ($argument:ident) => { Some(Argument::$argument) };
-    ($($word:ident $($argument:ident)? => $command:expr;)*) => {
-        const ROWS: u8 = [$(Word::$word),*].len() as u8;
-
-        avr_progmem::progmem! {
-            static progmem WORDS: [[u8; 2]; ROWS as usize] =
-                [$([Word::$word as u8, argument_number(commands!($($argument)?))]),*];
-            static progmem COMMANDS: [Command; ROWS as usize] = [$($command),*];
+    let mut row = 0;
+    let takes = loop {
+        let Some(action) = Action::from_index(row) else { return usage };
+        command.action = action;
+        let takes = flash::byte(&GRAMMAR, 2 * usize::from(row) + 1);
+        if flash::byte(&GRAMMAR, 2 * usize::from(row)) == word as u8 && takes & KIND == kind {
+            break takes & !KIND;
         }
+        row += 1;
+    };
+    let is_complete = if second.is_empty() { takes & VALUE == 0 } else { takes != 0 };
+    if !is_complete || !split_word(rest).0.is_empty() {
+        return usage;
+    }
+    if kind == SETTING {
+        command.setting = Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?;
+    }
+    if second.is_empty() {
+        return Ok(command);
+    }
+    let argument = Argument::find(second);
+    if takes & FORCE != 0 {
+        command.force = argument == Some(Argument::Force);
+        return if command.force { Ok(command) } else { usage };
+    }
+    command.number = match argument {
+        Some(Argument::On) if takes & VALUE != 0 && command.setting.is_switched() => 1,
+        Some(Argument::Off) if takes & VALUE != 0 && command.setting.is_switched() => 0,
+        _ => match number(second) {
+            Some(number) => number,
+            None => return if takes & VALUE != 0 { Err(ParseError::Value(command.setting)) } else { usage },
+        },
+    };
+    Ok(command)
+}
+
+/// What follows the word: an argument, by its number, or one of these.
+const NOTHING: u8 = Argument::COUNT;
+const NUMBER: u8 = NOTHING + 1;
+const SETTING: u8 = NOTHING + 2;
+const KIND: u8 = 0x1F;
+const _: () = assert!(SETTING <= KIND);
+
+/// What follows that: `force` or a speed, which may be left out, or a value. Otherwise nothing.
+const FORCE: u8 = 1 << 5;
+const SPEED: u8 = 1 << 6;
+const VALUE: u8 = 1 << 7;
+
+/// Makes the grammar, one row a command: its action, its word, what follows the word, and what follows that.
+macro_rules! commands {
+    (@) => { NOTHING };
+    (@ number) => { NUMBER };
+    (@ setting) => { SETTING };
+    (@ $argument:ident) => { Argument::$argument as u8 };
+    ($($Action:ident: $word:ident $($argument:ident)? $(+ $more:ident)?;)*) => {
+        /// What a command does, a row of the grammar each.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        #[expect(missing_docs, reason = "the rows say what each is")]
+        pub enum Action { $($Action),* }
+
+        impl Action {
+            const fn from_index(index: u8) -> Option<Self> {
+                match index {
+                    $(index if index == Self::$Action as u8 => Some(Self::$Action),)*
+                    _ => None,
+                }
+            }
+        }
+
+        const ROWS: &[[u8; 2]] = &[$([Word::$word as u8, commands!(@ $($argument)?) $(| $more)?]),*];
     };
 }
 
 commands! {
-    // The commands with the longest lines come first, because the search takes 30 cycles a row.
-    Label Plant => Command::Label { label: label::PLANT, force: false };
-    Label Weed => Command::Label { label: label::WEED, force: false };
-    Calibrate Start => Command::CalibrateStart;
-    Calibrate Servo => Command::CalibrateServo;
-    Test Row => Command::TestRow { speed_mm_s: TEST_SPEED_MM_S };
-    Test Watchdog => Command::TestWatchdog;
-    Help => Command::Help;
-    Status => Command::Status;
-    Get => Command::GetAll;
-    Save => Command::Save;
-    Revert => Command::Revert;
-    Defaults => Command::Defaults;
-    Servo In => Command::ServoIn;
-    Servo Out => Command::ServoOut;
-    Start => Command::Start { now: false };
-    Start Now => Command::Start { now: true };
-    Hold => Command::Hold;
-    Clear => Command::Clear;
-    Events On => Command::Events(true);
-    Events Off => Command::Events(false);
-    Plot On => Command::Plot(Plot::Arduino);
-    Plot Off => Command::Plot(Plot::Off);
-    Plot Teleplot => Command::Plot(Plot::Teleplot);
-    Examples => Command::Examples;
-    Teach Plant => Command::Teach(label::PLANT);
-    Teach Weed => Command::Teach(label::WEED);
-    Forget All => Command::ForgetAll;
-    Dump => Command::Dump;
-    Version => Command::Version;
+    LabelPlant: Label Plant + FORCE;
+    LabelWeed: Label Weed + FORCE;
+    CalibrateStart: Calibrate Start;
+    CalibrateServo: Calibrate Servo;
+    Calibrate: Calibrate number + FORCE;
+    TestRow: Test Row + SPEED;
+    TestWatchdog: Test Watchdog;
+    Help: Help;
+    Explain: Help setting;
+    Status: Status;
+    GetAll: Get;
+    Get: Get setting;
+    Set: Set setting + VALUE;
+    Save: Save;
+    Revert: Revert;
+    Defaults: Defaults;
+    ServoIn: Servo In;
+    ServoOut: Servo Out;
+    Servo: Servo number;
+    Start: Start;
+    StartNow: Start Now;
+    Hold: Hold;
+    Clear: Clear;
+    EventsOn: Events On;
+    EventsOff: Events Off;
+    PlotOn: Plot On;
+    PlotOff: Plot Off;
+    PlotTeleplot: Plot Teleplot;
+    Examples: Examples;
+    Feature: Teach number;
+    TeachPlant: Teach Plant;
+    TeachWeed: Teach Weed;
+    Forget: Forget number;
+    ForgetAll: Forget All;
+    Dump: Dump;
+    Version: Version;
 }
 
-/// A setting's value from a word: a number, or `on` or `off` for a switch.
-fn value(setting: Setting, word: &[u8]) -> Option<u16> {
-    match Argument::find(word) {
-        Some(Argument::On) if setting.is_switched() => Some(1),
-        Some(Argument::Off) if setting.is_switched() => Some(0),
-        _ => number(word),
-    }
+avr_progmem::progmem! {
+    static progmem GRAMMAR: [u8; 2 * ROWS.len()] = {
+        let (mut bytes, mut place) = ([0; 2 * ROWS.len()], 0);
+        while place < bytes.len() {
+            bytes[place] = ROWS[place / 2][place % 2];
+            place += 1;
+        }
+        bytes
+    };
 }
 
 /// The next word of a line, empty at its end, and what follows it.
@@ -257,7 +237,7 @@ fn number(digits: &[u8]) -> Option<u16> {
 #[derive(Clone, Debug, Default)]
 pub struct LineBuffer {
     characters: Vec<u8, LINE_LENGTH, u8>,
-    error: Option<ParseError>,
+    error: Option<Wrong>,
 }
 
 impl LineBuffer {
@@ -282,11 +262,11 @@ impl LineBuffer {
             }
             b'\t' | b' '..=b'~' => {
                 if self.characters.push(byte).is_err() {
-                    self.fail(ParseError::TooLong);
+                    self.fail(Wrong::TooLong);
                 }
             }
-            GAP_MARK => self.fail(ParseError::CharactersLost),
-            _ => self.fail(ParseError::NotText),
+            GAP_MARK => self.fail(Wrong::CharactersLost),
+            _ => self.fail(Wrong::NotText),
         }
         false
     }
@@ -295,7 +275,7 @@ impl LineBuffer {
     #[inline(never)]
     pub fn read(&mut self) -> Option<Result<Command, ParseError>> {
         let line = match self.error.take() {
-            Some(error) => Some(Err(error)),
+            Some(wrong) => Some(Err(ParseError::Line(wrong))),
             None if split_word(&self.characters).0.is_empty() => None,
             None => Some(parse(&self.characters)),
         };
@@ -303,7 +283,7 @@ impl LineBuffer {
         line
     }
 
-    fn fail(&mut self, error: ParseError) {
+    fn fail(&mut self, error: Wrong) {
         self.error.get_or_insert(error);
     }
 }
@@ -313,69 +293,91 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    fn answers(bytes: &[u8]) -> Vec<Result<Command, ParseError>> {
+    fn answers(bytes: &[u8]) -> Vec<Result<Action, ParseError>> {
         let mut line = LineBuffer::new();
-        bytes.iter().filter_map(|&byte| line.take(byte)).collect()
+        let parsed = bytes.iter().filter_map(|&byte| line.take(byte));
+        parsed.map(|parsed| parsed.map(|command| command.action)).collect()
     }
 
     #[test]
     fn every_command_is_parsed_with_its_arguments() {
-        for (line, command) in [
-            (&b"help"[..], Command::Help),
-            (b"help k", Command::Explain(Setting::K)),
-            (b"status", Command::Status),
-            (b"get", Command::GetAll),
-            (b"get wheel_mm", Command::Get(Setting::WheelMm)),
-            (b"set wheel_mm 405", Command::Set(Setting::WheelMm, 405)),
-            (b"  set \t wheel_mm   405 ", Command::Set(Setting::WheelMm, 405)),
-            (b"set end_switch on", Command::Set(Setting::EndSwitch, 1)),
-            (b"set end_switch off", Command::Set(Setting::EndSwitch, 0)),
-            (b"set end_switch 1", Command::Set(Setting::EndSwitch, 1)),
-            (b"save", Command::Save),
-            (b"revert", Command::Revert),
-            (b"defaults", Command::Defaults),
-            (b"calibrate start", Command::CalibrateStart),
-            (b"calibrate 10000", Command::Calibrate { distance_mm: 10_000, force: false }),
-            (b"calibrate 10000 force", Command::Calibrate { distance_mm: 10_000, force: true }),
-            (b"calibrate servo", Command::CalibrateServo),
-            (b"servo in", Command::ServoIn),
-            (b"servo out", Command::ServoOut),
-            (b"servo 1750", Command::Servo(1750)),
-            (b"test row", Command::TestRow { speed_mm_s: 500 }),
-            (b"test row 700", Command::TestRow { speed_mm_s: 700 }),
-            (b"test watchdog", Command::TestWatchdog),
-            (b"plot on", Command::Plot(Plot::Arduino)),
-            (b"plot off", Command::Plot(Plot::Off)),
-            (b"plot teleplot", Command::Plot(Plot::Teleplot)),
-            (b"start", Command::Start { now: false }),
-            (b"start now", Command::Start { now: true }),
-            (b"hold", Command::Hold),
-            (b"clear", Command::Clear),
-            (b"events on", Command::Events(true)),
-            (b"events off", Command::Events(false)),
-            (b"label plant", Command::Label { label: label::PLANT, force: false }),
-            (b"label weed", Command::Label { label: label::WEED, force: false }),
-            (b"label weed force", Command::Label { label: label::WEED, force: true }),
-            (b"teach 255", Command::Feature(255)),
-            (b"teach plant", Command::Teach(label::PLANT)),
-            (b"teach weed", Command::Teach(label::WEED)),
-            (b"examples", Command::Examples),
-            (b"forget 31", Command::Forget(31)),
-            (b"forget all", Command::ForgetAll),
-            (b"dump", Command::Dump),
-            (b"version", Command::Version),
+        use Action::*;
+        for (line, action) in [
+            (&b"help"[..], Help),
+            (b"status", Status),
+            (b"get", GetAll),
+            (b"save", Save),
+            (b"revert", Revert),
+            (b"defaults", Defaults),
+            (b"calibrate start", CalibrateStart),
+            (b"calibrate servo", CalibrateServo),
+            (b"servo in", ServoIn),
+            (b"servo out", ServoOut),
+            (b"test watchdog", TestWatchdog),
+            (b"plot on", PlotOn),
+            (b"plot off", PlotOff),
+            (b"plot teleplot", PlotTeleplot),
+            (b"start", Start),
+            (b"start now", StartNow),
+            (b"hold", Hold),
+            (b"clear", Clear),
+            (b"events on", EventsOn),
+            (b"events off", EventsOff),
+            (b"label plant", LabelPlant),
+            (b"label weed", LabelWeed),
+            (b"teach plant", TeachPlant),
+            (b"teach weed", TeachWeed),
+            (b"examples", Examples),
+            (b"forget all", ForgetAll),
+            (b"dump", Dump),
+            (b"version", Version),
         ] {
-            assert_eq!(parse(line), Ok(command), "{}", line.escape_ascii());
+            let parsed = parse(line).map(|command| (command.action, command.force));
+            assert_eq!(parsed, Ok((action, false)), "{}", line.escape_ascii());
+        }
+        for (line, action, number) in [
+            (&b"calibrate 10000"[..], Calibrate, 10_000),
+            (b"servo 1750", Servo, 1750),
+            (b"test row", TestRow, 500),
+            (b"test row 700", TestRow, 700),
+            (b"teach 255", Feature, 255),
+            (b"forget 31", Forget, 31),
+        ] {
+            let parsed = parse(line).map(|command| (command.action, command.number, command.force));
+            assert_eq!(parsed, Ok((action, number, false)), "{}", line.escape_ascii());
+        }
+        for (line, action) in [
+            (&b"calibrate 10000 force"[..], Calibrate),
+            (b"label plant force", LabelPlant),
+            (b"label weed force", LabelWeed),
+        ] {
+            let parsed = parse(line).map(|command| (command.action, command.force));
+            assert_eq!(parsed, Ok((action, true)), "{}", line.escape_ascii());
+        }
+        for (line, action, setting) in [(&b"help k"[..], Explain, Setting::K), (b"get wheel_mm", Get, Setting::WheelMm)]
+        {
+            let parsed = parse(line).map(|command| (command.action, command.setting));
+            assert_eq!(parsed, Ok((action, setting)), "{}", line.escape_ascii());
+        }
+        for (line, setting, value) in [
+            (&b"set wheel_mm 405"[..], Setting::WheelMm, 405),
+            (b"  set \t wheel_mm   405 ", Setting::WheelMm, 405),
+            (b"set end_switch on", Setting::EndSwitch, 1),
+            (b"set end_switch off", Setting::EndSwitch, 0),
+            (b"set end_switch 1", Setting::EndSwitch, 1),
+        ] {
+            let parsed = parse(line).map(|command| (command.action, command.setting, command.number));
+            assert_eq!(parsed, Ok((Set, setting, value)), "{}", line.escape_ascii());
         }
     }
 
     #[test]
     fn an_unknown_name_or_value_is_an_error() {
         for (line, error) in [
-            (&b"hepl"[..], ParseError::UnknownCommand),
-            (b"HELP", ParseError::UnknownCommand),
-            (b"help me", ParseError::UnknownSetting),
-            (b"set wheel 400", ParseError::UnknownSetting),
+            (&b"hepl"[..], ParseError::Line(Wrong::UnknownCommand)),
+            (b"HELP", ParseError::Line(Wrong::UnknownCommand)),
+            (b"help me", ParseError::Line(Wrong::UnknownSetting)),
+            (b"set wheel 400", ParseError::Line(Wrong::UnknownSetting)),
             (b"set wheel_mm 4oo", ParseError::Value(Setting::WheelMm)),
             (b"set wheel_mm -400", ParseError::Value(Setting::WheelMm)),
             (b"set wheel_mm on", ParseError::Value(Setting::WheelMm)),
@@ -389,7 +391,7 @@ mod tests {
     #[test]
     fn arguments_that_a_command_does_not_take_name_the_allowed_ones() {
         for (word, command, arguments) in [
-            (Word::Help, "help", &["me now"][..]),
+            (Word::Help, "help", &["k now", "me now"][..]),
             (Word::Status, "status", &["please"]),
             (Word::Set, "set", &["wheel_mm", "wheel_mm 400 mm"]),
             (Word::Start, "start", &["later"]),
@@ -416,7 +418,7 @@ mod tests {
     #[test]
     fn a_line_is_one_command_or_one_error_and_the_next_line_is_read() {
         let hold_and = |spaces: usize| [&b"hold"[..], &[b' '; 80][..spaces], b"\n"].concat();
-        let twice = &[Ok(Command::Hold), Ok(Command::Clear)][..];
+        let twice = &[Ok(Action::Hold), Ok(Action::Clear)][..];
         for (text, expected) in [
             // Carriage return, line feed or both end a line.
             (&b"hold\rclear\r"[..], twice),
@@ -425,12 +427,12 @@ mod tests {
             (b"\n\nhold\r\r\n \nclear\n", twice),
             // Backspace deletes the last character.
             (b"hole\x08d\n\x7F\x7Fclear\n", twice),
-            (&[&[b'x'; 300][..], b"\nclear\n"].concat(), &[Err(ParseError::TooLong), Ok(Command::Clear)]),
-            (b"\xFF\0\x1Bhold\nclear\n", &[Err(ParseError::NotText), Ok(Command::Clear)]),
-            (b"set k 1\x1A\nclear\n", &[Err(ParseError::CharactersLost), Ok(Command::Clear)]),
+            (&[&[b'x'; 300][..], b"\nclear\n"].concat(), &[Err(ParseError::Line(Wrong::TooLong)), Ok(Action::Clear)]),
+            (b"\xFF\0\x1Bhold\nclear\n", &[Err(ParseError::Line(Wrong::NotText)), Ok(Action::Clear)]),
+            (b"set k 1\x1A\nclear\n", &[Err(ParseError::Line(Wrong::CharactersLost)), Ok(Action::Clear)]),
             // Eighty characters are not too long.
-            (&hold_and(76), &[Ok(Command::Hold)]),
-            (&hold_and(77), &[Err(ParseError::TooLong)]),
+            (&hold_and(76), &[Ok(Action::Hold)]),
+            (&hold_and(77), &[Err(ParseError::Line(Wrong::TooLong))]),
         ] {
             assert_eq!(answers(text), expected, "{}", text.escape_ascii());
         }

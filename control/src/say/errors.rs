@@ -18,17 +18,13 @@ use crate::{
 pub(super) fn write_parse_error(error: ParseError, line: &mut Line) {
     line.say(texts::ERROR);
     let what = match error {
-        ParseError::TooLong => texts::TOO_LONG,
-        ParseError::NotText => texts::NOT_TEXT,
-        ParseError::CharactersLost => texts::CHARACTERS_LOST,
-        ParseError::UnknownCommand => texts::UNKNOWN_COMMAND,
-        ParseError::UnknownSetting => texts::UNKNOWN_SETTING,
         ParseError::Usage(word) => {
             line.say(texts::USAGE);
             line.say(word.text());
             word.takes()
         }
         ParseError::Value(setting) => return write_allowed(setting.text(), setting, line),
+        ParseError::Line(wrong) => texts::TOO_LONG.plus(wrong as u8 - 1),
     };
     line.say(what);
 }

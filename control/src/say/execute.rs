@@ -2,12 +2,9 @@
 
 use super::{
     answer::Answer,
-    command::{Command, ParseError},
+    command::{Action, Command, ParseError},
 };
-use crate::{
-    ground::class::Classifier, memory::Memory, operate::command_error::CommandError, settings::Setting,
-    weeder::Controller,
-};
+use crate::{ground::class::Classifier, memory::Memory, operate::plot::Plot, settings::Setting, weeder::Controller};
 
 /// Runs a line and begins its answer.
 #[inline(never)]
@@ -23,66 +20,75 @@ where
             return Answer::Wrong(error);
         }
     };
-    match command {
-        Command::Help => Answer::Help(0),
-        Command::Explain(setting) => Answer::Explain(setting),
-        Command::Status => Answer::Status,
-        Command::GetAll => Answer::GetAll(0),
-        Command::Get(setting) => Answer::Get(setting),
-        Command::Version => Answer::Version,
-        Command::Examples => Answer::Examples(0),
-        Command::Dump => Answer::DumpHeading,
-        Command::Set(setting, value) => done(controller.set(setting, value), Some(setting)),
-        Command::Save => done(controller.save(), None),
-        Command::Revert => done(controller.take_saved(), None),
-        Command::Defaults => done(controller.take_defaults(), None),
-        Command::CalibrateStart => done(controller.calibrate_start(), None),
-        Command::Calibrate { distance_mm, force } => match controller.calibrate(distance_mm, force) {
-            Ok(()) => Answer::Get(Setting::TicksPerM),
-            refused => done(refused, Some(Setting::TicksPerM)),
-        },
-        Command::CalibrateServo => done(controller.calibrate_servo(), None),
-        Command::ServoIn => done(controller.servo_in(), None),
-        Command::ServoOut => done(controller.servo_out(), None),
-        Command::Servo(pulse_us) => done(controller.servo_by_hand(pulse_us), None),
-        Command::TestRow { speed_mm_s } => done(controller.test_row(speed_mm_s), None),
-        Command::TestWatchdog => done(controller.test_watchdog(), None),
-        Command::Plot(plot) => {
-            controller.set_plot(plot);
-            Answer::Ok
+    let Command { action, setting, number, force } = command;
+    let mut refused = None;
+    let result = match action {
+        Action::Help => return Answer::Help(0),
+        Action::Explain => return Answer::Explain(setting),
+        Action::Status => return Answer::Status,
+        Action::GetAll => return Answer::GetAll(0),
+        Action::Get => return Answer::Get(setting),
+        Action::Version => return Answer::Version,
+        Action::Examples => return Answer::Examples(0),
+        Action::Dump => return Answer::DumpHeading,
+        Action::Set => {
+            refused = Some(setting);
+            controller.set(setting, number)
         }
-        Command::Start { now } => done(controller.start(now), None),
-        Command::Label { label, force } => done(controller.label(label, force), None),
-        Command::Feature(feature) => {
-            controller.enter_feature(feature);
-            Answer::Ok
+        Action::Save => controller.save(),
+        Action::Revert => controller.take_saved(),
+        Action::Defaults => controller.take_defaults(),
+        Action::CalibrateStart => controller.calibrate_start(),
+        Action::Calibrate => {
+            refused = Some(Setting::TicksPerM);
+            match controller.calibrate(number, force) {
+                Ok(()) => return Answer::Get(Setting::TicksPerM),
+                refused => refused,
+            }
         }
-        Command::Teach(label) => done(controller.teach(label), None),
-        Command::Forget(number) => done(controller.forget(number), None),
-        Command::ForgetAll => {
+        Action::CalibrateServo => controller.calibrate_servo(),
+        Action::ServoIn => controller.servo_in(),
+        Action::ServoOut => controller.servo_out(),
+        Action::Servo => controller.servo_by_hand(number),
+        Action::TestRow => controller.test_row(number),
+        Action::TestWatchdog => controller.test_watchdog(),
+        Action::PlotOn | Action::PlotOff | Action::PlotTeleplot => {
+            controller.set_plot(match action {
+                Action::PlotOn => Plot::Arduino,
+                Action::PlotTeleplot => Plot::Teleplot,
+                _ => Plot::Off,
+            });
+            Ok(())
+        }
+        Action::Start | Action::StartNow => controller.start(matches!(action, Action::StartNow)),
+        Action::LabelPlant | Action::LabelWeed => {
+            controller.label(u8::from(matches!(action, Action::LabelPlant)), force)
+        }
+        Action::Feature => {
+            controller.enter_feature(number as u8);
+            Ok(())
+        }
+        Action::TeachPlant | Action::TeachWeed => controller.teach(u8::from(matches!(action, Action::TeachPlant))),
+        Action::Forget => controller.forget(number as u8),
+        Action::ForgetAll => {
             controller.forget_all();
-            Answer::Ok
+            Ok(())
         }
-        Command::Hold => {
+        Action::Hold => {
             controller.hold();
-            Answer::Ok
+            Ok(())
         }
-        Command::Clear => {
+        Action::Clear => {
             controller.clear();
-            Answer::Ok
+            Ok(())
         }
-        Command::Events(on) => {
-            controller.enable_events(on);
-            Answer::Ok
+        Action::EventsOn | Action::EventsOff => {
+            controller.enable_events(matches!(action, Action::EventsOn));
+            Ok(())
         }
-    }
-}
-
-/// The answer to a command that can fail.
-#[inline(never)]
-fn done(result: Result<(), CommandError>, setting: Option<Setting>) -> Answer {
+    };
     match result {
         Ok(()) => Answer::Ok,
-        Err(error) => Answer::Refused(error, setting),
+        Err(error) => Answer::Refused(error, refused),
     }
 }

@@ -101,7 +101,7 @@ macro_rules! status_table {
                 "for" = reason(reason) => reason: Option<String>,
                     "at work: why the tool is out (`plant`, `unseen_ground`, `too_fast`, `encoder_doubtful`)";
             } {
-                "pos" = number(machine.readings().position.count()) => position: i32,
+                "pos" = number(machine.position().count()) => position: i32,
                     "the machine's position, in encoder ticks";
                 "speed_mm_s" = number(machine.speed_mm_s()) => speed_mm_s: i32,
                     "the machine's speed in mm/s, negative backwards";

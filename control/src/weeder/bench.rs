@@ -69,7 +69,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
     pub fn calibrate_start(&mut self) -> Result<(), CommandError> {
         self.expect_hold()?;
-        self.distance.begin(self.sensors.readings.position);
+        self.distance.begin(self.sensors.position);
         Ok(())
     }
 
@@ -79,7 +79,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set). Nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), CommandError> {
         let nominal = self.configuration.settings().nominal_ticks_per_m();
-        let counted = self.distance.end(self.sensors.readings.position, distance_mm, nominal, force)?;
+        let counted = self.distance.end(self.sensors.position, distance_mm, nominal, force)?;
         self.set(Setting::TicksPerM, counted)
     }
 
@@ -124,13 +124,17 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         out
     }
 
-    /// Sets the leads from the measured times, if the settings allow them, and reports the result.
+    /// Sets both leads from the measured times, or none if the settings do not allow one, and reports the result.
     fn finish_swings(&mut self, outcome: Outcome) {
         let fits = match outcome {
-            Outcome::Measured(SwingTimes { out_ms, in_ms }) => self
-                .configuration
-                .change(&[(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, in_ms)], self.is_working())
-                .is_ok(),
+            Outcome::Measured(SwingTimes { out_ms, in_ms }) => {
+                let before_ms = self.configuration.get(Setting::LeadInMs);
+                let fits = self.set(Setting::LeadInMs, in_ms).is_ok() && self.set(Setting::LeadOutMs, out_ms).is_ok();
+                if !fits {
+                    let _ = self.set(Setting::LeadInMs, before_ms);
+                }
+                fits
+            }
             _ => false,
         };
         self.events.announce(Event::Calibrated { outcome, fits });

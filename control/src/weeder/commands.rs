@@ -2,10 +2,7 @@
 
 use super::Controller;
 use crate::{
-    ground::{
-        class::{Class, Classifier, ExamplesFull, label},
-        field_examples,
-    },
+    ground::class::{Class, Classifier, ExamplesFull, label},
     memory::Memory,
     operate::{command_error::CommandError, limits::Limits, plot::Plot, state::State, unknown_run::UnknownRun},
     settings::Setting,
@@ -53,7 +50,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// [`CommandError::NotInHold`], [`CommandError::OutOfRange`], and a new [`Contradiction`](crate::settings::Contradiction).
     /// Nothing is changed then.
     pub fn set(&mut self, setting: Setting, value: u16) -> Result<(), CommandError> {
-        self.configuration.change(&[(setting, value)], self.is_working())
+        self.configuration.change(setting, value, self.is_working())
     }
 
     /// Restores factory settings in RAM. [`save`](Self::save) writes them to the EEPROM.
@@ -83,8 +80,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.ground.forget_slip();
         }
         let settings = self.configuration.settings();
-        self.ground.follow(settings, self.sensors.readings.position);
-        self.limits = Limits::of(settings, self.ground.wheel());
+        self.ground.follow(settings, self.sensors.position);
+        self.limits = Limits::of(settings, self.ground.wheel(), self.ground.scale());
         self.leads_are_old = true;
     }
 
@@ -159,9 +156,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Forgets all field examples.
     pub fn forget_all(&mut self) {
-        for number in 0..field_examples::CAPACITY {
-            self.classifier.forget(number);
-        }
+        self.classifier.forget_all();
     }
 
     /// Turns event lines on or off.

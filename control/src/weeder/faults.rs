@@ -24,7 +24,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// The fault in the readings, if any. `doubted` is the number of ticks that may be noise.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
-        let Readings { now, position, end_switch_on, stack_free, .. } = self.sensors.readings;
+        let Readings { now, end_switch_on, stack_free, .. } = self.sensors.readings;
+        let position = self.sensors.position;
         let working = self.is_working();
         let fault = self.sensors.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
         if !self.sensors.encoder.stands() {
@@ -82,7 +83,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                 self.events.add(Event::Warning(Warning::LateCommand));
             }
         }
-        if self.plant_timeout.warn(self.sensors.readings.position, self.limits.no_plant()) {
+        if self.plant_timeout.warn(self.sensors.position, self.limits.no_plant()) {
             self.events.add(Event::Warning(Warning::NoPlants));
         }
     }

@@ -9,7 +9,7 @@ use crate::{
         calibration::Distance, detections::Detections, event::Event, lamp, plot::Plot, state::State, tool::Reason,
     },
     settings::{Setting, Settings},
-    units::Ticks,
+    units::{Length, Position, Ticks},
 };
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
@@ -35,12 +35,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Why the tool may or may not work at its position.
     pub fn ground_at_tool(&self) -> AtTool {
-        self.ground.at_tool(self.sensors.readings.position)
+        self.ground.at_tool(self.sensors.position)
     }
 
     /// The machine's speed in millimetres a second, negative backwards.
     pub fn speed_mm_s(&self) -> i16 {
-        self.ground.millimetres(Ticks(self.sensors.meter.speed().0))
+        self.ground.millimetres(self.ticks_per_s())
     }
 
     /// Keep-out zones at the tool or ahead of it, with an open detection.
@@ -70,7 +70,12 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the wheel turns so fast that an edge can be missed: both channels may then change at once.
     pub fn believes_jumps(&self) -> bool {
-        self.sensors.meter.speed().is_beyond(quadrature::FAST)
+        self.ticks_per_s().0.unsigned_abs() > quadrature::FAST.into()
+    }
+
+    /// The ticks that the machine rolls in a second.
+    fn ticks_per_s(&self) -> Ticks {
+        self.ground.ticks(Length(self.sensors.meter.speed().0))
     }
 
     /// Whether the beam is broken.
@@ -86,6 +91,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Whether the tool is commanded out of the row.
     pub fn tool_out(&self) -> bool {
         self.tool.is_out()
+    }
+
+    /// The machine's position: the encoder's count without the ticks that noise added.
+    pub fn position(&self) -> Position {
+        self.sensors.position
     }
 
     /// The last readings.

@@ -40,7 +40,7 @@ impl Classifier for ByWidth {
     }
 
     fn classify(&self, features: &Features, _: u8) -> Vote {
-        let class = if features.hold_mm < self.least_hold_mm { Class::Weed } else { Class::Plant };
+        let class = if features.hold_mm() < self.least_hold_mm { Class::Weed } else { Class::Plant };
         Vote { class, votes: 1 }
     }
 }

@@ -119,7 +119,7 @@ pub fn train(objects: &[Labelled], k: Option<u8>, most: usize) -> Result<Trainin
         objects.len()
     );
 
-    let values: Vec<[i16; COUNT]> = objects.iter().map(|object| object.features.values()).collect();
+    let values: Vec<[i16; COUNT]> = objects.iter().map(|object| *object.features.values()).collect();
     let ranges = Scale::learn_ranges(&values).context(NO_OBJECTS)?;
     let examples = quantised(&Scale::new(ranges), objects);
     let edited = condense::edit(&examples);

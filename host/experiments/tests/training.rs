@@ -69,14 +69,14 @@ fn the_simulated_field_has_every_speed_slip_missing_plants_and_weeds_everywhere(
         objects.iter().any(|object| object.kind == kind && test(&object.features))
     };
     for speed in SPEED_CLASSES_MM_S {
-        assert!(is(Kind::Plant, &|features| features.speed_mm_s == speed), "{speed}");
-        assert!(is(Kind::Weed, &|features| features.speed_mm_s == speed && features.spacing_mm < 120), "{speed}");
-        assert!(is(Kind::Weed, &|features| features.speed_mm_s == speed && features.spacing_mm > 700), "{speed}");
+        assert!(is(Kind::Plant, &|features| features.speed_mm_s() == speed), "{speed}");
+        assert!(is(Kind::Weed, &|features| features.speed_mm_s() == speed && features.spacing_mm() < 120), "{speed}");
+        assert!(is(Kind::Weed, &|features| features.speed_mm_s() == speed && features.spacing_mm() > 700), "{speed}");
     }
     // 650 mm is the widest planted spacing, and 180 mm of canopy are 280 mm of hold.
-    assert!(is(Kind::Plant, &|features| features.spacing_mm > 800), "a plant behind one that is missing");
-    assert!(is(Kind::Plant, &|features| features.hold_mm > 281), "a wheel that drags counts more than it rolled");
-    let widest_weed = objects.iter().filter(|object| object.kind == Kind::Weed).map(|object| object.features.hold_mm);
+    assert!(is(Kind::Plant, &|features| features.spacing_mm() > 800), "a plant behind one that is missing");
+    assert!(is(Kind::Plant, &|features| features.hold_mm() > 281), "a wheel that drags counts more than it rolled");
+    let widest_weed = objects.iter().filter(|object| object.kind == Kind::Weed).map(|object| object.features.hold_mm());
     assert!(widest_weed.max().is_some_and(|hold_mm| hold_mm <= 121));
 }
 
@@ -174,7 +174,7 @@ fn a_written_table_of_examples_reads_back() {
     let mut read_back = read_text(&[&String::from_utf8(text).unwrap()]).unwrap();
     let mut kept = training.kept;
     for objects in [&mut read_back, &mut kept] {
-        objects.sort_by_key(|object| object.features.values());
+        objects.sort_by_key(|object| *object.features.values());
     }
     assert_eq!(read_back, kept);
 }

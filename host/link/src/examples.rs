@@ -147,7 +147,7 @@ fn set<'a>(examples: impl IntoIterator<Item = &'a Taught>) -> HashSet<Taught> {
 
 /// Converts a detection to an example, as the firmware's `label` does.
 pub fn example_of(features: &Features, label: u8) -> Taught {
-    Example::new(SCALE.quantise(&features.values()), label)
+    Example::new(SCALE.quantise(features.values()), label)
 }
 
 /// The features of an example in millimetres and millimetres a second. Each feature is the middle of the values that
@@ -158,8 +158,7 @@ pub fn features_of(example: &Taught) -> Option<Features> {
     for (feature, value) in values.iter_mut().enumerate() {
         *value = *VALUES[feature].get(&example.features[feature])?;
     }
-    let [speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm] = values;
-    Some(Features { speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm })
+    Some(Features(values))
 }
 
 /// For each feature, the value that represents a byte.

@@ -10,7 +10,7 @@
 use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
 use crate::{ConsoleLine, EventLine, Status};
-use control::say::command::{self, Command};
+use control::say::command::{self, Action, Command};
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 
@@ -81,18 +81,18 @@ impl InUse {
     }
 
     /// Takes a command that the machine has carried out.
-    pub fn carry_out(&mut self, command: &Command) {
-        match *command {
-            Command::Set(setting, value) => {
-                if self.settings.change(setting, value).is_ok() {
+    pub fn carry_out(&mut self, &Command { action, setting, number, .. }: &Command) {
+        match action {
+            Action::Set => {
+                if self.settings.change(setting, number).is_ok() {
                     let is_set = |unknown: Setting| unknown == setting;
                     let is_reset = |unknown| unknown == Setting::TicksPerM && setting.is_of_the_wheel();
                     self.unknown.retain(|&unknown| !is_set(unknown) && !is_reset(unknown));
                 }
             }
-            Command::Save => self.saved = self.is_known().then(|| self.settings.clone()),
-            Command::Defaults => (self.settings, self.unknown) = (Settings::new(), Vec::new()),
-            Command::Revert => match &self.saved {
+            Action::Save => self.saved = self.is_known().then(|| self.settings.clone()),
+            Action::Defaults => (self.settings, self.unknown) = (Settings::new(), Vec::new()),
+            Action::Revert => match &self.saved {
                 Some(saved) => (self.settings, self.unknown) = (saved.clone(), Vec::new()),
                 None => self.forget(),
             },

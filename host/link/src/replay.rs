@@ -35,7 +35,7 @@ use self::stretch::{Happened, Stretch};
 use super::EventLine;
 use super::log::{Entry, Kind};
 use super::settings::Setting;
-use control::say::command::{self, Command};
+use control::say::command::{self, Action};
 use files::in_a_line;
 use std::fmt;
 use thiserror::Error;
@@ -204,13 +204,14 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
                     EventLine::Swing { .. } => is_given = stretch.follows_change(place),
                     _ => {}
                 }
-                logged.push(Heard { line: entry.number, steps: 0, event: *event, speed: player.speed().0, is_given });
+                logged.push(Heard { line: entry.number, steps: 0, event: *event, speed: player.speed(), is_given });
             }
             Happened::Refused => {}
             Happened::Command(line) => {
                 // The status that shows the new state must come nearer to the command.
                 if stretch.is_reported_by_event(place) {
-                    starts_now = matches!(command::parse(line.as_bytes()), Ok(Command::Start { now: true }));
+                    starts_now =
+                        command::parse(line.as_bytes()).is_ok_and(|command| command.action == Action::StartNow);
                     continue;
                 }
                 if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {

@@ -13,7 +13,7 @@
 use super::moment::Moment;
 use super::settings::{self, Settings, SettingsError, Shown};
 use super::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
-use control::say::command::{Command, parse};
+use control::say::command::{Action, parse};
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -382,11 +382,14 @@ fn parse_answer(question: &str, answer: Vec<String>) -> Result<Option<Happening>
 /// The question to ask again after this command was answered by `ok`; `None` if it changes nothing.
 fn changed_by(command: &str) -> Option<String> {
     Some(
-        match parse(command.as_bytes()).ok()? {
-            Command::Set(..) | Command::Save | Command::Revert | Command::Defaults | Command::Calibrate { .. } => {
-                SETTINGS
-            }
-            Command::Label { .. } | Command::Teach(_) | Command::Forget(_) | Command::ForgetAll => EXAMPLES,
+        match parse(command.as_bytes()).ok()?.action {
+            Action::Set | Action::Save | Action::Revert | Action::Defaults | Action::Calibrate => SETTINGS,
+            Action::LabelPlant
+            | Action::LabelWeed
+            | Action::TeachPlant
+            | Action::TeachWeed
+            | Action::Forget
+            | Action::ForgetAll => EXAMPLES,
             _ => return None,
         }
         .to_owned(),

@@ -14,6 +14,7 @@ use control::{
         nearest::Nearest,
     },
     measure::{quadrature::Odometer, readings::Readings, reset::Cause},
+    memory::Volatile,
     operate::{servo, state::State, tool::Reason},
     say::{Console, LINE, command::LineBuffer},
     settings::{Setting, Settings},
@@ -38,26 +39,39 @@ const MARGINS_MM: i16 = 100;
 struct Observed {
     nearest: ByExamples<Half>,
     by: Classification,
-    /// The width of the weed classified just now, in millimetres.
+    /// The width of the detection that is being classified, in millimetres.
+    width_mm: i16,
+    /// The width of the weed classified just now.
     weed: Cell<Option<i16>>,
 }
 
-impl Classifier for Observed {
-    fn init(&mut self) {
-        self.nearest.init();
-    }
-
-    fn classify(&self, features: &Features, k: u8) -> Vote {
-        let width_mm = features.hold_mm - MARGINS_MM;
-        let vote = match self.by {
-            Classification::Examples => self.nearest.classify(features, k),
-            Classification::Width if width_mm < PLANT_MM => Vote { class: Class::Weed, votes: 1 },
-            Classification::Width => Vote { class: Class::Plant, votes: 1 },
-        };
-        if vote.class == Class::Weed {
-            self.weed.set(Some(width_mm));
+impl Observed {
+    fn observed(&self, vote: Option<Vote>) -> Option<Vote> {
+        if vote.is_some_and(|vote| vote.class == Class::Weed) {
+            self.weed.set(Some(self.width_mm));
         }
         vote
+    }
+}
+
+impl Classifier for Observed {
+    fn classify(&self, features: &Features, _: u8) -> Vote {
+        let class = if features.hold_mm() - MARGINS_MM < PLANT_MM { Class::Weed } else { Class::Plant };
+        Vote { class, votes: 1 }
+    }
+
+    fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
+        self.width_mm = features.hold_mm() - MARGINS_MM;
+        let vote = match self.by {
+            Classification::Examples => self.nearest.begin(features, k),
+            Classification::Width => Some(self.classify(features, k)),
+        };
+        self.observed(vote)
+    }
+
+    fn go_on(&mut self) -> Option<Vote> {
+        let vote = self.nearest.go_on();
+        self.observed(vote)
     }
 
     fn built_in_class(&mut self, features: &Features) -> Class {
@@ -77,6 +91,10 @@ impl Classifier for Observed {
 
     fn forget(&mut self, number: u8) -> bool {
         self.nearest.forget(number)
+    }
+
+    fn forget_all(&mut self) {
+        self.nearest.forget_all();
     }
 
     fn listed(&self, place: u8) -> Option<(Listed, u8)> {
@@ -140,8 +158,8 @@ impl Decisions {
 
     fn start(eeprom: Eeprom, beginning: Beginning, world: &World, cause: Cause) -> Self {
         let [for_settings, for_examples] = eeprom.halves();
-        let nearest = Nearest::uninit(&EXAMPLES[..], for_examples);
-        let classifier = Observed { nearest, by: beginning.classification, weed: Cell::new(None) };
+        let nearest = Nearest::new(&EXAMPLES[..], for_examples);
+        let classifier = Observed { nearest, by: beginning.classification, width_mm: 0, weed: Cell::new(None) };
         let (readings, beams) = shown(beginning.steps, world);
         let weeder = Rig::wake_at(classifier, for_settings, readings, beams, cause);
         Self {
@@ -265,8 +283,7 @@ impl Machine for Decisions {
             while self.console.listens()
                 && let Some(byte) = self.typed.pop_front()
             {
-                if let Some(line) = self.line.take(byte) {
-                    self.console.take(line);
+                if self.line.collect(byte) && self.console.take(&mut self.line) {
                     begun = self.lines.pop_front();
                 }
             }
@@ -282,7 +299,7 @@ impl Machine for Decisions {
     }
 
     fn examples(&self) -> Vec<Listed> {
-        from_the_field(self.weeder.classifier())
+        from_the_field(&Nearest::new(&EXAMPLES[..], Volatile::holding(self.eeprom.examples())))
     }
 
     fn spoil(&mut self, address: usize, byte: u8) -> Checked {

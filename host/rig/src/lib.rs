@@ -13,7 +13,7 @@ pub use self::scripted_port::{ScriptedBoard, ScriptedPort};
 use control::ground::{class::Classifier, features, nearest::Nearest};
 use control::measure::readings::{Edge, Readings, Startup};
 use control::measure::reset::Cause;
-use control::memory::{Memory, Volatile};
+use control::memory::{Memory, SIZE, Volatile};
 use control::operate::event::Event;
 use control::say::{self, LINE, command::LineBuffer, line::Line};
 use control::units::{Instant, Interval, Position};
@@ -112,7 +112,8 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
     #[inline(always)]
     pub fn turn_with(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
-        let orders = self.controller.step(readings);
+        *self.controller.next_readings() = readings;
+        let orders = self.controller.step();
         self.controller.catch_up();
         orders
     }
@@ -142,6 +143,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         for byte in bytes {
             let Some(typed) = self.line.take(byte) else { continue };
             let mut answer = say::execute(typed, &mut self.controller);
+            self.write_all();
             while !answer.is_done() {
                 let mut line = Line::new();
                 answer.write_line(&self.controller, &mut line);
@@ -151,6 +153,11 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
             }
         }
         said
+    }
+
+    /// Writes what is to be saved, as the loop does before it answers. Gives up if the memory takes no byte.
+    pub fn write_all(&mut self) {
+        (0..4 * SIZE).any(|_| self.controller.carry_on());
     }
 
     /// Takes the waiting events.

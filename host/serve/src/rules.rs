@@ -6,7 +6,7 @@
 //! `clear` only if the operator allowed this when starting `weeder serve`. All other commands are refused over the
 //! network, and so are commands that this version does not know.
 
-use control::say::command::{Command, parse};
+use control::say::command::{Action, parse};
 use thiserror::Error;
 
 /// The origin of a command.
@@ -67,11 +67,11 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
     if link::is_hold(line) {
         return Ok(Order::Hold);
     }
-    match (reach, parse(line.as_bytes())) {
+    match (reach, parse(line.as_bytes()).map(|command| command.action)) {
         // The machine itself reports errors in the line.
         (Reach::Here, _) => Ok(Order::Type),
         (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),
-        (Reach::Lan { may_start }, Ok(command)) => match why_not(command) {
+        (Reach::Lan { may_start }, Ok(action)) => match why_not(action) {
             Some(Forbidden::NoStart) if may_start => Ok(Order::Type),
             Some(why) => Err(why),
             None => Ok(Order::Type),
@@ -80,39 +80,41 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
 }
 
 /// Why a command is refused over the network. Every new command must be added here.
-fn why_not(command: Command) -> Option<Forbidden> {
-    match command {
-        Command::Help
-        | Command::Explain(_)
-        | Command::Status
-        | Command::GetAll
-        | Command::Get(_)
-        | Command::Hold
-        | Command::Events(true)
-        | Command::Examples
-        | Command::Dump
-        | Command::Version => None,
+fn why_not(action: Action) -> Option<Forbidden> {
+    match action {
+        Action::Help
+        | Action::Explain
+        | Action::Status
+        | Action::GetAll
+        | Action::Get
+        | Action::Hold
+        | Action::EventsOn
+        | Action::Examples
+        | Action::Dump
+        | Action::Version => None,
         // A client that has not seen the fault must not clear a latched alarm.
-        Command::Start { now: false } | Command::Clear => Some(Forbidden::NoStart),
-        Command::Start { now: true } => Some(Forbidden::Unseen),
-        Command::CalibrateServo
-        | Command::ServoIn
-        | Command::ServoOut
-        | Command::Servo(_)
-        | Command::TestRow { .. }
-        | Command::TestWatchdog => Some(Forbidden::MovesTool),
-        Command::Set(..)
-        | Command::Save
-        | Command::Revert
-        | Command::Defaults
-        | Command::CalibrateStart
-        | Command::Calibrate { .. }
-        | Command::Label { .. }
-        | Command::Feature(_)
-        | Command::Teach(_)
-        | Command::Forget(_)
-        | Command::ForgetAll => Some(Forbidden::ChangesMachine),
-        Command::Events(false) | Command::Plot(_) => Some(Forbidden::ChangesWire),
+        Action::Start | Action::Clear => Some(Forbidden::NoStart),
+        Action::StartNow => Some(Forbidden::Unseen),
+        Action::CalibrateServo
+        | Action::ServoIn
+        | Action::ServoOut
+        | Action::Servo
+        | Action::TestRow
+        | Action::TestWatchdog => Some(Forbidden::MovesTool),
+        Action::Set
+        | Action::Save
+        | Action::Revert
+        | Action::Defaults
+        | Action::CalibrateStart
+        | Action::Calibrate
+        | Action::LabelPlant
+        | Action::LabelWeed
+        | Action::Feature
+        | Action::TeachPlant
+        | Action::TeachWeed
+        | Action::Forget
+        | Action::ForgetAll => Some(Forbidden::ChangesMachine),
+        Action::EventsOff | Action::PlotOn | Action::PlotOff | Action::PlotTeleplot => Some(Forbidden::ChangesWire),
     }
 }
 

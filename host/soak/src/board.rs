@@ -11,7 +11,7 @@ use control::ground::{class::Listed, nearest::Nearest};
 use control::measure::reset::Cause;
 use control::memory::{SIZE, Volatile};
 use control::operate::state::State;
-use control::say::command::{Command, parse};
+use control::say::command::{Action, parse};
 use control::settings::{Setting, Settings};
 use field::machine::{channels, encoder_edge};
 use field::wiring;
@@ -176,16 +176,16 @@ impl Board {
     fn end(&mut self, line: &str, is_ok: bool) {
         let (true, Ok(command)) = (is_ok, parse(line.as_bytes())) else { return };
         self.in_use.carry_out(&command);
-        match command {
-            Command::Set(..) | Command::GetAll => self.begin_rest(),
-            Command::Defaults | Command::Revert => self.in_use.forget(),
-            Command::CalibrateServo => self.times_the_servo = true,
-            Command::Hold | Command::Start { .. } | Command::Servo(_) | Command::ServoIn | Command::ServoOut => {
+        match command.action {
+            Action::Set | Action::GetAll => self.begin_rest(),
+            Action::Defaults | Action::Revert => self.in_use.forget(),
+            Action::CalibrateServo => self.times_the_servo = true,
+            Action::Hold | Action::Start | Action::StartNow | Action::Servo | Action::ServoIn | Action::ServoOut => {
                 self.end_of_timing();
                 // The tool has yet to come back from a manual move.
                 self.begin_rest();
             }
-            Command::TestRow { .. } => self.end_of_timing(),
+            Action::TestRow => self.end_of_timing(),
             _ => {}
         }
     }

@@ -60,6 +60,6 @@ pub fn write_csv(examples: &[Labelled], to: impl io::Write) -> Result<(), csv::E
 /// The examples in an order that can be looked through: weeds and plants, slow and fast, near and far.
 fn in_order(kept: &[Labelled]) -> Vec<Labelled> {
     let mut sorted = kept.to_vec();
-    sorted.sort_by_key(|example| (label_of(example.kind), example.features.values()));
+    sorted.sort_by_key(|example| (label_of(example.kind), *example.features.values()));
     sorted
 }

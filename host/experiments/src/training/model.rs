@@ -45,7 +45,7 @@ impl Model {
     /// # Errors
     /// If k does not suit the number of examples.
     pub fn answer(&self, features: &Features) -> Result<Answer<{ label::COUNT }>, ClassifyError> {
-        classify(self.examples.as_slice(), &self.scale.quantise(&features.values()), self.k, self.radius)
+        classify(self.examples.as_slice(), &self.scale.quantise(features.values()), self.k, self.radius)
     }
 
     /// The machine's class for a detection; unknown if the classifier has no answer.
@@ -75,9 +75,9 @@ impl Model {
             let answer = self.answer(features)?;
             table.add_row([
                 (index + 1).to_string(),
-                features.speed_mm_s.to_string(),
-                features.spacing_mm.to_string(),
-                features.hold_mm.to_string(),
+                features.speed_mm_s().to_string(),
+                features.spacing_mm().to_string(),
+                features.hold_mm().to_string(),
                 format!("{:?}", class_of(&answer)).to_lowercase(),
                 answer.votes[usize::from(label::PLANT)].to_string(),
                 answer.votes[usize::from(label::WEED)].to_string(),
@@ -102,7 +102,7 @@ impl Model {
 
 /// The objects as examples.
 pub(super) fn quantised(scale: &Scale<COUNT>, objects: &[Labelled]) -> Vec<Example<COUNT>> {
-    let example = |object: &Labelled| Example::new(scale.quantise(&object.features.values()), label_of(object.kind));
+    let example = |object: &Labelled| Example::new(scale.quantise(object.features.values()), label_of(object.kind));
     objects.iter().map(example).collect()
 }
 

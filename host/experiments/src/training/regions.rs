@@ -39,7 +39,7 @@ const UNKNOWN_GROUND: &str = "#eeece6";
 /// Draws the table that `training` made of `objects`.
 pub fn draw(training: &Training, objects: &[Labelled]) -> Document {
     let model = training.model();
-    let is_of = |object: &Labelled, class: i16| speed_class(object.features.speed_mm_s) == class;
+    let is_of = |object: &Labelled, class: i16| speed_class(object.features.speed_mm_s()) == class;
     let classes: Vec<i16> =
         SPEED_CLASSES_MM_S.into_iter().filter(|&class| objects.iter().any(|object| is_of(object, class))).collect();
     let axes = Axes::around(objects);
@@ -74,8 +74,8 @@ impl Axes {
         };
         let up_to = |value: f64| (value * 1.05 / 50.0).ceil() * 50.0;
         Self {
-            spacing_mm: 0.0..up_to(greatest(|features| features.spacing_mm)),
-            hold_mm: LEAST_HOLD_MM..up_to(greatest(|features| features.hold_mm)).max(2.0 * LEAST_HOLD_MM),
+            spacing_mm: 0.0..up_to(greatest(|features| features.spacing_mm())),
+            hold_mm: LEAST_HOLD_MM..up_to(greatest(|features| features.hold_mm())).max(2.0 * LEAST_HOLD_MM),
         }
     }
 
@@ -165,7 +165,7 @@ fn dots(objects: &[Labelled], axes: &Axes, ringed: bool) -> Group {
             Kind::Plant => PLANT,
             Kind::Weed => WEED,
         };
-        let (x, y) = (axes.x(f64::from(features.spacing_mm)), axes.y(f64::from(features.hold_mm)));
+        let (x, y) = (axes.x(f64::from(features.spacing_mm())), axes.y(f64::from(features.hold_mm())));
         let dot = Circle::new().set("cx", tenth(x)).set("cy", tenth(y));
         dots = dots.add(if ringed {
             dot.set("r", 3.6).set("fill", "none").set("stroke", INK).set("stroke-width", 1.3)

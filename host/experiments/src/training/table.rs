@@ -68,10 +68,9 @@ fn object(line: Line) -> Result<Recorded, FileError> {
     for (value, column) in values.iter_mut().zip(COLUMNS) {
         *value = line.value(column, "a whole number from -32768 to 32767")?;
     }
-    let [speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm] = values;
     let kind = match line.text(LABEL) {
         "" => None,
         _ => Some(line.value(LABEL, "plant or weed, or empty")?),
     };
-    Ok(Recorded { features: Features { speed_mm_s, spacing_mm, delay_mm, hold_mm, actuation_mm }, kind })
+    Ok(Recorded { features: Features(values), kind })
 }

@@ -84,7 +84,7 @@ impl Classifier for ReplayClassifier<'_> {
         let describe = |class| Features::describe(class, seen.spacing_mm, seen.width_mm);
         let as_logged =
             self.witness.speed_classes().map(describe).find(|features| self.nearest.classify(features, k) == seen.vote);
-        let by_machine = as_logged.unwrap_or_else(|| describe(features.speed_mm_s));
+        let by_machine = as_logged.unwrap_or_else(|| describe(features.speed_mm_s()));
         let mut described = self.described.borrow_mut();
         described.truncate(OBJECTS - 1);
         described.push_front((*features, by_machine));

@@ -8,11 +8,12 @@ use crate::settings::{Setting, steps};
 use crate::{EventLine, Mode, Status};
 use control::alarm::Alarm;
 use control::ground::class::Vote;
+use control::ground::class::label;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
 use control::operate::event::Event;
-use control::say::command::{self, Command};
-use control::units::{Instant, Interval, Position, Ticks, TicksPerSecond};
+use control::say::command::{self, Action, Command};
+use control::units::{Instant, Interval, Position, Ticks};
 use control::{measure::readings::Readings, operate::state::State};
 use rig::{Beams, Rig};
 use std::rc::Rc;
@@ -149,11 +150,11 @@ impl<'a> Player<'a> {
         self.rig.readings.position.count()
     }
 
-    /// The machine's speed in ticks.
-    pub(super) fn speed(&self) -> TicksPerSecond {
+    /// The machine's speed in ticks a second.
+    pub(super) fn speed(&self) -> i32 {
         let wheel = self.rig.settings().wheel();
         let ticks = wheel.ticks(self.speed_mm_s.unsigned_abs().min(FASTEST_MM_S.into()) as u16).0;
-        TicksPerSecond(if self.speed_mm_s < 0 { -ticks } else { ticks })
+        if self.speed_mm_s < 0 { -ticks } else { ticks }
     }
 
     /// Rolls to the next status, `host_ms` later by the PC's clock. False if that is too far.
@@ -228,7 +229,7 @@ impl<'a> Player<'a> {
     /// Runs a turn of the decisions at the present position.
     fn step(&mut self) {
         self.steps += 1;
-        let response = self.speed().distance_in_ms(self.rig.settings().get(Setting::BeamResponseMs));
+        let response = Ticks(self.speed() * i32::from(self.rig.settings().get(Setting::BeamResponseMs)) / 1000);
         let ground = (self.rig.readings.position - response).count();
         let canopy = self.canopies.over(ground);
         let before = self.rig.beams();
@@ -246,7 +247,7 @@ impl<'a> Player<'a> {
     }
 
     fn listen(&mut self) {
-        let speed = self.speed().0;
+        let speed = self.speed();
         while let Some(event) = self.rig.next_event() {
             match event {
                 Event::Alarm { .. } if std::mem::take(&mut self.swallows_alarm) => {}
@@ -290,18 +291,21 @@ impl<'a> Player<'a> {
 
     /// Executes a typed line. False if it cannot be replayed.
     pub(super) fn command(&mut self, line: &str) -> bool {
-        match command::parse(line.as_bytes()) {
+        let Ok(Command { action, setting, number, force }) = command::parse(line.as_bytes()) else { return true };
+        match action {
             // If the log lacks the answer: the firmware refused what the replay refuses.
-            Ok(Command::Start { now }) => _ = self.rig.start(now),
-            Ok(Command::Hold) => self.rig.hold(),
-            Ok(Command::Clear) => self.rig.clear(),
+            Action::Start | Action::StartNow => _ = self.rig.start(action == Action::StartNow),
+            Action::Hold => self.rig.hold(),
+            Action::Clear => self.rig.clear(),
             // The log lacks the second beam's edges.
-            Ok(Command::Set(Setting::SecondBeamMm, 1..)) => return false,
-            Ok(Command::Set(setting, value)) => _ = self.rig.set(setting, value),
-            Ok(Command::Label { label, force }) => _ = self.rig.label(label, force),
-            Ok(Command::Feature(feature)) => self.rig.enter_feature(feature),
-            Ok(Command::Teach(label)) => _ = self.rig.teach(label),
-            Ok(Command::Forget(_) | Command::ForgetAll) => return false,
+            Action::Set if setting == Setting::SecondBeamMm && number > 0 => return false,
+            Action::Set => _ = self.rig.set(setting, number),
+            Action::LabelPlant => _ = self.rig.label(label::PLANT, force),
+            Action::LabelWeed => _ = self.rig.label(label::WEED, force),
+            Action::Feature => self.rig.enter_feature(number as u8),
+            Action::TeachPlant => _ = self.rig.teach(label::PLANT),
+            Action::TeachWeed => _ = self.rig.teach(label::WEED),
+            Action::Forget | Action::ForgetAll => return false,
             _ => {
                 let word = line.split_whitespace().next().unwrap_or_default();
                 return !["servo", "calibrate", "test", "defaults", "revert"].contains(&word);
@@ -350,8 +354,8 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
             }
             Happened::Command(line) => {
                 // Later holds have the new margin.
-                if let Ok(Command::Set(setting, value)) = command::parse(line.as_bytes()) {
-                    let _ = settings.change(setting, value);
+                if let Ok(Command { action: Action::Set, setting, number, .. }) = command::parse(line.as_bytes()) {
+                    let _ = settings.change(setting, number);
                 }
             }
             _ => {}

@@ -56,6 +56,16 @@ impl Eeprom {
         chip.finish();
     }
 
+    /// The bytes of the examples, with the one that is being written.
+    pub fn examples(&self) -> [u8; SIZE] {
+        let chip = self.0.borrow();
+        let mut bytes = chip.bytes;
+        if let Some((address, byte)) = chip.under_way {
+            bytes[address] = byte;
+        }
+        std::array::from_fn(|index| bytes[SIZE + index])
+    }
+
     /// Changes a byte, as a failing cell would.
     pub fn spoil(&mut self, address: usize, byte: u8) {
         self.0.borrow_mut().bytes[address] = byte;
