@@ -33,7 +33,7 @@ pub struct Arguments {
     speeds: Vec<f64>,
     /// Log of `weeder record`: each stretch of work is a plot, in the order of the plots' numbers. It gives each plot its
     /// speed, and fills the empty cells of time, plants and area.
-    #[arg(long, value_name = "FILE.csv", value_parser = source::file, conflicts_with = "speeds")]
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file(), conflicts_with = "speeds")]
     log: Option<PathBuf>,
     /// The plot of each stretch of work in the log, 0 to 100000, 0 for none.
     #[arg(long, value_delimiter = ',', requires = "log", value_parser = whole_within(0..=100_000_u32))]

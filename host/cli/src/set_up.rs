@@ -21,8 +21,7 @@ use mechanics::machine::Machine;
 use mechanics::swing::Swing;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::fs;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
@@ -45,7 +44,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", default_value = "set-up.txt")]
     state: PathBuf,
     /// Your machine, as for `weeder design`. Without it, the measures of arm, tool and servo are asked.
-    #[arg(long, value_name = "FILE.toml", value_parser = source::file)]
+    #[arg(long, value_name = "FILE.toml", value_parser = source::file())]
     machine: Option<PathBuf>,
     /// Start again at the first step, and forget the measurements.
     #[arg(long)]
