@@ -29,8 +29,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use uno::Uno;
-use uno::elf::EEPROM_BYTES;
-use uno::hex::Bootloader;
+use uno::bootloader::Bootloader;
+use uno::memory::EEPROM_BYTES;
 use uno::pty::Pty;
 use uno::{CYCLES_PER_SECOND, PinChange, Pulse};
 

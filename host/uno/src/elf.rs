@@ -8,16 +8,11 @@ use std::path::Path;
 
 use crate::file_error::FileError;
 use crate::hex;
+use crate::memory::{EEPROM_BYTES, FLASH_BYTES};
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf,
 };
-
-/// Flash of the ATmega328P in bytes (data sheet, section 8.2).
-pub const FLASH_BYTES: usize = 32 * 1024;
-
-/// EEPROM of the ATmega328P in bytes (data sheet, section 8.4).
-pub const EEPROM_BYTES: usize = 1024;
 
 /// Origins of SRAM, EEPROM and the following sections in the single address space of AVR ELF files.
 const SRAM_ORIGIN: u64 = 0x80_0000;

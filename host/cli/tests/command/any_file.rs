@@ -16,8 +16,9 @@ use link::{log, replay, settings_file};
 use proptest::prelude::*;
 use std::error::Error;
 use std::path::Path;
+use uno::bootloader::Bootloader;
 use uno::elf::Image;
-use uno::hex::{self, Bootloader};
+use uno::hex;
 use uno::recording;
 
 /// The reader of a kind of file, and a file of that kind.
