@@ -5,25 +5,29 @@
 //! [`Line`] once the last one is sent. [`Console`] does one small step in each turn: it reads or writes a few characters, builds a
 //! line, or runs a command. No input can stop the loop.
 //!
-//! All texts are in flash ([`packed`]), with the names of alarms and settings. No module below imports this one. Inside it imports
-//! run `words` -> `texts` -> `packed` -> `names`, `line` -> [`command`], and the modules that build lines -> `answer` -> `execute`
-//! -> this file.
+//! All texts are in flash ([`packed`]), with the names of alarms and settings. No module below imports this one, except for the
+//! texts of its own names. Inside it `texts` lists what `packed` packs. Else imports run `words` -> [`command`] -> `names`, `line`
+//! -> the modules that build lines -> `answer` -> `execute` -> this file.
 
 mod answer;
 pub mod command;
 mod errors;
-mod events;
 mod execute;
 pub mod line;
 mod line_tables;
+mod lines;
 pub mod names;
 pub mod packed;
-mod status;
 mod texts;
 mod version;
 mod words;
 
-pub use self::{answer::Answer, events::write_event, execute::execute, status::write_plot, texts::Text};
+pub use self::{
+    answer::Answer,
+    execute::execute,
+    lines::{write_event, write_plot},
+    packed::Text,
+};
 
 use self::{command::LineBuffer, line::Line};
 use crate::{ground::class::Classifier, memory::Memory, weeder::Controller};

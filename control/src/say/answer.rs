@@ -4,8 +4,8 @@ use super::{
     command::{Command, ParseError},
     errors::{write_command_error, write_parse_error},
     line::Line,
+    lines::{Counts, Status, write_alarm, write_detection, write_example, write_setting},
     names,
-    status::{Counts, Status, write_detection, write_example, write_setting},
     texts::{self, Text},
     words::Word,
 };
@@ -72,10 +72,9 @@ impl Answer {
                 line.say(texts::WEEDER);
                 line.say(texts::RESET_BY);
                 line.say(controller.cause().text());
-                line.say(texts::STATE);
                 line.say(names::state(controller.state()));
                 if let State::Alarm(alarm) = controller.state() {
-                    line.alarm(texts::IN_WORDS, alarm);
+                    write_alarm(alarm, line);
                 }
                 line.say(texts::TOOL_OUT);
                 Self::Done
@@ -153,7 +152,7 @@ impl Answer {
 
 /// The rest of a name, and its explanation.
 fn explain(name: Text, explanation: Text, line: &mut Line) {
+    line.say(texts::EXPLAINED);
     line.say(name);
-    line.say(texts::DASH);
     line.say(explanation);
 }

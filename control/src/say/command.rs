@@ -4,10 +4,12 @@
 //! Blanks separate words. A line with an error becomes one [`ParseError`] and has no other effect. [`say`](crate::say) runs and
 //! answers commands.
 
-use crate::settings::Setting;
+use super::words::{FORCE, GRAMMAR, KIND, NOTHING, NUMBER, SETTING, VALUE};
+use crate::{named::named, settings::Setting};
+use core::mem;
 use heapless::Vec;
 
-pub use super::words::{Argument, Word};
+pub use super::words::{Action, Argument, Word};
 
 /// Most characters of a line.
 pub const LINE_LENGTH: usize = 80;
@@ -31,20 +33,23 @@ pub struct Command {
 /// Speed of a dry run without an argument: 1.8 km/h.
 const TEST_SPEED_MM_S: u16 = 500;
 
-/// What is wrong with a line, in the order of its texts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Wrong {
-    /// More than [`LINE_LENGTH`] characters.
-    TooLong = 1,
-    /// Characters other than printable ASCII.
-    NotText,
-    /// Bytes were lost before the firmware read them.
-    CharactersLost,
-    /// No command begins like this.
-    UnknownCommand,
-    /// No setting has this name.
-    UnknownSetting,
+named! {
+    /// What is wrong with a line.
+    Wrong {
+        // It is 0, like memory before start-up.
+        /// Nothing, so far.
+        Nothing = "",
+        /// More than [`LINE_LENGTH`] characters.
+        TooLong = "send 80 characters at most",
+        /// Characters other than printable ASCII.
+        NotText = "send letters, digits and blanks only",
+        /// Bytes were lost before the firmware read them.
+        CharactersLost = "characters were lost, send the line again",
+        /// No command begins like this.
+        UnknownCommand = "no such command, help lists them all",
+        /// No setting has this name.
+        UnknownSetting = "no such setting, get lists them all",
+    }
 }
 
 /// Why a line is not a command.
@@ -64,6 +69,8 @@ pub enum ParseError {
 /// A [`ParseError`], whose text says what is allowed.
 #[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
+    // An operator in a hurry may end the word as a sentence.
+    let line = if let [line @ .., b'.'] = line { line } else { line };
     let (word, rest) = split_word(line);
     let word = Word::find(word).ok_or(ParseError::Line(Wrong::UnknownCommand))?;
     let usage = Err(ParseError::Usage(word));
@@ -118,94 +125,6 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     Ok(command)
 }
 
-/// What follows the word: an argument, by its number, or one of these.
-const NOTHING: u8 = Argument::COUNT;
-const NUMBER: u8 = NOTHING + 1;
-const SETTING: u8 = NOTHING + 2;
-const KIND: u8 = 0x1F;
-const _: () = assert!(SETTING <= KIND);
-
-/// What follows that: `force` or a speed, which may be left out, or a value. Otherwise nothing.
-const FORCE: u8 = 1 << 5;
-const SPEED: u8 = 1 << 6;
-const VALUE: u8 = 1 << 7;
-
-/// Makes the grammar, one row a command: its action, its word, what follows the word, and what follows that.
-macro_rules! commands {
-    (@) => { NOTHING };
-    (@ number) => { NUMBER };
-    (@ setting) => { SETTING };
-    (@ $argument:ident) => { Argument::$argument as u8 };
-    ($($Action:ident: $word:ident $($argument:ident)? $(+ $more:ident)?;)*) => {
-        /// What a command does, a row of the grammar each.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        #[expect(missing_docs, reason = "the rows say what each is")]
-        pub enum Action { $($Action),* }
-
-        impl Action {
-            const fn from_index(index: u8) -> Option<Self> {
-                match index {
-                    $(index if index == Self::$Action as u8 => Some(Self::$Action),)*
-                    _ => None,
-                }
-            }
-        }
-
-        const ROWS: &[[u8; 2]] = &[$([Word::$word as u8, commands!(@ $($argument)?) $(| $more)?]),*];
-    };
-}
-
-commands! {
-    LabelPlant: Label Plant + FORCE;
-    LabelWeed: Label Weed + FORCE;
-    CalibrateStart: Calibrate Start;
-    CalibrateServo: Calibrate Servo;
-    Calibrate: Calibrate number + FORCE;
-    TestRow: Test Row + SPEED;
-    TestWatchdog: Test Watchdog;
-    Help: Help;
-    Explain: Help setting;
-    Status: Status;
-    GetAll: Get;
-    Get: Get setting;
-    Set: Set setting + VALUE;
-    Save: Save;
-    Revert: Revert;
-    Defaults: Defaults;
-    ServoIn: Servo In;
-    ServoOut: Servo Out;
-    Servo: Servo number;
-    Start: Start;
-    StartNow: Start Now;
-    Hold: Hold;
-    Clear: Clear;
-    EventsOn: Events On;
-    EventsOff: Events Off;
-    PlotOn: Plot On;
-    PlotOff: Plot Off;
-    PlotTeleplot: Plot Teleplot;
-    Examples: Examples;
-    Feature: Teach number;
-    TeachPlant: Teach Plant;
-    TeachWeed: Teach Weed;
-    Forget: Forget number;
-    ForgetAll: Forget All;
-    Dump: Dump;
-    Version: Version;
-}
-
-avr_progmem::progmem! {
-    static progmem GRAMMAR: [u8; 2 * ROWS.len()] = {
-        let (mut bytes, mut place) = ([0; 2 * ROWS.len()], 0);
-        while place < bytes.len() {
-            bytes[place] = ROWS[place / 2][place % 2];
-            place += 1;
-        }
-        bytes
-    };
-}
-
 /// The next word of a line, empty at its end, and what follows it.
 #[inline(never)]
 fn split_word(line: &[u8]) -> (&[u8], &[u8]) {
@@ -232,16 +151,16 @@ fn number(digits: &[u8]) -> Option<u16> {
 }
 
 /// Collects bytes into lines.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct LineBuffer {
     characters: Vec<u8, LINE_LENGTH, u8>,
-    error: Option<Wrong>,
+    error: Wrong,
 }
 
 impl LineBuffer {
     /// An empty line.
     pub const fn new() -> Self {
-        Self { characters: Vec::new(), error: None }
+        Self { characters: Vec::new(), error: Wrong::Nothing }
     }
 
     /// Takes a byte. At a line's end it returns the command or the error; nothing for an empty line.
@@ -259,7 +178,7 @@ impl LineBuffer {
                 self.characters.pop();
             }
             b'\t' | b' '..=b'~' => {
-                if self.characters.push(byte).is_err() {
+                if self.characters.push(byte.to_ascii_lowercase()).is_err() {
                     self.fail(Wrong::TooLong);
                 }
             }
@@ -272,17 +191,19 @@ impl LineBuffer {
     /// Second half of [`take`](Self::take): parses the line and starts the next. This takes far longer than storing a byte.
     #[inline(never)]
     pub fn read(&mut self) -> Option<Result<Command, ParseError>> {
-        let line = match self.error.take() {
-            Some(wrong) => Some(Err(ParseError::Line(wrong))),
-            None if split_word(&self.characters).0.is_empty() => None,
-            None => Some(parse(&self.characters)),
+        let line = match mem::replace(&mut self.error, Wrong::Nothing) {
+            Wrong::Nothing if split_word(&self.characters).0.is_empty() => None,
+            Wrong::Nothing => Some(parse(&self.characters)),
+            wrong => Some(Err(ParseError::Line(wrong))),
         };
         self.characters.clear();
         line
     }
 
     fn fail(&mut self, error: Wrong) {
-        self.error.get_or_insert(error);
+        if self.error == Wrong::Nothing {
+            self.error = error;
+        }
     }
 }
 

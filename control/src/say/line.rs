@@ -1,21 +1,15 @@
-//! A line that is being sent: its texts, and the numbers for the `#` in them.
+//! A line that is being sent: its texts, and the numbers and words for each `#` and `@` in them.
 //!
 //! A line's values are taken at once, so they belong to one moment. It is sent a character at a time, because a turn has little
 //! time. Each call unpacks or divides only as far as the next character.
 
-use crate::{
-    alarm::Alarm,
-    say::{
-        packed::Characters,
-        texts::{self, Text},
-    },
-};
+use crate::say::packed::{Characters, Text};
 use ufmt::{Formatter, uDisplay, uWrite};
 
-/// Most texts of a line; a setting's line has ten. A power of two, for short arithmetic.
-pub const TEXTS: usize = 16;
+/// Most texts of a line; the first line about the status has twelve.
+pub const TEXTS: usize = 12;
 
-/// Most numbers of a line; a detection's line has six. A power of two too.
+/// Most numbers of a line; the second line about the status has seven. A power of two, for short arithmetic.
 const NUMBERS: usize = 8;
 
 /// A line, or the rest of it.
@@ -23,6 +17,8 @@ const NUMBERS: usize = 8;
 pub struct Line {
     /// The rest of the present text, and of the number in it.
     characters: Characters,
+    /// The rest of the text around it: where it goes on, and how many bytes are left.
+    outer: (u16, u8),
     /// The number of texts and numbers, and how many of each have been started.
     texts: u8,
     texts_begun: u8,
@@ -37,11 +33,12 @@ impl Line {
     pub const fn new() -> Self {
         Self {
             characters: Characters::NONE,
+            outer: (0, 0),
             texts: 0,
             texts_begun: 0,
             numbers: 0,
             numbers_begun: 0,
-            text: [Text::FIRST; TEXTS],
+            text: [Text::NONE; TEXTS],
             number: [0; NUMBERS],
         }
     }
@@ -51,12 +48,14 @@ impl Line {
         self.texts == 0
     }
 
-    /// Adds a text. Each `#` in it stands for the line's next number.
+    /// Adds a text. In it each `#` stands for the line's next number, and each `@` for the line's next text.
     #[inline(never)]
     pub(crate) fn say(&mut self, text: Text) {
         debug_assert!(usize::from(self.texts) < TEXTS, "a line has {TEXTS} texts at most");
-        self.text[usize::from(self.texts) % TEXTS] = text;
-        self.texts += 1;
+        if let Some(place) = self.text.get_mut(usize::from(self.texts)) {
+            *place = text;
+            self.texts += 1;
+        }
     }
 
     /// Adds a number for a `#` that is never negative.
@@ -71,22 +70,6 @@ impl Line {
         debug_assert!(usize::from(self.numbers) < NUMBERS, "a line has {NUMBERS} numbers at most");
         self.number[usize::from(self.numbers) % NUMBERS] = number;
         self.numbers += 1;
-    }
-
-    /// Adds a number, or `none`.
-    pub(crate) fn optional(&mut self, number: Option<i16>) {
-        self.say(if number.is_some() { texts::NUMBER } else { texts::NONE });
-        self.number(number.unwrap_or(0).into());
-    }
-
-    /// Adds an alarm's code, in a text with two `#`, and its name.
-    #[inline(never)]
-    pub(crate) fn alarm(&mut self, code: Text, alarm: Alarm) {
-        self.say(code);
-        self.say(alarm.text());
-        let (first, second) = alarm.code();
-        self.counted(first.into());
-        self.counted(second.into());
     }
 }
 
@@ -105,14 +88,22 @@ impl Iterator for Line {
                     // A number has at least one digit.
                     return self.characters.next();
                 }
+                // Nothing of a fragment waits here, because a word is never in one.
+                Some(b'@') => self.outer = (self.characters.next, self.characters.left),
                 Some(character) => return Some(character),
-                None if self.texts_begun == self.texts => break,
-                None => {
-                    let text = self.text[usize::from(self.texts_begun) % TEXTS];
-                    self.texts_begun += 1;
-                    self.characters.begin(text);
+                None if self.outer.1 > 0 => {
+                    (self.characters.next, self.characters.left) = self.outer;
+                    self.outer.1 = 0;
+                    continue;
                 }
+                None => {}
             }
+            let Some(&text) = self.text.get(usize::from(self.texts_begun)).filter(|_| self.texts_begun < self.texts)
+            else {
+                break;
+            };
+            self.texts_begun += 1;
+            self.characters.begin(text);
         }
         (self.texts, self.texts_begun, self.numbers, self.numbers_begun) = (0, 0, 0, 0);
         None
@@ -135,6 +126,7 @@ impl Default for Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::say::texts;
     use std::string::{String, ToString};
 
     fn written(mut line: Line) -> String {
@@ -168,6 +160,15 @@ mod tests {
         line.say(texts::END);
         assert!(!line.is_done());
         assert_eq!(written(line), "ok from -1 to 20\r\n");
+    }
+
+    #[test]
+    fn a_word_stands_for_each_at_and_may_have_numbers() {
+        let mut line = Line::new();
+        line.say(texts::IS);
+        [texts::OK, texts::NUMBER, texts::RANGE, texts::EXPLAINED, texts::NO, texts::YES].map(|text| line.say(text));
+        [1, 2, 3].map(|number| line.number(number));
+        assert_eq!(written(line), "ok=1 from 2 to 3no - yes");
     }
 
     #[test]
