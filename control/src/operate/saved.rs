@@ -34,8 +34,6 @@ pub struct SavedSettings<M> {
     /// The older copy, 0 or 1, which the next save overwrites, and the newer copy's sequence number.
     older: u8,
     sequence: u8,
-    /// The bytes to write: the settings at the time of the save.
-    image: [u8; COPY],
     /// Steps left of the save: make the first byte wrong, write the others, write the first.
     left: u8,
     /// The next byte of that step.
@@ -47,7 +45,7 @@ pub struct SavedSettings<M> {
 impl<M: Memory> SavedSettings<M> {
     /// The settings before [`load`](Self::load).
     pub const fn new(memory: M) -> Self {
-        Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, next: 0, exists: false }
+        Self { memory, older: 0, sequence: 0, left: 0, next: 0, exists: false }
     }
 
     /// Loads the newest valid copy; `None` if there is none.
@@ -74,24 +72,36 @@ impl<M: Memory> SavedSettings<M> {
     }
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
-    pub fn save(&mut self, settings: &Settings) {
+    pub fn save(&mut self) {
         self.exists = true;
         self.older ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
-        self.image = image(settings, self.sequence);
         // A first byte that is already wrong stays: a power loss while it is written can leave any value, also the right one.
-        self.left = if self.memory.read(self.newest()) == self.image[0] { 3 } else { 2 };
-        self.next = 0;
+        self.left = if self.memory.read(self.newest()) == MARK[0] { 3 } else { 2 };
     }
 
-    /// Writes the next byte, if the memory is ready. Returns whether all is written.
-    pub fn carry_on(&mut self) -> bool {
+    /// The settings have changed: a save begins again.
+    pub fn change(&mut self) {
+        self.next = 0;
+        if self.left == 1 {
+            self.left = 3;
+        }
+    }
+
+    /// Writes the next byte of these settings, if the memory is ready. Returns whether all is written.
+    ///
+    /// Out of line, so that its bytes are not on the loop's stack.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn carry_on(&mut self, settings: &Settings) -> bool {
         if self.left > 0 {
-            let wrong = [!self.image[0]];
+            let mut image = image(settings, self.sequence);
             let (offset, bytes) = match self.left {
-                3 => (0, &wrong[..]),
-                2 => (1, &self.image[1..]),
-                _ => (0, &self.image[..1]),
+                3 => {
+                    image[0] = !image[0];
+                    (0, &image[..1])
+                }
+                2 => (1, &image[1..]),
+                _ => (0, &image[..1]),
             };
             let address = address(self.older ^ 1) + offset;
             if self.memory.update(address, bytes, &mut self.next) {
@@ -149,11 +159,14 @@ impl<M: Memory> SavedSettings<M> {
     }
 }
 
+/// The table's mark, as a copy begins with it.
+const MARK: [u8; 2] = TABLE_MARK.to_le_bytes();
+
 /// The bytes of a copy.
 #[inline(never)]
 fn image(settings: &Settings, sequence: u8) -> [u8; COPY] {
     let mut bytes = [0; COPY];
-    let [low, high] = TABLE_MARK.to_le_bytes();
+    let [low, high] = MARK;
     bytes[..HEADER].copy_from_slice(&[low, high, Setting::COUNT, sequence]);
     for (setting, value) in Setting::all().zip(bytes[HEADER..END].chunks_exact_mut(2)) {
         value.copy_from_slice(&settings.get(setting).to_le_bytes());
@@ -181,8 +194,8 @@ mod tests {
     fn save(memory: Volatile, settings: &Settings) -> Volatile {
         let mut saved = SavedSettings::new(memory);
         saved.load();
-        saved.save(settings);
-        while !saved.carry_on() {}
+        saved.save();
+        while !saved.carry_on(settings) {}
         saved.into_memory()
     }
 
