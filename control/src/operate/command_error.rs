@@ -6,7 +6,7 @@
 use crate::named::named;
 
 named! {
-    /// A command that the present state does not allow. `say::errors` adds the numbers and words of its message.
+    /// A command that the present state does not allow. `say::errors` adds numbers and words to some messages.
     #[expect(missing_docs, reason = "the messages say what each means")]
     CommandError {
         AlarmLatched = "an alarm is latched, see status, then clear it",
@@ -30,12 +30,12 @@ named! {
         TestSpeed = "test row takes a speed in mm/s from 100 to #",
         /// The ticks a metre differ by more than 30 % from the wheel's diameter;
         /// [`counted`](crate::operate::calibration::Distance::counted) has the count.
-        WheelDiffers = "that would be ticks_per_m #, the wheel has #, look again, or add force",
+        WheelDiffers = "that would be ticks_per_m #, the wheel has #",
         /// The built-in examples say plant, and the label says weed.
-        TakenForPlant = "the built-in examples say plant, look again, or add force",
+        TakenForPlant = "plant",
         /// The built-in examples say weed, and the label says plant.
-        TakenForWeed = "the built-in examples say weed, look again, or add force",
-        /// The value lies outside the setting's range.
-        OutOfRange = "@ takes@",
+        TakenForWeed = "weed",
+        /// The value lies outside the setting's range. The message has the range.
+        OutOfRange = "",
     }
 }

@@ -6,7 +6,8 @@ use super::{
     line::Line,
     lines::{Counts, Status, write_alarm, write_detection, write_example, write_setting},
     names,
-    texts::{self, Text},
+    packed::Text,
+    texts,
     words::Word,
 };
 use crate::{
@@ -69,10 +70,11 @@ impl Answer {
         *self = match *self {
             Self::Done | Self::Typed(_) => return,
             Self::Greeting => {
-                line.say(texts::WEEDER);
+                line.add(texts::WEEDER);
                 line.say(texts::RESET_BY);
-                line.say(controller.cause().text());
-                line.say(names::state(controller.state()));
+                line.add(controller.cause().text());
+                line.say(texts::STATE);
+                line.add(names::state(controller.state()));
                 if let State::Alarm(alarm) = controller.state() {
                     write_alarm(alarm, line);
                 }
@@ -81,8 +83,7 @@ impl Answer {
             }
             Self::Help(place) => {
                 if let Some(word) = Word::from_index(place) {
-                    line.say(word.text());
-                    explain(word.takes(), word.help(), line);
+                    explain(word.text(), word.help(), line);
                 }
                 if place + 1 < Word::COUNT { Self::Help(place + 1) } else { Self::Ok }
             }
@@ -130,7 +131,7 @@ impl Answer {
                 if place + 1 < controller.detections().len() { Self::Dump(place + 1) } else { Self::Ok }
             }
             Self::Version => {
-                line.say(texts::WEEDER);
+                line.add(texts::WEEDER);
                 Self::Ok
             }
             Self::Ok => {
@@ -150,9 +151,9 @@ impl Answer {
     }
 }
 
-/// The rest of a name, and its explanation.
+/// A name, and its explanation.
 fn explain(name: Text, explanation: Text, line: &mut Line) {
-    line.say(texts::EXPLAINED);
-    line.say(name);
-    line.say(explanation);
+    line.add(name);
+    line.say(texts::DASH);
+    line.add(explanation);
 }

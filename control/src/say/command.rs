@@ -69,8 +69,6 @@ pub enum ParseError {
 /// A [`ParseError`], whose text says what is allowed.
 #[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
-    // An operator in a hurry may end the word as a sentence.
-    let line = if let [line @ .., b'.'] = line { line } else { line };
     let (word, rest) = split_word(line);
     let word = Word::find(word).ok_or(ParseError::Line(Wrong::UnknownCommand))?;
     let usage = Err(ParseError::Usage(word));
@@ -173,7 +171,13 @@ impl LineBuffer {
     #[inline(never)]
     pub fn collect(&mut self, byte: u8) -> bool {
         match byte {
-            b'\r' | b'\n' => return true,
+            b'\r' | b'\n' => {
+                // An operator in a hurry may end the command as a sentence.
+                if self.characters.last() == Some(&b'.') {
+                    self.characters.pop();
+                }
+                return true;
+            }
             0x08 | 0x7F => {
                 self.characters.pop();
             }

@@ -6,24 +6,42 @@
 use crate::say::packed::{Characters, Text};
 use ufmt::{Formatter, uDisplay, uWrite};
 
-/// Most texts of a line; the first line about the status has twelve.
-pub const TEXTS: usize = 12;
+/// Most texts of a line; a setting's line has 16. A power of two, for short arithmetic.
+pub const TEXTS: usize = 16;
 
-/// Most numbers of a line; the second line about the status has seven. A power of two, for short arithmetic.
+/// Most numbers of a line; the second line about the status has seven. A power of two too.
 const NUMBERS: usize = 8;
+
+/// A text that the code names. One byte numbers it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Said(u8);
+
+impl Said {
+    /// A text of the first groups.
+    pub(crate) const fn of(text: &str) -> Self {
+        let number = Text::of(text).number();
+        assert!(number <= u8::MAX as u16, "texts that the code names are first in the list of groups");
+        Self(number as u8)
+    }
+
+    /// The same text.
+    pub(crate) const fn text(self) -> Text {
+        Text::FIRST.after(self.0)
+    }
+}
 
 /// A line, or the rest of it.
 #[derive(Clone, Debug)]
 pub struct Line {
     /// The rest of the present text, and of the number in it.
     characters: Characters,
-    /// The rest of the text around it: where it goes on, and how many bytes are left.
-    outer: (u16, u8),
     /// The number of texts and numbers, and how many of each have been started.
     texts: u8,
     texts_begun: u8,
     numbers: u8,
     numbers_begun: u8,
+    /// The last text that the code named.
+    last: Said,
     text: [Text; TEXTS],
     number: [i32; NUMBERS],
 }
@@ -33,12 +51,12 @@ impl Line {
     pub const fn new() -> Self {
         Self {
             characters: Characters::NONE,
-            outer: (0, 0),
             texts: 0,
             texts_begun: 0,
             numbers: 0,
             numbers_begun: 0,
-            text: [Text::NONE; TEXTS],
+            last: Said(0),
+            text: [Text::FIRST; TEXTS],
             number: [0; NUMBERS],
         }
     }
@@ -48,14 +66,26 @@ impl Line {
         self.texts == 0
     }
 
-    /// Adds a text. In it each `#` stands for the line's next number, and each `@` for the line's next text.
+    /// Adds a text. In it each `#` stands for the line's next number, and each `@` for the line's next word.
     #[inline(never)]
-    pub(crate) fn say(&mut self, text: Text) {
+    pub(crate) fn say(&mut self, text: Said) {
+        self.last = text;
+        self.add(text.text());
+    }
+
+    /// Adds a word for an `@`, and the last text's part behind it.
+    #[inline(never)]
+    pub(crate) fn word(&mut self, word: Text) {
+        self.add(word);
+        self.say(Said(self.last.0 + 1));
+    }
+
+    /// Adds a text of any group.
+    #[inline(never)]
+    pub(crate) fn add(&mut self, text: Text) {
         debug_assert!(usize::from(self.texts) < TEXTS, "a line has {TEXTS} texts at most");
-        if let Some(place) = self.text.get_mut(usize::from(self.texts)) {
-            *place = text;
-            self.texts += 1;
-        }
+        self.text[usize::from(self.texts) % TEXTS] = text;
+        self.texts += 1;
     }
 
     /// Adds a number for a `#` that is never negative.
@@ -88,22 +118,14 @@ impl Iterator for Line {
                     // A number has at least one digit.
                     return self.characters.next();
                 }
-                // Nothing of a fragment waits here, because a word is never in one.
-                Some(b'@') => self.outer = (self.characters.next, self.characters.left),
                 Some(character) => return Some(character),
-                None if self.outer.1 > 0 => {
-                    (self.characters.next, self.characters.left) = self.outer;
-                    self.outer.1 = 0;
-                    continue;
+                None if self.texts_begun == self.texts => break,
+                None => {
+                    let text = self.text[usize::from(self.texts_begun) % TEXTS];
+                    self.texts_begun += 1;
+                    self.characters.begin(text);
                 }
-                None => {}
             }
-            let Some(&text) = self.text.get(usize::from(self.texts_begun)).filter(|_| self.texts_begun < self.texts)
-            else {
-                break;
-            };
-            self.texts_begun += 1;
-            self.characters.begin(text);
         }
         (self.texts, self.texts_begun, self.numbers, self.numbers_begun) = (0, 0, 0, 0);
         None
@@ -126,7 +148,10 @@ impl Default for Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::say::texts;
+    use crate::{
+        say::{lines, texts},
+        settings::Setting,
+    };
     use std::string::{String, ToString};
 
     fn written(mut line: Line) -> String {
@@ -151,24 +176,17 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_its_texts_with_its_numbers_for_each_hash() {
+    fn a_line_is_its_texts_with_its_numbers_for_each_hash_and_its_words_for_each_at() {
         let mut line = Line::new();
-        line.say(texts::OK);
+        line.add(Setting::K.text());
         line.say(texts::RANGE);
-        line.number(-1);
-        line.number(20);
+        line.say(Said::of(lines::LINES[2]));
+        line.word(texts::NUMBER.text());
         line.say(texts::END);
+        [-1, 20, 7, 8].map(|number| line.number(number));
         assert!(!line.is_done());
-        assert_eq!(written(line), "ok from -1 to 20\r\n");
-    }
-
-    #[test]
-    fn a_word_stands_for_each_at_and_may_have_numbers() {
-        let mut line = Line::new();
-        line.say(texts::IS);
-        [texts::OK, texts::NUMBER, texts::RANGE, texts::EXPLAINED, texts::NO, texts::YES].map(|text| line.say(text));
-        [1, 2, 3].map(|number| line.number(number));
-        assert_eq!(written(line), "ok=1 from 2 to 3no - yes");
+        assert_eq!(lines::LINES[2], "swing tool=@ pos=#");
+        assert_eq!(written(line), "k from -1 to 20swing tool=7 pos=8\r\n");
     }
 
     #[test]

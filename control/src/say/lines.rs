@@ -8,15 +8,15 @@ use crate::{
     memory::Memory,
     operate::{
         calibration::{Outcome, SwingTimes},
-        command_error::CommandError,
         detections::Classified,
         event::Event,
         plot::Plot,
         state::State,
     },
     say::{
-        line::Line,
-        texts::{self, Text},
+        line::{Line, Said},
+        packed::Text,
+        texts,
         words::Argument,
     },
     settings::Setting,
@@ -46,8 +46,8 @@ macro_rules! write_lines {
         pub fn write_event(event: &Event, line: &mut Line) {
             match *event {
                 $($pattern => {
-                    line.say(const { Text::of(concat!($beginning, $($part,)* $($tail)?)) });
-                    $(kind::$kind($value, line);)*
+                    line.say(const { Said::of(concat!($beginning, $($part,)* $($tail)?)) });
+                    $(kind::$kind(line, $value);)*
                 })*
             }
             line.say(texts::END);
@@ -61,8 +61,8 @@ macro_rules! write_lines {
                 /// Builds the line.
                 pub(super) fn write<C: Classifier, M: Memory>($machine: &Controller<C, M>, line: &mut Line) {
                     $($(if let $condition = $from)? {
-                        line.say(const { Text::of(concat!($($word),*)) });
-                        $(kind::$of($state, line);)*
+                        line.say(const { Said::of(concat!($($word),*)) });
+                        $(kind::$of(line, $state);)*
                     })*
                 }
             }
@@ -81,64 +81,66 @@ mod kind {
         operate::{state::State, tool::Reason},
     };
 
-    pub(super) fn number(value: impl Into<i32>, line: &mut Line) {
+    #[inline(always)]
+    pub(super) fn number(line: &mut Line, value: impl Into<i32>) {
         line.number(value.into());
     }
 
-    pub(super) fn count(value: impl Into<u16>, line: &mut Line) {
+    #[inline(always)]
+    pub(super) fn count(line: &mut Line, value: impl Into<u16>) {
         line.counted(value.into());
     }
 
-    pub(super) fn optional(value: Option<i16>, line: &mut Line) {
-        line.say(if value.is_some() { texts::NUMBER } else { texts::NONE });
+    pub(super) fn optional(line: &mut Line, value: Option<i16>) {
+        line.word(if value.is_some() { texts::NUMBER } else { texts::NONE }.text());
         line.number(value.unwrap_or(0).into());
     }
 
     #[inline(never)]
-    pub(super) fn led(alarm: Alarm, line: &mut Line) {
+    pub(super) fn led(line: &mut Line, alarm: Alarm) {
         let (first, second) = alarm.code();
         line.counted(first.into());
         line.counted(second.into());
     }
 
-    pub(super) fn class(class: Class, line: &mut Line) {
-        line.say(names::class(class));
+    pub(super) fn class(line: &mut Line, class: Class) {
+        line.word(names::class(class));
     }
 
-    pub(super) fn place(tool_out: bool, line: &mut Line) {
-        line.say(names::place(tool_out));
+    pub(super) fn place(line: &mut Line, tool_out: bool) {
+        line.word(names::place(tool_out));
     }
 
-    pub(super) fn state(state: State, line: &mut Line) {
-        line.say(names::state(state));
+    pub(super) fn state(line: &mut Line, state: State) {
+        line.word(names::state(state));
     }
 
-    pub(super) fn alarm(alarm: Alarm, line: &mut Line) {
-        line.say(alarm.text());
+    pub(super) fn alarm(line: &mut Line, alarm: Alarm) {
+        line.word(alarm.text());
     }
 
-    pub(super) fn warning(warning: Warning, line: &mut Line) {
-        line.say(warning.text());
+    pub(super) fn warning(line: &mut Line, warning: Warning) {
+        line.word(warning.text());
     }
 
-    pub(super) fn reason(reason: Reason, line: &mut Line) {
-        line.say(reason.text());
+    pub(super) fn reason(line: &mut Line, reason: Reason) {
+        line.word(reason.text());
     }
 
-    pub(super) fn cause(cause: Cause, line: &mut Line) {
-        line.say(cause.text());
+    pub(super) fn cause(line: &mut Line, cause: Cause) {
+        line.word(cause.text());
     }
 
-    pub(super) fn answer(yes: bool, line: &mut Line) {
-        line.say(names::answer(yes));
+    pub(super) fn answer(line: &mut Line, yes: bool) {
+        line.word(names::answer(yes));
     }
 }
 
 /// Adds an alarm's code and name.
 pub(super) fn write_alarm(alarm: Alarm, line: &mut Line) {
     line.say(texts::IN_WORDS);
-    kind::led(alarm, line);
-    kind::alarm(alarm, line);
+    kind::led(line, alarm);
+    line.add(alarm.text());
 }
 
 /// Builds the next points of a plotter's curves, each `label:value`.
@@ -159,66 +161,62 @@ pub(super) fn write_setting<C: Classifier, M: Memory>(
     line: &mut Line,
 ) {
     let value = controller.settings().get(setting);
-    line.say(texts::IS);
-    line.say(setting.text());
-    write_value(setting, value, line);
-    line.say(setting.unit());
-    if setting.is_switched() {
-        line.say(texts::ON_OR_OFF);
-    } else {
-        line.say(texts::RANGE);
-        write_range(setting, line);
-    }
-    line.say(texts::DEFAULT);
-    write_value(setting, setting.default(), line);
+    line.add(setting.text());
+    write_value(texts::IS, setting, value, line);
+    line.add(setting.unit());
+    write_range(setting, line);
+    write_value(texts::DEFAULT, setting, setting.default(), line);
     match controller.saved(setting) {
         None => line.say(texts::NOT_SAVED),
         Some(saved) if saved == value => {}
-        Some(saved) => {
-            line.say(texts::SAVED);
-            write_value(setting, saved, line);
-        }
+        Some(saved) => write_value(texts::SAVED, setting, saved, line),
     }
 }
 
-/// A setting's value, in a word.
+/// A text, then a setting's value.
 #[inline(never)]
-fn write_value(setting: Setting, value: u16, line: &mut Line) {
-    if setting.is_switched() {
-        return line.say(if value == 0 { Argument::Off } else { Argument::On }.text());
+fn write_value(text: Said, setting: Setting, value: u16, line: &mut Line) {
+    line.say(text);
+    if !setting.is_switched() {
+        line.say(texts::NUMBER);
+        return line.counted(value);
     }
-    line.say(texts::NUMBER);
-    line.counted(value);
+    line.add(if value == 0 { Argument::Off } else { Argument::On }.text());
 }
 
-#[inline(never)]
 fn write_range(setting: Setting, line: &mut Line) {
+    if setting.is_switched() {
+        return line.say(texts::ON_OR_OFF);
+    }
+    line.say(texts::RANGE);
     line.counted(setting.least());
     line.counted(setting.greatest());
 }
 
-/// What a setting takes, under the setting's name or another.
+/// The range of a setting, under the setting's name or another.
 #[inline(never)]
 pub(super) fn write_allowed(name: Text, setting: Setting, line: &mut Line) {
-    line.say(CommandError::OutOfRange.text());
-    line.say(name);
-    line.say(if setting.is_switched() { texts::ON_OR_OFF } else { texts::WHOLE_NUMBER });
+    line.add(name);
+    line.say(if setting.is_switched() { texts::TAKES } else { texts::TAKES_A_NUMBER });
     write_range(setting, line);
 }
 
 pub(super) fn write_example(listed: &Listed, line: &mut Line) {
     line.say(if listed.from_field { texts::FIELD } else { texts::BUILT_IN });
+    line.say(texts::EXAMPLE);
     line.counted(listed.number.into());
-    line.say(names::label(listed.example.label));
+    line.add(names::label(listed.example.label));
+    line.say(texts::FEATURES);
     listed.example.features.iter().for_each(|&feature| line.counted(feature.into()));
 }
 
 pub(super) fn write_detection(detection: &Classified, line: &mut Line) {
     line.say(texts::DUMPED);
     detection.features().values().iter().for_each(|&value| line.number(value.into()));
-    line.say(names::class(detection.vote.class));
+    line.add(names::class(detection.vote.class));
+    line.say(texts::VOTES);
     line.counted(detection.vote.votes.into());
     if let Some(label) = detection.label {
-        line.say(names::label(label));
+        line.add(names::label(label));
     }
 }

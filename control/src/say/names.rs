@@ -4,7 +4,8 @@ use crate::{
     ground::class::{Class, label},
     operate::state::State,
     say::{
-        texts::{self, Text},
+        packed::Text,
+        texts,
         words::{Argument, Word},
     },
     settings::{self, Setting},
@@ -27,8 +28,8 @@ impl Setting {
 pub fn state(state: State) -> Text {
     match state {
         State::Hold => Word::Hold.text(),
-        State::Work => texts::WORK,
-        State::Alarm(_) => texts::IN_ALARM,
+        State::Work => texts::WORK.text(),
+        State::Alarm(_) => texts::IN_ALARM.text(),
     }
 }
 
@@ -39,7 +40,7 @@ pub fn place(tool_out: bool) -> Text {
 
 /// Yes or no.
 pub fn answer(yes: bool) -> Text {
-    if yes { texts::YES } else { texts::NO }
+    if yes { texts::YES } else { texts::NO }.text()
 }
 
 /// A [label](mod@crate::ground::class::label)'s name.
@@ -52,6 +53,6 @@ pub fn class(class: Class) -> Text {
     match class {
         Class::Plant => Argument::Plant.text(),
         Class::Weed => Argument::Weed.text(),
-        Class::Unknown => texts::UNKNOWN,
+        Class::Unknown => texts::UNKNOWN.text(),
     }
 }

@@ -1,7 +1,7 @@
 //! All texts, packed into one table in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is an offset in it. `texts`
-//! lists the texts.
+//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is a number in it. `texts`
+//! lists the texts. A text with words is several texts here: its parts before, between and behind the words.
 //!
 //! # How it works
 //!
@@ -12,7 +12,7 @@
 
 use crate::say::texts::{GROUPS, UNPACKED};
 
-/// A text in flash: its offset in the table.
+/// A text in flash: its number in the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Text(u16);
 
@@ -25,11 +25,17 @@ const DIGITS: usize = "-2147483648".len();
 /// Most steps from a code to its first character.
 pub const HALVINGS: usize = 4;
 
+/// Texts for each entry of the index. From an entry on, a text is found by the lengths of those before it.
+const STRIDE: usize = 16;
+
 /// Bits of a text's header with its packed length. The other two are its [`mark`], which excludes most words in a search without
 /// unpacking them.
 const LENGTH: u8 = 0x3F;
 
-/// No code: it ends a text during packing.
+/// Stands for a word in a text.
+const WORD: u8 = b'@';
+
+/// No code: during packing it ends a text, or the part of a text before a word.
 const END: u8 = u8::MAX;
 
 /// Most characters of all texts together, with an end each. No value for the chip may have 32 KiB, and an
@@ -79,15 +85,14 @@ const FIRST_FRAGMENT: u8 = CHARACTERS.1 as u8;
 const ZERO: u8 = CODES[b'0' as usize];
 const _: () = assert!(CODES[b'9' as usize] == ZERO + 9);
 
-/// The table: the fragments, the characters, and the texts, each after a byte with its mark and packed length.
+/// The table: the fragments, the characters, the index, and the texts, each after a byte with its mark and packed length.
 struct Packed {
     /// It is longer than needed.
     table: [u8; 4096],
     length: usize,
-    /// Offset of the characters.
+    /// Offsets of the characters and of the index.
     letters: usize,
-    /// Offsets of the texts, group by group.
-    starts: [u16; 1024],
+    index: usize,
 }
 
 #[allow(long_running_const_eval, reason = "it packs hundreds of texts, and ends")]
@@ -100,7 +105,7 @@ const PACKED: Packed = {
             assert!(GROUPS[group][place].is_ascii(), "a serial monitor can be trusted with ASCII alone");
             let (text, mut at) = (GROUPS[group][place].as_bytes(), 0);
             while at < text.len() {
-                codes[length + at] = code[text[at] as usize];
+                codes[length + at] = if text[at] == WORD { END } else { code[text[at] as usize] };
                 at += 1;
             }
             length += text.len() + 1;
@@ -110,12 +115,10 @@ const PACKED: Packed = {
     }
     // Those of the version, at the end, stay as they are. So all else is the same for each commit.
     let unpacked = UNPACKED.len() + 1;
-    // No half of a fragment: a text's end, and a word, which stands between two codes of its line.
-    let word = code[b'@' as usize];
     // For each code its halves, the second halves that wait while it is split, the steps to its first character, and whether it may
     // be a first half.
     let (mut halves, mut waiting, mut steps, mut splits) = ([[0; 2]; 256], [0; 256], [0; 256], [true; 256]);
-    (splits[END as usize], splits[word as usize]) = (false, false);
+    splits[END as usize] = false;
     let mut fragment = FIRST_FRAGMENT as usize;
     while fragment < END as usize {
         // For each code the place behind its first one, and from there to the next: a pair's second code is there.
@@ -133,7 +136,7 @@ const PACKED: Packed = {
             while at > 0 {
                 let second = codes[at] as usize;
                 counts[second] += 1;
-                if counts[second] > most && second != END as usize && second != word as usize {
+                if counts[second] > most && second != END as usize {
                     (most, pair) = (counts[second], [first as u8, second as u8]);
                 }
                 at = next[at - 1] as usize;
@@ -168,30 +171,67 @@ const PACKED: Packed = {
         table[end] = CHARACTERS.0[end - letters];
         end += 1;
     }
-    let (mut starts, mut number, mut group, mut at) = ([0; 1024], 0, 0, 0);
+    let index = end;
+    end += 2 * COUNT.div_ceil(STRIDE);
+    let (mut number, mut group, mut at) = (0, 0, 0);
     while group < GROUPS.len() {
         let mut place = 0;
         while place < GROUPS[group].len() {
-            let start = end;
-            end += 1;
-            while codes[at] != END {
-                (table[end], end, at) = (codes[at], end + 1, at + 1);
+            let (text, mut to) = (GROUPS[group][place].as_bytes(), 0);
+            while to <= text.len() {
+                let from = to;
+                while to < text.len() && text[to] != WORD {
+                    to += 1;
+                }
+                if number % STRIDE == 0 {
+                    let entry = index + 2 * (number / STRIDE);
+                    [table[entry], table[entry + 1]] = (end as u16).to_le_bytes();
+                }
+                let start = end;
+                end += 1;
+                while codes[at] != END {
+                    (table[end], end, at) = (codes[at], end + 1, at + 1);
+                }
+                assert!(end - start - 1 <= LENGTH as usize, "six bits tell a text's packed length");
+                table[start] = mark(text.split_at(to).0.split_at(from).1) | (end - start - 1) as u8;
+                (number, at, to) = (number + 1, at + 1, to + 1);
             }
-            assert!(end - start - 1 <= LENGTH as usize, "six bits tell a text's packed length");
-            table[start] = mark(GROUPS[group][place].as_bytes()) | (end - start - 1) as u8;
-            (starts[number], number, place, at) = (start as u16, number + 1, place + 1, at + 1);
+            place += 1;
         }
         group += 1;
     }
-    Packed { table, length: end, letters, starts }
+    Packed { table, length: end, letters, index }
 };
 
-/// Two bits that differ between words, above the length's bits.
-const fn mark(word: &[u8]) -> u8 {
-    match word.last() {
-        Some(&last) => last.wrapping_add(word.len() as u8) << LENGTH.count_ones(),
-        None => 0,
+/// The number of texts.
+const COUNT: usize = number_of(GROUPS, GROUPS.len(), 0);
+
+/// The number of texts in front of a text: those in the groups before its group, and those before it there.
+const fn number_of(groups: &[&[&str]], group: usize, place: usize) -> usize {
+    let (mut number, mut at) = (0, 0);
+    while at < group || place > 0 && at == group {
+        let texts = groups[at];
+        let mut before = 0;
+        while before < if at == group { place } else { texts.len() } {
+            let (text, mut to) = (texts[before].as_bytes(), 0);
+            while to < text.len() {
+                number += (text[to] == WORD) as usize;
+                to += 1;
+            }
+            (number, before) = (number + 1, before + 1);
+        }
+        at += 1;
     }
+    number
+}
+
+/// Two bits that differ between words, above the length's bits. They depend on the first word alone.
+const fn mark(text: &[u8]) -> u8 {
+    let mut length = 0;
+    while length < text.len() && text[length] != b' ' {
+        length += 1;
+    }
+    if length > 0 { text[length - 1].wrapping_add(length as u8) << LENGTH.count_ones() } else { 0 }
 }
 
 avr_progmem::progmem! {
@@ -212,65 +252,74 @@ fn byte(place: usize) -> u8 {
 }
 
 impl Text {
-    /// No text, before there is one.
-    pub(crate) const NONE: Self = Self(0);
+    /// The first text of the table.
+    pub(crate) const FIRST: Self = Self(0);
 
-    /// The first text of a group. For the compiler alone: the chip does not have the offsets.
+    /// The first text of a group.
     pub(crate) const fn first_of(group: &[&str]) -> Self {
-        let (mut first, mut place) = (0, 0);
+        let mut place = 0;
         while !is_same_group(GROUPS[place], group) {
-            first += GROUPS[place].len();
             place += 1;
         }
-        Self(PACKED.starts[first])
+        Self(number_of(GROUPS, place, 0) as u16)
     }
 
-    /// A text of the groups. For the compiler alone too.
+    /// A text of the groups.
     pub(crate) const fn of(text: &str) -> Self {
-        let (mut number, mut group) = (0, 0);
-        loop {
-            let mut place = 0;
-            while place < GROUPS[group].len() {
-                if is_same(GROUPS[group][place], text) {
-                    return Self(PACKED.starts[number]);
-                }
-                (number, place) = (number + 1, place + 1);
+        let (mut group, mut place) = (0, 0);
+        while !is_same(GROUPS[group][place], text) {
+            place += 1;
+            if place == GROUPS[group].len() {
+                (group, place) = (group + 1, 0);
             }
-            group += 1;
         }
+        Self(number_of(GROUPS, group, place) as u16)
+    }
+
+    /// Its number in the table.
+    pub(crate) const fn number(self) -> u16 {
+        self.0
     }
 
     /// The text this many places after this one.
-    #[inline(never)]
-    pub(crate) fn after(self, places: u8) -> Self {
-        let mut start = self.0;
-        for _ in 0..places {
-            start += 1 + u16::from(byte(start.into()) & LENGTH);
-        }
-        Self(start)
+    pub(crate) const fn after(self, places: u8) -> Self {
+        Self(self.0 + places as u16)
     }
 
-    /// The index of `word` among `count` texts from this one on; `count` if it is not among them.
+    /// The index of `word` among `count` texts from this one on; `count` if it is not among them. A blank ends a text.
     #[inline(never)]
     pub(crate) fn find(self, count: u8, word: &[u8]) -> u8 {
         if word.is_empty() {
             return count;
         }
         let mark = mark(word);
-        let mut text = self;
+        let mut start = self.start();
         let mut characters = Characters::NONE;
         for place in 0..count {
-            let header = byte(text.0.into());
+            let header = byte(start);
             if header & !LENGTH == mark {
-                characters.begin(text);
-                if word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none() {
+                characters.begin_at(start);
+                if word.iter().all(|&character| characters.next() == Some(character))
+                    && characters.next().is_none_or(|character| character == b' ')
+                {
                     return place;
                 }
             }
             // The next text follows directly.
-            text.0 += 1 + u16::from(header & LENGTH);
+            start += 1 + usize::from(header & LENGTH);
         }
         count
+    }
+
+    /// Its offset in the table.
+    #[inline(never)]
+    fn start(self) -> usize {
+        let entry = PACKED.index + 2 * (usize::from(self.0) / STRIDE);
+        let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
+        for _ in 0..self.0 as u8 % STRIDE as u8 {
+            start += 1 + usize::from(byte(start) & LENGTH);
+        }
+        start
     }
 
     /// The characters, ASCII.
@@ -309,8 +358,8 @@ impl core::fmt::Display for Text {
 #[derive(Clone, Debug)]
 pub struct Characters {
     /// The next byte's offset, and how many bytes are left.
-    pub(super) next: u16,
-    pub(super) left: u8,
+    next: usize,
+    left: u8,
     /// A stack of digits and second halves of fragments, last one first; and its depth.
     waiting: [u8; WAITING],
     halves: u8,
@@ -321,9 +370,14 @@ impl Characters {
     pub(crate) const NONE: Self = Self { next: 0, left: 0, waiting: [0; WAITING], halves: 0 };
 
     /// Starts a text, and drops the rest of another.
-    #[inline(never)]
     pub(crate) fn begin(&mut self, text: Text) {
-        (self.next, self.left, self.halves) = (text.0 + 1, byte(text.0.into()) & LENGTH, 0);
+        self.begin_at(text.start());
+    }
+
+    /// Starts the text at an offset of the table.
+    #[inline(never)]
+    fn begin_at(&mut self, start: usize) {
+        (self.next, self.left, self.halves) = (start + 1, byte(start) & LENGTH, 0);
     }
 
     /// Inserts a number before the rest of the text.
@@ -368,7 +422,7 @@ impl Iterator for Characters {
         } else {
             self.left = self.left.checked_sub(1)?;
             self.next += 1;
-            byte(usize::from(self.next) - 1)
+            byte(self.next - 1)
         };
         while let Some(fragment) = code.checked_sub(FIRST_FRAGMENT) {
             let pair = 2 * usize::from(fragment);
@@ -382,14 +436,20 @@ impl Iterator for Characters {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        alarm::Alarm,
+        say::words::{Argument, Word},
+        settings::Setting,
+    };
     use std::string::String;
 
     #[test]
     fn every_text_reads_as_it_was_written() {
         for group in GROUPS {
-            for (place, written) in (0..).zip(*group) {
-                let text = Text::first_of(group).after(place);
-                assert_eq!(String::from_utf8(text.bytes().collect()).expect("ASCII"), **written);
+            let mut text = Text::first_of(group);
+            for part in group.iter().flat_map(|text| text.split('@')) {
+                assert_eq!(String::from_utf8(text.bytes().collect()).expect("ASCII"), part);
+                text = text.after(1);
             }
         }
     }
@@ -402,9 +462,10 @@ mod tests {
 
     #[test]
     fn only_a_whole_word_of_the_group_is_found() {
-        for group in GROUPS.iter().filter(|group| group.iter().all(|word| !word.is_empty() && !word.contains(' '))) {
+        for group in [Setting::WORDS, Word::WORDS, Argument::WORDS, Alarm::WORDS] {
             let first = Text::first_of(group);
-            for (place, word) in (0..).zip(*group) {
+            for (place, word) in (0..).zip(group) {
+                let word = word.split(' ').next().expect("there is a word");
                 assert_eq!(first.find(group.len() as u8, word.as_bytes()), place);
                 assert_eq!(first.find(place, word.as_bytes()), place, "the group ends before it");
                 for no_word in [&word.as_bytes()[1..], &[word.as_bytes(), b"_"].concat()] {

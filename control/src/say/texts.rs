@@ -9,21 +9,22 @@ use crate::{
     operate::{command_error::CommandError, tool::Reason},
     say::{
         command::Wrong,
+        line::Said,
         lines, version,
         words::{self, Argument, Word},
     },
     settings::{self, Setting},
 };
 
-pub(crate) use super::packed::Text;
+use super::packed::Text;
 
-/// All texts, in the order of the table in flash. The texts of a group are found by their places in it.
+/// All texts, in the order of the table in flash. First those that the code names. Of the other groups, the code finds a text by its
+/// place in the group, so they have no `@`.
 pub(crate) const GROUPS: &[&[&str]] = &[
     SAID,
     lines::LINES,
     CommandError::WORDS,
     Wrong::WORDS,
-    words::TAKES,
     words::HELPS,
     settings::UNITS,
     settings::HELPS,
@@ -48,7 +49,7 @@ macro_rules! said {
     ($($NAME:ident = $text:literal;)*) => {
         const SAID: &[&str] = &[$($text),*];
 
-        $(pub(crate) const $NAME: Text = Text::of($text);)*
+        $(pub(crate) const $NAME: Said = Said::of($text);)*
     };
 }
 
@@ -56,41 +57,43 @@ said! {
     END = "\r\n";
     OK = "ok";
     ERROR = "error: ";
-    RESET_BY = ", reset by @, state @";
-    IN_WORDS = " #-# @";
+    RESET_BY = ", reset by ";
+    STATE = ", state ";
     TOOL_OUT = ", tool out; help lists the commands";
-    EXPLAINED = "@ - @";
+    DASH = " - ";
+    IN_WORDS = " #-# ";
     NUMBER = "#";
-    IS = "@=@@";
-    DEFAULT = ", default @";
-    SAVED = ", saved @";
+    IS = "=";
+    DEFAULT = ", default ";
+    SAVED = ", saved ";
     NOT_SAVED = ", not saved";
     RANGE = " from # to #";
-    WHOLE_NUMBER = " a whole number from # to #";
     ON_OR_OFF = " on or off";
+    TAKES = " takes";
+    TAKES_A_NUMBER = " takes a whole number";
     NONE = "none";
     YES = "yes";
     NO = "no";
     SERIAL_PLOTTER = "speed_mm_s:#,tool_deg:#,beam_broken:#,windows:#";
     TELEPLOT = ">speed_mm_s:#\r\n>tool_deg:#\r\n>beam_broken:#\r\n>windows:#";
-    FIELD = "field # @ # # # # #";
-    BUILT_IN = "built_in # @ # # # # #";
+    FIELD = "field";
+    BUILT_IN = "built_in";
+    EXAMPLE = " # ";
+    FEATURES = " # # # # #";
     SPOILED = "spoiled=#";
-    DUMPED = "#,#,#,#,#,@,#,";
+    DUMPED = "#,#,#,#,#,";
+    VOTES = ",#,";
     DUMP = "speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,answer,votes,label";
     WORK = "work";
     UNKNOWN = "unknown";
     IN_ALARM = "alarm";
-    USAGE = "the words do not fit, the command is @@";
-    HOLD_TO_SET = "@ changes where the tool is, hold first";
+    USAGE = "the words do not fit, the command is ";
+    HOLD_TO_SET = " changes where the tool is, hold first";
+    TAKEN_FOR = "the built-in examples say ";
+    LOOK_AGAIN = ", look again, or add force";
 }
 
 impl Word {
-    /// Its arguments, each after a blank.
-    pub(crate) fn takes(self) -> Text {
-        const { Text::first_of(words::TAKES) }.after(self as u8)
-    }
-
     /// Its help text.
     pub(crate) fn help(self) -> Text {
         const { Text::first_of(words::HELPS) }.after(self as u8)
