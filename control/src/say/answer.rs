@@ -83,7 +83,8 @@ impl Answer {
             }
             Self::Help(place) => {
                 if let Some(word) = Word::from_index(place) {
-                    explain(word.text(), word.help(), line);
+                    line.add(word.text());
+                    explain(word.takes(), word.help(), line);
                 }
                 if place + 1 < Word::COUNT { Self::Help(place + 1) } else { Self::Ok }
             }
@@ -151,7 +152,7 @@ impl Answer {
     }
 }
 
-/// A name, and its explanation.
+/// The rest of a name, and its explanation.
 fn explain(name: Text, explanation: Text, line: &mut Line) {
     line.add(name);
     line.say(texts::DASH);

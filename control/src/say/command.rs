@@ -171,13 +171,7 @@ impl LineBuffer {
     #[inline(never)]
     pub fn collect(&mut self, byte: u8) -> bool {
         match byte {
-            b'\r' | b'\n' => {
-                // An operator in a hurry may end the command as a sentence.
-                if self.characters.last() == Some(&b'.') {
-                    self.characters.pop();
-                }
-                return true;
-            }
+            b'\r' | b'\n' => return true,
             0x08 | 0x7F => {
                 self.characters.pop();
             }

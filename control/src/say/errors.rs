@@ -5,7 +5,7 @@ use crate::{
     ground::class::Classifier,
     memory::Memory,
     operate::command_error::CommandError,
-    say::{command::ParseError, line::Line, texts, words::Argument},
+    say::{command::ParseError, line::Line, texts, words::Word},
     settings::Setting,
     weeder::Controller,
 };
@@ -15,7 +15,8 @@ pub(super) fn write_parse_error(error: ParseError, line: &mut Line) {
     let what = match error {
         ParseError::Usage(word) => {
             line.say(texts::USAGE);
-            word.text()
+            line.add(word.text());
+            word.takes()
         }
         ParseError::Value(setting) => return write_allowed(setting.text(), setting, line),
         ParseError::Line(wrong) => wrong.text(),
@@ -33,7 +34,7 @@ pub(super) fn write_command_error<C: Classifier, M: Memory>(
     match (error, setting) {
         (CommandError::OutOfRange, Some(setting)) => return write_allowed(setting.text(), setting, line),
         // `servo US` is the only other command with a range.
-        (CommandError::OutOfRange, None) => return write_allowed(Argument::Servo.text(), Setting::ServoOutUs, line),
+        (CommandError::OutOfRange, None) => return write_allowed(Word::Servo.text(), Setting::ServoOutUs, line),
         (CommandError::NotInHold, Some(setting)) => {
             line.add(setting.text());
             return line.say(texts::HOLD_TO_SET);

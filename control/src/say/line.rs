@@ -3,7 +3,10 @@
 //! A line's values are taken at once, so they belong to one moment. It is sent a character at a time, because a turn has little
 //! time. Each call unpacks or divides only as far as the next character.
 
-use crate::say::packed::{Characters, Text};
+use crate::say::{
+    packed::{Characters, Text, WORD, is_same},
+    texts::GROUPS,
+};
 use ufmt::{Formatter, uDisplay, uWrite};
 
 /// Most texts of a line; a setting's line has 16. A power of two, for short arithmetic.
@@ -17,10 +20,14 @@ const NUMBERS: usize = 8;
 pub(crate) struct Said(u8);
 
 impl Said {
-    /// A text of the first groups.
+    /// A text of the first group.
     pub(crate) const fn of(text: &str) -> Self {
-        let number = Text::of(text).number();
-        assert!(number <= u8::MAX as u16, "texts that the code names are first in the list of groups");
+        let (group, mut number, mut place) = (GROUPS[0], 0, 0);
+        while !is_same(group[place], text) {
+            number += parts(group[place]);
+            place += 1;
+        }
+        assert!(number + parts(text) <= u8::MAX as usize, "one byte numbers the texts that the code names");
         Self(number as u8)
     }
 
@@ -28,6 +35,16 @@ impl Said {
     pub(crate) const fn text(self) -> Text {
         Text::FIRST.after(self.0)
     }
+}
+
+/// The parts of a text before, between and behind its words.
+const fn parts(text: &str) -> usize {
+    let (mut parts, mut at) = (1, 0);
+    while at < text.len() {
+        parts += (text.as_bytes()[at] == WORD) as usize;
+        at += 1;
+    }
+    parts
 }
 
 /// A line, or the rest of it.

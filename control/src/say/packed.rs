@@ -1,7 +1,8 @@
 //! All texts, packed into one table in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is a number in it. `texts`
-//! lists the texts. A text with words is several texts here: its parts before, between and behind the words.
+//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is a place in it. `texts`
+//! lists the texts in groups. The table has an index of the groups; in a group, a text is found by the lengths of those before it. A
+//! text with words is several texts here: its parts before, between and behind the words.
 //!
 //! # How it works
 //!
@@ -12,9 +13,12 @@
 
 use crate::say::texts::{GROUPS, UNPACKED};
 
-/// A text in flash: its number in the table.
+/// A text in flash: its group, and its place there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Text(u16);
+pub struct Text {
+    group: u8,
+    place: u8,
+}
 
 /// Most digits and second halves on the stack during unpacking; a power of two, for short arithmetic.
 const WAITING: usize = 16;
@@ -25,15 +29,12 @@ const DIGITS: usize = "-2147483648".len();
 /// Most steps from a code to its first character.
 pub const HALVINGS: usize = 4;
 
-/// Texts for each entry of the index. From an entry on, a text is found by the lengths of those before it.
-const STRIDE: usize = 16;
-
 /// Bits of a text's header with its packed length. The other two are its [`mark`], which excludes most words in a search without
 /// unpacking them.
 const LENGTH: u8 = 0x3F;
 
 /// Stands for a word in a text.
-const WORD: u8 = b'@';
+pub(super) const WORD: u8 = b'@';
 
 /// No code: during packing it ends a text, or the part of a text before a word.
 const END: u8 = u8::MAX;
@@ -172,20 +173,17 @@ const PACKED: Packed = {
         end += 1;
     }
     let index = end;
-    end += 2 * COUNT.div_ceil(STRIDE);
-    let (mut number, mut group, mut at) = (0, 0, 0);
+    end += 2 * GROUPS.len();
+    let (mut group, mut at) = (0, 0);
     while group < GROUPS.len() {
         let mut place = 0;
+        [table[index + 2 * group], table[index + 2 * group + 1]] = (end as u16).to_le_bytes();
         while place < GROUPS[group].len() {
             let (text, mut to) = (GROUPS[group][place].as_bytes(), 0);
             while to <= text.len() {
                 let from = to;
                 while to < text.len() && text[to] != WORD {
                     to += 1;
-                }
-                if number % STRIDE == 0 {
-                    let entry = index + 2 * (number / STRIDE);
-                    [table[entry], table[entry + 1]] = (end as u16).to_le_bytes();
                 }
                 let start = end;
                 end += 1;
@@ -194,7 +192,7 @@ const PACKED: Packed = {
                 }
                 assert!(end - start - 1 <= LENGTH as usize, "six bits tell a text's packed length");
                 table[start] = mark(text.split_at(to).0.split_at(from).1) | (end - start - 1) as u8;
-                (number, at, to) = (number + 1, at + 1, to + 1);
+                (at, to) = (at + 1, to + 1);
             }
             place += 1;
         }
@@ -203,35 +201,12 @@ const PACKED: Packed = {
     Packed { table, length: end, letters, index }
 };
 
-/// The number of texts.
-const COUNT: usize = number_of(GROUPS, GROUPS.len(), 0);
-
-/// The number of texts in front of a text: those in the groups before its group, and those before it there.
-const fn number_of(groups: &[&[&str]], group: usize, place: usize) -> usize {
-    let (mut number, mut at) = (0, 0);
-    while at < group || place > 0 && at == group {
-        let texts = groups[at];
-        let mut before = 0;
-        while before < if at == group { place } else { texts.len() } {
-            let (text, mut to) = (texts[before].as_bytes(), 0);
-            while to < text.len() {
-                number += (text[to] == WORD) as usize;
-                to += 1;
-            }
-            (number, before) = (number + 1, before + 1);
-        }
-        at += 1;
+/// Two bits that differ between words, above the length's bits.
+const fn mark(word: &[u8]) -> u8 {
+    match word.last() {
+        Some(&last) => last.wrapping_add(word.len() as u8) << LENGTH.count_ones(),
+        None => 0,
     }
-    number
-}
-
-/// Two bits that differ between words, above the length's bits. They depend on the first word alone.
-const fn mark(text: &[u8]) -> u8 {
-    let mut length = 0;
-    while length < text.len() && text[length] != b' ' {
-        length += 1;
-    }
-    if length > 0 { text[length - 1].wrapping_add(length as u8) << LENGTH.count_ones() } else { 0 }
 }
 
 avr_progmem::progmem! {
@@ -253,40 +228,24 @@ fn byte(place: usize) -> u8 {
 
 impl Text {
     /// The first text of the table.
-    pub(crate) const FIRST: Self = Self(0);
+    pub(crate) const FIRST: Self = Self { group: 0, place: 0 };
 
     /// The first text of a group.
     pub(crate) const fn first_of(group: &[&str]) -> Self {
-        let mut place = 0;
-        while !is_same_group(GROUPS[place], group) {
-            place += 1;
+        let mut number = 0;
+        while !is_same_group(GROUPS[number], group) {
+            number += 1;
         }
-        Self(number_of(GROUPS, place, 0) as u16)
-    }
-
-    /// A text of the groups.
-    pub(crate) const fn of(text: &str) -> Self {
-        let (mut group, mut place) = (0, 0);
-        while !is_same(GROUPS[group][place], text) {
-            place += 1;
-            if place == GROUPS[group].len() {
-                (group, place) = (group + 1, 0);
-            }
-        }
-        Self(number_of(GROUPS, group, place) as u16)
-    }
-
-    /// Its number in the table.
-    pub(crate) const fn number(self) -> u16 {
-        self.0
+        assert!(group.len() <= u8::MAX as usize, "a byte is the place in a group");
+        Self { group: number as u8, place: 0 }
     }
 
     /// The text this many places after this one.
     pub(crate) const fn after(self, places: u8) -> Self {
-        Self(self.0 + places as u16)
+        Self { group: self.group, place: self.place + places }
     }
 
-    /// The index of `word` among `count` texts from this one on; `count` if it is not among them. A blank ends a text.
+    /// The index of `word` among `count` texts from this one on; `count` if it is not among them.
     #[inline(never)]
     pub(crate) fn find(self, count: u8, word: &[u8]) -> u8 {
         if word.is_empty() {
@@ -299,9 +258,7 @@ impl Text {
             let header = byte(start);
             if header & !LENGTH == mark {
                 characters.begin_at(start);
-                if word.iter().all(|&character| characters.next() == Some(character))
-                    && characters.next().is_none_or(|character| character == b' ')
-                {
+                if word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none() {
                     return place;
                 }
             }
@@ -314,9 +271,9 @@ impl Text {
     /// Its offset in the table.
     #[inline(never)]
     fn start(self) -> usize {
-        let entry = PACKED.index + 2 * (usize::from(self.0) / STRIDE);
+        let entry = PACKED.index + 2 * usize::from(self.group);
         let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
-        for _ in 0..self.0 as u8 % STRIDE as u8 {
+        for _ in 0..self.place {
             start += 1 + usize::from(byte(start) & LENGTH);
         }
         start
@@ -338,7 +295,7 @@ const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
     same == one.len() && same == other.len()
 }
 
-const fn is_same(one: &str, other: &str) -> bool {
+pub(super) const fn is_same(one: &str, other: &str) -> bool {
     let (one, other, mut same) = (one.as_bytes(), other.as_bytes(), 0);
     while same < one.len() && same < other.len() && one[same] == other[same] {
         same += 1;
@@ -465,7 +422,6 @@ mod tests {
         for group in [Setting::WORDS, Word::WORDS, Argument::WORDS, Alarm::WORDS] {
             let first = Text::first_of(group);
             for (place, word) in (0..).zip(group) {
-                let word = word.split(' ').next().expect("there is a word");
                 assert_eq!(first.find(group.len() as u8, word.as_bytes()), place);
                 assert_eq!(first.find(place, word.as_bytes()), place, "the group ends before it");
                 for no_word in [&word.as_bytes()[1..], &[word.as_bytes(), b"_"].concat()] {

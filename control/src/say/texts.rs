@@ -21,10 +21,10 @@ use super::packed::Text;
 /// All texts, in the order of the table in flash. First those that the code names. Of the other groups, the code finds a text by its
 /// place in the group, so they have no `@`.
 pub(crate) const GROUPS: &[&[&str]] = &[
-    SAID,
-    lines::LINES,
+    &NAMED,
     CommandError::WORDS,
     Wrong::WORDS,
+    words::TAKES,
     words::HELPS,
     settings::UNITS,
     settings::HELPS,
@@ -38,11 +38,21 @@ pub(crate) const GROUPS: &[&[&str]] = &[
     &[UNPACKED],
 ];
 
+/// The texts that the code names: those below, and the lines of the tables.
+const NAMED: [&str; SAID.len() + lines::LINES.len()] = {
+    let (mut texts, mut place) = ([""; SAID.len() + lines::LINES.len()], 0);
+    while place < texts.len() {
+        texts[place] = if place < SAID.len() { SAID[place] } else { lines::LINES[place - SAID.len()] };
+        place += 1;
+    }
+    texts
+};
+
 /// The last text. No fragment is made of it, because it may name a commit.
 pub(crate) const UNPACKED: &str = version::NAME;
 
 /// The version.
-pub(crate) const WEEDER: Text = Text::of(UNPACKED);
+pub(crate) const WEEDER: Text = Text::first_of(&[UNPACKED]);
 
 /// Names texts.
 macro_rules! said {
@@ -94,6 +104,11 @@ said! {
 }
 
 impl Word {
+    /// Its arguments, each after a blank.
+    pub(crate) fn takes(self) -> Text {
+        const { Text::first_of(words::TAKES) }.after(self as u8)
+    }
+
     /// Its help text.
     pub(crate) fn help(self) -> Text {
         const { Text::first_of(words::HELPS) }.after(self as u8)

@@ -2,18 +2,19 @@
 
 use crate::named::named;
 
-/// Makes all of a command from its row: its word and the arguments, as `help` shows them; its help text; and its actions. An action
-/// has what follows the word in its line.
+/// Makes all of a command from its row: its word, its arguments as `help` shows them, its help text, and its actions. An action has
+/// what follows the word in its line.
 macro_rules! commands {
-    ($($Word:ident = $usage:literal, $help:literal { $($Action:ident: $follows:expr,)* })*) => {
+    ($($Word:ident = $word:literal, $takes:literal, $help:literal { $($Action:ident: $follows:expr,)* })*) => {
         named! {
-            /// The first word of a command. Its text has the arguments too.
+            /// The first word of a command.
             #[expect(missing_docs, reason = "the help texts say what each does")]
             Word {
-                $($Word = $usage,)*
+                $($Word = $word,)*
             }
         }
 
+        pub(super) const TAKES: &[&str] = &[$($takes),*];
         pub(super) const HELPS: &[&str] = &[$($help),*];
 
         /// What a command does, a row of the grammar each.
@@ -54,67 +55,67 @@ const fn then(argument: Argument) -> u8 {
 use Argument::{All, In, Now, Off, On, Out, Plant, Row, Servo, Start, Teleplot, Watchdog, Weed};
 
 commands! {
-    Help = "help [name]", "this list, or what a setting is" {
+    Help = "help", " [name]", "this list, or what a setting is" {
         Help: NOTHING, Explain: SETTING,
     }
-    Status = "status", "position, state and counts" {
+    Status = "status", "", "position, state and counts" {
         Status: NOTHING,
     }
-    Get = "get [name]", "one setting, or all" {
+    Get = "get", " [name]", "one setting, or all" {
         GetAll: NOTHING, Get: SETTING,
     }
-    Set = "set name value", "change a setting" {
+    Set = "set", " name value", "change a setting" {
         Set: SETTING | VALUE,
     }
-    Save = "save", "keep the settings" {
+    Save = "save", "", "keep the settings" {
         Save: NOTHING,
     }
-    Revert = "revert", "restore saved settings" {
+    Revert = "revert", "", "restore saved settings" {
         Revert: NOTHING,
     }
-    Defaults = "defaults", "restore factory settings" {
+    Defaults = "defaults", "", "restore factory settings" {
         Defaults: NOTHING,
     }
-    Calibrate = "calibrate start|servo|MM [force]", "measure a distance, or time the servo" {
+    Calibrate = "calibrate", " start|servo|MM [force]", "measure a distance, or time the servo" {
         CalibrateStart: then(Start), CalibrateServo: then(Servo), Calibrate: NUMBER | FORCE,
     }
-    Servo = "servo in|out|US", "move the tool" {
+    Servo = "servo", " in|out|US", "move the tool" {
         ServoIn: then(In), ServoOut: then(Out), Servo: NUMBER,
     }
-    Test = "test row [MM_S]|watchdog", "swing as for plants, or reset" {
+    Test = "test", " row [MM_S]|watchdog", "swing as for plants, or reset" {
         TestRow: then(Row) | SPEED, TestWatchdog: then(Watchdog),
     }
-    Start = "start [now]", "weed; now, over unseen ground" {
+    Start = "start", " [now]", "weed; now, over unseen ground" {
         Start: NOTHING, StartNow: then(Now),
     }
-    Hold = "hold", "tool out of the row" {
+    Hold = "hold", "", "tool out of the row" {
         Hold: NOTHING,
     }
-    Clear = "clear", "clear an alarm" {
+    Clear = "clear", "", "clear an alarm" {
         Clear: NOTHING,
     }
-    Events = "events on|off", "plants, swings and alarms" {
+    Events = "events", " on|off", "plants, swings and alarms" {
         EventsOn: then(On), EventsOff: then(Off),
     }
-    Plot = "plot on|off|teleplot", "curves for Arduino, or Teleplot" {
+    Plot = "plot", " on|off|teleplot", "curves for Arduino, or Teleplot" {
         PlotOn: then(On), PlotOff: then(Off), PlotTeleplot: then(Teleplot),
     }
-    Label = "label plant|weed [force]", "label the last detection" {
+    Label = "label", " plant|weed [force]", "label the last detection" {
         LabelPlant: then(Plant) | FORCE, LabelWeed: then(Weed) | FORCE,
     }
-    Teach = "teach N|plant|weed", "teach an example" {
+    Teach = "teach", " N|plant|weed", "teach an example" {
         Feature: NUMBER, TeachPlant: then(Plant), TeachWeed: then(Weed),
     }
-    Examples = "examples", "all examples" {
+    Examples = "examples", "", "all examples" {
         Examples: NOTHING,
     }
-    Forget = "forget N|all", "forget field examples" {
+    Forget = "forget", " N|all", "forget field examples" {
         Forget: NUMBER, ForgetAll: then(All),
     }
-    Dump = "dump", "the last 16 detections" {
+    Dump = "dump", "", "the last 16 detections" {
         Dump: NOTHING,
     }
-    Version = "version", "the firmware" {
+    Version = "version", "", "the firmware" {
         Version: NOTHING,
     }
 }
