@@ -1,7 +1,7 @@
 //! Answers, a line at a time.
 
 use super::{
-    command::{Command, ParseError},
+    command::ParseError,
     errors::{write_command_error, write_parse_error},
     line::Line,
     lines::{Counts, Status, write_alarm, write_detection, write_example, write_setting},
@@ -28,8 +28,8 @@ pub enum Answer {
     /// Nothing.
     #[default]
     Done,
-    /// The answer to this line, which has not been run yet.
-    Typed(Result<Command, ParseError>),
+    /// The answer to the console's command, which has not been run yet, or to an error.
+    Typed(Result<(), ParseError>),
     /// The commands from this index on.
     Help(u8),
     /// What a setting means.

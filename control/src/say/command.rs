@@ -63,22 +63,33 @@ pub enum ParseError {
     Value(Setting),
 }
 
+impl Command {
+    /// Before a line is parsed.
+    pub(super) const NONE: Self = Self { action: Action::Help, setting: Setting::TicksPerRev, number: 0, force: false };
+}
+
 /// Parses a line.
 ///
 /// # Errors
 /// A [`ParseError`], whose text says what is allowed.
-#[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
+    let mut command = Command::NONE;
+    parse_to(line, &mut command).map(|()| command)
+}
+
+/// Parses a line into a command that stays where it is. After an error the command has no meaning.
+#[inline(never)]
+fn parse_to(line: &[u8], command: &mut Command) -> Result<(), ParseError> {
     let (word, rest) = split_word(line);
     let word = Word::find(word).ok_or(ParseError::Line(Wrong::UnknownCommand))?;
     let usage = Err(ParseError::Usage(word));
     let (first, rest) = split_word(rest);
     let (second, rest) = split_word(rest);
-    let mut command = Command { action: Action::Help, setting: Setting::K, number: TEST_SPEED_MM_S, force: false };
+    let (mut setting, mut value, mut force) = (Setting::TicksPerRev, TEST_SPEED_MM_S, false);
     let kind = if first.is_empty() {
         NOTHING
     } else if matches!(word, Word::Help | Word::Get | Word::Set) {
-        command.setting = Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?;
+        setting = Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?;
         SETTING
     } else if let Some(argument) = Argument::find(first) {
         argument as u8
@@ -87,16 +98,15 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
         if number > 255 && matches!(word, Word::Teach | Word::Forget) {
             return usage;
         }
-        command.number = number;
+        value = number;
         NUMBER
     };
     let mut row = 0;
-    let takes = loop {
+    let (action, takes) = loop {
         let Some(action) = Action::from_index(row) else { return usage };
-        command.action = action;
         let takes = flash::byte(&GRAMMAR, 2 * usize::from(row) + 1);
         if flash::byte(&GRAMMAR, 2 * usize::from(row)) == word as u8 && takes & KIND == kind {
-            break takes & !KIND;
+            break (action, takes & !KIND);
         }
         row += 1;
     };
@@ -104,23 +114,26 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     if !is_complete || !split_word(rest).0.is_empty() {
         return usage;
     }
-    if second.is_empty() {
-        return Ok(command);
+    if !second.is_empty() {
+        let argument = Argument::find(second);
+        if takes & FORCE != 0 {
+            if argument != Some(Argument::Force) {
+                return usage;
+            }
+            force = true;
+        } else {
+            value = match argument {
+                Some(Argument::On) if takes & VALUE != 0 && setting.is_switched() => 1,
+                Some(Argument::Off) if takes & VALUE != 0 && setting.is_switched() => 0,
+                _ => match number(second) {
+                    Some(number) => number,
+                    None => return if takes & VALUE != 0 { Err(ParseError::Value(setting)) } else { usage },
+                },
+            };
+        }
     }
-    let argument = Argument::find(second);
-    if takes & FORCE != 0 {
-        command.force = argument == Some(Argument::Force);
-        return if command.force { Ok(command) } else { usage };
-    }
-    command.number = match argument {
-        Some(Argument::On) if takes & VALUE != 0 && command.setting.is_switched() => 1,
-        Some(Argument::Off) if takes & VALUE != 0 && command.setting.is_switched() => 0,
-        _ => match number(second) {
-            Some(number) => number,
-            None => return if takes & VALUE != 0 { Err(ParseError::Value(command.setting)) } else { usage },
-        },
-    };
-    Ok(command)
+    *command = Command { action, setting, number: value, force };
+    Ok(())
 }
 
 /// The next word of a line, empty at its end, and what follows it.
@@ -163,7 +176,11 @@ impl LineBuffer {
 
     /// Takes a byte. At a line's end it returns the command or the error; nothing for an empty line.
     pub fn take(&mut self, byte: u8) -> Option<Result<Command, ParseError>> {
-        if self.collect(byte) { self.read() } else { None }
+        if !self.collect(byte) {
+            return None;
+        }
+        let mut command = Command::NONE;
+        Some(self.read(&mut command)?.map(|()| command))
     }
 
     /// First half of [`take`](Self::take): stores a byte. Returns whether it ends the line; the caller then calls
@@ -188,10 +205,10 @@ impl LineBuffer {
 
     /// Second half of [`take`](Self::take): parses the line and starts the next. This takes far longer than storing a byte.
     #[inline(never)]
-    pub fn read(&mut self) -> Option<Result<Command, ParseError>> {
+    pub fn read(&mut self, command: &mut Command) -> Option<Result<(), ParseError>> {
         let line = match mem::replace(&mut self.error, Wrong::Nothing) {
             Wrong::Nothing if split_word(&self.characters).0.is_empty() => None,
-            Wrong::Nothing => Some(parse(&self.characters)),
+            Wrong::Nothing => Some(parse_to(&self.characters, command)),
             wrong => Some(Err(ParseError::Line(wrong))),
         };
         self.characters.clear();
