@@ -85,11 +85,10 @@ fn parse_to(line: &[u8], command: &mut Command) -> Result<(), ParseError> {
     let usage = Err(ParseError::Usage(word));
     let (first, rest) = split_word(rest);
     let (second, rest) = split_word(rest);
-    let (mut setting, mut value, mut force) = (Setting::TicksPerRev, TEST_SPEED_MM_S, false);
+    let (mut value, mut force) = (TEST_SPEED_MM_S, false);
     let kind = if first.is_empty() {
         NOTHING
     } else if matches!(word, Word::Help | Word::Get | Word::Set) {
-        setting = Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?;
         SETTING
     } else if let Some(argument) = Argument::find(first) {
         argument as u8
@@ -114,22 +113,21 @@ fn parse_to(line: &[u8], command: &mut Command) -> Result<(), ParseError> {
     if !is_complete || !split_word(rest).0.is_empty() {
         return usage;
     }
+    // Another row names no setting, and none that is a switch stands for it.
+    let setting = match kind {
+        SETTING => Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?,
+        _ => Setting::TicksPerRev,
+    };
     if !second.is_empty() {
-        let argument = Argument::find(second);
-        if takes & FORCE != 0 {
-            if argument != Some(Argument::Force) {
-                return usage;
-            }
-            force = true;
-        } else {
-            value = match argument {
-                Some(Argument::On) if takes & VALUE != 0 && setting.is_switched() => 1,
-                Some(Argument::Off) if takes & VALUE != 0 && setting.is_switched() => 0,
-                _ => match number(second) {
-                    Some(number) => number,
-                    None => return if takes & VALUE != 0 { Err(ParseError::Value(setting)) } else { usage },
-                },
-            };
+        match Argument::find(second) {
+            Some(Argument::Force) if takes & FORCE != 0 => force = true,
+            Some(Argument::On) if setting.is_switched() => value = 1,
+            Some(Argument::Off) if setting.is_switched() => value = 0,
+            _ => match number(second) {
+                Some(number) if takes & FORCE == 0 => value = number,
+                _ if takes & VALUE != 0 => return Err(ParseError::Value(setting)),
+                _ => return usage,
+            },
         }
     }
     *command = Command { action, setting, number: value, force };
@@ -325,7 +323,7 @@ mod tests {
     #[test]
     fn arguments_that_a_command_does_not_take_name_the_allowed_ones() {
         for (word, command, arguments) in [
-            (Word::Help, "help", &["k now"][..]),
+            (Word::Help, "help", &["k now", "me now"][..]),
             (Word::Status, "status", &["please"]),
             (Word::Set, "set", &["wheel_mm", "wheel_mm 400 mm"]),
             (Word::Start, "start", &["later"]),
