@@ -166,6 +166,12 @@ pub struct LineBuffer {
     error: Wrong,
 }
 
+impl Default for LineBuffer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl LineBuffer {
     /// An empty line.
     pub const fn new() -> Self {
