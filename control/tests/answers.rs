@@ -9,7 +9,7 @@ use control::{
         class::{Class, Vote},
         keep_out::Plan,
     },
-    measure::reset::Cause,
+    measure::{readings::Readings, reset::Cause},
     memory::Volatile,
     operate::{
         calibration::{Outcome, SwingTimes},
@@ -23,7 +23,7 @@ use control::{
         line::Line,
     },
     settings::Setting,
-    units::{Position, Ticks},
+    units::{Instant, Position, Ticks},
 };
 use rig::{Beams, Rig};
 
@@ -146,7 +146,7 @@ fn status_shows_the_distance_to_seen_ground() {
     assert_eq!(
         machine.ask("status"),
         [
-            "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=449",
+            "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=450",
             "lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=65535 reset=power_on",
             "ok"
         ]
@@ -156,6 +156,38 @@ fn status_shows_the_distance_to_seen_ground() {
     assert!(machine.ask("status")[0].starts_with("state=work tool=out for=unseen_ground "));
     assert_eq!(machine.ask("start now"), ["ok"]);
     assert!(machine.ask("status")[0].ends_with("unseen_mm=0"));
+}
+
+/// The greeting, and the second line of the status, after a reset of a machine that was at work.
+fn after_a_reset_at_work(cause: Cause) -> (String, Rig<ByWidth>) {
+    let readings = Readings::new(Instant::ZERO, Position::new(0));
+    let classifier = ByWidth::new(LEAST_HOLD_MM, 0);
+    let mut machine = Rig::wake_from(classifier, Volatile::new(), readings, Beams::default(), cause, true);
+    let mut console = Console::new();
+    console.carry_on(&mut machine);
+    (std::iter::from_fn(|| console.next_byte()).map(char::from).collect(), machine)
+}
+
+#[test]
+fn a_reset_at_work_is_told_in_greeting_and_status_until_the_operator_starts_holds_or_clears() {
+    for cause in [Cause::ResetPin, Cause::BrownOut, Cause::LoopStalled, Cause::Unknown] {
+        let (greeting, mut machine) = after_a_reset_at_work(cause);
+        assert!(greeting.contains(&format!(", reset by {}, was work, state alarm", cause.text())), "{greeting}");
+        assert!(machine.ask("status")[1].ends_with(&format!(" reset={} was=work", cause.text())));
+        assert!(machine.works_or_did(), "another reset does not hide it");
+        for line in ["clear", "hold", "start"] {
+            let mut after = after_a_reset_at_work(cause).1;
+            if line == "start" {
+                after.ask("clear");
+            }
+            assert_eq!(after.ask(line), ["ok"]);
+            assert!(after.ask("status")[1].ends_with(&format!(" reset={}", cause.text())), "{line}");
+            assert_eq!(after.works_or_did(), line == "start");
+        }
+    }
+    let (greeting, mut machine) = after_a_reset_at_work(Cause::PowerOn);
+    assert!(greeting.contains(", reset by power_on, state alarm"), "SRAM is random then: {greeting}");
+    assert!(machine.ask("status")[1].ends_with(" reset=power_on"));
 }
 
 #[test]
@@ -249,6 +281,7 @@ fn a_wheel_with_too_few_counts_is_refused_with_the_allowed_value() {
     assert_eq!(machine.ask("set wheel_mm 401"), [refusal]);
     machine.ask("calibrate start");
     machine.at(800).turn_after(1000);
+    machine.stand(200);
     assert_eq!(machine.ask("calibrate 1000 force"), [refusal]);
     assert_eq!(machine.settings().get(Setting::TicksPerM), 0);
 }
@@ -328,10 +361,16 @@ fn a_calibration_answers_its_result_or_the_allowed_values() {
     assert_eq!(machine.ask("calibrate 10000"), ["error: calibrate start first, then roll"]);
     assert_eq!(machine.ask("calibrate start"), ["ok"]);
     machine.at(18_900).turn_after(1000);
+    assert_eq!(machine.ask("calibrate 10000"), ["error: the machine rolls, stop first"]);
+    machine.stand(200);
     assert_eq!(machine.ask("calibrate 500"), ["error: roll 1000 mm at least, 10000 are better"]);
     let refusal = "error: that would be ticks_per_m 3780, the wheel has 1910, look again, or add force";
     assert_eq!(machine.ask("calibrate 5000"), [refusal]);
-    let answer = ["ticks_per_m=1890 from 0 to 20000, default 0, not saved", "ok"];
+    let answer = [
+        "ticks_per_m=1890 from 0 to 20000, default 0, not saved",
+        "that is 10 permille off the diameter of the wheel",
+        "ok",
+    ];
     assert_eq!(machine.ask("calibrate 10000"), answer);
     assert_eq!(machine.ask("calibrate 5000 force")[0], "ticks_per_m=3780 from 0 to 20000, default 0, not saved");
 }

@@ -11,7 +11,7 @@
 //! What it does not do: measure slip on empty ground, or see plants that are nearer to the tool than the second beam.
 
 use super::{
-    detection::{Detection, End},
+    detection::Detection,
     detector::Detector,
     slip::{Slip, SlipChange},
 };
@@ -71,14 +71,19 @@ impl SecondBeam {
         slip: Slip::NONE,
     };
 
-    /// Starts at a position. Forgets earlier detections, and the slip measured with them. The beam's level stays: only its edges
-    /// are reported, and none may come.
+    /// Starts at a position. Forgets earlier detections, and no longer trusts the slip measured with them. The beam's level stays:
+    /// only its edges are reported, and none may come.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn begin(&mut self, position: WrappedPosition) {
         self.detector.begin(position, self.detector.is_broken());
         (self.awaited, self.missed, self.is_crowded) = (0, 0, false);
         self.expected_to = position;
-        self.slip = Slip::NONE;
+        self.slip.distrust();
+    }
+
+    /// Edges were lost, or none has come yet. The beam is now `broken`. The caller then calls [`begin`](Self::begin).
+    pub fn lose_edges(&mut self, broken: bool) {
+        self.detector.lose_edges(broken);
     }
 
     /// The measured slip.
@@ -94,11 +99,6 @@ impl SecondBeam {
     /// Whether the beam is broken.
     pub fn is_broken(&self) -> bool {
         self.detector.is_broken()
-    }
-
-    /// Which end of a detection an edge at this position is.
-    pub fn end(&self, position: WrappedPosition) -> End {
-        self.detector.end(position)
     }
 
     /// Where the open detection begins.

@@ -3,10 +3,11 @@
 //! A copy is the table's mark, the number of values, a sequence number, the values, and a CRC-16 of all. A save overwrites the
 //! older copy, one byte at a time, so a power loss leaves the newer copy intact. The save first makes the mark's first byte wrong
 //! and writes it correctly at the end. So a half-written copy is invalid, even if an old copy with one flipped bit is overwritten.
-//! At start-up the newest valid copy is used: right CRC, this firmware's table, all values within their ranges.
+//! At start-up the newest valid copy is used: right CRC, this firmware's table, all values within their ranges. A copy with the
+//! mark of a complete save that is not valid has changed since. The operator is warned, because the other may be older.
 
 use crate::{
-    memory::{Memory, SIZE, checksum},
+    memory::{ERASED, Memory, SIZE, checksum},
     settings::{Setting, Settings, TABLE_MARK},
 };
 
@@ -42,12 +43,14 @@ pub struct SavedSettings<M> {
     next: u8,
     /// Whether there is a valid copy.
     exists: bool,
+    /// Whether the other copy was saved, and is no longer valid.
+    spoiled: bool,
 }
 
 impl<M: Memory> SavedSettings<M> {
     /// The settings before [`load`](Self::load).
     pub const fn new(memory: M) -> Self {
-        Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, next: 0, exists: false }
+        Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, next: 0, exists: false, spoiled: false }
     }
 
     /// Loads the newest valid copy; `None` if there is none.
@@ -62,10 +65,13 @@ impl<M: Memory> SavedSettings<M> {
         let sequence = |copy| self.memory.read(address(copy) + SEQUENCE);
         // If only one copy is valid, the order does not matter.
         let newer = u8::from(sequence(1).wrapping_sub(sequence(0)).cast_signed() > 0);
+        // Both, because the sequence number may have changed.
+        let spoiled = (0..2).any(|copy| self.was_saved(copy) && !self.read(copy, settings));
         for turn in 0..2 {
             let copy = newer ^ turn;
             if self.read(copy, settings) {
                 self.exists = true;
+                self.spoiled = spoiled;
                 (self.older, self.sequence) = (copy ^ 1, self.memory.read(address(copy) + SEQUENCE));
                 return true;
             }
@@ -75,7 +81,7 @@ impl<M: Memory> SavedSettings<M> {
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
     pub fn save(&mut self, settings: &Settings) {
-        self.exists = true;
+        (self.exists, self.spoiled) = (true, false);
         self.older ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
         self.image = image(settings, self.sequence);
@@ -119,6 +125,11 @@ impl<M: Memory> SavedSettings<M> {
         exists
     }
 
+    /// Whether a copy was saved, and has changed since. The next save overwrites it.
+    pub const fn is_spoiled(&self) -> bool {
+        self.spoiled
+    }
+
     /// The memory, for a test or another machine.
     pub fn into_memory(self) -> M {
         self.memory
@@ -139,6 +150,13 @@ impl<M: Memory> SavedSettings<M> {
     #[inline(never)]
     fn values(&self, copy: u16, settings: &mut Settings) -> bool {
         Setting::all().all(|setting| settings.set(setting, self.value_at(copy, setting)).is_ok())
+    }
+
+    /// Whether a copy's first byte is that of a complete save, or has one other bit. An unfinished save has all other bits.
+    fn was_saved(&self, copy: u8) -> bool {
+        let first = self.memory.read(address(copy));
+        let changed = first ^ TABLE_MARK as u8;
+        changed & changed.wrapping_sub(1) == 0 && first != ERASED
     }
 
     /// Reads a copy. Returns whether it is valid.
@@ -171,7 +189,7 @@ const fn address(copy: u8) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::memory::{ERASED, Volatile};
+    use crate::memory::Volatile;
     use std::{format, vec::Vec};
 
     fn with_k(k: u16) -> Settings {
@@ -209,6 +227,32 @@ mod tests {
         for time in 0..600 {
             memory = save(memory, &with_k(1 + time % 15));
             assert_eq!(load(&memory), Some(with_k(1 + time % 15)), "{time}");
+        }
+    }
+
+    /// Whether a start with this memory finds a copy that has changed since it was saved.
+    fn is_spoiled(memory: &Volatile) -> bool {
+        let mut saved = SavedSettings::new(memory.clone());
+        saved.load();
+        saved.is_spoiled()
+    }
+
+    #[test]
+    fn each_changed_bit_of_a_saved_copy_is_told_until_the_next_save_and_an_unfinished_save_is_not() {
+        let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
+        assert!(!is_spoiled(&Volatile::new()) && !is_spoiled(&save(Volatile::new(), &with_k(5))) && !is_spoiled(&memory));
+        for bit in 0..8 * COPY {
+            for copy in 0..2 {
+                let mut changed = memory.clone();
+                changed.bytes[usize::from(address(copy)) + bit / 8] ^= 1 << (bit % 8);
+                assert!(is_spoiled(&changed), "copy {copy}, bit {bit}");
+                assert!(!is_spoiled(&save(changed, &with_k(9))), "copy {copy}, bit {bit}");
+            }
+        }
+        for power in 0..=COPY + 1 {
+            let mut failing = memory.clone();
+            failing.lose_power_after(power);
+            assert!(!is_spoiled(&save(failing, &with_k(9)).with_power()), "{power}");
         }
     }
 

@@ -39,6 +39,10 @@ pub enum Answer {
     Counts,
     /// A setting's value.
     Get(Setting),
+    /// The wheel's calibration.
+    Calibrated,
+    /// How far it is from the diameter.
+    OffTheDiameter,
     /// The settings from this index on.
     GetAll(u8),
     /// The examples from this index on.
@@ -72,6 +76,9 @@ impl Answer {
                 line.say(texts::WEEDER);
                 line.say(texts::RESET_BY);
                 line.say(controller.cause().text());
+                if controller.was_working() {
+                    line.say(texts::WAS_WORK);
+                }
                 line.say(texts::STATE);
                 line.say(names::state(controller.state()));
                 if let State::Alarm(alarm) = controller.state() {
@@ -101,6 +108,17 @@ impl Answer {
             }
             Self::Get(setting) => {
                 write_setting(controller, setting, line);
+                Self::Ok
+            }
+            Self::Calibrated => {
+                write_setting(controller, Setting::TicksPerM, line);
+                Self::OffTheDiameter
+            }
+            Self::OffTheDiameter => {
+                line.say(texts::OFF_THE_DIAMETER);
+                let nominal = controller.settings().nominal_ticks_per_m();
+                let off = u32::from(controller.distance().counted().abs_diff(nominal));
+                line.counted((off * 1000 / u32::from(nominal)) as u16);
                 Self::Ok
             }
             Self::GetAll(place) => {

@@ -41,7 +41,7 @@ const DIGITS: usize = "-2147483648".len();
 pub const HALVINGS: usize = 4;
 
 /// Texts for each entry of the index. From an entry on, a text is found by the lengths of those before it.
-const STRIDE: u8 = 16;
+const STRIDE: u16 = 16;
 
 /// Bits of a text's header with its packed length. The other two are its [`mark`], which excludes most words in a search without
 /// unpacking them.

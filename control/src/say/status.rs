@@ -2,7 +2,6 @@
 
 use super::{line_tables::line, names};
 use crate::{
-    alarm::Warning,
     ground::class::{Classifier, Listed},
     memory::Memory,
     operate::{detections::Classified, plot::Plot, state::State},

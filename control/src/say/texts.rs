@@ -36,19 +36,18 @@ pub(crate) const GROUPS: &[&[&str]] = &[
 ];
 
 /// The number of texts.
-pub(crate) const COUNT: u8 = {
+pub(crate) const COUNT: u16 = {
     let (mut count, mut group) = (0, 0);
     while group < GROUPS.len() {
         count += GROUPS[group].len();
         group += 1;
     }
-    assert!(count <= u8::MAX as usize, "a byte numbers the texts");
-    count as u8
+    count as u16
 };
 
 /// A text in flash, by its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Text(u8);
+pub struct Text(u16);
 
 impl Text {
     /// The first text of the table.
@@ -58,7 +57,7 @@ impl Text {
     pub(crate) const fn first_of(group: &[&str]) -> Self {
         let (mut first, mut place) = (0, 0);
         while !is_same_group(GROUPS[place], group) {
-            first += GROUPS[place].len() as u8;
+            first += GROUPS[place].len() as u16;
             place += 1;
         }
         Self(first)
@@ -73,11 +72,11 @@ impl Text {
 
     /// The text this many places after this one.
     pub(crate) const fn plus(self, places: u8) -> Self {
-        Self(self.0 + places)
+        Self(self.0 + places as u16)
     }
 
     /// Its index in the table.
-    pub(crate) const fn number(self) -> u8 {
+    pub(crate) const fn number(self) -> u16 {
         self.0
     }
 }
@@ -124,12 +123,12 @@ macro_rules! texts_of_status {
 status_table!(texts_of_status);
 
 /// Both without repetitions, and their number.
-const DISTINCT: ([&str; 48], usize) = distinct(OF_STATUS, distinct(OF_EVENTS, ([""; 48], 0)));
+const DISTINCT: ([&str; 56], usize) = distinct(OF_STATUS, distinct(OF_EVENTS, ([""; 56], 0)));
 
 const fn distinct(
     lines: &[&[&'static str]],
-    (mut texts, mut count): ([&'static str; 48], usize),
-) -> ([&'static str; 48], usize) {
+    (mut texts, mut count): ([&'static str; 56], usize),
+) -> ([&'static str; 56], usize) {
     let mut line = 0;
     while line < lines.len() {
         let mut place = 0;
@@ -179,6 +178,7 @@ said! {
     WEEDER = version::NAME;
     RESET_BY = ", reset by ";
     STATE = ", state ";
+    WAS_WORK = ", was work";
     TOOL_OUT = ", tool out; help lists the commands";
     DASH = " - ";
     IN_WORDS = " #-# ";
@@ -215,6 +215,7 @@ said! {
     USAGE = "the words do not fit, the command is ";
     HOLD_TO_SET = " changes where the tool is, hold first";
     WHEEL_DIFFERS = "that would be ticks_per_m #, the wheel has #";
+    OFF_THE_DIAMETER = "that is # permille off the diameter of the wheel";
     TAKEN_FOR = "the built-in examples say ";
     LOOK_AGAIN = ", look again, or add force";
 }

@@ -77,7 +77,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub(super) fn follow_settings(&mut self) {
         self.configuration.follow();
         if !self.is_working() {
-            self.ground.forget_slip();
+            self.ground.distrust_slip();
         }
         let settings = self.configuration.settings();
         self.ground.follow(settings, self.sensors.position);

@@ -7,7 +7,7 @@
 //! unknown, because it was never seen or was forgotten. An alarm opens nothing.
 //!
 //! With a stem zone, the tool may work at either end of a detection: beyond the zone, but by at most a fifth of that
-//! part. A second beam may see the end elsewhere, which adds to the limit.
+//! part. A second beam can only add to a detection.
 //!
 //! Guarded ground is closed like a canopy from then on, with or without a plant.
 //!
@@ -61,9 +61,8 @@ pub struct Model {
     guarded: Vec<Stretch>,
     /// Gaps that belong to a canopy, each with the frontier at which it was set.
     merge_gaps: Vec<(i64, i64)>,
-    /// Stem zones, each with the frontier at which it was set; and the shift of an end by a second beam.
+    /// Stem zones, each with the frontier at which it was set.
     stem_zones: Vec<(i64, i64)>,
-    moved: i64,
     /// A detection up to this width may have been classified as a weed without an event.
     narrow: i64,
     /// Error of every position: from the machine's resolution of the ground, and a turn of the loop.
@@ -89,7 +88,6 @@ impl Model {
             guarded: Vec::new(),
             merge_gaps: Vec::new(),
             stem_zones: Vec::new(),
-            moved: 0,
             narrow: 0,
             slack: 0,
             resolution_slack: 0,
@@ -105,8 +103,8 @@ impl Model {
     /// the ground again as new.
     pub fn follow(&mut self, place: i64, settings: &Settings, narrow_mm: u16) {
         let metre = i64::from(settings.wheel().ticks(1000).0);
-        let [merge_gap, zone, second_beam] =
-            [Setting::MergeGapMm, Setting::StemZoneMm, Setting::SecondBeamMm].map(|set| settings.ticks(set).0.into());
+        let [merge_gap, zone] =
+            [Setting::MergeGapMm, Setting::StemZoneMm].map(|set| settings.ticks(set).0.into());
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
             self.may_have_forgotten = true;
@@ -125,7 +123,6 @@ impl Model {
         if self.stem_zones.last().map_or(0, |&(_, last)| last) != zone {
             self.stem_zones.push((self.frontier, zone));
         }
-        self.moved = self.moved.max(second_beam / 16);
         self.narrow = self.narrow.max(settings.wheel().ticks(narrow_mm).0.into());
     }
 
@@ -155,6 +152,8 @@ impl Model {
         self.merge_gaps.clear();
         let zone = self.stem_zones.last().copied();
         self.stem_zones = zone.map(|(_, zone)| (place, zone)).into_iter().collect();
+        // A plant that breaks the beam here is kept from here on.
+        self.touch(0);
     }
 
     /// The machine reports that it guards the ground around a position, where a plant was expected.
@@ -370,7 +369,7 @@ impl Model {
         let zones = self.stem_zones[first..].iter().filter(|&&(_, zone)| zone > 0);
         let beside = |zone: i64| ((self.widest(stretch) - zone) / 2).clamp(0, zone * 13 / 64);
         let most = zones.map(|&(_, zone)| beside(zone)).max();
-        most.map_or(0, |most| if most > 0 { most + self.moved + 1 } else { 0 })
+        most.map_or(0, |most| if most > 0 { most + 1 } else { 0 })
     }
 
     /// Whether the machine may merge two neighbours.
@@ -397,5 +396,21 @@ impl Model {
             self.stretches[..end].iter().rfind(is_closed)
         };
         found.copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plant_in_the_beam_is_kept_where_ground_is_seen_again_as_new() {
+        let mut model = Model::new(0, false);
+        model.edge(900, true, 0);
+        model.roll_to(1000, 0);
+        model.see_again(950);
+        assert!(model.has_canopy_near(950, 0) && model.canopy_between(940, 960, 0).is_none(), "it may be of no width");
+        model.roll_to(1000, 0);
+        assert!(model.canopy_between(960, 960, 0).is_some());
     }
 }
