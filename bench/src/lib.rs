@@ -6,7 +6,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-use control::ground::{examples::sorted_by_first_feature, features};
+use control::ground::features;
 use knn::Example;
 
 /// Queries of each task.
@@ -67,7 +67,7 @@ impl Random {
     }
 }
 
-/// `N` random examples of two classes, in the order of a table in flash.
+/// `N` random examples of two classes.
 #[must_use]
 pub const fn examples<const N: usize>() -> [Example<{ features::COUNT }>; N] {
     let mut random = Random::new(0x9E37_79B9 ^ N as u32);
@@ -77,5 +77,5 @@ pub const fn examples<const N: usize>() -> [Example<{ features::COUNT }>; N] {
         examples[index] = Example::new(random.features(), random.byte() % CLASSES as u8);
         index += 1;
     }
-    sorted_by_first_feature(examples)
+    examples
 }

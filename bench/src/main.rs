@@ -1,8 +1,8 @@
 //! The benchmark on the chip: runs the tasks of `Task::ALL`, and shows each call on D13.
 //!
 //! It runs the firmware's own search of examples in flash, in the firmware's own profile. Then it repeats the queries with the
-//! plain search of the crate `knn`, and counts different answers. It does the same for examples in SRAM. It prints nothing: `cargo
-//! bench-uno` reads the pin and the variables.
+//! plain search of the crate `knn`, and counts different answers. It prints nothing: `cargo bench-uno` reads the pin and the
+//! variables.
 
 #![no_std]
 #![no_main]
@@ -18,7 +18,7 @@ use control::ground::{
 };
 use core::{arch::asm, hint::black_box};
 use examples::{BuiltIn, InFlash, Row, rows};
-use knn::{Answer, ClassifyError, Example, Examples, MAX_K, Nearest, Neighbour, VACANT, classify};
+use knn::{Answer, ClassifyError, Example, Examples, MAX_K, Nearest, Neighbour, classify};
 use knn_bench::{CLASSES, K, QUERIES, Random, Task};
 
 progmem! {
@@ -51,7 +51,7 @@ fn main() -> ! {
         match task {
             Task::Quantise => {
                 for object in objects() {
-                    measured(|| black_box(scale().quantise(black_box(&object.values()))));
+                    measured(|| black_box(scale().quantise(black_box(object.values()))));
                 }
             }
             Task::Classify(count) => {
@@ -61,7 +61,7 @@ fn main() -> ! {
             }
             Task::ClassifyObjects => {
                 for object in objects() {
-                    let _ = black_box(measured_search(found, &BuiltIn::table(), &scale().quantise(&object.values())));
+                    let _ = black_box(measured_search(found, &BuiltIn::table(), &scale().quantise(object.values())));
                 }
             }
         }
@@ -78,27 +78,11 @@ fn main() -> ! {
             }
             Task::ClassifyObjects => {
                 for object in objects() {
-                    let query = scale().quantise(&object.values());
+                    let query = scale().quantise(object.values());
                     different +=
                         u16::from(search(found, &BuiltIn::table(), &query) != plain_search(&BuiltIn::table(), &query));
                 }
             }
-        }
-    }
-    let mut taught = InMemory { places: [Example::new([0; features::COUNT], VACANT); TAUGHT], is_plain: false };
-    for (number, place) in taught.places.iter_mut().enumerate() {
-        // Some places stay empty.
-        if let Some(example) = random(TAUGHT as u8).example(number).filter(|_| number % 5 > 0) {
-            *place = example;
-        }
-    }
-    for query in queries() {
-        for k in [K, MAX_K] {
-            let [fast, plain] = [false, true].map(|is_plain| {
-                taught.is_plain = is_plain;
-                search_taught(&taught, &query, k)
-            });
-            different += u16::from(fast != plain);
         }
     }
     // SAFETY: as above.
@@ -127,7 +111,7 @@ fn measured_search(found: &mut Nearest<CLASSES>, examples: &InFlash, query: &Que
 #[inline(never)]
 fn search(found: &mut Nearest<CLASSES>, examples: &InFlash, query: &Query) -> Result {
     found.begin(black_box(K))?;
-    examples.keep_nearest(query, found);
+    examples.join(0..examples.len(), query, found);
     found.answer(RADIUS)
 }
 
@@ -147,45 +131,6 @@ impl Examples<{ features::COUNT }> for OneByOne<'_> {
     fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
         self.0.example(index)
     }
-}
-
-/// The number of examples in SRAM.
-const TAUGHT: usize = 32;
-
-/// Examples in SRAM, and whether the crate's plain search searches them.
-struct InMemory {
-    places: [Example<{ features::COUNT }>; TAUGHT],
-    is_plain: bool,
-}
-
-impl InMemory {
-    fn held(&self) -> impl Iterator<Item = &Example<{ features::COUNT }>> {
-        self.places.iter().filter(|example| example.label != VACANT)
-    }
-}
-
-impl Examples<{ features::COUNT }> for InMemory {
-    fn len(&self) -> usize {
-        self.held().count()
-    }
-
-    fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
-        self.held().nth(index).copied()
-    }
-
-    #[inline(never)]
-    fn keep_nearest<const CLASSES: usize>(&self, query: &Query, nearest: &mut Nearest<CLASSES>) {
-        if self.is_plain {
-            self.held().for_each(|example| nearest.join(example.neighbour_of(query)));
-        } else {
-            BuiltIn.keep_nearest_of(&self.places, query, nearest);
-        }
-    }
-}
-
-#[inline(never)]
-fn search_taught(examples: &InMemory, query: &Query, k: u8) -> Result {
-    classify(examples, query, black_box(k), RADIUS)
 }
 
 /// Random examples: 8, 16, 32, 64 or 128.

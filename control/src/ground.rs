@@ -135,10 +135,6 @@ impl Ground {
         if self.geometry.guard_spacing() != guard_spacing {
             self.guard = Guard::NONE;
         }
-        if !self.has_second_beam() {
-            // Its last level would stay for ever.
-            self.second_beam.lose_edges(false);
-        }
         if self.geometry.scale != scale {
             self.beam = self.geometry.scale.wrap(position);
             self.begin_here(self.detector.is_broken());
@@ -164,9 +160,16 @@ impl Ground {
     }
 
     /// No longer trusts the second beam's measurements: the wheel or the beams' distance may have changed. The second beam ignores
-    /// earlier detections of the first.
+    /// earlier detections of the first. Its level stays, because only its edges are reported, and none may come.
     pub fn distrust_slip(&mut self) {
-        self.second_beam.begin(self.detector.frontier());
+        self.begin_second(self.second_is_broken());
+    }
+
+    /// The second beam starts with a level, where the first beam is.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn begin_second(&mut self, broken: bool) {
+        // A beam that is not there any more would stay broken.
+        self.second_beam.begin(self.detector.frontier(), broken && self.has_second_beam());
     }
 
     /// Recalculates the leads for another speed, see [`Leads::at`].
@@ -254,8 +257,8 @@ impl Ground {
     /// Edges of the beams were lost, so this ground is unknown. The beams' levels are now `broken` and `second_broken`.
     pub fn lose_edges(&mut self, broken: bool, second_broken: bool) {
         self.detector.lose_edges(broken);
-        self.second_beam.lose_edges(second_broken && self.has_second_beam());
         self.forget();
+        self.begin_second(second_broken);
     }
 
     /// Forgets everything, and starts detection at the beam's position. `broken` is its level.

@@ -115,6 +115,52 @@ impl Memory for Volatile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::cell::Cell;
+
+    /// A memory with a cell that no longer changes. It counts the writes, and takes some calls for each.
+    struct Worn {
+        memory: Volatile,
+        cell: u16,
+        written: usize,
+        busy: Cell<u8>,
+    }
+
+    impl Memory for Worn {
+        fn read(&self, address: u16) -> u8 {
+            assert_eq!(self.busy.get(), 0, "nothing can be read during a write");
+            self.memory.read(address)
+        }
+
+        fn is_ready(&self) -> bool {
+            self.busy.set(self.busy.get().saturating_sub(1));
+            self.busy.get() == 0
+        }
+
+        fn write(&mut self, address: u16, byte: u8) {
+            if address != self.cell {
+                self.memory.write(address, byte);
+            }
+            self.written += 1;
+            self.busy.set(3);
+        }
+    }
+
+    #[test]
+    fn an_update_writes_each_wrong_byte_once_and_does_not_wait_for_a_worn_cell() {
+        let bytes = [1, 2, ERASED, 4];
+        for cell in 9..=14 {
+            let mut worn = Worn { memory: Volatile::new(), cell, written: 0, busy: Cell::new(0) };
+            for written in [3, usize::from([10, 11, 13].contains(&cell))] {
+                (worn.written, worn.busy) = (0, Cell::new(0));
+                let mut next = 0;
+                let calls = (1..).find(|_| worn.update(10, &bytes, &mut next));
+                assert!(calls <= Some(1 + 3 * 3), "{calls:?}");
+                assert_eq!((worn.written, next), (written, 0), "cell {cell}");
+            }
+            let holds = |address: u16| worn.memory.read(address) == bytes[usize::from(address - 10)];
+            assert!((10..14).all(|address| address == cell || holds(address)), "cell {cell}");
+        }
+    }
 
     #[test]
     fn the_checksum_matches_the_crc_catalogue() {

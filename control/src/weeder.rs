@@ -177,7 +177,15 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(always)]
     pub fn take_edge(&mut self, edge: Edge) {
         match edge {
-            Edge::Seen { position, broken, second_broken } => {
+            Edge::Seen { position, broken, second_broken } => self.see_levels(position, broken, second_broken),
+            Edge::Lost { broken, second_broken } => self.beam_edges_lost(broken, second_broken),
+        }
+    }
+
+    /// Takes the beams' levels at a position. One of them may be new.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    fn see_levels(&mut self, position: Position, broken: bool, second_broken: bool) {
                 let is_broken = broken || second_broken && self.ground.has_second_beam();
                 if self.sensors.beam.edge(self.sensors.readings.now, is_broken) {
                     self.forget_and_raise(Alarm::BeamFlickers);
@@ -189,16 +197,14 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
                 if is_of_second {
                     self.match_second_beam(self.sensors.odometer.place(position), second_broken);
                 }
-            }
-            Edge::Lost { broken, second_broken } => self.beam_edges_lost(broken, second_broken),
-        }
     }
 
     /// Takes an edge of the first beam, and the position at which it came.
     fn beam_edge(&mut self, position: Position, broken: bool) {
         self.sensors.beam_broken = broken;
         if broken && self.is_working() && self.sensors.encoder.beam_broke() {
-            self.forget_and_raise(Alarm::EncoderSilent);
+            let flickers = self.sensors.beam.short_breaks() > 1;
+            self.forget_and_raise(if flickers { Alarm::BeamFlickers } else { Alarm::EncoderSilent });
         }
         if let Some(detection) = self.ground.edge(self.sensors.odometer.place(position), broken) {
             self.see(detection);
@@ -367,7 +373,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
-        let alarm = self.sensors.explain(alarm);
+        let alarm = self.sensors.beam.explain(alarm);
         self.events.add(Event::Alarm { alarm, position: self.sensors.position });
         self.enter(State::Alarm(alarm));
     }

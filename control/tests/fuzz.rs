@@ -120,8 +120,8 @@ fn settings(changes: &[(u8, u16)]) -> Settings {
 fn save(memory: Volatile, settings: &Settings) -> Volatile {
     let mut saved = SavedSettings::new(memory);
     saved.load();
-    saved.save(settings);
-    while !saved.carry_on() {}
+    saved.save();
+    while !saved.carry_on(settings) {}
     saved.into_memory()
 }
 

@@ -127,6 +127,20 @@ proptest! {
 }
 
 #[test]
+fn a_speed_that_no_machine_has_stays_the_fastest_and_does_not_turn_round() {
+    // The fastest count that the chip does not lose, forward and back.
+    for counts_per_s in [30_000.0, 100_000.0, 290_000.0, -30_000.0, -290_000.0] {
+        let mut run = Run::new();
+        for _ in 0..1000 {
+            run.roll(1, 200, |time| counts_per_s * time);
+            let (speed, expected) = (run.speed() / counts_per_s.signum(), run.expected() / counts_per_s.signum());
+            assert!(speed >= 0.0 && expected >= speed, "{speed} and {expected} at {counts_per_s}");
+        }
+        assert!(run.speed().abs() > 20_000.0, "{}", run.speed());
+    }
+}
+
+#[test]
 fn a_stop_shows_within_tens_of_milliseconds() {
     let mut run = Run::new();
     run.roll(500, 200, |time| 1326.0 * time);

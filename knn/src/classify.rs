@@ -39,8 +39,6 @@ pub fn classify<const FEATURES: usize, const CLASSES: usize>(
 ) -> Result<Answer<CLASSES>, ClassifyError> {
     let nearest: &mut Nearest<CLASSES> = &mut Nearest::<CLASSES, _>::new([Neighbour::NONE; MAX_K as usize]);
     nearest.begin(k)?;
-    for example in (0..examples.len()).filter_map(|index| examples.example(index)) {
-        nearest.join(example.neighbour_of(features));
-    }
+    examples.join(0..examples.len(), features, nearest);
     nearest.answer(radius)
 }

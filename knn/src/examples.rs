@@ -2,7 +2,8 @@
 //!
 //! Examples may be in flash, EEPROM or SRAM. A store returns them one by one. A pair of stores is a store.
 
-use crate::{Neighbour, squared_distance};
+use crate::{Nearest, Neighbour, squared_distance};
+use core::ops::Range;
 
 /// A labelled example: its features, and its class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -49,6 +50,14 @@ pub trait Examples<const FEATURES: usize> {
 
     /// The example at `index`; `None` from [`len`](Self::len) on.
     fn example(&self, index: usize) -> Option<Example<FEATURES>>;
+
+    /// Lets the examples of a range of indices join a search. A store whose examples are slow to load may leave one early: once its
+    /// squared distance exceeds [`Nearest::reach`], it cannot be among the nearest.
+    fn join<const CLASSES: usize>(&self, range: Range<usize>, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
+        for example in range.filter_map(|index| self.example(index)) {
+            nearest.join(example.neighbour_of(query));
+        }
+    }
 
     /// Whether there are no examples.
     fn is_empty(&self) -> bool {

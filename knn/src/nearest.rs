@@ -72,6 +72,15 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
         }
     }
 
+    /// The squared distance of the farthest place: no example beyond it can join. While a place is free, none is beyond.
+    ///
+    /// Out of line, because it takes more code than a call.
+    #[inline(never)]
+    #[must_use]
+    pub fn reach(&self) -> u32 {
+        self.places.get(usize::from(self.k).wrapping_sub(1)).map_or(0, |farthest| farthest.distance())
+    }
+
     /// The k places, nearest first. Places without an example come last, and hold [`Neighbour::NONE`].
     #[inline]
     #[must_use]

@@ -40,12 +40,11 @@ fn greeted(uno: &mut Uno) {
 
 /// An EEPROM with an example in every slot.
 fn full_eeprom() -> Vec<u8> {
-    let mut store = FieldExamples::uninit(Volatile::new());
-    store.init();
+    let mut store = FieldExamples::new(Volatile::new());
     for number in 0..field_examples::CAPACITY {
-        store.add(Example::new([number, 1, 2, 3, 4], number % 2)).expect("there is room");
+        assert!(store.add(Example::new([number, 1, 2, 3, 4], number % 2)), "there is room");
+        while !store.carry_on() {}
     }
-    while !store.carry_on() {}
     let mut eeprom = vec![ERASED; SLOTS_BEGIN];
     eeprom.extend(store.into_memory().bytes);
     eeprom

@@ -134,8 +134,8 @@ fn a_stack_that_nearly_reaches_the_variables_is_an_alarm() {
 fn eeprom_with(saves: &[Settings]) -> Vec<u8> {
     let mut saved = SavedSettings::new(Volatile::new());
     for settings in saves {
-        saved.save(settings);
-        while !saved.carry_on() {}
+        saved.save();
+        while !saved.carry_on(settings) {}
     }
     saved.into_memory().bytes.to_vec()
 }

@@ -7,7 +7,7 @@ use crate::common::{Run, ask, elf, run_for_ms, started};
 use crate::interrupt_budgets::roll;
 use avr_bounds::{Bounds, Budgets, Program, prove};
 use control::ground::detection::Detection;
-use control::ground::{examples, field_examples, keep_out, nearest};
+use control::ground::{examples, features, field_examples, keep_out};
 use control::operate::event::{self, Event};
 use control::operate::saved;
 use control::say::command::{Argument, LINE_LENGTH, Word};
@@ -204,7 +204,6 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     // A save writes each byte, and the first twice.
     assert_eq!(passes("weeder_firmware::run"), saved::COPY + 1 + 1);
     assert!(passes("weeder_firmware::run") > usize::from(field_examples::CAPACITY));
-    assert_eq!(passes("control::ground::nearest::Nearest::keep"), usize::from(field_examples::CAPACITY) + 1);
     for function in ["answer::Answer::write_line", "execute::execute"] {
         assert_eq!(
             passes(&format!("control::say::{function}")),
@@ -212,15 +211,19 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
             "{function}"
         );
     }
-    // A search goes in two directions, and each comes to its end. All positions except one move up.
-    let moving = usize::from(MAX_K);
-    let search = by_depth("weeder_firmware::examples::BuiltIn::keep_nearest");
-    assert_eq!(search, [examples::COUNT + 2, moving]);
-    assert_eq!(by_depth("control::weeder::Controller::catch_up"), [nearest::AT_ONCE + 2, moving]);
+    // A label is checked with all built-in examples at once. A slot has the features, the label and the CRC.
+    let slot = features::COUNT + 1 + 2;
+    assert_eq!(by_depth("control::ground::nearest::Nearest::ask"), [examples::COUNT + 1, slot + 1]);
+    assert_eq!(by_depth("control::ground::nearest::Nearest::keep"), [field_examples::CAPACITY as usize + 1, slot + 1]);
+    assert_eq!(passes("control::ground::field_examples::FieldExamples::slot"), slot + 1);
+    for function in ["control::ground::nearest::Nearest::begin", "control::ground::nearest::Nearest::vote"] {
+        assert_eq!(passes(function), usize::from(MAX_K) + 1, "{function}");
+    }
+    assert_eq!(passes("knn::nearest::Nearest::join"), usize::from(MAX_K) + 1);
+    assert_eq!(passes("weeder_firmware::eeprom::Eeprom::update"), saved::COPY + 1);
     // The ELF must have the loops' own records: of the edges that a turn takes, and of the console's bytes.
     let records = program(&elf()).records.len();
     assert_eq!(records, 2);
-    assert_eq!(passes("knn::nearest::Nearest::answer"), usize::from(MAX_K) + 1);
     // Bytes that move when an entry of a list is removed. An entry takes at least as many bytes on the PC.
     let moves = [(event::CAPACITY - 1) * size_of::<Event>(), (keep_out::CAPACITY - 1) * size_of::<Detection>()];
     for function in ["memcpy", "memmove", "memset"] {

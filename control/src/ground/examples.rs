@@ -59,9 +59,8 @@ pub const COUNT: usize = table::TRAINED.len();
 
 const _: () = assert!(COUNT <= CAPACITY, "too many examples for the flash budget");
 
-/// The table, [sorted by speed](sorted_by_first_feature), and shuffled within each speed: neighbours are `STEP` places apart in the
-/// table. In the trained order similar examples are neighbours, and a search comes ever nearer. Each example would then enter the
-/// list of the nearest for a while.
+/// The table, shuffled: neighbours are `STEP` places apart in it. In the trained order similar examples are neighbours, and a search
+/// comes ever nearer. Each example would then enter the list of the nearest for a while.
 pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
     let mut examples = [Example::new([0; features::COUNT], 0); COUNT];
     let mut index = 0;
@@ -70,27 +69,8 @@ pub const EXAMPLES: [Example<{ features::COUNT }>; COUNT] = {
         examples[index] = Example::new(SCALE.quantise(features), *label);
         index += 1;
     }
-    sorted_by_first_feature(examples)
-};
-
-/// Sorts examples for the search in flash: it starts with those whose first feature equals the query's, which are nearest to it.
-/// The sort is stable.
-pub const fn sorted_by_first_feature<const N: usize>(
-    mut examples: [Example<{ features::COUNT }>; N],
-) -> [Example<{ features::COUNT }>; N] {
-    let mut sorted = 1;
-    while sorted < N {
-        let example = examples[sorted];
-        let mut place = sorted;
-        while place > 0 && examples[place - 1].features[0] > example.features[0] {
-            examples[place] = examples[place - 1];
-            place -= 1;
-        }
-        examples[place] = example;
-        sorted += 1;
-    }
     examples
-}
+};
 
 /// Some five eighths of the table, coprime to its length, so that no example is left out.
 const STEP: usize = {

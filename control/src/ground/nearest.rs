@@ -60,7 +60,6 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     }
 
     /// The example at an index, if there is one.
-    #[inline(never)]
     fn at(&self, index: u8) -> Option<Example<{ features::COUNT }>> {
         match index.checked_sub(self.built_in()) {
             None => self.built_in.example(index.into()),
@@ -71,9 +70,12 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     /// Asks the next examples, up to an index.
     #[inline(never)]
     fn ask(&mut self, end: u8) {
+        let found: &mut Found<[Neighbour]> = &mut self.found;
+        let built_in = self.built_in.len() as u8;
+        self.built_in.join(self.asked.into()..end.min(built_in).into(), &self.query, found);
+        self.asked = self.asked.max(end.min(built_in));
         while self.asked < end {
-            if let Some(example) = self.at(self.asked) {
-                let found: &mut Found<[Neighbour]> = &mut self.found;
+            if let Some(example) = self.field.slot(self.asked - built_in) {
                 found.join(example.neighbour_of(&self.query));
             }
             self.asked += 1;

@@ -287,9 +287,6 @@ const TINY: u8 = 4;
 /// Consecutive short breaks that are a fault of the beam: more than the stalks of the alarm `crop_unknown`, or as many with a tiny one.
 const SHORT_BREAKS: u8 = 8;
 
-/// As many on a machine that stands. The break that raises the alarm has not ended.
-const SHORT_BREAKS_STANDING: u8 = BREAKS - 1;
-
 /// The beam's monitor. It takes two beams as one.
 #[derive(Clone, Debug)]
 pub struct BeamMonitor {
@@ -333,10 +330,16 @@ impl BeamMonitor {
         self.edges > FLICKER_EDGES
     }
 
-    /// Whether the last breaks were all so short, and so many, that the beam is at fault.
-    pub fn flickers(&self, now: Instant, stands: bool) -> bool {
-        let most = if stands { SHORT_BREAKS_STANDING } else { SHORT_BREAKS };
-        self.short >= most && (!self.broken || now.coarse().since(self.broke_at) <= SHORT_BREAK)
+    /// Consecutive short breaks until now; a tiny one counts as `TINY`.
+    pub const fn short_breaks(&self) -> u8 {
+        self.short
+    }
+
+    /// The alarm for detections that fit no crop. They are a fault of the beam if its breaks were short.
+    pub fn explain(&self, alarm: Alarm) -> Alarm {
+        let is_of_detections =
+            matches!(alarm, Alarm::BeamBlind | Alarm::SecondBeamBlind | Alarm::ScheduleFull | Alarm::CropUnknown);
+        if is_of_detections && self.short >= SHORT_BREAKS { Alarm::BeamFlickers } else { alarm }
     }
 }
 

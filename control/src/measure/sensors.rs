@@ -10,10 +10,7 @@ use super::{
     speed::SpeedMeter,
     switch::Switch,
 };
-use crate::{
-    alarm::Alarm,
-    units::{Instant, LengthScale, Position},
-};
+use crate::units::{Instant, LengthScale, Position};
 
 /// The machine's sensors.
 #[derive(Clone, Debug)]
@@ -66,16 +63,5 @@ impl Sensors {
         self.encoder.init(now, position);
         self.beam.init(now);
         self.meter.init(scale.wrap(position), now);
-    }
-
-    /// The alarm for a fault that a flickering beam causes too: then it is the beam's.
-    pub fn explain(&self, alarm: Alarm) -> Alarm {
-        let of_breaks = alarm == Alarm::EncoderSilent && self.encoder.stands();
-        let of_detections = matches!(
-            alarm,
-            Alarm::BeamBlocked | Alarm::BeamBlind | Alarm::SecondBeamBlind | Alarm::ScheduleFull | Alarm::CropUnknown
-        );
-        let flickers = (of_breaks || of_detections) && self.beam.flickers(self.readings.now, of_breaks);
-        if flickers { Alarm::BeamFlickers } else { alarm }
     }
 }

@@ -82,6 +82,7 @@ impl<M: Memory> Configuration<M> {
             return Err(refusal);
         }
         self.changed = true;
+        self.saved.change();
         Ok(())
     }
 
@@ -109,13 +110,13 @@ impl<M: Memory> Configuration<M> {
     /// A [`Contradiction`].
     pub fn save(&mut self) -> Result<(), CommandError> {
         self.expect_no_contradiction()?;
-        self.saved.save(&self.settings);
+        self.saved.save();
         Ok(())
     }
 
     /// Runs one step of a save, without waiting. Returns whether all is written.
     pub fn carry_on(&mut self) -> bool {
-        self.saved.carry_on()
+        self.saved.carry_on(&self.settings)
     }
 
     /// Checks that the settings fit together.

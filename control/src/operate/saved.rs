@@ -7,7 +7,7 @@
 //! mark of a complete save that is not valid has changed since. The operator is warned, because the other may be older.
 
 use crate::{
-    memory::{ERASED, Memory, SIZE, checksum},
+    memory::{Memory, SIZE, checksum},
     settings::{Setting, Settings, TABLE_MARK},
 };
 
@@ -35,8 +35,6 @@ pub struct SavedSettings<M> {
     /// The older copy, 0 or 1, which the next save overwrites, and the newer copy's sequence number.
     older: u8,
     sequence: u8,
-    /// The bytes to write: the settings at the time of the save.
-    image: [u8; COPY],
     /// Steps left of the save: make the first byte wrong, write the others, write the first.
     left: u8,
     /// The next byte of that step.
@@ -50,7 +48,7 @@ pub struct SavedSettings<M> {
 impl<M: Memory> SavedSettings<M> {
     /// The settings before [`load`](Self::load).
     pub const fn new(memory: M) -> Self {
-        Self { memory, older: 0, sequence: 0, image: [0; COPY], left: 0, next: 0, exists: false, spoiled: false }
+        Self { memory, older: 0, sequence: 0, left: 0, next: 0, exists: false, spoiled: false }
     }
 
     /// Loads the newest valid copy; `None` if there is none.
@@ -65,39 +63,49 @@ impl<M: Memory> SavedSettings<M> {
         let sequence = |copy| self.memory.read(address(copy) + SEQUENCE);
         // If only one copy is valid, the order does not matter.
         let newer = u8::from(sequence(1).wrapping_sub(sequence(0)).cast_signed() > 0);
-        // Both, because the sequence number may have changed.
-        let spoiled = (0..2).any(|copy| self.was_saved(copy) && !self.read(copy, settings));
-        for turn in 0..2 {
-            let copy = newer ^ turn;
+        // The newer one last. The other too, because the sequence number may have changed.
+        for copy in [newer ^ 1, newer] {
             if self.read(copy, settings) {
                 self.exists = true;
-                self.spoiled = spoiled;
                 (self.older, self.sequence) = (copy ^ 1, self.memory.read(address(copy) + SEQUENCE));
-                return true;
+            } else {
+                self.spoiled |= self.was_saved(copy);
             }
         }
-        false
+        self.exists && self.values(self.newest(), settings)
     }
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
-    pub fn save(&mut self, settings: &Settings) {
+    pub fn save(&mut self) {
         (self.exists, self.spoiled) = (true, false);
         self.older ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
-        self.image = image(settings, self.sequence);
         // A first byte that is already wrong stays: a power loss while it is written can leave any value, also the right one.
-        self.left = if self.memory.read(self.newest()) == self.image[0] { 3 } else { 2 };
-        self.next = 0;
+        self.left = if self.memory.read(self.newest()) == MARK[0] { 3 } else { 2 };
     }
 
-    /// Writes the next byte, if the memory is ready. Returns whether all is written.
-    pub fn carry_on(&mut self) -> bool {
+    /// The settings have changed: a save begins again.
+    pub fn change(&mut self) {
+        self.next = 0;
+        if self.left == 1 {
+            self.left = 3;
+        }
+    }
+
+    /// Writes the next byte of these settings, if the memory is ready. Returns whether all is written.
+    ///
+    /// Out of line, so that its bytes are not on the loop's stack.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn carry_on(&mut self, settings: &Settings) -> bool {
         if self.left > 0 {
-            let wrong = [!self.image[0]];
+            let mut image = image(settings, self.sequence);
             let (offset, bytes) = match self.left {
-                3 => (0, &wrong[..]),
-                2 => (1, &self.image[1..]),
-                _ => (0, &self.image[..1]),
+                3 => {
+                    image[0] = !image[0];
+                    (0, &image[..1])
+                }
+                2 => (1, &image[1..]),
+                _ => (0, &image[..1]),
             };
             let address = address(self.older ^ 1) + offset;
             if self.memory.update(address, bytes, &mut self.next) {
@@ -127,7 +135,7 @@ impl<M: Memory> SavedSettings<M> {
 
     /// Whether a copy was saved, and has changed since. The next save overwrites it.
     pub const fn is_spoiled(&self) -> bool {
-        self.spoiled
+        self.exists && self.spoiled
     }
 
     /// The memory, for a test or another machine.
@@ -154,9 +162,8 @@ impl<M: Memory> SavedSettings<M> {
 
     /// Whether a copy's first byte is that of a complete save, or has one other bit. An unfinished save has all other bits.
     fn was_saved(&self, copy: u8) -> bool {
-        let first = self.memory.read(address(copy));
-        let changed = first ^ TABLE_MARK as u8;
-        changed & changed.wrapping_sub(1) == 0 && first != ERASED
+        let changed = self.memory.read(address(copy)) ^ MARK[0];
+        changed & changed.wrapping_sub(1) == 0
     }
 
     /// Reads a copy. Returns whether it is valid.
@@ -167,11 +174,17 @@ impl<M: Memory> SavedSettings<M> {
     }
 }
 
+/// The table's mark, as a copy begins with it. Its first byte differs from an erased one in more than one bit.
+const MARK: [u8; 2] = {
+    let [low, high] = TABLE_MARK.to_le_bytes();
+    [if low.count_ones() < 7 { low } else { !low }, high]
+};
+
 /// The bytes of a copy.
 #[inline(never)]
 fn image(settings: &Settings, sequence: u8) -> [u8; COPY] {
     let mut bytes = [0; COPY];
-    let [low, high] = TABLE_MARK.to_le_bytes();
+    let [low, high] = MARK;
     bytes[..HEADER].copy_from_slice(&[low, high, Setting::COUNT, sequence]);
     for (setting, value) in Setting::all().zip(bytes[HEADER..END].chunks_exact_mut(2)) {
         value.copy_from_slice(&settings.get(setting).to_le_bytes());
@@ -189,7 +202,7 @@ const fn address(copy: u8) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::memory::Volatile;
+    use crate::memory::{ERASED, Volatile};
     use std::{format, vec::Vec};
 
     fn with_k(k: u16) -> Settings {
@@ -199,8 +212,8 @@ mod tests {
     fn save(memory: Volatile, settings: &Settings) -> Volatile {
         let mut saved = SavedSettings::new(memory);
         saved.load();
-        saved.save(settings);
-        while !saved.carry_on() {}
+        saved.save();
+        while !saved.carry_on(settings) {}
         saved.into_memory()
     }
 
@@ -211,8 +224,7 @@ mod tests {
     #[test]
     fn a_copy_is_mark_number_sequence_values_and_check_with_nothing_in_between() {
         let values = Setting::all().flat_map(|setting| with_k(9).get(setting).to_le_bytes());
-        let mark = TABLE_MARK.to_le_bytes();
-        let mut bytes: Vec<u8> = mark.into_iter().chain([Setting::COUNT, 77]).chain(values).collect();
+        let mut bytes: Vec<u8> = MARK.into_iter().chain([Setting::COUNT, 77]).chain(values).collect();
         bytes.extend(checksum(&bytes).to_le_bytes());
         for copy in 0..2 {
             let mut memory = Volatile::new();

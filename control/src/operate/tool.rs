@@ -96,3 +96,23 @@ impl Tool {
         now.slow().since(self.since) >= milliseconds
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pulse_that_is_older_than_the_clock_counts_is_still_held() {
+        let mut tool = Tool::NONE;
+        tool.init(Instant::ZERO);
+        let at = |seconds: f64| Instant::at_ms((seconds * 1000.0) as u32);
+        for quarter in 0..1200 {
+            let seconds = 0.25 * f64::from(quarter);
+            tool.order(3000, at(seconds));
+            assert_eq!(tool.has_held(3000, at(seconds), 600), seconds >= 0.75, "{seconds} s");
+            assert!(!tool.has_held(4000, at(seconds), 0), "it has not had this pulse");
+        }
+        tool.order(4000, at(300.0));
+        assert!(!tool.has_held(4000, at(300.0), 600) && tool.has_held(4000, at(301.0), 600));
+    }
+}

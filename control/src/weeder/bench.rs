@@ -126,11 +126,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         out
     }
 
-    /// Sets the leads from the measured times, if the settings allow them, and reports the result.
+    /// Sets both leads from the measured times, or none if the settings do not allow one, and reports the result.
     fn finish_swings(&mut self, outcome: Outcome) {
         let fits = match outcome {
             Outcome::Measured(SwingTimes { out_ms, in_ms }) => {
-                self.set(Setting::LeadOutMs, out_ms).is_ok() && self.set(Setting::LeadInMs, in_ms).is_ok()
+                let before_ms = self.configuration.get(Setting::LeadInMs);
+                let fits = self.set(Setting::LeadInMs, in_ms).is_ok() && self.set(Setting::LeadOutMs, out_ms).is_ok();
+                if !fits {
+                    let _ = self.set(Setting::LeadInMs, before_ms);
+                }
+                fits
             }
             _ => false,
         };

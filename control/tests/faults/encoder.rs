@@ -313,6 +313,22 @@ fn a_wheel_that_trembles_after_a_slow_stop_is_no_alarm() {
 }
 
 #[test]
+fn an_alarm_that_a_beam_edge_raises_reports_the_odometers_position() {
+    let mut drive = Drive::at_work();
+    // Jumps bring ticks that are noise: the odometer leaves them out, so its position differs from the count.
+    for _ in 0..3 {
+        drive.machine.readings.jumps += 1;
+        drive.place += 2.0;
+        drive.roll(0.7, 0.3);
+    }
+    let position = drive.machine.position();
+    assert_ne!(position, drive.machine.readings.position, "the odometer leaves noise out");
+    drive.machine.events();
+    drive.machine.lose_edges(Beams::default());
+    assert_eq!(drive.machine.events()[0], Event::Alarm { alarm: Alarm::BeamEdgesLost, position });
+}
+
+#[test]
 fn jumps_are_an_alarm_by_the_distance_between_them() {
     // Across the count's wrap. Each jump brings two ticks that are noise.
     for (metres_between, alarm) in [(0.02, Some(Alarm::EncoderJumps)), (0.05, None)] {

@@ -21,8 +21,8 @@ fn saved_settings_are_in_use_after_a_restart() {
 /// A memory with these settings, valid or not.
 fn saved(settings: &Settings) -> Volatile {
     let mut saved = SavedSettings::new(Volatile::new());
-    saved.save(settings);
-    while !saved.carry_on() {}
+    saved.save();
+    while !saved.carry_on(settings) {}
     saved.into_memory()
 }
 
