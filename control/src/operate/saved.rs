@@ -64,7 +64,8 @@ impl<M: Memory> SavedSettings<M> {
         // If only one copy is valid, the order does not matter.
         let newer = u8::from(sequence(1).wrapping_sub(sequence(0)).cast_signed() > 0);
         // The newer one last. The other too, because the sequence number may have changed.
-        for copy in [newer ^ 1, newer] {
+        for turn in 1..3 {
+            let copy = newer ^ (turn & 1);
             if self.read(copy, settings) {
                 self.exists = true;
                 (self.older, self.sequence) = (copy ^ 1, self.memory.read(address(copy) + SEQUENCE));

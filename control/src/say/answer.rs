@@ -39,10 +39,8 @@ pub enum Answer {
     Counts,
     /// A setting's value.
     Get(Setting),
-    /// The wheel's calibration.
+    /// How far the calibrated wheel is from its diameter; then its setting.
     Calibrated,
-    /// How far it is from the diameter.
-    OffTheDiameter,
     /// The settings from this index on.
     GetAll(u8),
     /// The examples from this index on.
@@ -111,15 +109,9 @@ impl Answer {
                 Self::Ok
             }
             Self::Calibrated => {
-                write_setting(controller, Setting::TicksPerM, line);
-                Self::OffTheDiameter
-            }
-            Self::OffTheDiameter => {
                 line.say(texts::OFF_THE_DIAMETER);
-                let nominal = controller.settings().nominal_ticks_per_m();
-                let off = u32::from(controller.distance().counted().abs_diff(nominal));
-                line.counted((off * 1000 / u32::from(nominal)) as u16);
-                Self::Ok
+                line.counted(controller.distance().off_permille());
+                Self::Get(Setting::TicksPerM)
             }
             Self::GetAll(place) => {
                 if let Some(setting) = Setting::from_index(place) {
