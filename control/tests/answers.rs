@@ -15,6 +15,7 @@ use control::{
         calibration::{Outcome, SwingTimes},
         event::Event,
         plot::Plot,
+        saved::SavedSettings,
         state::State,
     },
     say::{
@@ -22,7 +23,7 @@ use control::{
         command::{LineBuffer, Word},
         line::Line,
     },
-    settings::Setting,
+    settings::{Setting, Settings},
     units::{Instant, Position, Ticks},
 };
 use rig::{Beams, Rig};
@@ -158,35 +159,35 @@ fn status_shows_the_distance_to_seen_ground() {
     assert!(machine.ask("status")[0].ends_with("unseen_mm=0"));
 }
 
-/// The greeting, and the second line of the status, after a reset of a machine that was at work.
+/// The greeting of a machine with saved settings after a reset at work, and the machine.
 fn after_a_reset_at_work(cause: Cause) -> (String, Rig<ByWidth>) {
+    let mut saved = SavedSettings::new(Volatile::new());
+    saved.save();
+    while !saved.carry_on(&Settings::new()) {}
     let readings = Readings::new(Instant::ZERO, Position::new(0));
     let classifier = ByWidth::new(LEAST_HOLD_MM, 0);
-    let mut machine = Rig::wake_from(classifier, Volatile::new(), readings, Beams::default(), cause, true);
+    let mut machine = Rig::wake_from(classifier, saved.into_memory(), readings, Beams::default(), cause, true);
     let mut console = Console::new();
     console.carry_on(&mut machine);
     (std::iter::from_fn(|| console.next_byte()).map(char::from).collect(), machine)
 }
 
 #[test]
-fn a_reset_at_work_is_told_in_greeting_and_status_until_the_operator_starts_holds_or_clears() {
+fn a_reset_at_work_is_told_in_greeting_and_status_until_the_operator_starts_or_holds() {
     for cause in [Cause::ResetPin, Cause::BrownOut, Cause::LoopStalled, Cause::Unknown] {
-        let (greeting, mut machine) = after_a_reset_at_work(cause);
-        assert!(greeting.contains(&format!(", reset by {}, was work, state alarm", cause.text())), "{greeting}");
-        assert!(machine.ask("status")[1].ends_with(&format!(" reset={} was=work", cause.text())));
-        assert!(machine.works_or_did(), "another reset does not hide it");
-        for line in ["clear", "hold", "start"] {
-            let mut after = after_a_reset_at_work(cause).1;
-            if line == "start" {
-                after.ask("clear");
-            }
-            assert_eq!(after.ask(line), ["ok"]);
-            assert!(after.ask("status")[1].ends_with(&format!(" reset={}", cause.text())), "{line}");
-            assert_eq!(after.works_or_did(), line == "start");
+        for line in ["start", "hold"] {
+            let (greeting, mut machine) = after_a_reset_at_work(cause);
+            assert!(greeting.contains(&format!(", reset by {}, was work, state hold", cause.text())), "{greeting}");
+            let reset = format!(" reset={}", cause.text());
+            assert!(machine.ask("status")[1].ends_with(&format!("{reset} was=work")));
+            assert!(machine.works_or_did(), "another reset does not hide it");
+            assert_eq!(machine.ask(line), ["ok"]);
+            assert!(machine.ask("status")[1].ends_with(&reset), "{line}");
+            assert_eq!(machine.works_or_did(), line == "start");
         }
     }
     let (greeting, mut machine) = after_a_reset_at_work(Cause::PowerOn);
-    assert!(greeting.contains(", reset by power_on, state alarm"), "SRAM is random then: {greeting}");
+    assert!(greeting.contains(", reset by power_on, state hold"), "SRAM is random then: {greeting}");
     assert!(machine.ask("status")[1].ends_with(" reset=power_on"));
 }
 

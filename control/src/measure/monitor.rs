@@ -277,8 +277,9 @@ const FLICKER_PERIOD: u16 = Coarse::steps_in_ms(100);
 /// More edges in that time than any canopy makes: at 10 km/h a clear stretch every 14 mm.
 const FLICKER_EDGES: u8 = 40;
 
-/// The longest break that sun on the receiver or a loose wire causes. A plant is longer, except a stalk of 20 mm or less at 2.5 km/h.
-const SHORT_BREAK: u16 = Coarse::steps_in_ms(30);
+/// The longest break that sun on the receiver or a loose wire causes, 30 ms and a turn. A plant is longer, except a stalk of 20 mm
+/// or less at 2.5 km/h.
+const SHORT_BREAK: u16 = Coarse::steps_in_ms(31);
 
 /// No stalk breaks the beam for so short a time: at 2.5 km/h, 8 ms are 6 mm. Such a break counts as `TINY` short ones.
 const TINY_BREAK: u16 = Coarse::steps_in_ms(8);

@@ -4,7 +4,7 @@ use crate::common::{ByWidth, LEAST_HOLD_MM};
 use control::{
     alarm::{Alarm, Warning},
     measure::reset::Cause,
-    memory::Volatile,
+    memory::{SIZE, Volatile},
     operate::{command_error::CommandError, event::Event, saved::SavedSettings, state::State},
     settings::{Setting, Settings},
 };
@@ -32,14 +32,14 @@ fn a_copy_that_has_changed_since_it_was_saved_is_a_warning_until_the_next_save()
     saved.load();
     let mut settings = Settings::new();
     settings.set(Setting::K, 7).unwrap();
-    saved.save(&settings);
-    while !saved.carry_on() {}
+    saved.save();
+    while !saved.carry_on(&settings) {}
     let mut memory = saved.into_memory();
     let wake = |memory: &Volatile| Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), memory.clone(), Cause::PowerOn);
     let mut sound = wake(&memory);
     assert_eq!((sound.events(), sound.present_warning(), sound.settings()), (vec![], None, &settings));
-    // The newer copy is the first: the other save began with the second.
-    memory.bytes[20] ^= 4;
+    // The second save overwrote the second copy.
+    memory.bytes[SIZE / 2 + 20] ^= 4;
     let mut machine = wake(&memory);
     assert_eq!(machine.settings().get(Setting::K), Settings::new().get(Setting::K), "the older ones are in use");
     assert_eq!(machine.events(), [Event::Warning(Warning::SettingsOlder)], "also while events are off");

@@ -3,22 +3,22 @@
 
 #[rustfmt::skip]
 pub(super) const FRAGMENTS: &[&str] = &[
-    "\r\n", " [", " detection", " mm", " ms", " p", " s", " ta", " take", "# ", "#,", "#,#,",
-    ", ", ", or ", "0 ", "00 ", ":#", "; ", "; 0 ", "; 0 n", "=#", "=# ", "_m", "_mm",
-    "_mm,", "_ms", "_s", "a ", "ac", "ack", "al", "alar", "alarm ", "ali", "alibr", "all",
-    "am", "ame", "an", "an ", "and", "and ", "ar", "ar ", "are ", "at", "at ", "atch",
-    "ate", "be", "beam", "beam_", "bel", "br", "calibr", "calibrate", "ce", "ch", "ch ", "chan",
-    "ck", "co", "coder", "comm", "con", "ction", "d ", "d b", "d_", "de", "der", "dete",
-    "detection", "di", "do", "du", "e ", "ee", "eed", "eed ", "eed_mm", "el", "em", "en",
-    "en ", "encoder", "er", "ere ", "ervo", "ex", "exam", "examp", "example", "fa", "fi", "fir",
-    "first", "for", "force", "fr", "fro", "from ", "ga", "ge", "hol", "il", "in", "ind",
-    "ing", "ing ", "is", "is ", "it", "ke", "l ", "la", "le", "lea", "lead_", "li",
-    "list", "lo", "m ", "mm", "ms", "name", "no", "not ", "now", "of", "off", "ol",
-    "on", "one", "op", "or", "or ", "ou", "oun", "out", "ow", "p ", "pl", "plan",
-    "plant", "re", "row", "s ", "s a ", "s and ", "s th", "s=# ", "s_", "sa", "save", "se",
-    "servo", "servo_", "set", "sett", "setting", "sp", "speed_mm", "st", "st ", "star", "stat", "sw",
-    "t ", "ta", "te", "ter", "th", "the ", "the tool ", "ti", "tion", "to", "to ", "tool",
-    "tool ", "ul", "un", "unse", "us", "ve", "ver", "vo", "wh", "whee", "wi", "y ",
+    "\r\n", " #", " [", " a", " an", " b", " c", " d", " det", " detec", " detection", " di",
+    " f", " is ", " m", " mm", " ms", " on", " p", " plant", " s", " setting", " tak", " the ",
+    " the tool ", " w", " wh", "# ", "#,", "#,#,", ", ", ", or", ", or ", "0 ", "00 ", ":#",
+    "; ", "; 0 ", "; 0 n", "=#", "=# ", "_m", "_mm", "_mm,", "_ms", "_p", "_per", "_s",
+    "ac", "ach", "ack", "ak", "al", "alar", "alarm", "ali", "alibr", "all", "am", "an",
+    "and", "and ", "ant", "ar", "are ", "at", "atch", "ate", "av", "be", "beam", "beam_",
+    "bel", "br", "calibr", "calibrate", "ce", "ch", "chan", "ck", "co", "coder", "comm", "d ",
+    "d b", "d_", "de", "der", "do", "e ", "e a", "e, ", "ec", "ed", "ee", "eed",
+    "eed_mm", "eel", "een", "el", "en", "encoder", "er", "ervo", "es", "es ", "et", "ett",
+    "etting", "ettings", "ev", "ex", "exam", "examp", "example", "fa", "fi", "fir", "first", "for",
+    "fr", "fro", "ga", "get", "hol", "in", "ind", "ing", "is ", "it", "la", "le",
+    "lea", "lead_", "li", "list", "lo", "m ", "mi", "mm", "nam", "name", "no", "now",
+    "of", "off", "ol", "on", "op", "or", "ou", "oun", "out", "ow", "pl", "plant",
+    "res", "row", "s ", "s and ", "s th", "s=# ", "sav", "seen", "servo", "servo_", "settings", "sp",
+    "speed_mm", "st", "st ", "star", "stat", "sw", "t ", "tak", "te", "ter", "th", "the ",
+    "ti", "tion", "to", "tool", "tool ", "ul", "um", "un", "unseen", "us", "vo", "wh",
 ];
 
 #[cfg(test)]
