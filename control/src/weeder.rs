@@ -373,7 +373,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
-        let alarm = self.sensors.beam.explain(alarm);
+        let alarm = self.sensors.beam.explain(alarm, self.sensors.readings.now);
         self.events.add(Event::Alarm { alarm, position: self.sensors.position });
         self.enter(State::Alarm(alarm));
     }

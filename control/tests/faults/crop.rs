@@ -134,6 +134,15 @@ fn plants_and_stalks_are_no_flicker() {
     // Stalks of 15 to 20 mm at 2.5 km/h.
     let stalks = [22, 28, 25, 29, 23, 26, 27].into_iter().cycle();
     assert_eq!(flicker(0.7, stalks, 3), Some(Alarm::CropUnknown));
+    // Weeds as short, then an object that stays in the beam.
+    let mut drive = Drive::at_work();
+    for _ in 0..4 {
+        drive.pass(0.7, 0.004);
+        drive.roll(0.7, 0.2);
+    }
+    drive.beam(true);
+    drive.roll(0.7, 0.5);
+    assert_eq!(drive.alarm(), Some(Alarm::BeamBlocked));
 }
 
 #[test]
