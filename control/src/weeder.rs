@@ -186,17 +186,17 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn see_levels(&mut self, position: Position, broken: bool, second_broken: bool) {
-                let is_broken = broken || second_broken && self.ground.has_second_beam();
-                if self.sensors.beam.edge(self.sensors.readings.now, is_broken) {
-                    self.forget_and_raise(Alarm::BeamFlickers);
-                }
-                let is_of_second = self.ground.has_second_beam() && second_broken != self.ground.second_is_broken();
-                if !is_of_second || broken != self.sensors.beam_broken {
-                    self.beam_edge(position, broken);
-                }
-                if is_of_second {
-                    self.match_second_beam(self.sensors.odometer.place(position), second_broken);
-                }
+        let second_broken = second_broken && self.ground.has_second_beam();
+        if self.sensors.beam.edge(self.sensors.readings.now, broken || second_broken) {
+            self.forget_and_raise(Alarm::BeamFlickers);
+        }
+        let is_of_second = second_broken != self.ground.second_is_broken();
+        if !is_of_second || broken != self.sensors.beam_broken {
+            self.beam_edge(position, broken);
+        }
+        if is_of_second {
+            self.match_second_beam(self.sensors.odometer.place(position), second_broken);
+        }
     }
 
     /// Takes an edge of the first beam, and the position at which it came.
@@ -216,7 +216,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn match_second_beam(&mut self, position: Position, broken: bool) {
         let seen = self.ground.match_second_beam(position, broken);
         if let Some(blind) = self.ground.blind() {
-            return self.forget_and_raise(if blind == Blind::First { Alarm::BeamBlind } else { Alarm::SecondBeamBlind });
+            return self.forget_and_raise(if blind == Blind::First {
+                Alarm::BeamBlind
+            } else {
+                Alarm::SecondBeamBlind
+            });
         }
         if let Some(detection) = seen {
             self.classify(detection, true);

@@ -160,12 +160,8 @@ fn a_slip_that_an_alarm_made_unknown_costs_no_canopy_before_it_is_known_again() 
 }
 
 /// X 700, the second beam at 100, margin 50.
-const FAR: [(Setting, u16); 4] = [
-    (Setting::BeamToToolMm, 700),
-    (Setting::SecondBeamMm, 100),
-    (Setting::MarginMm, 50),
-    (Setting::LeadInMs, 0),
-];
+const FAR: [(Setting, u16); 4] =
+    [(Setting::BeamToToolMm, 700), (Setting::SecondBeamMm, 100), (Setting::MarginMm, 50), (Setting::LeadInMs, 0)];
 
 #[test]
 fn a_plant_that_stands_in_the_second_beam_at_power_on_or_after_lost_edges_is_kept() {

@@ -59,9 +59,9 @@ fn the_flash_that_the_tools_tell_is_what_avr_size_counts_and_what_is_flashed() {
 fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
-        Some((begin, rest)) => name
-            .strip_prefix(begin)
-            .is_some_and(|name| (0..=name.len()).any(|skipped| matches(rest, &name[skipped..]))),
+        Some((begin, rest)) => {
+            name.strip_prefix(begin).is_some_and(|name| (0..=name.len()).any(|skipped| matches(rest, &name[skipped..])))
+        }
     }
 }
 
@@ -75,6 +75,7 @@ fn each_line_of_the_order_of_functions_matches_one() {
     let patterns: Vec<&str> =
         order.lines().filter_map(|line| line.strip_prefix("*(.text.")?.strip_suffix(')')).collect();
     assert!(patterns.len() > 50, "{} lines", patterns.len());
-    let unmatched: Vec<_> = patterns.iter().filter(|pattern| !names.iter().any(|name| matches(pattern, name))).collect();
+    let unmatched: Vec<_> =
+        patterns.iter().filter(|pattern| !names.iter().any(|name| matches(pattern, name))).collect();
     assert!(unmatched.is_empty(), "run .ci/order: these lines of functions.x match no function: {unmatched:#?}");
 }

@@ -70,13 +70,7 @@ impl Canopy {
     /// see an end of a single plant within a quarter of `within`, its trim stays. Otherwise it then keeps its full width, because
     /// one beam has not seen all of it.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(super) fn widen(
-        &mut self,
-        from: WrappedPosition,
-        to: WrappedPosition,
-        reach: Length,
-        within: Length,
-    ) -> bool {
+    pub(super) fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, reach: Length, within: Length) -> bool {
         if self.leading - to > reach || from - self.trailing > reach {
             return false;
         }

@@ -302,8 +302,7 @@ pub struct BeamMonitor {
 
 impl BeamMonitor {
     /// A monitor that has seen no edge.
-    pub const NONE: Self =
-        Self { edges: 0, since: Coarse::ZERO, short: 0, broke_at: Coarse::ZERO, broken: false };
+    pub const NONE: Self = Self { edges: 0, since: Coarse::ZERO, short: 0, broke_at: Coarse::ZERO, broken: false };
 
     /// Starts counting.
     pub const fn init(&mut self, now: Instant) {

@@ -253,7 +253,9 @@ mod tests {
     #[test]
     fn each_changed_bit_of_a_saved_copy_is_told_until_the_next_save_and_an_unfinished_save_is_not() {
         let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
-        assert!(!is_spoiled(&Volatile::new()) && !is_spoiled(&save(Volatile::new(), &with_k(5))) && !is_spoiled(&memory));
+        assert!(
+            !is_spoiled(&Volatile::new()) && !is_spoiled(&save(Volatile::new(), &with_k(5))) && !is_spoiled(&memory)
+        );
         for bit in 0..8 * COPY {
             for copy in 0..2 {
                 let mut changed = memory.clone();

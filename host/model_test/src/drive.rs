@@ -259,6 +259,7 @@ impl<M: Machine> Drive<M> {
                 self.turns(turns)?;
                 self.edges_get_lost = false;
                 self.machine.lose_edges(&self.world)?;
+                self.model.lose_edges();
                 prop_assert!(is_alarm(self.machine.state()) || self.is_tried, "lost edges are no alarm");
                 Ok(())
             }

@@ -55,6 +55,8 @@ pub struct Model {
     /// Whether the beam is broken now, and whether the last stretch goes on at the frontier.
     broken: bool,
     is_growing: bool,
+    /// Whether edges were lost while the beam was broken, anywhere behind the frontier. The machine then expects a plant there.
+    may_be_broken_at_frontier: bool,
     /// In the order of their positions.
     stretches: Vec<Stretch>,
     /// Ground of expected but missed plants, in the order of the machine's reports.
@@ -84,6 +86,7 @@ impl Model {
             frontier: place,
             broken,
             is_growing: false,
+            may_be_broken_at_frontier: false,
             stretches: Vec::new(),
             guarded: Vec::new(),
             merge_gaps: Vec::new(),
@@ -103,8 +106,7 @@ impl Model {
     /// the ground again as new.
     pub fn follow(&mut self, place: i64, settings: &Settings, narrow_mm: u16) {
         let metre = i64::from(settings.wheel().ticks(1000).0);
-        let [merge_gap, zone] =
-            [Setting::MergeGapMm, Setting::StemZoneMm].map(|set| settings.ticks(set).0.into());
+        let [merge_gap, zone] = [Setting::MergeGapMm, Setting::StemZoneMm].map(|set| settings.ticks(set).0.into());
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
             self.may_have_forgotten = true;
@@ -146,6 +148,7 @@ impl Model {
         self.known_from = self.known_from.min(place);
         self.begin = self.begin.min(place);
         (self.frontier, self.is_growing, self.may_have_forgotten) = (place, false, false);
+        self.may_be_broken_at_frontier = false;
         self.stretches.retain(|stretch| stretch.leading < place);
         self.stretches.iter_mut().for_each(|stretch| stretch.trailing = stretch.trailing.min(place - 1));
         self.guarded.retain(|guarded| guarded.trailing < place);
@@ -191,7 +194,13 @@ impl Model {
             self.touch(blur);
             self.frontier = place;
             self.touch(blur);
+            self.may_be_broken_at_frontier = false;
         }
+    }
+
+    /// The machine has lost edges of the beam, and now knows its level again.
+    pub fn lose_edges(&mut self) {
+        self.may_be_broken_at_frontier = self.broken;
     }
 
     /// The beam breaks or clears at a position.
@@ -313,7 +322,9 @@ impl Model {
             let reach = reach + self.slack + 2 * stretch.blur;
             stretch.leading - reach <= place && place <= stretch.trailing + reach
         };
-        self.stretches.iter().chain(&self.guarded).any(is_near)
+        let at_frontier = Stretch::closed(self.frontier, self.frontier, 0);
+        self.may_be_broken_at_frontier && is_near(&at_frontier)
+            || self.stretches.iter().chain(&self.guarded).any(is_near)
     }
 
     /// The last canopy between `near` and `far`, if canopies and their margins close all of that ground.
