@@ -39,11 +39,10 @@
 //! | [`Nearest`] for k, which may be kept | 4 k + 1 | |
 //! | [`classify`] | about 100 + 2 C of stack | n F multiplications of 8 x 8 bits; k comparisons an example; k + C to vote |
 //!
-//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. The calls and the vote take about 500 cycles, and
-//! each example that is loaded 19 to 67. An example that is among the k nearest at that moment takes some 75 more. In random order
-//! these are about k (1 + ln(n / k)) of n. If each one is a little nearer than the one before, they are all. [`classify`] clears
-//! its places first. The plain [`Examples::keep_nearest`] takes about 200 cycles an example. [`Scale::quantise`] takes 1,400
-//! cycles. `cargo bench-uno` in the weeder's workspace measures all of this in the simulator simavr.
+//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. An example that joins the nearest takes about four
+//! times the cycles of one that is left early (see [`Examples::join`]). In random order, k (1 + ln(n / k)) of n join. If each one is
+//! a little nearer than the one before, all join. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno` in the weeder's workspace
+//! measures all of this in the simulator simavr.
 //!
 //! # What it does not do
 //!

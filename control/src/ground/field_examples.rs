@@ -1,8 +1,8 @@
 //! Field examples: taught by the operator, and kept in the EEPROM.
 //!
 //! Each of [`CAPACITY`] examples has a slot of eight bytes: five features, the label, and a CRC-16. The CRC covers features, label
-//! and the features' scale, because on another scale the bytes mean something else. An erased slot reads as ones. A slot with a
-//! wrong CRC, after a power loss or a flipped bit, is dropped and counted.
+//! and the features' scale, because on another scale the bytes mean something else. A slot without a label is free, as after an
+//! unfinished save. One with a label and a wrong CRC, as after a flipped bit, is free too, and counted as spoiled.
 //!
 //! The examples stay in the EEPROM: a search reads them there, a few in each turn. It waits while a byte is being written. A change
 //! writes one byte each time the memory is ready. Until all are written, the slot counts as spoiled or as it was.
@@ -48,30 +48,28 @@ impl<M: Memory> FieldExamples<M> {
         self.memory.is_ready()
     }
 
-    /// Slots with a wrong CRC.
+    /// Slots with a label and a wrong CRC.
     pub fn spoiled(&self) -> u8 {
-        (0..CAPACITY).filter(|&number| !self.is_erased(number) && self.slot(number).is_none()).count() as u8
+        (0..CAPACITY).filter(|&number| self.label(number) != ERASED && self.slot(number).is_none()).count() as u8
     }
 
-    fn is_erased(&self, number: u8) -> bool {
-        (0..SLOT as u16).all(|index| self.memory.read(Self::address(number) + index) == ERASED)
+    fn label(&self, number: u8) -> u8 {
+        self.memory.read(Self::address(number) + features::COUNT as u16)
     }
 
     /// The example in a slot. Only if [`is_ready`](Self::is_ready).
     #[inline(never)]
     pub fn slot(&self, number: u8) -> Option<Taught> {
-        if number >= CAPACITY {
+        // Most slots have no label, and need no CRC.
+        if number >= CAPACITY || usize::from(self.label(number)) >= label::COUNT {
             return None;
         }
         let mut bytes = [0; SLOT];
-        let mut address = Self::address(number);
-        for byte in &mut bytes {
+        for (address, byte) in (Self::address(number)..).zip(&mut bytes) {
             *byte = self.memory.read(address);
-            address += 1;
         }
         let [a, b, c, d, e, label, low, high] = bytes;
-        let is_valid = check(&mut bytes) == u16::from_le_bytes([low, high]) && usize::from(label) < label::COUNT;
-        is_valid.then_some(Example::new([a, b, c, d, e], label))
+        (check(&mut bytes) == u16::from_le_bytes([low, high])).then_some(Example::new([a, b, c, d, e], label))
     }
 
     /// Adds an example. [`carry_on`](Self::carry_on) writes it. Returns whether there was room.

@@ -16,7 +16,7 @@ use crate::{
 use knn::{Answer, Example, Examples, Kind, MAX_K, Neighbour};
 
 /// Examples searched in one turn.
-pub const AT_ONCE: u8 = 16;
+pub const AT_ONCE: u8 = 8;
 
 /// The nearest examples found so far.
 type Found<Places> = knn::Nearest<{ label::COUNT }, Places>;
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn invalid_field_examples_are_counted() {
         let mut memory = Volatile::new();
-        (memory.bytes[0], memory.bytes[100]) = (0, 0);
+        (memory.bytes[5], memory.bytes[8 * 12 + 5]) = (0, 1);
         let nearest = Nearest::new([Example::new([0; features::COUNT], label::WEED); 1], memory);
         assert_eq!(nearest.spoiled(), 2);
     }

@@ -73,7 +73,6 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     let kind = if first.is_empty() {
         NOTHING
     } else if matches!(word, Word::Help | Word::Get | Word::Set) {
-        command.setting = Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?;
         SETTING
     } else if let Some(argument) = Argument::find(first) {
         argument as u8
@@ -98,6 +97,9 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     let is_complete = if second.is_empty() { takes & VALUE == 0 } else { takes != 0 };
     if !is_complete || !split_word(rest).0.is_empty() {
         return usage;
+    }
+    if kind == SETTING {
+        command.setting = Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?;
     }
     if second.is_empty() {
         return Ok(command);
@@ -389,7 +391,7 @@ mod tests {
     #[test]
     fn arguments_that_a_command_does_not_take_name_the_allowed_ones() {
         for (word, command, arguments) in [
-            (Word::Help, "help", &["k now"][..]),
+            (Word::Help, "help", &["k now", "me now"][..]),
             (Word::Status, "status", &["please"]),
             (Word::Set, "set", &["wheel_mm", "wheel_mm 400 mm"]),
             (Word::Start, "start", &["later"]),
