@@ -9,6 +9,7 @@
 # firmware.txt        its size, and its worst-case stack and time
 # page/               the page: open its index.html, or serve it to a phone with `weeder serve`
 # weeder              the host tools, for computers like this one, with the firmware and the page inside
+# wokwi/              the wiring with this firmware, for the Wokwi editor
 # 60-weeder.rules     lets a Linux user open an Uno's port
 # manual/             README.md and docs/, as Markdown, and the sources that docs/ links; book/ is docs/ for a browser
 # sbom/               the parts as CycloneDX, for programs: packages, versions, licences
@@ -88,6 +89,10 @@ cmp "$inside/weeder.hex" "$folder/weeder.hex"
 # The front door, and the rule for Linux.
 sed "s|SYSTEM|$(uname -s) on $(uname -m)|" page/START.html >"$folder/START.html"
 cp host/cli/60-weeder.rules "$folder/"
+mkdir "$folder/wokwi"
+cp wokwi/diagram.json "$folder/wokwi/"
+cp "$inside/weeder-firmware.elf" "$folder/wokwi/weeder.elf"
+sed -e '/^#/d' -e 's|^firmware = .*|firmware = "../weeder.hex"|' -e 's|^elf = .*|elf = "weeder.elf"|' wokwi/wokwi.toml >"$folder/wokwi/wokwi.toml"
 
 # The manual, with the sources that docs/ links. Other links to sources do not work here.
 mkdir "$folder/manual"

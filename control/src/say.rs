@@ -47,6 +47,12 @@ pub struct Console {
     line: Line,
 }
 
+impl Default for Console {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Console {
     /// A console that sends the greeting first.
     pub const fn new() -> Self {

@@ -387,6 +387,15 @@ test("the steps of the set-up take a value each, set and save it, and keep what 
     await beam.fill("430");
     await step.getByRole("button", { name: "Set and save" }).click();
     await step.getByText("Saved.").waitFor();
+    // What the machine shows is marked, and the operator marks the other steps.
+    await steps.getByText("Open: second_beam_mm is 0").waitFor();
+    await part(page, "set-up-done").filter({ hasText: "0 of 8 steps are done." }).waitFor();
+    await step.getByRole("checkbox", { name: "I have done it" }).check();
+    await steps.locator("[data-step=stem_zone_mm]").fill("110");
+    const stem = steps.locator("li").filter({ has: page.locator("[data-step=stem_zone_mm]") });
+    await stem.getByRole("button", { name: "Set and save" }).click();
+    await stem.getByText("✓ Done").waitFor();
+    await part(page, "set-up-done").filter({ hasText: "2 of 8 steps are done." }).waitFor();
     await inspect(page, "phone-set-up");
     await type(page, "revert");
     await type(page, "get beam_to_tool_mm");

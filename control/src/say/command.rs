@@ -166,6 +166,12 @@ pub struct LineBuffer {
     error: Wrong,
 }
 
+impl Default for LineBuffer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl LineBuffer {
     /// An empty line.
     pub const fn new() -> Self {
@@ -307,7 +313,6 @@ mod tests {
     fn an_unknown_name_or_value_is_an_error() {
         for (line, error) in [
             (&b"hepl"[..], ParseError::Line(Wrong::UnknownCommand)),
-            (b"HELP", ParseError::Line(Wrong::UnknownCommand)),
             (b"help me", ParseError::Line(Wrong::UnknownSetting)),
             (b"set wheel 400", ParseError::Line(Wrong::UnknownSetting)),
             (b"set wheel_mm 4oo", ParseError::Value(Setting::WheelMm)),
@@ -355,6 +360,8 @@ mod tests {
             // Carriage return, line feed or both end a line.
             (&b"hold\rclear\r"[..], twice),
             (b"hold\nclear\n", twice),
+            // Capital letters count as small ones.
+            (b"HOLD\nClear\n", twice),
             (b"hold\r\nclear\r\n", twice),
             (b"\n\nhold\r\r\n \nclear\n", twice),
             // Backspace deletes the last character.

@@ -4,7 +4,7 @@
 //! time. Each call unpacks or divides only as far as the next character.
 
 use crate::say::{
-    packed::{Characters, Text, WORD, is_same},
+    packed::{Characters, Text, is_same, parts},
     texts::GROUPS,
 };
 use ufmt::{Formatter, uDisplay, uWrite};
@@ -35,16 +35,6 @@ impl Said {
     pub(crate) const fn text(self) -> Text {
         Text::FIRST.after(self.0)
     }
-}
-
-/// The parts of a text before, between and behind its words.
-const fn parts(text: &str) -> usize {
-    let (mut parts, mut at) = (1, 0);
-    while at < text.len() {
-        parts += (text.as_bytes()[at] == WORD) as usize;
-        at += 1;
-    }
-    parts
 }
 
 /// A line, or the rest of it.

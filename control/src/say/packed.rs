@@ -34,7 +34,7 @@ pub const HALVINGS: usize = 4;
 const LENGTH: u8 = 0x3F;
 
 /// Stands for a word in a text.
-pub(super) const WORD: u8 = b'@';
+const WORD: u8 = b'@';
 
 /// No code: during packing it ends a text, or the part of a text before a word.
 const END: u8 = u8::MAX;
@@ -199,6 +199,29 @@ const PACKED: Packed = {
         group += 1;
     }
     Packed { table, length: end, letters, index }
+};
+
+/// The parts of a text before, between and behind its words.
+pub(super) const fn parts(text: &str) -> usize {
+    let (mut parts, mut at) = (1, 0);
+    while at < text.len() {
+        parts += (text.as_bytes()[at] == WORD) as usize;
+        at += 1;
+    }
+    parts
+}
+
+/// The number of texts in the largest group.
+pub const LARGEST_GROUP: usize = {
+    let (mut largest, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        let (mut texts, mut place) = (0, 0);
+        while place < GROUPS[group].len() {
+            (texts, place) = (texts + parts(GROUPS[group][place]), place + 1);
+        }
+        (largest, group) = (if texts > largest { texts } else { largest }, group + 1);
+    }
+    largest
 };
 
 /// Two bits that differ between words, above the length's bits.

@@ -1,13 +1,15 @@
 //! `weeder evaluate`: evaluates a field trial from the counts and measurements of its plots.
 
 use crate::destination::{OutFolder, OutName, Replace};
-use crate::numbers::number_within;
-use crate::output::{self, say};
+use crate::numbers::{number_within, whole_within};
+use crate::output::{self, say, tell};
 use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
+use experiments::evaluation::field_log::{self, OfLog};
 use experiments::evaluation::{self, Analysis, ResponseAnalysis};
 use experiments::page::Page;
+use link::worked::worked;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -19,6 +21,7 @@ const REPORT: &str = "report.html";
     weeder evaluate trial.csv                   the results, and what they depend on\n  \
     weeder evaluate trial.csv --out report      also write report/report.html, with plots\n  \
     weeder evaluate trial.csv --speeds 1,1.5,2,2.5   the table has measured speeds\n  \
+    weeder evaluate trial.csv --log row.csv     speed, time, plants and area come from the log of `weeder record`\n  \
     weeder evaluate trial.csv --json | jq .responses[0].model.terms")]
 pub struct Arguments {
     /// CSV file with a line for each plot: replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged,
@@ -28,6 +31,13 @@ pub struct Arguments {
     /// Nominal speeds in km/h, 0.1 to 15, where the table has measured ones: means and analysis of variance take the nearest.
     #[arg(long, value_delimiter = ',', value_parser = number_within(0.1..=15.0))]
     speeds: Vec<f64>,
+    /// Log of `weeder record`: each stretch of work is a plot, in the order of the plots' numbers. It gives each plot its
+    /// speed, and fills the empty cells of time, plants and area.
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file, conflicts_with = "speeds")]
+    log: Option<PathBuf>,
+    /// The plot of each stretch of work in the log, 0 to 100000, 0 for none.
+    #[arg(long, value_delimiter = ',', requires = "log", value_parser = whole_within(0..=100_000_u32))]
+    plots: Vec<u32>,
     /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -41,12 +51,26 @@ pub struct Arguments {
 /// Reads, evaluates and prints.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.as_ref().map(|out| out.folder([REPORT], arguments.replace)).transpose()?;
-    let records = evaluation::read_csv(&arguments.file)?;
-    let analysis =
-        Analysis::at_speeds(records, &arguments.speeds).with_context(|| arguments.file.display().to_string())?;
-    let printed = match arguments.json {
-        true => say!("{:#}", in_json(&analysis)),
-        false => output::print(format_args!("{analysis}")),
+    let mut records = evaluation::read_csv(&arguments.file)?;
+    let (analysis, joined) = match &arguments.log {
+        Some(log) => {
+            let levels_km_h = records.iter().map(|record| record.speed_km_h).collect();
+            let stretches = worked(&link::log::read(log)?);
+            let joined = field_log::join(&mut records, &stretches, &arguments.plots)?;
+            joined.iter().filter_map(OfLog::warning).for_each(|warning| tell!("{warning}"));
+            (Analysis::at_levels(records, levels_km_h), Some(joined))
+        }
+        None => (Analysis::at_speeds(records, &arguments.speeds), None),
+    };
+    let analysis = analysis.with_context(|| arguments.file.display().to_string())?;
+    let printed = match (arguments.json, &joined) {
+        (true, joined) => {
+            let mut json = in_json(&analysis);
+            json["log"] = json!(joined);
+            say!("{json:#}")
+        }
+        (false, Some(joined)) => output::print(format_args!("{}\n\n{analysis}", field_log::of_log_table(joined))),
+        (false, None) => output::print(format_args!("{analysis}")),
     };
     if let Some(folder) = &folder {
         write_report(&analysis, &arguments.file, folder)?;

@@ -202,7 +202,7 @@ mod tests {
 
     /// Arguments of files that are only read.
     const READ: &str = "bounds:budgets bounds:diff bounds:elf check-board:second_simulator classify:file design:machine \
-        evaluate:file examples.diff:file examples.push:file flash:elf hex:elf map:logs merge:parts replay:log serve:page \
+        evaluate:file evaluate:log examples.diff:file examples.push:file flash:elf hex:elf map:logs merge:parts replay:log serve:page set-up:machine \
         settings.diff:file settings.push:file sim:capture sim:elf sim:field sim:row soak:elf sweep:field train:files trial:elf \
         trial:examples trial:field virtual-uno:bootloader virtual-uno:elf virtual-uno:field virtual-uno:row";
 

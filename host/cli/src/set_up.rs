@@ -8,39 +8,50 @@ mod simulated;
 
 use crate::output::{say, tell};
 use crate::ports::Port;
-use anyhow::{Context, Result, bail};
+use crate::source;
+use anyhow::{Context, Error, Result, bail};
 use clap::Args;
 use files::whole_file;
+use link::row_names::Board;
 use link::set_up::{ManualStep, SetUp, Step, Task, steps};
 use link::settings::{self, Setting, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
-use std::collections::BTreeSet;
+use mechanics::design::Design;
+use mechanics::machine::Machine;
+use mechanics::swing::Swing;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::fs;
-use std::io::{self, BufRead, ErrorKind, Write};
-use std::path::PathBuf;
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 #[derive(Args)]
 #[command(after_help = "\
-It goes through the steps of docs/set-up.md. Enter accepts, s skips a step, q stops.
-The next call continues at the open step.
+It goes through the steps of docs/set-up.md. At every question, Enter takes what stands in [brackets], s leaves the step out,
+and q stops. The next call continues at the open step. It ends with a summary.
 
 Examples:
   weeder set-up --port /dev/ttyACM0
-  weeder set-up --state left.txt --port left      each row has its own file
+  weeder set-up --machine my.toml                 offers the stroke and leads of `weeder design --machine my.toml`
+  weeder set-up --state left.txt --port left      each board has its own file
   weeder set-up --simulated                       what each step brings in the simulated field")]
 pub struct Arguments {
     #[command(flatten)]
     port: Port,
-    /// The file for progress and measurements.
+    /// The file for progress and measurements. It belongs to one board.
     #[arg(long, value_name = "FILE", default_value = "set-up.txt")]
     state: PathBuf,
+    /// Your machine, as for `weeder design`. Without it, the measures of arm, tool and servo are asked.
+    #[arg(long, value_name = "FILE.toml", value_parser = source::file)]
+    machine: Option<PathBuf>,
     /// Start again at the first step, and forget the measurements.
     #[arg(long)]
     again: bool,
     /// Do the steps on the simulated machine, and print what each of them brings.
-    #[arg(long, conflicts_with_all = ["port", "state", "again"])]
+    #[arg(long, conflicts_with_all = ["port", "state", "machine", "again"])]
     simulated: bool,
 }
 
@@ -51,6 +62,22 @@ const PLANTS: Duration = Duration::from_secs(600);
 /// Time between two checks whether the machine stands, and the ticks after which it has left a mark.
 const POLL: Duration = Duration::from_millis(200);
 const ROLLED_TICKS: u32 = 500;
+
+/// From this speed on, the machine ends timed swings: 0.05 km/h, rounded up.
+const ROLLS_MM_S: u32 = 15;
+
+/// The measures from which `weeder design` calculates the stroke: section and key of a machine file, and the question.
+const TOOL_WIDTH: (&str, &str) = ("intra_row", "width");
+const ASKED: [((&str, &str), &str); 8] = [
+    (TOOL_WIDTH, "The tool's width"),
+    (("intra_row", "shank_length"), "The arm's length, from the servo's axis to the blade's tip"),
+    (("intra_row", "blade_height"), "The blade's height"),
+    (("intra_row", "servo_torque"), "The servo's greatest torque"),
+    (("swing", "servo_time_60"), "The servo's time for 60 degrees without load"),
+    (("swing", "protected"), "The width round a stem that no tool may enter"),
+    (("swing", "stem_off"), "How far a stem may stand off the middle of its canopy"),
+    (("swing", "room"), "Room beside the stem zone, for plants off the line and a machine that strays"),
+];
 
 /// Leads through the steps.
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -65,22 +92,48 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let kept_state =
         State::parse(&kept).with_context(|| format!("{} is no file of `weeder set-up`", path.display()))?;
-    let state = if arguments.again { State::parse("")? } else { kept_state };
-    let link = arguments.port.open()?;
-    Guide { link, state, path: path.clone() }.lead()
+    let mut state = if arguments.again { State::default() } else { kept_state };
+    let machine = arguments.machine.as_deref().map(mechanics::file::read).transpose()?;
+    let board = Board::at(&arguments.port.board()?.port()?)?;
+    state.take_board(&board, path)?;
+    let link = board.open()?;
+    Guide { link, state, machine, typed: typed_lines(), path: path.clone() }.lead()
 }
 
-/// The completed steps and the measurements.
+/// The lines that the user types. The channel ends with the input.
+fn typed_lines() -> Receiver<String> {
+    let (sender, typed) = mpsc::channel();
+    // Reading blocks until the user types, so it has its own thread. The thread ends with the process.
+    thread::spawn(move || {
+        let mut lines = io::stdin().lines().map_while(Result::ok);
+        lines.try_for_each(|line| sender.send(line.trim().to_owned()))
+    });
+    typed
+}
+
+/// The completed steps, the measurements, and the user's measures.
+#[derive(Default)]
 struct State {
+    /// The board, in words. Empty in a new file.
+    board: String,
     done: BTreeSet<usize>,
+    /// The user's measures in a machine file's units, by section and key.
+    asked: BTreeMap<String, f64>,
+    /// With the board's settings as they were last.
     measured: SetUp,
 }
 
 /// The first line of its file.
 const HEAD: &str = "# What `weeder set-up` has done and measured: it goes on from here.";
 
-/// The text before the number of a completed step.
+/// The beginnings of its other lines. The settings come behind a typed `get`, as in a log.
+const BOARD: &str = "board ";
 const DONE: &str = "done ";
+const ASK: &str = "machine ";
+const GET: &str = "> get";
+
+/// A board with its own number begins so, in words.
+const NUMBER: &str = "serial number ";
 
 impl State {
     fn parse(text: &str) -> Result<Self> {
@@ -89,61 +142,189 @@ impl State {
             None | Some(HEAD) => {}
             Some(_) => bail!("its first line has to be `{HEAD}`; give another --state"),
         }
-        let is_done = |line: &&str| line.starts_with(DONE);
-        let done = lines.clone().filter(is_done).filter_map(|line| line[DONE.len()..].parse().ok()).collect();
-        Ok(Self { done, measured: SetUp::of_lines(lines.filter(|line| !is_done(line))) })
+        let of = |beginning: &'static str| lines.clone().filter_map(move |line| line.strip_prefix(beginning));
+        let asked = of(ASK)
+            .filter_map(|line| line.split_once(' '))
+            .filter_map(|(key, value)| Some((key.to_owned(), value.parse().ok()?)));
+        Ok(Self {
+            board: of(BOARD).next().unwrap_or_default().to_owned(),
+            done: of(DONE).filter_map(|number| number.parse().ok()).collect(),
+            asked: asked.collect(),
+            measured: SetUp::of_lines(lines),
+        })
     }
 
     fn text(&self) -> String {
-        let done = self.done.iter().map(|number| format!("{DONE}{number}"));
-        let lines: Vec<String> =
-            std::iter::once(HEAD.to_owned()).chain(done).chain(self.measured.lines()).chain([String::new()]).collect();
+        let mut lines = vec![HEAD.to_owned(), format!("{BOARD}{}", self.board)];
+        lines.extend(self.done.iter().map(|number| format!("{DONE}{number}")));
+        lines.extend(self.asked.iter().map(|(key, value)| format!("{ASK}{key} {value}")));
+        lines.extend(self.measured.lines());
+        lines.push(GET.to_owned());
+        let value = |setting| format!("{}={}", name(setting), self.measured.settings.get(setting));
+        lines.extend(Setting::all().map(value));
+        lines.push(String::new());
         lines.join("\n")
+    }
+
+    /// Takes the board that is there.
+    ///
+    /// # Errors
+    /// If the file belongs to a board with another serial number.
+    fn take_board(&mut self, board: &Board, path: &Path) -> Result<()> {
+        let named = match board {
+            Board::SerialNumber(number) => format!("{NUMBER}{number}"),
+            Board::Port(port) => format!("port {port}"),
+            Board::Only { .. } => String::new(),
+        };
+        if [&self.board, &named].iter().all(|words| words.starts_with(NUMBER)) && self.board != named {
+            let path = path.display();
+            bail!(
+                "{path} belongs to the board with {}, and this one has {named}: give another --state, or start \
+                 {path} again with --again",
+                self.board
+            );
+        }
+        if !self.board.is_empty() && self.board != named {
+            tell!("{} was made for a board at {}. This one is at {named}.", path.display(), self.board);
+        }
+        self.board = named;
+        Ok(())
     }
 }
 
-/// The user's answer to a step, and how the step ended.
-enum Answer {
-    Go,
+/// How the user ends a step early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
     LeaveOut,
     Stop,
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the user has ended the step")
+    }
 }
 
 /// Leads the user through the steps.
 struct Guide {
     link: Link,
     state: State,
+    machine: Option<Machine>,
+    typed: Receiver<String>,
     path: PathBuf,
 }
 
 impl Guide {
     fn lead(mut self) -> Result<()> {
+        match self.lead_to_the_end() {
+            Err(error) if error.downcast_ref() == Some(&End::Stop) => {
+                say!("Stopped. The same command continues here.")
+            }
+            ended => ended,
+        }
+    }
+
+    fn lead_to_the_end(&mut self) -> Result<()> {
         if settings::status(&mut self.link)?.mode == Mode::Alarm {
             // A new board has no saved settings, which is an alarm. This saves the present ones.
             self.link.ask("save")?;
             self.link.ask("clear")?;
         }
         self.link.ask("events on")?;
+        say!("Enter takes what stands in [brackets], s leaves a step out, q stops.")?;
+        self.compare()?;
         let steps = steps();
         let count = steps.len();
         for step in &steps {
             let ManualStep { number, title, how, tasks } = step;
+            let why = self.open(tasks)?;
             // The last step follows from the others, and is asked for each time.
-            if self.state.done.contains(number) && *number < count {
+            if self.state.done.contains(number) && why.is_none() && *number < count {
                 say!("Step {number} of {count}, {title}: done")?;
                 continue;
             }
             say!("\nStep {number} of {count}: {title}\n  {how}")?;
-            match self.step(tasks)? {
-                Answer::Go => {
-                    self.state.done.insert(*number);
-                    self.keep()?;
+            match self.step(tasks) {
+                Ok(()) => {}
+                Err(error) if error.downcast_ref() == Some(&End::LeaveOut) => {
+                    say!("  Left out.")?;
+                    continue;
                 }
-                Answer::LeaveOut => say!("  Left out.")?,
-                Answer::Stop => return say!("Stopped. The same command continues here."),
+                Err(error) => return Err(error),
+            }
+            match self.open(tasks)? {
+                None => self.state.done.insert(*number),
+                Some(why) => {
+                    say!("  Step {number} is still open: {why}")?;
+                    self.state.done.remove(number)
+                }
+            };
+            self.keep()?;
+        }
+        self.summary(&steps)
+    }
+
+    /// Why a step is open: the board's settings or the measurements show it.
+    fn open(&mut self, tasks: &[Task]) -> Result<Option<String>> {
+        Ok(self.state.measured.open(tasks, &settings::read(&mut self.link)?))
+    }
+
+    /// Compares the board's settings with those of the file. Steps whose settings differ are open again.
+    fn compare(&mut self) -> Result<()> {
+        let on_board = settings::read(&mut self.link)?;
+        let kept = std::mem::replace(&mut self.state.measured.settings, on_board.clone());
+        let differing: Vec<Setting> = match self.path.exists() && !self.state.done.is_empty() {
+            true => Setting::all().filter(|&setting| on_board.get(setting) != kept.get(setting)).collect(),
+            false => Vec::new(),
+        };
+        if differing.is_empty() {
+            return Ok(());
+        }
+        say!("The board does not have the settings of {}:", self.path.display())?;
+        for &setting in &differing {
+            say!("  {} is {}, and was {}", name(setting), on_board.get(setting), kept.get(setting))?;
+        }
+        self.go("Go on with the board's settings")?;
+        for step in steps() {
+            if step.tasks.iter().any(|task| matches!(task, Task::Set(setting, _) if differing.contains(setting))) {
+                self.state.done.remove(&step.number);
             }
         }
-        say!("\nThe settings are saved on the machine. The measurements are in {}.", self.path.display())
+        self.keep()
+    }
+
+    /// Prints what is set, what it is expected to weed, what is missing, and what to read next.
+    fn summary(&mut self, steps: &[ManualStep]) -> Result<()> {
+        let settings = settings::read(&mut self.link)?;
+        say!("\nSummary\n  Set and saved:")?;
+        for setting in Setting::all().filter(|&setting| settings.get(setting) != setting.description().default) {
+            say!("    {} {} {}", name(setting), settings.get(setting), unit(setting))?;
+        }
+        for ManualStep { number, title, tasks, .. } in steps {
+            let why = self.state.measured.open(tasks, &settings);
+            if why.is_some() || !self.state.done.contains(number) {
+                say!("  Open: step {number}, {title}{}", why.map(|why| format!(": {why}")).unwrap_or_default())?;
+            }
+        }
+        if let Some(warning) = self.state.measured.warning(&settings) {
+            say!("  Warning: {warning}")?;
+        }
+        match self.tool_width_mm() {
+            Some(width_mm) => match simulated::expected(&settings, width_mm) {
+                Ok(expected) => say!("  Expected: {expected}")?,
+                Err(error) => say!("  Expected: not calculated, because {error:#}")?,
+            },
+            None => say!("  Expected: not calculated, because the tool's width was not given in step 3")?,
+        }
+        say!("  The measurements are in {}.", self.path.display())?;
+        say!("  Next, read docs/work.md (in a release: manual/docs/work.md).")
+    }
+
+    fn tool_width_mm(&self) -> Option<f64> {
+        let (section, key) = TOOL_WIDTH;
+        let is_width = |input: &mechanics::machine::Input| (input.section, input.key) == TOOL_WIDTH;
+        let of_machine = self.machine.and_then(|machine| machine.inputs().into_iter().find(is_width));
+        of_machine.map(|input| input.value).or_else(|| self.state.asked.get(&format!("{section}.{key}")).copied())
     }
 
     fn keep(&self) -> Result<()> {
@@ -151,56 +332,137 @@ impl Guide {
             .with_context(|| format!("{} cannot be written", self.path.display()))
     }
 
-    /// Asks for a line. `None` at the end of the input.
-    fn prompt(&self, question: &str) -> Result<Option<String>> {
-        let mut out = io::stdout().lock();
-        write!(out, "  {question}: ")?;
-        out.flush()?;
-        let mut line = String::new();
-        let read = io::stdin().lock().read_line(&mut line)?;
-        Ok((read > 0).then(|| line.trim().to_owned()))
-    }
-
-    fn go(&self, question: &str) -> Result<Answer> {
+    /// Asks for a line. Enter takes `shown`. `seen` gets the machine's lines meanwhile.
+    fn line(&mut self, question: &str, shown: Option<&str>, seen: impl Fn(&str) -> Result<()>) -> Result<String> {
         loop {
-            match self.prompt(&format!("{question} (Enter, s to leave it out, q to stop)"))?.as_deref() {
-                Some("") => return Ok(Answer::Go),
-                Some("s") => return Ok(Answer::LeaveOut),
-                None | Some("q") => return Ok(Answer::Stop),
-                Some(_) => tell!("  error: type Enter, s or q"),
+            let mut out = io::stdout().lock();
+            write!(out, "  {question}{}: ", shown.map(|shown| format!(" [{shown}]")).unwrap_or_default())?;
+            out.flush()?;
+            drop(out);
+            let typed = loop {
+                match self.typed.try_recv() {
+                    Ok(typed) => break typed,
+                    Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
+                    // Waits a fiftieth of a second for a line of the machine.
+                    Err(TryRecvError::Empty) => {
+                        self.link.next_line()?.as_deref().map_or(Ok(()), &seen)?;
+                    }
+                }
+            };
+            match (typed.as_str(), shown) {
+                ("s", _) => return Err(Error::msg(End::LeaveOut)),
+                ("q", _) => return Err(Error::msg(End::Stop)),
+                ("", Some(shown)) => return Ok(shown.to_owned()),
+                ("", None) => tell!("  error: type the value, s or q"),
+                _ => return Ok(typed),
             }
         }
     }
 
-    fn step(&mut self, tasks: &[Task]) -> Result<Answer> {
-        for task in tasks {
-            if let Task::Fit(part, value) = task {
-                say!("  Part: {part} = {value} on the simulated machine")?;
-            }
+    fn ask_for(&mut self, question: &str, shown: Option<&str>) -> Result<String> {
+        self.line(question, shown, |_| Ok(()))
+    }
+
+    /// Waits until the user goes on.
+    fn go(&mut self, question: &str) -> Result<()> {
+        while self.ask_for(question, Some("go on"))? != "go on" {
+            tell!("  error: type Enter, s or q");
         }
-        let answer = self.go("Do it")?;
-        if !matches!(answer, Answer::Go) {
-            return Ok(answer);
+        Ok(())
+    }
+
+    fn step(&mut self, tasks: &[Task]) -> Result<()> {
+        if tasks.is_empty() {
+            return self.watch();
         }
+        let needs_stroke = tasks.iter().any(|task| matches!(task, Task::Set(Setting::StemZoneMm, _)));
+        let calculated = if needs_stroke { self.calculated()? } else { Vec::new() };
         let mut wanted = Vec::new();
         for task in tasks {
-            let goes_on = match *task {
-                Task::Fit(..) => true,
-                Task::Set(setting, of_the_manual) => {
-                    let value = self.value(setting, Some(of_the_manual))?;
-                    wanted.extend(value.map(|value| (setting, value)));
-                    value.is_some()
+            match *task {
+                Task::Fit("machine.tool_width_mm", _) => self.measure_tool()?,
+                // Its setting is asked for.
+                Task::Fit(..) => {}
+                Task::Set(setting, _) => {
+                    let offered = calculated.iter().find(|(offered, _)| *offered == setting).map(|&(_, value)| value);
+                    wanted.push((setting, self.value(setting, offered)?));
                 }
                 Task::TimeServo => self.time_servo()?,
                 Task::MeasureWheel(length_mm) => self.measure_wheel(length_mm)?,
                 Task::SetMargin => self.set_margin()?,
-            };
-            if !goes_on {
-                return Ok(Answer::Stop);
             }
         }
-        self.push(&wanted)?;
-        Ok(Answer::Go)
+        self.push(&wanted)
+    }
+
+    /// Shows the detections as they come.
+    fn watch(&mut self) -> Result<()> {
+        let is_detection =
+            |line: &str| matches!(ConsoleLine::parse(line), ConsoleLine::Event(EventLine::Detection { .. }));
+        let show = |line: &str| if is_detection(line) { say!("\n    {line}") } else { Ok(()) };
+        while self.line("The lines come here. When each plant gives one", Some("go on"), show)? != "go on" {
+            tell!("  error: type Enter, s or q");
+        }
+        Ok(())
+    }
+
+    /// The stroke, leads and zone that follow from the user's arm, tool and servo. Empty if the user types them.
+    fn calculated(&mut self) -> Result<Vec<(Setting, u16)>> {
+        let machine = match self.machine {
+            Some(machine) => machine,
+            None => {
+                let question = "Calculate them from your arm, tool and servo, or type them: yes, no";
+                if self.ask_for(question, Some("yes"))? != "yes" {
+                    return Ok(Vec::new());
+                }
+                for (input, question) in ASKED {
+                    self.measure(input, question)?;
+                }
+                let text: String = self.state.asked.iter().map(|(key, value)| written(key, *value)).collect();
+                mechanics::file::parse(Path::new("the machine"), &text)?
+            }
+        };
+        let torque = Design::of(&machine)?.servo_torque;
+        let swing = match Swing::of(&machine, torque) {
+            Ok(swing) => swing,
+            Err(problem) => {
+                tell!("  The tool cannot swing as it has to: {problem}.");
+                return Ok(Vec::new());
+            }
+        };
+        for sentence in swing.sentences(&machine, torque) {
+            say!("  {sentence}")?;
+        }
+        let setting = |(name, value): (&str, u32)| Some((Setting::find(name.as_bytes())?, u16::try_from(value).ok()?));
+        Ok(swing.settings().into_iter().filter_map(setting).collect())
+    }
+
+    /// Asks for the tool's width, unless the machine's file has it.
+    fn measure_tool(&mut self) -> Result<()> {
+        match self.machine {
+            Some(_) => self.go(&format!("The machine's file has {} mm", self.tool_width_mm().unwrap_or_default())),
+            None => self.measure(TOOL_WIDTH, ASKED[0].1),
+        }
+    }
+
+    /// Asks for a measure of the machine.
+    fn measure(&mut self, (section, key): (&str, &str), question: &str) -> Result<()> {
+        let inputs = Machine::default().inputs();
+        let Some(input) = inputs.iter().find(|input| (input.section, input.key) == (section, key)) else {
+            return Ok(());
+        };
+        let name = format!("{section}.{key}");
+        let before = self.state.asked.get(&name).map(f64::to_string);
+        loop {
+            let typed = self.ask_for(&format!("{question}, in {}", input.unit), before.as_deref())?;
+            match typed.parse().ok().filter(|value| (input.least..=input.most).contains(value)) {
+                Some(value) => {
+                    self.state.asked.insert(name, value);
+                    return self.keep();
+                }
+                None => tell!("  error: it has to be a number {}", input.range()),
+            }
+        }
     }
 
     /// Sets and saves.
@@ -213,38 +475,22 @@ impl Guide {
         Ok(())
     }
 
-    /// Asks for a setting's value. `None` if the user stops.
-    fn value(&mut self, setting: Setting, of_the_manual: Option<u16>) -> Result<Option<u16>> {
+    /// Asks for a setting's value. Enter takes the offered one, or else the present one.
+    fn value(&mut self, setting: Setting, offered: Option<u16>) -> Result<u16> {
         let now = settings::read(&mut self.link)?.get(setting);
         let range_of = setting.description();
-        let manual = of_the_manual.map_or(String::new(), |value| format!(", m takes the manual's {value}"));
+        let mut question = format!("{} in {}", name(setting), unit(setting));
+        if offered.is_some_and(|offered| offered != now) {
+            question += &format!(", now {now}");
+        }
+        let shown = offered.unwrap_or(now).to_string();
         loop {
-            let question = format!("{} in {}; Enter keeps {now}{manual}, or type it", name(setting), unit(setting));
-            let value = match self.prompt(&question)?.as_deref() {
-                None | Some("q") => return Ok(None),
-                Some("") => Some(now),
-                Some("m") => of_the_manual,
-                Some(typed) => typed.parse().ok(),
-            };
-            match value.filter(|value| (range_of.least..=range_of.greatest).contains(value)) {
-                Some(value) => return Ok(Some(value)),
+            let typed = self.ask_for(&question, Some(&shown))?;
+            match typed.parse().ok().filter(|value| (range_of.least..=range_of.greatest).contains(value)) {
+                Some(value) => return Ok(value),
                 None => tell!("  error: {} has to be a whole number, {}", name(setting), range(setting)),
             }
         }
-    }
-
-    /// Waits for an event of the machine.
-    fn wait_for<T>(&mut self, time: Duration, wanted: impl Fn(&EventLine) -> Option<T>) -> Result<Option<(T, String)>> {
-        let deadline = Instant::now() + time;
-        while Instant::now() < deadline {
-            let Some(line) = self.link.next_line()? else { continue };
-            if let ConsoleLine::Event(event) = ConsoleLine::parse(&line)
-                && let Some(found) = wanted(&event)
-            {
-                return Ok(Some((found, line)));
-            }
-        }
-        Ok(None)
     }
 
     /// Types a command. `None` if the machine refuses it; the reason was printed.
@@ -260,8 +506,18 @@ impl Guide {
     }
 
     /// Times the servo until there are enough measurements over the present stroke.
-    fn time_servo(&mut self) -> Result<bool> {
+    fn time_servo(&mut self) -> Result<()> {
         self.push(&[])?;
+        let has_switch = settings::read(&mut self.link)?.get(Setting::EndSwitch) > 0;
+        let shown = if has_switch { "on" } else { "off" };
+        let wanted = loop {
+            match self.ask_for("An end switch on D5 times the servo by itself: on, off", Some(shown))?.as_str() {
+                "on" => break 1,
+                "off" => break 0,
+                _ => tell!("  error: type on or off"),
+            }
+        };
+        self.push(&[(Setting::EndSwitch, wanted)])?;
         loop {
             let settings = settings::read(&mut self.link)?;
             let missing = self.state.measured.missing(&settings);
@@ -271,27 +527,20 @@ impl Guide {
                     _ => None,
                 });
                 let leads: Vec<(Setting, u16)> = leads.collect();
-                self.push(&leads)?;
-                return Ok(true);
+                return self.push(&leads);
             };
             say!("  Next, {step}")?;
-            if !matches!(self.go("Keep clear of the tool")?, Answer::Go) {
-                return Ok(false);
-            }
-            self.stands_at(None)?;
+            self.go("Keep clear of the tool")?;
+            let from = self.stands_at(None)?;
             if self.ask("calibrate servo")?.is_none() {
                 continue;
             }
-            let calibrated = |event: &EventLine| {
-                use EventLine::{CalibratedByEye, CalibratedBySwitch, NotCalibrated};
-                matches!(event, CalibratedBySwitch { .. } | CalibratedByEye {} | NotCalibrated {}).then_some(*event)
-            };
-            let Some((event, line)) = self.wait_for(SWINGS, calibrated)? else {
-                bail!("the machine has not reported the swings: is it in hold?");
-            };
+            let Some((event, line)) = self.swings(from)? else { continue };
             match event {
                 EventLine::NotCalibrated {} => {
-                    tell!("  error: the end switch did not follow: see to it, or type `set end_switch off`")
+                    tell!(
+                        "  error: the end switch did not follow: see to it, or leave out this step and begin it with off"
+                    );
                 }
                 EventLine::CalibratedBySwitch { out_ms, in_ms, is_set } => {
                     say!("  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms.")?;
@@ -306,14 +555,42 @@ impl Guide {
                     self.state.measured.take_line(&line);
                     let mut leads = Vec::new();
                     for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
-                        let Some(value) = self.value(lead, None)? else { return Ok(false) };
-                        leads.push((lead, value));
+                        leads.push((lead, self.value(lead, None)?));
                     }
                     self.push(&leads)?;
                 }
             }
             self.keep()?;
         }
+    }
+
+    /// Waits for the result of the timed swings. `None` if the machine has dropped them; the reason was printed.
+    fn swings(&mut self, from: i32) -> Result<Option<(EventLine, String)>> {
+        let calibrated = |event: &EventLine| {
+            use EventLine::{CalibratedByEye, CalibratedBySwitch, NotCalibrated};
+            matches!(event, CalibratedBySwitch { .. } | CalibratedByEye {} | NotCalibrated {})
+        };
+        let deadline = Instant::now() + SWINGS;
+        let mut has_moved = false;
+        while Instant::now() < deadline && !has_moved {
+            let until = Instant::now() + POLL;
+            while Instant::now() < until {
+                let Some(line) = self.link.next_line()? else { continue };
+                if let ConsoleLine::Event(event) = ConsoleLine::parse(&line)
+                    && calibrated(&event)
+                {
+                    return Ok(Some((event, line)));
+                }
+            }
+            has_moved = settings::status(&mut self.link)?.speed_mm_s.unsigned_abs() >= ROLLS_MM_S;
+        }
+        let has_moved = has_moved || settings::status(&mut self.link)?.position != from;
+        if has_moved {
+            tell!("  The wheel moved, so the machine has dropped the measurement. Hold the machine still.");
+        } else {
+            tell!("  The machine has not reported the swings within {} seconds.", SWINGS.as_secs());
+        }
+        Ok(None)
     }
 
     /// Waits until the machine stands, and returns its position. With `from`, it must first have left that position.
@@ -331,28 +608,24 @@ impl Guide {
     }
 
     /// Measures the wheel until there are enough measurements.
-    fn measure_wheel(&mut self, length_mm: u16) -> Result<bool> {
+    fn measure_wheel(&mut self, length_mm: u16) -> Result<()> {
+        if settings::read(&mut self.link)?.get(Setting::TicksPerM) == 0 {
+            // They were of another wheel.
+            self.state.measured.forget_stretches();
+        }
         loop {
             let stretches = self.state.measured.stretches();
             if stretches >= SetUp::STRETCHES {
-                self.push(&[])?;
-                return Ok(true);
+                return self.push(&[]);
             }
             say!("  Stretch {} of {}", stretches + 1, SetUp::STRETCHES)?;
-            if !matches!(self.go("Stand at the first mark, and stand still")?, Answer::Go) {
-                return Ok(false);
-            }
+            self.go("Stand at the first mark, and stand still")?;
             let from = self.stands_at(None)?;
             if self.ask("calibrate start")?.is_none() {
                 continue;
             }
-            let typed =
-                self.prompt(&format!("Roll to the other mark and stand; the distance in mm, Enter for {length_mm}"))?;
-            let length = match typed.as_deref() {
-                None | Some("q") => return Ok(false),
-                Some("") => length_mm.to_string(),
-                Some(typed) => typed.to_owned(),
-            };
+            let question = "Roll to the other mark and stand still; the distance in mm";
+            let length = self.ask_for(question, Some(&length_mm.to_string()))?;
             self.stands_at(Some(from))?;
             let command = format!("calibrate {length}");
             let Some(answer) = self.ask(&command)? else { continue };
@@ -365,52 +638,61 @@ impl Guide {
     }
 
     /// Sets the margin that follows from the measurements, or prints what is missing.
-    fn set_margin(&mut self) -> Result<bool> {
+    fn set_margin(&mut self) -> Result<()> {
         self.push(&[])?;
         let settings = settings::read(&mut self.link)?;
+        if matches!(self.state.measured.missing(&settings)[..], [Step::PassPlants(_)]) {
+            say!("  Roll past plants: both beams measure the slip.")?;
+        }
         loop {
             match self.state.measured.margin(&settings) {
                 Ok(margin) => {
                     let least_mm = margin.least_mm();
                     say!("  The measurements ask for {least_mm} mm: {margin}")?;
-                    let Some(value) = self.value(Setting::MarginMm, Some(least_mm))? else { return Ok(false) };
+                    let value = self.value(Setting::MarginMm, Some(least_mm))?;
                     self.state.measured.take_line(&format!("> set {} {value}", name(Setting::MarginMm)));
                     self.push(&[(Setting::MarginMm, value)])?;
                     if let Some(warning) = self.state.measured.warning(&settings::read(&mut self.link)?) {
                         tell!("  Warning: {warning}");
                     }
-                    return Ok(true);
+                    return Ok(());
                 }
                 Err(missing) => {
                     let [Step::PassPlants(_)] = missing[..] else {
                         for step in missing {
                             say!("  Missing: {step}")?;
                         }
-                        say!("  The margin stays at {} mm.", settings.get(Setting::MarginMm))?;
-                        return Ok(true);
+                        return say!("  The margin stays at {} mm.", settings.get(Setting::MarginMm));
                     };
-                    say!("  Roll past plants: both beams measure the slip.")?;
-                    if !self.pass_plants()? {
-                        return Ok(false);
-                    }
+                    self.pass_plant()?;
                 }
             }
         }
     }
 
     /// Listens to the next plant that passes both beams.
-    fn pass_plants(&mut self) -> Result<bool> {
-        let slip = |event: &EventLine| match *event {
-            EventLine::Slip { permille } => Some(permille),
-            _ => None,
-        };
-        let Some((permille, line)) = self.wait_for(PLANTS, slip)? else {
-            tell!("  No plant has passed both beams for {} minutes.", PLANTS.as_secs() / 60);
-            return Ok(false);
-        };
-        say!("  slip {permille} permille")?;
-        self.state.measured.take_line(&line);
-        self.keep()?;
-        Ok(true)
+    fn pass_plant(&mut self) -> Result<()> {
+        let deadline = Instant::now() + PLANTS;
+        while Instant::now() < deadline {
+            match self.typed.try_recv().as_deref() {
+                Ok("s") => return Err(Error::msg(End::LeaveOut)),
+                Ok("q") | Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
+                _ => {}
+            }
+            let Some(line) = self.link.next_line()? else { continue };
+            if let ConsoleLine::Event(EventLine::Slip { permille }) = ConsoleLine::parse(&line) {
+                say!("  slip {permille} permille")?;
+                self.state.measured.take_line(&line);
+                return self.keep();
+            }
+        }
+        tell!("  No plant has passed both beams for {} minutes.", PLANTS.as_secs() / 60);
+        Err(Error::msg(End::LeaveOut))
     }
+}
+
+/// A measure as a line of a machine file.
+fn written(name: &str, value: f64) -> String {
+    let unit = Machine::default().inputs().into_iter().find(|input| format!("{}.{}", input.section, input.key) == name);
+    unit.map_or_else(String::new, |input| format!("{name} = \"{value} {}\"\n", input.unit))
 }

@@ -13,6 +13,7 @@ use comfy_table::Table;
 use experiments::experiment::{PlotOutcome, Treatment};
 use experiments::shard::Shard;
 use experiments::sweep::{Axis, Point, RESULTS, SPACINGS_CM, SPEEDS_KM_H, Sweep};
+use experiments::table::in_two_lines;
 use field::conditions::{self, Conditions, PARAMETERS};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
@@ -37,14 +38,26 @@ Examples:
   weeder sweep --x k=1..9:2 --shard 2/4 --out 2.part      the second of four parts, for `weeder merge`
 An axis is `speed` in km/h, `spacing` in cm, a parameter of the field as in its TOML file, or a setting of the firmware.";
 
+/// Columns of the help.
+const HELP_WIDTH: usize = 100;
+
 /// The examples, and all possible axes.
 fn long_help() -> String {
     let lines = axes();
     let [name_width, range_width] = [0, 1].map(|part| lines.iter().map(|line| line[part].len()).max().unwrap_or(0));
     let mut text = format!("{EXAMPLES}\n\nWhat an axis can be:\n");
     for [name, range, meaning] in &lines {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "  {name:<name_width$}  {range:<range_width$}  {meaning}");
+        let begin = format!("  {name:<name_width$}  {range:<range_width$}  ");
+        let mut line = begin.clone();
+        for word in meaning.split(' ') {
+            if line.len() + word.len() > HELP_WIDTH {
+                // Writing to a String cannot fail.
+                let _ = writeln!(text, "{}", line.trim_end());
+                line = " ".repeat(begin.len());
+            }
+            line += &format!("{word} ");
+        }
+        let _ = writeln!(text, "{}", line.trim_end());
     }
     text
 }
@@ -171,10 +184,11 @@ fn show(sweep: &Sweep, points: &[Point], shown: &Shown, out: Option<OutFile>) ->
 fn in_words(result: &str, sweep: &Sweep, points: &[Point]) -> String {
     let mut text = match &sweep.y {
         Some(y) => format!(
-            "{}, {} across, {} down\n{}\n",
-            result,
-            sweep.x.parameter,
-            y.parameter,
+            "{}, {}, {} across, {} down\n{}\n",
+            result.replace('_', " "),
+            unit_of(result),
+            with_unit(&sweep.x.parameter),
+            with_unit(&y.parameter),
             grid(sweep, y, points, result)
         ),
         None => format!("{}\n", list(sweep, points)),
@@ -239,10 +253,24 @@ fn grid(sweep: &Sweep, y: &Axis, points: &[Point], result: &str) -> Table {
     table
 }
 
+/// The unit of a result.
+fn unit_of(result: &str) -> &'static str {
+    if result == "performance_index" { "ha %²/(h hp)" } else { "%" }
+}
+
+/// An axis with its unit. The names of other axes end with theirs.
+fn with_unit(axis: &str) -> String {
+    match axis {
+        "speed" => "speed, km/h".to_owned(),
+        "spacing" => "spacing, cm".to_owned(),
+        _ => axis.to_owned(),
+    }
+}
+
 /// A line a value of the only axis, a column a result.
 fn list(sweep: &Sweep, points: &[Point]) -> Table {
-    let names = RESULTS.iter().map(|name| name.replace('_', " "));
-    let mut table = number_table([sweep.x.parameter.clone()].into_iter().chain(names), 0);
+    let names = RESULTS.iter().map(|name| format!("{}\n{}", in_two_lines(&name.replace('_', " ")), unit_of(name)));
+    let mut table = number_table([with_unit(&sweep.x.parameter)].into_iter().chain(names), 0);
     for point in points {
         let results = point.results.map(|value| shown(value, point));
         table.add_row([point.x.to_string()].into_iter().chain(results));
@@ -272,8 +300,15 @@ mod tests {
     fn the_help_separates_an_axis_s_name_range_and_meaning() {
         let help = long_help();
         let (_, list) = help.split_once("What an axis can be:\n").expect("there is a list");
-        let mut columns = list.lines().map(|line| line.trim_start().split("  ").filter(|part| !part.is_empty()));
-        assert!(columns.clone().count() > 60);
-        assert!(columns.all(|parts| parts.count() == 3), "{list}");
+        // The meaning goes on in the next line, below its beginning.
+        let at = list.lines().next().and_then(|line| line.rfind("  ")).expect("it has three columns");
+        let mut entries = 0;
+        for line in list.lines() {
+            let (begin, meaning) = line.split_at(at + 2);
+            let columns = begin.split("  ").filter(|part| !part.trim().is_empty()).count();
+            assert!(line.len() <= HELP_WIDTH && !meaning.starts_with(' ') && [0, 2].contains(&columns), "{line:?}");
+            entries += columns / 2;
+        }
+        assert_eq!(entries, axes().len());
     }
 }

@@ -5,15 +5,20 @@ use crate::ctrl_c;
 use crate::flash;
 use crate::numbers::{number_within, whole_within};
 use crate::output::{say, tell};
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, ensure};
 use clap::Args;
+use field::machine::Machine;
 use field::motion::mm_s;
 use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
+use std::io;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver};
+use std::thread;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use trial::firmware;
 use trial::live::rows::{LiveRows, Ran};
-use trial::live::{Course, Sender, Setup};
+use trial::live::{Course, Run, Sender, Setup};
 use uno::hex::Bootloader;
 
 #[derive(Args)]
@@ -39,6 +44,11 @@ With the old bootloader, from Debian's arduino-core-avr:
   weeder virtual-uno --link /tmp/uno --bootloader ATmegaBOOT_168_atmega328.hex
   weeder flash --port /tmp/uno --old-bootloader
 
+A machine to rehearse the set-up: it rolls when you press Enter here. The other terminal has the questions:
+
+  weeder virtual-uno --roll --link /tmp/uno
+  weeder set-up --port /tmp/uno
+
 A machine with six rows, with one wheel and encoder for all, at the ports row1 to row6.
 The second command prints what that costs this computer:
 
@@ -59,6 +69,10 @@ pub struct Arguments {
     /// The machine stands still.
     #[arg(long)]
     stand: bool,
+    /// The machine stands until you type in this terminal: Enter rolls it along the row once, and a number from 1000 to
+    /// 60000 rolls it so many millimetres over bare ground. For one row.
+    #[arg(long, conflicts_with = "stand")]
+    roll: bool,
     /// Start this bootloader at every reset: a file, or `optiboot`, the Uno's own. The flash is empty unless --elf is
     /// given.
     #[arg(long, value_name = "optiboot|FILE.hex")]
@@ -110,7 +124,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .into_iter()
         .map(|course| course.slipping(conditions.ground.slip_percent / 100.0))
         .collect::<Vec<_>>();
-    if !arguments.stand {
+    ensure!(!arguments.roll || count == 1, "--roll is for one row: leave out --rows");
+    if arguments.roll {
+        let Machine { wheel_mm, beam_to_tool_mm, second_beam_mm, tool_width_mm, .. } = conditions.machine(0);
+        tell!(
+            "By tape: wheel {wheel_mm} mm, from the beam to the tool {beam_to_tool_mm} mm and to the second beam \
+             {second_beam_mm} mm, tool {tool_width_mm} mm wide. An end switch is on D5."
+        );
+        tell!("Here Enter rolls along the row once, and a number rolls that many millimetres over bare ground.");
+    } else if !arguments.stand {
         tell!("The machine rolls {:.0} mm each time.", courses[0].rolls_mm());
     }
     let elf = match (&arguments.elf, &bootloader) {
@@ -138,6 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         // The machine has one receiver, on its first row.
         receiver: receiver.take(),
         course: (!arguments.stand).then_some(course),
+        runs: arguments.roll.then(typed_runs),
         fast: arguments.fast,
         keeps_running_when_opened: arguments.no_reset,
     };
@@ -157,6 +180,31 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         say!("{}", cost(ran, count))?;
     }
     Ok(())
+}
+
+/// The distances that a person may ask for, in millimetres.
+const RUN_MM: RangeInclusive<u16> = 1000..=60_000;
+
+/// The runs that are typed into this terminal.
+fn typed_runs() -> Receiver<Run> {
+    let (asked, runs) = mpsc::channel();
+    // Reading blocks until a person types, so it has its own thread. The thread ends with the process.
+    thread::spawn(move || {
+        for line in io::stdin().lines().map_while(Result::ok) {
+            let run = match line.trim() {
+                "" => Some(Run::AlongRow),
+                typed => typed.parse().ok().filter(|mm| RUN_MM.contains(mm)).map(|mm| Run::OverGround(mm.into())),
+            };
+            let Some(run) = run else {
+                tell!("error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end());
+                continue;
+            };
+            if asked.send(run).is_err() {
+                break;
+            }
+        }
+    });
+    runs
 }
 
 /// The next command to type. An Uno with only a bootloader needs a firmware.

@@ -6,6 +6,7 @@
 //! all plots. [`published`] holds the paper's printed figures. The code does not distinguish real plots from simulated
 //! plots.
 
+pub mod field_log;
 mod findings;
 mod nominal;
 mod plot;
@@ -91,17 +92,27 @@ impl Analysis {
     /// # Errors
     /// As [`of`](Self::of), and if a plot is far from each nominal speed.
     pub fn at_speeds(mut records: Vec<PlotRecord>, nominal_km_h: &[f64]) -> Result<Self> {
-        ensure!(!records.is_empty(), "a trial has at least one plot");
         for (record, number) in records.iter_mut().zip(1..) {
             if record.plot == 0 {
                 record.plot = number;
             }
-            record.check().map_err(|problem| anyhow!("plot {}: {problem}", record.plot))?;
         }
         let levels_km_h = match nominal_km_h {
             [] => records.iter().map(|record| record.speed_km_h).collect(),
             nominal_km_h => nominal::nearest(&records, nominal_km_h)?,
         };
+        Self::at_levels(records, levels_km_h)
+    }
+
+    /// Analyses the plots of a trial whose speeds were measured, each at its own nominal speed.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn at_levels(records: Vec<PlotRecord>, levels_km_h: Vec<f64>) -> Result<Self> {
+        ensure!(!records.is_empty(), "a trial has at least one plot");
+        for record in &records {
+            record.check().map_err(|problem| anyhow!("plot {}: {problem}", record.plot))?;
+        }
         let performances: Vec<Performance> = records.iter().map(PlotRecord::performance).collect();
         let mut analysis = Self { records, performances, levels_km_h, responses: Vec::new() };
         analysis.responses = Response::ALL.map(|response| ResponseAnalysis::of(response, &analysis)).to_vec();

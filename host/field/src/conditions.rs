@@ -17,7 +17,7 @@ use crate::trial::{Start, Trial};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 use files::toml_entry::{self, Entry};
-use files::{FileError, text_file};
+use files::{FileError, near, text_file};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
 use std::io::ErrorKind;
@@ -65,8 +65,12 @@ impl Conditions {
         match Self::preset(preset_or_file) {
             Some(conditions) => conditions,
             None => {
+                let meant = near(preset_or_file, presets()).map(|near| format!("; did you mean {near}?"));
                 let presets = presets().collect::<Vec<_>>().join(", ");
-                let problem = format!("is none of the presets ({presets}), and as a file it cannot be read");
+                let problem = format!(
+                    "is none of the presets ({presets}), and as a file it cannot be read{}",
+                    meant.unwrap_or_default()
+                );
                 // A file that is there has an error of its own.
                 let text = match text_file::read(path) {
                     Err(FileError::File { source, .. }) if source.kind() == ErrorKind::NotFound => {
@@ -98,7 +102,7 @@ impl Conditions {
     /// Whether every value is in its range, and the sweeps keep off the crop.
     fn check(&self) -> Result<(), WrongValue> {
         let in_range = |name: String, value: f64| match range(&name) {
-            None => Err(WrongValue::unknown(name)),
+            None => Err(WrongValue::unknown(&name)),
             // A number that is none is in no range.
             Some((least, greatest, _)) if (least..=greatest).contains(&value) => Ok(()),
             Some((least, greatest, meaning)) => Err(WrongValue::out_of_range(name, value, (least, greatest), meaning)),
@@ -286,11 +290,16 @@ impl WrongValue {
         Self::new(name, format!("is {value}, but has to be a whole number"))
     }
 
-    fn unknown(name: impl Into<String>) -> Self {
+    fn unknown(name: &str) -> Self {
         let parameters = PARAMETERS.iter().map(|parameter| parameter.name.to_owned());
         let known: Vec<String> = parameters.chain(Setting::all().map(|setting| setting.text().to_string())).collect();
-        let known = known.join(", ");
-        Self::new(name, format!("is neither a parameter of the field nor a setting of the firmware; there are {known}"))
+        // A file has settings behind their table.
+        let bare = name.strip_prefix("settings.").unwrap_or(name);
+        let right = match near(bare, known.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean {near}?"),
+            None => format!("there are {}", known.join(", ")),
+        };
+        Self::new(name, format!("is neither a parameter of the field nor a setting of the firmware; {right}"))
     }
 }
 
@@ -386,6 +395,11 @@ mod tests {
                 "field.toml, line 3: machine.second_beam_mm is 200, but has to be 0 to 0",
             ),
             ("[settings]\nlead = 9\n", "field.toml, line 2: settings.lead is neither a parameter of the field"),
+            (
+                "[settings]\nmargin = 9\n",
+                "field.toml, line 2: settings.margin is neither a parameter of the field nor a setting of the firmware; \
+                 did you mean margin_mm?",
+            ),
             ("[ground]\nslip = 4\n", "field.toml, line 2: unknown field `slip`, expected `slip_percent`"),
             (
                 "[ground]\nslip_percent = \"much\"\n",
@@ -398,6 +412,8 @@ mod tests {
         }
         let said = Conditions::load("no-such-field").unwrap_err().to_string();
         assert!(said.starts_with("no-such-field is none of the presets (transplanted, even-stand"), "{said}");
+        let said = Conditions::load("walkd").unwrap_err().to_string();
+        assert!(said.contains("did you mean walked?"), "{said}");
     }
 
     #[test]

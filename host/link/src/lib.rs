@@ -34,6 +34,7 @@ pub mod session;
 pub mod set_up;
 pub mod settings;
 pub mod settings_file;
+pub mod worked;
 
 pub use self::console_line::{ANSWERS, ConsoleLine};
 pub use self::error::LinkError;

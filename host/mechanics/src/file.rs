@@ -15,7 +15,11 @@ pub fn read(path: &Path) -> Result<Machine, FileError> {
     parse(path, &text_file::read(path)?)
 }
 
-fn parse(path: &Path, text: &str) -> Result<Machine, FileError> {
+/// Parses the text of such a file and checks the machine. `path` is named in errors.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(path: &Path, text: &str) -> Result<Machine, FileError> {
     text_file::check_nesting(path, text)?;
     let machine: Machine = toml::from_str(text).map_err(|error| {
         let byte = error.span().map_or(0, |span| span.start);

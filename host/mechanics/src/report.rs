@@ -2,11 +2,17 @@
 
 use crate::figure::{Figure, digits, digits_beside};
 use crate::paper::{Comparison, Verdict};
-use comfy_table::{Attribute, Cell, CellAlignment, Color, ContentArrangement, Table, presets};
+use comfy_table::{Attribute, Cell, CellAlignment, Color, ColumnConstraint, ContentArrangement, Table, presets};
+
+/// The greatest width of the design's table, in columns of a terminal.
+const WIDTH: u16 = 100;
 
 /// Every figure with its equation and its interpretation, and a `!` if the machine should be changed.
 pub fn design_table(figures: &[Figure]) -> Table {
     let mut table = table(&["quantity", "equation", "it gives", "unit", "", "which means"], 2..3);
+    // A pipe has no width.
+    let width = table.width().map_or(WIDTH, |width| width.min(WIDTH));
+    table.set_width(width);
     for figure in figures {
         let sense = Cell::new(&figure.sense);
         table.add_row([
@@ -17,6 +23,10 @@ pub fn design_table(figures: &[Figure]) -> Table {
             Cell::new(if figure.concern { "!" } else { "" }),
             if figure.concern { sense.fg(Color::Red).add_attribute(Attribute::Bold) } else { sense },
         ]);
+    }
+    // Only the meaning is broken into lines.
+    for column in table.column_iter_mut().take(5) {
+        column.set_constraint(ColumnConstraint::ContentWidth);
     }
     table
 }

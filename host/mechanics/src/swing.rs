@@ -123,12 +123,17 @@ impl Swing {
         })
     }
 
-    /// The settings that follow, as lines for the firmware's console.
-    pub fn set_lines(&self) -> Vec<String> {
+    /// The settings that follow.
+    pub fn settings(&self) -> Vec<(&'static str, u32)> {
         let pulses = [("servo_in_us", self.servo_in_us), ("servo_out_us", self.servo_out_us)];
         let leads = [("lead_out_ms", self.lead_out_ms), ("lead_in_ms", self.lead_in_ms)];
         let zone = (self.stem_zone_mm > 0).then_some(("stem_zone_mm", self.stem_zone_mm));
-        pulses.into_iter().chain(leads).chain(zone).map(|(name, value)| format!("set {name} {value}")).collect()
+        pulses.into_iter().chain(leads).chain(zone).collect()
+    }
+
+    /// The same as lines for the firmware's console.
+    pub fn set_lines(&self) -> Vec<String> {
+        self.settings().into_iter().map(|(name, value)| format!("set {name} {value}")).collect()
     }
 
     /// Its description, in sentences. `torque` is the one used in the calculation.

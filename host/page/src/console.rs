@@ -119,7 +119,8 @@ impl Heard {
         let (settings, _) = settings(Settings::new(), &self.settings);
         let manual = set_up::steps().into_iter().map(|step| {
             let tasks: Vec<String> = step.tasks.iter().map(task).collect();
-            json!({ "title": step.title, "how": step.how, "tasks": tasks })
+            let (is_shown, open) = (step.is_shown(), set_up.open(&step.tasks, &settings));
+            json!({ "title": step.title, "how": step.how, "tasks": tasks, "isShown": is_shown, "open": open })
         });
         let margin = set_up.margin(&settings);
         let missing = margin.as_ref().err().map_or(&[][..], Vec::as_slice);

@@ -11,7 +11,7 @@
 //! - **Baud rate.** The chip sends and receives at the pace of its UBRR. The terminal carries bytes at any rate, so a
 //!   wrong rate in a program has no effect. Unread bytes are lost when the next program opens the port.
 //! - **The machine.** It stands, accelerates before the row, rolls past it and brakes behind it. After a few seconds it
-//!   repeats this, forward, with the same row ahead. The tool follows the firmware, and does not change the row.
+//!   repeats this, forward, with the same row ahead. Or it stands until a person asks for a [`Run`]. The tool follows the firmware, and does not change the row.
 //! - **The end switch.** It closes while the arm is fully out. The machine's servo turns the arm by the pulses on its
 //!   line.
 //! - **The receiver.** A satellite receiver on the machine has its own pseudo terminal.
@@ -27,6 +27,7 @@ use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc;
 use uno::Uno;
 use uno::elf::EEPROM_BYTES;
 use uno::hex::Bootloader;
@@ -54,10 +55,21 @@ pub struct Setup {
     pub receiver: Option<(Sender, PathBuf)>,
     /// The course of the machine. Without one, the machine stands.
     pub course: Option<Course>,
+    /// The runs that a person asks for. Without them, the machine rolls by itself.
+    pub runs: Option<mpsc::Receiver<Run>>,
     /// Whether to run as fast as the host can, not in real time.
     pub fast: bool,
     /// Whether to leave the chip alone when a program opens the port.
     pub keeps_running_when_opened: bool,
+}
+
+/// A run that a person asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Run {
+    /// Along the row, once.
+    AlongRow,
+    /// Over bare ground, for this distance in millimetres.
+    OverGround(f64),
 }
 
 /// A row, and the machine that rolls along it.
@@ -70,8 +82,6 @@ pub struct Course {
     span_mm: Range<f64>,
     /// Share of the wheel's distance that slip takes.
     slip: f64,
-    /// Time of standing before the first run, in seconds.
-    stands_first_s: u64,
 }
 
 /// Chip time between two looks at the terminal and at the host's clock.
@@ -109,9 +119,7 @@ impl Course {
         let spans = || rows.iter().map(Row::span_mm);
         let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
         let end = spans().map(|span| span.end).fold(f64::NEG_INFINITY, f64::max);
-        rows.into_iter()
-            .map(|row| Self { row, machine, speed_mm_s, span_mm: start..end, slip: 0.0, stands_first_s: STANDING_S })
-            .collect()
+        rows.into_iter().map(|row| Self { row, machine, speed_mm_s, span_mm: start..end, slip: 0.0 }).collect()
     }
 
     /// The same, with a wheel that turns farther than the machine rolls by this share of its distance.
@@ -120,26 +128,33 @@ impl Course {
         Self { slip, ..self }
     }
 
-    /// The same course with a standing time before the first run, for actions that need a machine at rest.
-    pub fn standing_first(self, stands_first_s: u64) -> Self {
-        Self { stands_first_s, ..self }
-    }
-
     /// How far the machine rolls each time.
     pub fn rolls_mm(&self) -> f64 {
-        let motion = self.motion();
+        let motion = self.motion(Run::AlongRow);
         motion.end_mm() - motion.start_mm()
     }
 
-    /// The motion along the row, once. At its end the encoder's channels are as at the start.
-    fn motion(&self) -> Motion {
+    /// The motion of a run. At its end the encoder's channels are as at the start.
+    fn motion(&self, run: Run) -> Motion {
         let span = &self.span_mm;
-        let start_mm = span.start - AHEAD_MM;
-        let braking_mm = self.speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
-        let wanted_mm = span.end + self.machine.beam_to_tool_mm + BEHIND_MM + braking_mm - start_mm;
+        let braking_mm = |speed_mm_s: f64| speed_mm_s.powi(2) / (2.0 * ACCELERATION_MM_S2);
+        let (start_mm, wanted_mm, speed_mm_s) = match run {
+            Run::AlongRow => {
+                let start_mm = span.start - AHEAD_MM;
+                let behind_mm = self.machine.beam_to_tool_mm + BEHIND_MM + braking_mm(self.speed_mm_s);
+                (start_mm, span.end + behind_mm - start_mm, self.speed_mm_s)
+            }
+            Run::OverGround(length_mm) => {
+                // A short run ends before the machine has gained its speed.
+                let reached_mm_s = (ACCELERATION_MM_S2 * length_mm / 2.0).sqrt();
+                (span.end + AHEAD_MM, length_mm, self.speed_mm_s.min(reached_mm_s))
+            }
+        };
         let period_mm = TICKS_IN_A_PERIOD * self.machine.tick_mm() * (1.0 - self.slip);
-        let length_mm = (wanted_mm / period_mm).ceil() * period_mm;
-        Motion::steady(start_mm, ACCELERATION_MM_S2, self.speed_mm_s, start_mm + length_mm - braking_mm)
+        let periods = wanted_mm / period_mm;
+        let length_mm = period_mm * if run == Run::AlongRow { periods.ceil() } else { periods.round() };
+        let until_mm = start_mm + length_mm - braking_mm(speed_mm_s);
+        Motion::steady(start_mm, ACCELERATION_MM_S2, speed_mm_s, until_mm)
             .change_speed(0.0, ACCELERATION_MM_S2)
             .with_slip(|| self.slip)
     }
@@ -260,6 +275,7 @@ struct LiveUno {
     link: Option<PathBuf>,
     receiver: Option<Receiver>,
     course: Option<Course>,
+    runs: Option<mpsc::Receiver<Run>>,
     arm: Option<Arm>,
     way: Way,
     /// When the machine sets off again.
@@ -292,8 +308,9 @@ impl LiveUno {
             link: setup.link,
             receiver: setup.receiver.map(Receiver::start).transpose()?,
             arm: setup.course.as_ref().map(|course| Arm::of(&course.machine)),
-            sets_off: setup.course.as_ref().map_or(STANDING_S, |course| course.stands_first_s) * CYCLES_PER_SECOND,
+            sets_off: STANDING_S * CYCLES_PER_SECOND,
             course: setup.course,
+            runs: setup.runs,
             way: Way { before_mm: 0.0, since: None },
             eeprom,
             unread: VecDeque::new(),
@@ -358,19 +375,27 @@ impl LiveUno {
         give(pty, &mut self.unread)
     }
 
-    /// Starts a run when the machine has stood for long enough.
+    /// Starts a run when the machine has stood for long enough, or when a person asks for one.
     fn roll(&mut self) {
         if let Some(course) = &self.course
             && self.uno.cycle() >= self.sets_off
         {
+            let run = match &self.runs {
+                None => Run::AlongRow,
+                Some(runs) => {
+                    let Ok(run) = runs.try_recv() else { return };
+                    self.sets_off = self.uno.cycle();
+                    run
+                }
+            };
             // All Unos that share the wheel use the same cycle, although their last instructions end at different
             // cycles.
-            let motion = course.motion();
+            let motion = course.motion(run);
             self.uno.drive(course.machine.pin_changes(&course.row, &motion, self.sets_off));
             let end = cycle_at(self.sets_off, motion.duration_s());
             let set_off_s = self.sets_off as f64 / CYCLES_PER_SECOND as f64;
             self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), since: Some((set_off_s, motion)) };
-            self.sets_off = end + STANDING_S * CYCLES_PER_SECOND;
+            self.sets_off = end + if self.runs.is_some() { 0 } else { STANDING_S * CYCLES_PER_SECOND };
         }
     }
 

@@ -2,7 +2,7 @@
 // the steps, remembers the measurements and calculates the margin (host/page/src/console.rs).
 
 import { module } from "../core.ts";
-import { make, makeButton, type Parts } from "../dom.ts";
+import { make, makeButton, type Parts, plain } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
 import { Rust } from "../rust.ts";
@@ -11,7 +11,15 @@ import type { Machine } from "./machine.ts";
 
 /** The results of the session for the steps. */
 interface Advice {
-    readonly steps: readonly { readonly title: string; readonly how: string; readonly tasks: readonly string[] }[];
+    readonly steps: readonly {
+        readonly title: string;
+        readonly how: string;
+        readonly tasks: readonly string[];
+        /** Whether settings or measurements show that it is done. */
+        readonly isShown: boolean;
+        /** Why it is not done, if they show that. */
+        readonly open: string | null;
+    }[];
     /** The next step; null before the first measurement. */
     readonly next: string | null;
     /** The missing measurements for the margin. */
@@ -27,6 +35,10 @@ export class SetUp {
     /** The language of the steps that are shown, and their inputs by setting. */
     #language: string | undefined;
     readonly #inputs = new Map<string, HTMLInputElement>();
+    /** The mark of each step: a text, or a box where only the operator knows. */
+    #marks: readonly (HTMLElement | HTMLInputElement)[] = [];
+    /** The steps that the operator has marked, by their places. */
+    readonly #marked = new Set<number>();
 
     constructor(
         private readonly parts: Parts,
@@ -59,6 +71,16 @@ export class SetUp {
         if (this.#language !== language()) this.#build(steps);
         for (const [name, input] of this.#inputs)
             if (input.dataset.typed === undefined) input.value = String(this.machine.setting(name));
+        let done = 0;
+        this.#marks.forEach((mark, at) => {
+            const open = steps[at]?.open ?? null;
+            const isDone = mark instanceof HTMLInputElement ? this.#marked.has(at) : open === null;
+            if (isDone) done++;
+            if (mark instanceof HTMLInputElement) mark.checked = isDone;
+            else mark.textContent = open === null ? say("stepDone") : say("stepOpen", { what: plain(told(open)) });
+        });
+        const isAll = done === steps.length ? ` ${say("readWork")}` : "";
+        this.parts.write("set-up-done", say("stepsDone", { done, all: steps.length }) + isAll);
         const before = () => say("beforeMargin", { steps: missing.map((step) => `${told(step)}.`).join(" ") });
         this.parts.write("margin-said", next === null ? before() : say("next", { step: told(next) }));
         this.parts.write("margin-warning", warning === null ? "" : say("warningOf", { what: told(warning) }));
@@ -70,17 +92,32 @@ export class SetUp {
     #build(steps: Advice["steps"]): void {
         this.#language = language();
         this.#inputs.clear();
+        this.#marks = steps.map((manual, at) => (manual.isShown ? make("p", "aside") : this.#box(at)));
         this.parts.html("set-up-steps").replaceChildren(
-            ...steps.map((manual) => {
+            ...steps.map((manual, at) => {
                 const [title, how] = step(manual.title, manual.how);
+                const mark = this.#marks[at] ?? "";
                 return make(
                     "li",
                     "stack",
                     make("span", "", make("b", "", title), ". ", how),
                     ...this.#tasks(manual.tasks),
+                    manual.isShown ? mark : make("label", "", mark, say("markDone")),
                 );
             }),
         );
+    }
+
+    /** A box with which the operator marks a step. */
+    #box(at: number): HTMLInputElement {
+        const box = make("input", "");
+        box.type = "checkbox";
+        box.addEventListener("change", () => {
+            if (box.checked) this.#marked.add(at);
+            else this.#marked.delete(at);
+            this.show();
+        });
+        return box;
     }
 
     /** The inputs and buttons for the tasks of a step. */

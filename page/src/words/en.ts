@@ -205,6 +205,11 @@ export const en = {
         steps: "The steps",
         stepsLead: "Step by step: type what you measure on your machine. The margin comes last.",
         setAndSave: "Set and save",
+        stepDone: "✓ Done",
+        markDone: "I have done it",
+        stepOpen: "Open: {what}",
+        stepsDone: "{done} of {all} steps are done.",
+        readWork: "Next, read docs/work.md in the manual.",
         beforeMargin: "Before the margin is lowered: {steps}",
         next: "Next, {step}.",
         setMargin: "Set the margin to {margin} and save",
@@ -442,13 +447,14 @@ export const en = {
 
         // The next step of the set-up (host/link/src/set_up.rs).
         timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
-        takeWorst: "take the worst time: `set {name} {worst}`",
+        takeWorst: "take the calculated lead: `set {name} {worst}`",
         measureWheel: "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)",
         passPlants: "measure the slip with both beams: roll past {all} plants ({done} done)",
         lowerMargin: "lower the margin: `set margin_mm {margin}`: {sum}",
         raiseMargin: "raise the margin: `set margin_mm {margin}`: {sum}",
         marginReady: "the margin pays for {sum}: `save`",
         marginTooSmall: "margin_mm {now} is too small: the measurements need {least}",
+        settingIsZero: "{name} is 0",
         marginNotMeasured: "margin_mm {now} is not measured: {missing} first; {safe} is safe",
     },
 } as const;

@@ -1,10 +1,11 @@
 //! The effect of each step of the manual in the simulated field.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use comfy_table::{CellAlignment, Table};
-use experiments::experiment::{Engine, Experiment, Treatment, totals};
+use experiments::experiment::{Engine, Experiment, Total, Treatment, totals};
 use field::conditions::{self, Conditions};
-use link::set_up::steps;
+use link::set_up::{Task, steps};
+use link::settings::{Setting, Settings, name};
 use trial::by_the_manual::Novice;
 use trial::report::number_table;
 
@@ -32,13 +33,7 @@ pub fn table() -> Result<Table> {
     let field = Conditions::load(conditions::DEFAULT)?;
     let mut novice = Novice::new(field.from_the_box(), SEED);
     let mut line = |number: String, title: &str, conditions: &Conditions| {
-        let experiment = Experiment {
-            speeds_km_h: vec![SPEED_KM_H],
-            replications: REPLICATIONS,
-            controllers: vec![Treatment::Firmware],
-            ..Experiment::as_in_the_paper(conditions.clone(), SEED)
-        };
-        for total in totals(&experiment.run(&Engine::Native, |_| ())?) {
+        for total in weeded(conditions)? {
             table.add_row([
                 number.clone(),
                 title.to_owned(),
@@ -55,4 +50,49 @@ pub fn table() -> Result<Table> {
         line(step.number.to_string(), step.title, &novice.conditions)?;
     }
     Ok(table)
+}
+
+/// The field's rows, weeded.
+fn weeded(conditions: &Conditions) -> Result<Vec<Total>> {
+    let experiment = Experiment {
+        speeds_km_h: vec![SPEED_KM_H],
+        replications: REPLICATIONS,
+        controllers: vec![Treatment::Firmware],
+        ..Experiment::as_in_the_paper(conditions.clone(), SEED)
+    };
+    Ok(totals(&experiment.run(&Engine::Native, |_| ())?))
+}
+
+/// What a machine with these settings and a tool of this width is expected to weed. The servo, wheel and ground are those
+/// of the field.
+///
+/// # Errors
+/// If the simulated machine cannot have these settings.
+pub fn expected(settings: &Settings, tool_width_mm: f64) -> Result<String> {
+    let mut conditions = Conditions::load(conditions::DEFAULT)?.from_the_box();
+    // A calibrated wheel: 2010 ticks a metre with this field's slip.
+    if settings.get(Setting::TicksPerM) > 0 {
+        conditions.set("wheel_mm", 380.0)?;
+    }
+    conditions.set("machine.tool_width_mm", tool_width_mm)?;
+    conditions.set("machine.beam_to_tool_mm", settings.get(Setting::BeamToToolMm).into())?;
+    conditions.set("machine.second_beam_mm", settings.get(Setting::SecondBeamMm).into())?;
+    let set = steps().into_iter().flat_map(|step| step.tasks).filter_map(|task| match task {
+        Task::Set(Setting::WheelMm, _) => None,
+        Task::Set(setting, _) => Some(setting),
+        Task::SetMargin => Some(Setting::MarginMm),
+        _ => None,
+    });
+    for setting in set {
+        conditions.set(&name(setting), settings.get(setting).into())?;
+    }
+    let totals = weeded(&conditions)?;
+    let total = totals.first().context("no row was weeded")?;
+    Ok(format!(
+        "{:.1} % of the row's ground weeded, and {:.1} % of the plants that the beam sees damaged, in the simulated \
+         field {} at {SPEED_KM_H} km/h, with a tool of {tool_width_mm} mm",
+        100.0 * total.plots.weeded_share,
+        total.damage_of_seen().percent(),
+        conditions::DEFAULT,
+    ))
 }

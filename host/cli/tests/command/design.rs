@@ -49,6 +49,8 @@ fn without_a_file_the_papers_machine_is_calculated() {
     assert_eq!(line(&table, "rolling resistance  ")[..4], ["rolling resistance", "Eq. 4", "60.36", "N"]);
     assert_eq!(line(&table, "engine")[..5], ["engine", "below Eq. 9", "1.111", "hp", "!"]);
     assert!(table.starts_with("0 of the machine's"), "{table}");
+    let lines = || table.lines().filter(|line| line.starts_with(['│', '┌']));
+    assert!(lines().count() > 30 && lines().all(|line| line.chars().count() <= 100), "{table}");
 }
 
 #[test]

@@ -77,16 +77,7 @@ fn a_receiver_that_is_unplugged_and_plugged_in_again_goes_on_in_the_record() {
 
 /// A virtual Uno at rest that runs at full speed.
 fn uno() -> Background {
-    let setup = Setup {
-        elf: Some(firmware::build().expect("the firmware builds")),
-        bootloader: None,
-        eeprom: None,
-        link: None,
-        receiver: None,
-        course: None,
-        fast: true,
-        keeps_running_when_opened: false,
-    };
+    let setup = Setup { elf: Some(firmware::build().expect("the firmware builds")), fast: true, ..Setup::default() };
     LiveRows::start(vec![setup]).expect("there is a pseudo terminal").run_in_background()
 }
 

@@ -4,18 +4,17 @@ use crate::common::said;
 use crate::typed::{printed, typed};
 use experiments::experiment::{Engine, Experiment, Total, Treatment, totals};
 use field::conditions::Conditions;
-use field::planting::Planting;
 use link::set_up::{ManualStep, Task, steps};
 use link::settings::{Setting, name};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::thread;
+use std::time::Duration;
 use tempfile::TempDir;
 use trial::by_the_manual::Novice;
-use trial::firmware;
-use trial::live::rows::LiveRows;
-use trial::live::{Course, Setup};
 
 /// The page of the manual.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");
@@ -176,12 +175,16 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
     assert!((ours - theirs).abs() < 2.0, "{ours:.1} and {theirs:.1} %: {:?}", novice.conditions.settings);
 }
 
+/// The simulated machine, as on the page.
+fn machine_of_the_page() -> String {
+    let page = fs::read_to_string(PAGE).expect("it is there");
+    page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("it has a machine").to_owned()
+}
+
 #[test]
 fn the_page_and_the_design_give_the_same_numbers() {
-    let page = fs::read_to_string(PAGE).expect("it is there");
-    let machine = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("it has a machine");
     let folder = TempDir::new().expect("there is room for a folder");
-    fs::write(folder.path().join("my.toml"), machine).expect("there is room for a file");
+    fs::write(folder.path().join("my.toml"), machine_of_the_page()).expect("there is room for a file");
     let printed = said(folder.path(), &["design", "--machine", "my.toml"]);
     // Nothing was measured on this machine, so the margin is the default.
     let set_lines: Vec<&str> = printed.lines().filter(|line| line.starts_with("set ")).collect();
@@ -209,64 +212,166 @@ fn a_file_that_is_another_s_is_not_written_over() {
     assert!(!Path::new("set-up.txt").exists());
 }
 
+/// Ends a process with the test.
+struct Ends(Child);
+
+impl Drop for Ends {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Starts `weeder` in a folder, with its input and output.
+fn start(folder: &Path, words: &[&str]) -> (Ends, ChildStdin, BufReader<ChildStdout>) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let command = command.current_dir(folder).args(words).stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("cargo has built the command");
+    let (input, output) = (child.stdin.take().expect("it is piped"), child.stdout.take().expect("it is piped"));
+    (Ends(child), input, BufReader::new(output))
+}
+
+/// Starts a virtual Uno, and waits for its port.
+fn uno(folder: &Path, words: &[&str]) -> (Ends, ChildStdin) {
+    let (uno, input, mut output) = start(folder, &[&["virtual-uno"], words].concat());
+    output.read_line(&mut String::new()).expect("it prints its port");
+    (uno, input)
+}
+
+/// Runs `weeder set-up` to its end. `act` gets each line and each question, and the user's keyboard. Returns the output.
+fn lead(folder: &Path, words: &[&str], mut act: impl FnMut(&str, &mut ChildStdin)) -> String {
+    let (mut guide, mut keyboard, output) = start(folder, &[&["set-up"], words].concat());
+    let (mut said, mut line) = (String::new(), Vec::new());
+    for byte in output.bytes() {
+        line.push(byte.expect("it can be read"));
+        if line.ends_with(b"\n") || line.ends_with(b"]: ") {
+            let text = String::from_utf8(std::mem::take(&mut line)).expect("it prints text");
+            said += &text;
+            act(&text, &mut keyboard);
+        }
+    }
+    assert!(guide.0.wait().expect("it ends").success(), "{said}");
+    said
+}
+
+fn type_to(keyboard: &mut ChildStdin, line: impl std::fmt::Display) {
+    writeln!(keyboard, "{line}").expect("it reads");
+}
+
 #[test]
-fn the_terminal_leads_through_the_steps_is_stopped_and_goes_on() {
-    let conditions = Conditions::preset("straight").expect("there is one").expect("it is right");
-    let planting = Planting { plants: 7, ..Planting::default() };
-    let row = planting.grow(SEED).expect("there is room");
-    // Fast, for a test. It stands until the servo is timed: two times twelve swings of 1.5 s, which end where it rolls.
-    let course = Course::of_rows(vec![row], conditions.machine(SEED), 1200.0)
-        .remove(0)
-        .slipping(conditions.ground.slip_percent / 100.0)
-        .standing_first(65);
-    let rolls_mm = course.rolls_mm().round();
-    let setup = Setup {
-        elf: Some(firmware::build().expect("the firmware builds")),
-        course: Some(course),
-        keeps_running_when_opened: true,
-        ..Setup::default()
-    };
-    let uno = LiveRows::start(vec![setup]).expect("there is a pseudo terminal").run_in_background();
+fn a_person_sets_the_virtual_uno_up_from_the_first_question_to_the_last() {
     let folder = TempDir::new().expect("there is room for a folder");
-    let weeder = |words: &[&str], input: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
-        command.current_dir(&folder).args(words).arg("--port").arg(uno.path());
-        printed(&typed(&mut command, input), 0)
+    fs::write(folder.path().join("my.toml"), machine_of_the_page()).expect("there is room for a file");
+    // Fast, for a test.
+    let (_uno, mut machine) = uno(folder.path(), &["--roll", "--link", "uno", "--speed", "5"]);
+    let words = ["--port", "./uno", "--machine", "my.toml"];
+    let (mut detections, mut timings, mut disturbed) = (0, 0, false);
+    let mut act = |text: &str, keyboard: &mut ChildStdin| {
+        if text.contains("votes=") {
+            detections += 1;
+            // The lines come while the question waits.
+            if detections == 12 {
+                type_to(keyboard, "");
+            }
+        } else if text.contains("Roll past plants: both beams") {
+            (0..2).for_each(|_| type_to(&mut machine, ""));
+        } else if text.contains("The lines come here") {
+            type_to(&mut machine, "");
+        } else if text.contains("second_beam_mm in mm") {
+            type_to(keyboard, "200");
+        } else if text.contains("Roll to the other mark") {
+            type_to(&mut machine, "10000");
+            type_to(keyboard, "");
+        } else if text.contains("An end switch on D5") {
+            type_to(keyboard, "on");
+        } else if text.contains("Keep clear of the tool") {
+            timings += 1;
+            type_to(keyboard, "");
+            if timings == 1 {
+                // The swings have begun by then, and have not ended.
+                thread::sleep(Duration::from_secs(4));
+                type_to(&mut machine, "1000");
+                disturbed = true;
+            }
+        } else if text.ends_with("]: ") {
+            type_to(keyboard, "");
+        }
     };
-    weeder(&["monitor", "--plain"], "save\nclear\nset end_switch on\nsave\n");
-    // An answer for each question of each step, as on the page: fit the parts, and take the manual's values.
-    let mut answers = Vec::new();
-    for step in steps() {
-        let mut input = "\n".to_owned();
-        for task in &step.tasks {
-            input += &match task {
-                Task::Fit(..) => String::new(),
-                Task::Set(..) | Task::SetMargin => "m\n".to_owned(),
-                Task::TimeServo => "\n".repeat(2),
-                Task::MeasureWheel(_) => format!("\n{rolls_mm}\n").repeat(3),
-            };
-        }
-        answers.push(input);
-    }
-    let half = answers.len() / 2;
-    let first = weeder(&["set-up"], &[answers[..half].concat(), "q\n".to_owned()].concat());
+    // Stopped at the fifth step, and continued.
+    let first = lead(folder.path(), &words, |text, keyboard| match text.contains("servo_in_us in us") {
+        true => type_to(keyboard, "q"),
+        false => act(text, keyboard),
+    });
     assert!(first.ends_with("Stopped. The same command continues here.\n"), "{first}");
-    let second = weeder(&["set-up"], &answers[half..].concat());
-    assert!(second.contains(&format!("Step {half} of {}", answers.len())) && second.contains(": done\n"), "{second}");
-    assert!(second.contains("The measurements ask for ") && !second.contains("Warning"), "{second}");
-    let json: serde_json::Value =
-        serde_json::from_str(&weeder(&["settings", "pull", "--json"], "")).expect("it is JSON");
-    let value = |setting: Setting| json[name(setting)].as_u64().expect("it is a number");
-    for task in steps().iter().flat_map(|step| &step.tasks) {
-        if let Task::Set(setting, wanted) = *task
-            && ![Setting::LeadOutMs, Setting::LeadInMs].contains(&setting)
-        {
-            assert_eq!(value(setting), u64::from(wanted), "{setting:?}");
-        }
+    let second = lead(folder.path(), &words, &mut act);
+    assert!(disturbed && timings == 3, "{timings} timings: {second}");
+    for words in [
+        "Step 4 of 8, Fit a second beam: done",
+        "servo_out_us in us, now 2000 [1750]",
+        "The measurements ask for ",
+        "    stem_zone_mm 110 mm\n",
+        "Next, read docs/work.md",
+    ] {
+        assert!(second.contains(words), "{words:?} is not in\n{second}");
     }
+    assert!(!second.contains("Open: ") && !second.contains("Warning"), "{second}");
+    // The summary expects what the field `walked` weeds.
+    let expected = second.split("Expected: ").nth(1).and_then(|rest| rest.split(' ').next()).expect("it is printed");
+    let walked = Conditions::preset("walked").expect("there is one").expect("it is right");
+    let weeded = 100.0 * weeded(&walked, 10, SEED).plots.weeded_share;
+    assert!((expected.parse::<f64>().expect("it is a number") - weeded).abs() < 2.0, "{expected}, not {weeded:.1}");
+
+    let json: serde_json::Value =
+        serde_json::from_str(&said(folder.path(), &["settings", "pull", "--port", "./uno", "--json"])).expect("JSON");
+    let value = |setting: Setting| json[name(setting)].as_u64().expect("it is a number");
     // 1909.86 counts a metre, and 5 % of slip: 2010.4. 50 to 80 ms of dead time, and up to 56 ms for the stroke.
     assert!((2005..=2016).contains(&value(Setting::TicksPerM)), "{json:#}");
     assert!((95..=155).contains(&value(Setting::LeadOutMs)), "{json:#}");
     assert!((60..=100).contains(&value(Setting::LeadInMs)), "{json:#}");
     assert!((20..=30).contains(&value(Setting::MarginMm)), "{json:#}");
+
+    // A second board is empty, and the file is not its own.
+    let (_other, _) = uno(folder.path(), &["--stand", "--link", "other"]);
+    let third = lead(folder.path(), &["--port", "./other"], |text, keyboard| {
+        if text.ends_with("]: ") {
+            type_to(keyboard, if text.contains("Go on with the board's") { "" } else { "q" });
+        }
+    });
+    assert!(third.contains("servo_out_us is 2000, and was 1750"), "{third}");
+    assert!(third.contains("Step 3 of 8, Fit a wider tool: done"), "{third}");
+    assert!(!third.contains("Fit a second beam: done") && !third.contains("Keep the stem: done"), "{third}");
+}
+
+#[test]
+fn without_a_machine_s_file_its_measures_are_asked_and_nothing_else_is_offered() {
+    let folder = TempDir::new().expect("there is room for a folder");
+    let (_uno, _) = uno(folder.path(), &["--stand", "--link", "uno"]);
+    let mut input = vec!["s", "s", "90", "s"];
+    // Step 5 by a person's own measures, one of them out of range at first.
+    input.extend(["", "", "300", "2.5", "40", "0.2", "900", "80", "20", "15", "", "", "", "", "", "s", "s", "s"]);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    command.current_dir(&folder).args(["set-up", "--port", "./uno"]);
+    let printed = printed(&typed(&mut command, input.join("\n") + "\n"), 0);
+    let machine = "[intra_row]\nwidth = \"90 mm\"\nshank_length = \"300 mm\"\nblade_height = \"2.5 mm\"\n\
+        servo_torque = \"40 kg cm\"\n[swing]\nservo_time_60 = \"0.2 s\"\nprotected = \"80 mm\"\nstem_off = \"20 mm\"\n\
+        room = \"15 mm\"\n";
+    fs::write(folder.path().join("my.toml"), machine).expect("there is room for a file");
+    let design = said(folder.path(), &["design", "--machine", "my.toml"]);
+    let lines: Vec<(&str, &str)> =
+        design.lines().filter_map(|line| line.strip_prefix("set ")?.split_once(' ')).collect();
+    assert_eq!(lines.len(), 5, "{design}");
+    for (setting, value) in lines {
+        assert!(
+            printed
+                .lines()
+                .any(|line| line.contains(&format!("{setting} in ")) && line.contains(&format!("[{value}]: "))),
+            "{setting} {value} is not offered in\n{printed}"
+        );
+    }
+    assert!(printed.contains("it has to be a number from 0 to 200 mm"), "{printed}");
+    for words in ["Open: step 4, Fit a second beam: second_beam_mm is 0", "Open: step 8, Lower the margin: "] {
+        assert!(printed.contains(words), "{words:?} is not in\n{printed}");
+    }
+    assert!(printed.contains("% of the row's ground weeded") && printed.contains("a tool of 90 mm"), "{printed}");
 }

@@ -95,6 +95,65 @@ fn the_wiring_diagram_shows_the_pins_and_pull_ups_of_the_pin_table() {
 }
 
 #[test]
+fn the_wokwi_project_has_the_pins_and_pull_ups_of_the_pin_table() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../wokwi/diagram.json");
+    let text = std::fs::read_to_string(file).expect("it is there");
+    let diagram: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
+    let ends = |connection: &serde_json::Value| [0, 1].map(|end| connection[end].as_str().expect("a text").to_owned());
+    let wires: Vec<[String; 2]> = diagram["connections"].as_array().expect("a list").iter().map(ends).collect();
+    let has = |one: &str, other: &str| {
+        wires.iter().any(|[a, b]| (a.as_str(), b.as_str()) == (one, other) || (b.as_str(), a.as_str()) == (one, other))
+    };
+    let mut drawn = Vec::new();
+    for (pin, part) in [
+        (wiring::ENCODER_A, "encoder:CLK"),
+        (wiring::ENCODER_B, "encoder:DT"),
+        (wiring::WORK_SWITCH, "work:2"),
+        (wiring::END_SWITCH, "end:1.l"),
+        (wiring::BEAM, "beam:1.l"),
+        (wiring::SERVO, "servo:PWM"),
+        (wiring::SECOND_BEAM, "second-beam:1.l"),
+    ] {
+        let contact = format!("uno:{}", pin.number());
+        assert!(has(&contact, part), "{contact} does not go to {part}");
+        drawn.push(contact);
+        // The knob drives both of its lines.
+        let connection = wiring::CONNECTIONS.iter().find(|connection| connection.pin == Some(pin)).expect("it is one");
+        if connection.pull_up == wiring::EXTERNAL && !part.starts_with("encoder") {
+            let resistor = part.replace(":1.l", "-pull-up");
+            assert!(has(drawn.last().expect("it is there"), &format!("{resistor}:1")), "{resistor}");
+            assert!(has("uno:5V", &format!("{resistor}:2")), "{resistor}");
+            let parts = diagram["parts"].as_array().expect("a list");
+            let part = parts.iter().find(|part| part["id"] == resistor.as_str()).expect("it is a part");
+            assert_eq!(part["attrs"]["value"], "4700");
+        }
+    }
+    // No other pin of the Uno is connected.
+    let is_pin = |end: &&String| end.strip_prefix("uno:").is_some_and(|pin| pin.parse::<u8>().is_ok());
+    assert!(wires.iter().flatten().filter(is_pin).all(|end| drawn.contains(end)), "{wires:?}");
+}
+
+#[test]
+fn the_drawing_of_the_arm_has_the_measures_of_the_simulated_machine() {
+    let machine = Conditions::preset("walked").expect("there is one").expect("it is right").machine(0);
+    let degrees = machine.servo.stroke_degrees();
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let texts: Vec<String> =
+        texts(&expect_file!["../../../../docs/arm.svg"].data()).into_iter().map(|(.., text)| text).collect();
+    for measure in [
+        format!("arm {} mm", machine.arm_mm),
+        format!("{degrees}° = {} us", machine.servo.out_us - machine.servo.in_us),
+        format!("{:.0} mm aside", machine.arm_mm * sin),
+        format!("{:.0} mm higher", machine.arm_mm * (1.0 - cos)),
+        format!("tool {} mm", machine.tool_width_mm),
+        format!("beam to tool {} mm", machine.beam_to_tool_mm),
+        format!("{} mm", machine.second_beam_mm),
+    ] {
+        assert!(texts.contains(&measure), "{measure} is not in {texts:?}");
+    }
+}
+
+#[test]
 fn the_wiring_table_is_the_pin_table() {
     let page = expect_file!["../../../../docs/build.md"];
     page.assert_eq(&with_part(&page, "wiring", &wiring::table()));

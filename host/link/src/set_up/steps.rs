@@ -50,6 +50,18 @@ impl Task {
     }
 }
 
+impl ManualStep {
+    /// Whether settings or measurements show that it is done. Otherwise only the user knows.
+    pub fn is_shown(&self) -> bool {
+        let is_shown = |task: &Task| match task {
+            Task::Set(setting, _) => matches!(setting, Setting::SecondBeamMm | Setting::StemZoneMm),
+            Task::Fit(..) => false,
+            Task::TimeServo | Task::MeasureWheel(_) | Task::SetMargin => true,
+        };
+        self.tasks.iter().any(is_shown)
+    }
+}
+
 /// The steps, in the page's order.
 pub fn steps() -> Vec<ManualStep> {
     sections(PAGE).filter_map(step).collect()
