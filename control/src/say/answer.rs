@@ -40,6 +40,8 @@ pub enum Answer {
     Counts,
     /// A setting's value.
     Get(Setting),
+    /// How far the calibrated wheel is from its diameter; then its setting.
+    Calibrated,
     /// The settings from this index on.
     GetAll(u8),
     /// The examples from this index on.
@@ -73,6 +75,9 @@ impl Answer {
                 line.add(texts::WEEDER);
                 line.say(texts::RESET_BY);
                 line.add(controller.cause().text());
+                if controller.was_working() {
+                    line.say(texts::WAS_WORK);
+                }
                 line.say(texts::STATE);
                 line.add(names::state(controller.state()));
                 if let State::Alarm(alarm) = controller.state() {
@@ -103,6 +108,11 @@ impl Answer {
             Self::Get(setting) => {
                 write_setting(controller, setting, line);
                 Self::Ok
+            }
+            Self::Calibrated => {
+                line.say(texts::OFF_THE_DIAMETER);
+                line.counted(controller.distance().off_permille());
+                Self::Get(Setting::TicksPerM)
             }
             Self::GetAll(place) => {
                 if let Some(setting) = Setting::from_index(place) {

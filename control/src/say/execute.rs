@@ -42,7 +42,7 @@ where
         Action::Calibrate => {
             refused = Some(Setting::TicksPerM);
             match controller.calibrate(number, force) {
-                Ok(()) => return Answer::Get(Setting::TicksPerM),
+                Ok(()) => return Answer::Calibrated,
                 refused => refused,
             }
         }

@@ -190,7 +190,7 @@ mod tests {
         line.say(Said::of(lines::LINES[2]));
         line.word(texts::NUMBER.text());
         line.say(texts::END);
-        [-1, 20, 7, 8].map(|number| line.number(number));
+        [-1, 20, 7, 8].into_iter().for_each(|number| line.number(number));
         assert!(!line.is_done());
         assert_eq!(lines::LINES[2], "swing tool=@ pos=#");
         assert_eq!(written(line), "k from -1 to 20swing tool=7 pos=8\r\n");

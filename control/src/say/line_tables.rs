@@ -117,8 +117,11 @@ macro_rules! line_tables {
                     " stack_free=#" count(machine.readings().stack_free) => stack_free: u16,
                         "bytes of stack that were never used";
                     " reset=@" cause(machine.cause()) => cause: String, "cause of the last reset";
-                } if true = machine.sees_no_plants() => {
-                    " warning=@" warning(Warning::NoPlants) => warning: Option<Warning>, "the present warning";
+                } if true = machine.was_working() => {
+                    " was=@" state(State::Work) => was: Option<Mode>,
+                        "`work` if the reset ended work, until `start`, `hold` or `clear`";
+                } if Some(warning) = machine.present_warning() => {
+                    " warning=@" warning(warning) => warning: Option<Warning>, "the present warning";
                 };
             }
         }

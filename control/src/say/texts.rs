@@ -68,6 +68,7 @@ said! {
     OK = "ok";
     ERROR = "error: ";
     RESET_BY = ", reset by ";
+    WAS_WORK = ", was work";
     STATE = ", state ";
     TOOL_OUT = ", tool out; help lists the commands";
     DASH = " - ";
@@ -99,6 +100,7 @@ said! {
     IN_ALARM = "alarm";
     USAGE = "the words do not fit, the command is ";
     HOLD_TO_SET = " changes where the tool is, hold first";
+    OFF_THE_DIAMETER = "that is # permille off the diameter of the wheel";
     TAKEN_FOR = "the built-in examples say ";
     LOOK_AGAIN = ", look again, or add force";
 }

@@ -165,7 +165,6 @@ macro_rules! read_lines {
         /// Each line's name, keys and fields, from the machine itself.
         #[cfg(test)]
         fn fields_of_status($machine: &tests::Machine) -> Vec<(Vec<&'static str>, Fields)> {
-            use control::alarm::Warning;
             vec![$({
                 let (mut keys, mut fields) = (Vec::new(), Vec::new());
                 $($(if let $condition = $from)? {
@@ -313,11 +312,11 @@ fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
 
 /// How each kind of value of the tables is read.
 pub(super) mod kind {
-    use super::{Alarm, Class, Warning, names};
+    use super::{Alarm, Class, Mode, Warning, names};
     use control::say::Text;
     use std::str::FromStr;
 
-    pub(super) use self::{number as count, number as state, word as cause, word as reason};
+    pub(super) use self::{number as count, word as cause, word as reason};
 
     pub(super) fn number<T: FromStr>(word: &str) -> Option<T> {
         word.parse().ok()
@@ -325,6 +324,10 @@ pub(super) mod kind {
 
     /// A number, or another word if there is none.
     pub(super) fn optional(word: &str) -> Option<i32> {
+        number(word)
+    }
+
+    pub(super) fn state(word: &str) -> Option<Mode> {
         number(word)
     }
 
