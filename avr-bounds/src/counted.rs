@@ -9,8 +9,8 @@ use crate::concrete::Concrete;
 use crate::decode::Instruction;
 use crate::decode::Operation::*;
 use crate::effects::Registers;
-use crate::flow::{Edge, Node};
 use crate::paths::{circles, entering, loops, runs_once};
+use crate::routine::{Edge, Node};
 use std::collections::BTreeSet;
 
 /// Turns after which a loop counts as endless.

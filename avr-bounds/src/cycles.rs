@@ -10,8 +10,8 @@
 //! routine.
 
 use crate::counted;
-use crate::flow::{Edge, Node, Routine};
 use crate::paths::{circles, entering, loops, reaching, runs_once};
+use crate::routine::{Edge, Node, Routine};
 use crate::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 

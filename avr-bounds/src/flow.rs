@@ -27,8 +27,9 @@ use crate::error::{BoundsError, Problem};
 use crate::paths;
 use crate::proved::{self, Found, Frame};
 use crate::reach::Reach;
+use crate::routine::{Edge, Entry, Kind, Node, Place, Routine, bytes};
 use crate::targets::{Targets, Where};
-use crate::values::{Constants, DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
+use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
@@ -41,104 +42,6 @@ const WRITE_HALT_CYCLES: u32 = 2;
 
 /// SREG's bit of the last result being zero.
 const ZERO_FLAG: u16 = 1;
-
-/// The kind of a routine's entry, which decides how it must end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Kind {
-    /// From the reset vector.
-    Reset,
-    /// From an interrupt's vector.
-    Handler,
-    /// By a call.
-    Function,
-}
-
-/// Which routine, in which circumstances.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Entry {
-    pub(crate) address: u32,
-    pub(crate) interrupts: Interrupts,
-    pub(crate) kind: Kind,
-    /// Which calls of functions with bounded recursion are active.
-    pub(crate) active: usize,
-}
-
-/// A place on a path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Place {
-    pub(crate) address: u32,
-    /// Bytes on the stack since the routine's entry.
-    pub(crate) depth: usize,
-    pub(crate) interrupts: Interrupts,
-}
-
-/// An edge from a place to the next.
-pub(crate) struct Edge {
-    /// The place's number in its routine.
-    pub(crate) to: usize,
-    /// Cycles of the instruction on this edge, including the call instruction itself.
-    pub(crate) cycles: u32,
-    /// The routine called on this edge.
-    pub(crate) through: Option<Rc<Routine>>,
-    /// The number in R21 and R20 at the beginning of the edge, if it is known: the third argument, if each has 16 bits.
-    /// This is the length of `memcpy` and similar functions.
-    pub(crate) length: Option<u16>,
-    /// Registers with known constants after the instruction.
-    pub(crate) constants: Constants,
-}
-
-/// An instruction at a place, and its edges.
-pub(crate) struct Node {
-    pub(crate) place: Place,
-    pub(crate) instruction: Instruction,
-    pub(crate) edges: Vec<Edge>,
-    /// If the routine returns here, the cycles of the return.
-    pub(crate) returns: Option<u32>,
-    /// Functions that are called from here and never return, and the cycles of the call.
-    pub(crate) ends_in: Vec<(u32, Rc<Routine>)>,
-    /// Whether the instruction waits for an unknown time.
-    pub(crate) waits: bool,
-}
-
-impl Node {
-    fn new(place: Place, instruction: Instruction) -> Node {
-        Node { place, instruction, edges: Vec::new(), returns: None, ends_in: Vec::new(), waits: false }
-    }
-
-    /// The routines that it calls, with the cycles of the call.
-    pub(crate) fn calls(&self) -> impl Iterator<Item = (u32, &Rc<Routine>)> {
-        let returning = self.edges.iter().filter_map(|edge| Some((edge.cycles, edge.through.as_ref()?)));
-        returning.chain(self.ends_in.iter().map(|(cycles, called)| (*cycles, called)))
-    }
-
-    /// The routines that it calls.
-    pub(crate) fn called(&self) -> impl Iterator<Item = &Rc<Routine>> {
-        self.calls().map(|(_, called)| called)
-    }
-}
-
-/// A routine with all its paths.
-pub(crate) struct Routine {
-    pub(crate) entry: Entry,
-    /// The reachable places; the first is the entry.
-    pub(crate) nodes: Vec<Node>,
-    /// States of the interrupts after its returns: off, on.
-    pub(crate) returns: BTreeSet<Interrupts>,
-    /// Registers and flags with the same value at every return as at the entry.
-    pub(crate) keeps: Registers,
-    /// Whether R1 is zero at every return.
-    pub(crate) leaves_zero: bool,
-    /// The deepest stack, and the deepest stack with interrupts on: the bytes of each function, from the entry on.
-    pub(crate) deepest: Vec<Frame>,
-    pub(crate) deepest_interrupted: Option<Vec<Frame>>,
-    /// The address where interrupts that were off at the entry are turned on, in it or in a called function.
-    pub(crate) enables: Option<u32>,
-}
-
-/// Bytes of a stack.
-pub(crate) fn bytes(frames: &[Frame]) -> usize {
-    frames.iter().map(|frame| frame.bytes).sum()
-}
 
 /// A program in flash, and the known facts about its routines.
 pub(crate) struct Code<'a> {

@@ -1,6 +1,6 @@
 //! The graph of a routine's places: its loops, and which places can be reached from which.
 
-use crate::flow::{Edge, Node};
+use crate::routine::{Edge, Node};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The nodes from which a node with `is_end` can be reached, itself included.

@@ -7,7 +7,8 @@
 
 use crate::effects::Registers;
 use crate::error::BoundsError;
-use crate::flow::{Code, Kind, Node, Routine};
+use crate::flow::Code;
+use crate::routine::{Kind, Node, Routine};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 

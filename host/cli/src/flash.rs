@@ -15,6 +15,7 @@ use std::io;
 use std::path::{self, Path};
 use std::process::Command;
 use trial::firmware;
+use uno::bootloader::check_room;
 use uno::elf::Image;
 use uno::hex;
 
@@ -71,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let elf = arguments.firmware.elf()?;
     let flash = Image::read(&elf)?.flash;
-    hex::check_room(flash.len(), bootloader.available)?;
+    check_room(flash.len(), bootloader.available)?;
     arguments.firmware.check(&elf)?;
     say!("Writing {} to the Uno at {port}", elf.display())?;
     say!(

@@ -19,7 +19,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use trial::firmware;
 use trial::live::rows::{LiveRows, Ran};
 use trial::live::{Course, Run, Sender, Setup};
-use uno::hex::Bootloader;
+use uno::bootloader::Bootloader;
 
 #[derive(Args)]
 #[command(after_help = "\

@@ -7,13 +7,14 @@ use std::path::Path;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::bootloader::Bootloader;
 use crate::core::adc::SUPPLY_MILLIVOLTS;
 use crate::core::measuring::{Cycles, InterruptStatistics, Place};
 use crate::core::recorder::{Log, ReceivedByte, Reset, ResetCause};
 use crate::core::{self, Core};
-use crate::elf::{EEPROM_BYTES, Image, Size, Variable};
+use crate::elf::{Image, Size, Variable};
 use crate::error::UnoError;
-use crate::hex::Bootloader;
+use crate::memory::EEPROM_BYTES;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
 
 /// The terminal's bit rate, until it follows the chip.

@@ -35,8 +35,8 @@ use self::recorder::{
     Callback, Log, PORTS, Port, Recorder, ResetCause, TIMER_OUTPUTS, on_interrupt, on_reset, on_sample, on_transmit,
 };
 use self::timer::Timer1;
-use crate::elf::{EEPROM_BYTES, FLASH_BYTES};
 use crate::error::UnoError;
+use crate::memory::{EEPROM_BYTES, FLASH_BYTES};
 use crate::pins::{CYCLES_PER_SECOND, Pin};
 
 unsafe extern "C" {

@@ -8,16 +8,11 @@ use std::path::Path;
 
 use crate::file_error::FileError;
 use crate::hex;
+use crate::memory::{EEPROM_BYTES, FLASH_BYTES};
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf,
 };
-
-/// Flash of the ATmega328P in bytes (data sheet, section 8.2).
-pub const FLASH_BYTES: usize = 32 * 1024;
-
-/// EEPROM of the ATmega328P in bytes (data sheet, section 8.4).
-pub const EEPROM_BYTES: usize = 1024;
 
 /// Origins of SRAM, EEPROM and the following sections in the single address space of AVR ELF files.
 const SRAM_ORIGIN: u64 = 0x80_0000;
@@ -48,7 +43,7 @@ impl Size {
     ///
     /// Where the file cannot be read or is no ELF for AVR.
     pub fn read(path: &Path) -> Result<Size, FileError> {
-        let bytes = read_bytes(path)?;
+        let bytes = FileError::bytes(path)?;
         parse(path, &bytes).map(|file| size(&file))
     }
 }
@@ -90,7 +85,7 @@ impl Image {
     /// Where the file cannot be read, is neither an ELF for AVR nor HEX, is for another chip, or holds more than the
     /// ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, FileError> {
-        let bytes = read_bytes(path)?;
+        let bytes = FileError::bytes(path)?;
         if is_hex(&bytes) {
             return Ok(Image { flash: hex::flash(path, &bytes)?, ..Image::default() });
         }
@@ -129,10 +124,6 @@ impl Image {
 
 fn is_hex(bytes: &[u8]) -> bool {
     bytes.trim_ascii_start().starts_with(b":")
-}
-
-fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
-    std::fs::read(path).map_err(|source| FileError::unread(path, source))
 }
 
 /// Takes the content of the file at `path` for an ELF for AVR.

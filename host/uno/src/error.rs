@@ -1,7 +1,7 @@
 //! The errors of a virtual Uno: it could not start, it stopped, or a wait timed out.
 
-use crate::elf::EEPROM_BYTES;
 use crate::file_error::FileError;
+use crate::memory::EEPROM_BYTES;
 
 /// Why a virtual Uno could not start, or stopped.
 #[derive(Debug, thiserror::Error)]

@@ -1,12 +1,14 @@
 #![doc = include_str!("../README.md")]
 //! # Imports
 //!
-//! They run one way: `file_error` -> `elf` -> `error` -> `hex`, `core` -> `board` -> `pty`. Inside `core`: `chip` -> `timer`, `eeprom`,
+//! They run one way: `memory`, `file_error` -> `hex` -> `elf`, `error` -> `bootloader`, `core` -> `board` -> `pty`. Inside `core`: `chip` -> `timer`, `eeprom`,
 //! `adc`, `uart`, with `measuring` beside them -> `recorder`, which owns what simavr calls back with -> `core`
 //! itself, which runs it. `pins` knows none of these and is known to all; `recording` knows only `pins` and `file_error`.
 
 #[cfg(feature = "simavr")]
 mod board;
+#[cfg(feature = "simavr")]
+pub mod bootloader;
 #[cfg(feature = "simavr")]
 mod core;
 #[cfg(feature = "simavr")]
@@ -17,6 +19,8 @@ mod error;
 mod file_error;
 #[cfg(feature = "simavr")]
 pub mod hex;
+#[cfg(feature = "simavr")]
+pub mod memory;
 mod pins;
 #[cfg(all(feature = "simavr", target_os = "linux"))]
 pub mod pty;

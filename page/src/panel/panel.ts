@@ -324,12 +324,12 @@ export class Panel {
     }
 }
 
-/** The line of the console about an event, and its kind. */
 /** Whether an event is an alarm, also one that only a newer firmware knows. */
 function isAlarm(event: EventLine): boolean {
     return event.is === "alarm" || (event.is === "newer" && event.isAlarm);
 }
 
+/** The line of the console about an event, and its kind. */
 function inConsole(happening: Happening): Parameters<Console["add"]> | undefined {
     switch (happening.is) {
         case "started":

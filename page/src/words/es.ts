@@ -367,6 +367,7 @@ export const es: Language = {
         servedSilent:
             "el ordenador que tiene el puerto de la máquina no responde: mire que este aparato esté en su red, y que weeder serve funcione allí",
         servedDropped: "esta página no pudo seguir lo que dicen las máquinas: se conecta otra vez",
+        unanswered: "`{command}` sin respuesta durante {seconds} s: revise el cable y la alimentación del Uno",
         servedGone: "el puerto ya no está: enchufe el Uno otra vez",
         servedNoAnswer: "la máquina no responde",
         servedNotThere: "la máquina no está",
@@ -437,7 +438,7 @@ export const es: Language = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms y top_speed_mm_s piden juntos un beam_to_tool_mm de {needed} o más: súbalo, o baje uno de ellos",
         timeServo: "mida el tiempo del servo: `calibrate servo` ({done} de {all} hechas)",
-        takeWorst: "tome el adelanto calculado: `set {name} {worst}`",
+        takeLead: "tome el adelanto calculado: `set {name} {lead}`",
         measureWheel: "mida 10 m: `calibrate start`, avance, `calibrate 10000` ({done} de {all} hechas)",
         passPlants: "deje que los haces digan el patinaje: pase {all} plantas ({done} hechas)",
         lowerMargin: "baje el margen: `set margin_mm {margin}`: {sum}",

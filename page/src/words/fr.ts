@@ -368,6 +368,7 @@ export const fr: Language = {
         servedSilent:
             "l'ordinateur qui a le port de la machine ne répond pas : voyez que cet appareil est dans son réseau, et que weeder serve y tourne",
         servedDropped: "cette page n'a pas pu suivre ce que disent les machines : elle se reconnecte",
+        unanswered: "pas de réponse à `{command}` depuis {seconds} s : vérifiez le câble et l'alimentation de l'Uno",
         servedGone: "le port a disparu : rebranchez l'Uno",
         servedNoAnswer: "la machine ne répond pas",
         servedNotThere: "la machine n'est pas là",
@@ -439,7 +440,7 @@ export const fr: Language = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms et top_speed_mm_s demandent ensemble un beam_to_tool_mm de {needed} ou plus : augmentez-le, ou baissez l'un d'eux",
         timeServo: "chronométrez le servo : `calibrate servo` ({done} sur {all} faits)",
-        takeWorst: "prenez l'avance calculée : `set {name} {worst}`",
+        takeLead: "prenez l'avance calculée : `set {name} {lead}`",
         measureWheel: "mesurez 10 m : `calibrate start`, avancez, `calibrate 10000` ({done} sur {all} faits)",
         passPlants: "laissez les faisceaux dire le patinage : passez {all} plantes ({done} faites)",
         lowerMargin: "baissez la marge : `set margin_mm {margin}` : {sum}",

@@ -357,6 +357,7 @@ export const hi: Language = {
         servedSilent:
             "जिस कंप्यूटर के पास मशीन का पोर्ट है वह उत्तर नहीं देता: देखें कि यह उपकरण उसके नेटवर्क में हो, और वहाँ weeder serve चल रहा हो",
         servedDropped: "यह पेज मशीनों की बातों के साथ नहीं चल सका: वह फिर से जुड़ता है",
+        unanswered: "`{command}` का {seconds} s से कोई उत्तर नहीं: Uno का केबल और बिजली देखें",
         servedGone: "पोर्ट चला गया: Uno को फिर से लगाएँ",
         servedNoAnswer: "मशीन उत्तर नहीं देती",
         servedNotThere: "मशीन वहाँ नहीं है",
@@ -423,7 +424,7 @@ export const hi: Language = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms और top_speed_mm_s को मिलाकर beam_to_tool_mm {needed} या अधिक चाहिए: उसे बढ़ाएँ, या उनमें से एक घटाएँ",
         timeServo: "सर्वो का समय नापें: `calibrate servo` ({all} में से {done} हुए)",
-        takeWorst: "गणना किया गया समय लें: `set {name} {worst}`",
+        takeLead: "गणना किया हुआ अग्रिम समय लें: `set {name} {lead}`",
         measureWheel: "10 मीटर नापें: `calibrate start`, चलाएँ, `calibrate 10000` ({all} में से {done} हुए)",
         passPlants: "किरणों को फिसलन बताने दें: {all} पौधों से गुज़रें ({done} हुए)",
         lowerMargin: "हाशिया घटाएँ: `set margin_mm {margin}`: {sum}",

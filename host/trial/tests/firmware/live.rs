@@ -14,7 +14,7 @@ use trial::firmware;
 use trial::live::rows::{Background, LiveRows};
 use trial::live::{Course, Setup};
 use uno::Uno;
-use uno::hex::Bootloader;
+use uno::bootloader::Bootloader;
 use uno::pty::Pty;
 
 /// Path in Debian's arduino-core-avr, which setup.sh installs.
