@@ -28,6 +28,7 @@ mod receiver;
 mod record;
 mod replay;
 mod rows;
+mod sensitivity;
 mod serve;
 mod set_up;
 mod settings;
@@ -103,6 +104,8 @@ commands! {
     Trial: trial,
     /// Map a result of the simulated trial against one or two parameters.
     Sweep: sweep,
+    /// Show what each assumption of the simulated field costs.
+    Sensitivity: sensitivity,
     /// Merge the parts of a trial, sweep or soak from several machines.
     Merge: merge,
     /// Learn a table of examples from labelled detections, and print its error rates.
@@ -203,7 +206,7 @@ mod tests {
     /// Arguments of files that are only read.
     const READ: &str = "bounds:budgets bounds:diff bounds:elf check-board:second_simulator classify:file design:machine \
         evaluate:file evaluate:log examples.diff:file examples.push:file flash:elf hex:elf map:logs merge:parts replay:log serve:page set-up:machine \
-        settings.diff:file settings.push:file sim:capture sim:elf sim:field sim:row soak:elf sweep:field train:files trial:elf \
+        settings.diff:file settings.push:file sensitivity:field sim:capture sim:elf sim:field sim:row soak:elf sweep:field train:files trial:elf \
         trial:examples trial:field virtual-uno:bootloader virtual-uno:elf virtual-uno:field virtual-uno:row";
 
     /// Arguments whose files are continued: logs, an EEPROM, and the state of a set-up. A file of another kind is

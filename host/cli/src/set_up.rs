@@ -19,6 +19,7 @@ use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
 use mechanics::design::Design;
 use mechanics::machine::Machine;
 use mechanics::swing::Swing;
+use mechanics::unit::MM;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io::{self, Write};
@@ -92,6 +93,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         State::parse(&kept).with_context(|| format!("{} is no file of `weeder set-up`", path.display()))?;
     let mut state = if arguments.again { State::default() } else { kept_state };
     let machine = arguments.machine.as_deref().map(mechanics::file::read).transpose()?;
+    let trailing = machine.filter(|machine| machine.swing.arm_trails > 0);
+    state.measured.trailing_tool_mm = trailing.map(|machine| MM.value(machine.intra_row.width).ceil() as u16);
     let board = Board::at(&arguments.port.board()?.port()?)?;
     state.take_board(&board, path)?;
     let link = board.open()?;

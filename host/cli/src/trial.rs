@@ -19,7 +19,7 @@ use experiments::statistics::Share;
 use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use experiments::table::{distinct, in_two_lines};
 use field::budget;
-use field::conditions::{self, Conditions, presets};
+use field::conditions::{self, presets};
 use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -214,12 +214,11 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
         spacings_cm: distinct(arguments.spacings.clone()),
         replications: arguments.replications,
         controllers: arguments.controllers(),
-        conditions: Conditions::load(&arguments.field)?,
+        conditions: source::field(&arguments.field)?,
         examples: examples.into_iter().map(|example| (example.features, example.label)).collect(),
         seed: arguments.seed,
         seeds: arguments.seeds,
     };
-    experiment.conditions.warnings().iter().for_each(|warning| tell!("Warning: {warning}"));
     let plants = experiment.plants();
     ensure!(
         plants <= MOST_PLANTS,

@@ -145,6 +145,16 @@ impl Sweep {
         (self.x.values.len() * self.y.as_ref().map_or(1, |y| y.values.len())) as u64
     }
 
+    /// What is likely wrong with the conditions of the first point that has such a problem, in sentences.
+    ///
+    /// # Errors
+    /// If an axis has an invalid value.
+    pub fn warnings(&self) -> Result<Vec<String>> {
+        let places = self.places()?;
+        let warnings = places.iter().map(|place| place.experiment.conditions.warnings());
+        Ok(warnings.into_iter().find(|warnings| !warnings.is_empty()).unwrap_or_default())
+    }
+
     /// Weeds a plot at each of a shard's points.
     ///
     /// # Errors

@@ -95,14 +95,20 @@ impl Swing {
         let stem_zone_mm = if protected_mm > 0.0 { protected_mm + MM.value(inputs.stem_off) } else { 0.0 };
         let top_speed_mm_s = f64::from(Setting::TopSpeedMmS.description().default);
         let aside_of_stroke_mm = arm_mm * angle_degrees.to_radians().sin();
-        let saved_ms = match stem_zone_mm > 0.0 {
-            true => f64::from(saved_ms(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm)),
-            false => 0.0,
+        let [saved_out_ms, saved_in_ms] = match stem_zone_mm > 0.0 {
+            true => saved_ms(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm).map(f64::from),
+            false => [0.0, 0.0],
         };
         let carried_mm = arm_mm * (1.0 - angle_degrees.to_radians().cos());
         let (arm_margin_mm, lift_mm) = match (inputs.arm_trails > 0, stem_zone_mm > 0.0) {
             (false, _) => (0.0, carried_mm),
-            (true, true) => (circle::carried_mm(arm_mm, tool_mm, stem_zone_mm), 0.0),
+            (true, true) => (
+                {
+                    let rolled_mm = circle::rolled_mm(top_speed_mm_s, unloaded_ms, stem_zone_mm, aside_of_stroke_mm);
+                    circle::carried_mm(arm_mm, tool_mm, stem_zone_mm, rolled_mm)
+                },
+                0.0,
+            ),
             // Over a whole canopy the tool is fully out.
             (true, false) => (carried_mm, 0.0),
         };
@@ -114,8 +120,8 @@ impl Swing {
             load,
             unloaded_ms,
             loaded_ms,
-            lead_out_ms: (lead_out_ms - saved_ms).ceil() as u32,
-            lead_in_ms: (dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)) + saved_ms).floor() as u32,
+            lead_out_ms: (lead_out_ms - saved_out_ms).ceil() as u32,
+            lead_in_ms: (dead_ms(inputs.least_dead_time.min(inputs.most_dead_time)) + saved_in_ms).floor() as u32,
             arm_margin_mm: arm_margin_mm.ceil() as u32,
             lift_mm,
             unweeded_strip_mm: (from_mm - tool_mm / 2.0).max(0.0),
@@ -155,11 +161,19 @@ impl Swing {
         ];
         said.push(if self.arm_margin_mm > 0 {
             format!(
-                "The trailing arm carries the tool towards the plant: add {} mm to the margin that `weeder set-up` calculates.",
+                "The trailing arm carries the tool towards the plant, so the margin is {} mm wider: `weeder set-up --machine` adds them.",
                 self.arm_margin_mm
             )
         } else {
-            format!("The pendulum lifts the blade by {:.0} mm over the stroke.", self.lift_mm)
+            let [arm_mm, half_mm] =
+                [machine.intra_row.shank_length, machine.intra_row.width / 2.0].map(|length| MM.value(length));
+            format!(
+                "The pendulum lifts the blade by {:.0} mm over the stroke, and by {:.0} mm until its edge leaves the row's \
+                 line. It works {:.0} mm deep in the row.",
+                self.lift_mm,
+                arm_mm - (arm_mm * arm_mm - half_mm * half_mm).max(0.0).sqrt(),
+                MM.value(machine.soil.depth)
+            )
         });
         if self.unweeded_strip_mm <= 0.0 {
             said.push("Tool and sweeps leave no strip between them.".to_owned());
@@ -199,7 +213,7 @@ mod tests {
         machine.swing.protected = MM.of(90.0);
         let stem = Swing::with_tool(&machine, torque, 100.0).expect("it swings");
         // 45 + 10 + 50 mm of an arm of 350 are 17.5 degrees.
-        let lines = ["set servo_out_us 1695", "set lead_out_ms 116", "set stem_zone_mm 100"];
+        let lines = ["set servo_out_us 1695", "set lead_out_ms 111", "set stem_zone_mm 100"];
         assert!(lines.iter().all(|line| stem.set_lines().iter().any(|set| set == line)), "{:?}", stem.set_lines());
         assert!(
             stem.sentences(&machine, torque)[0].starts_with("The tool clears a stem's zone of 90 mm at 17."),

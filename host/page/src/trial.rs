@@ -28,7 +28,7 @@ const BEFORE_MM: f64 = 500.0;
 /// pulse: avr8js does not time edges more exactly (docs/simulators.md).
 const CLEAR_WITHIN_DEGREES: f64 = 0.09;
 /// The margin from the measurements of the machine that is set up.
-const MARGIN_MM: u16 = 28;
+const MARGIN_MM: u16 = 25;
 
 /// A machine before a row.
 #[derive(Deserialize)]
@@ -148,7 +148,7 @@ impl Begun {
         trial.tell_now();
         trial.tell_sown();
         let dimensions = json!({
-            "beamToToolMm": machine.beam_to_tool_mm, "armMm": machine.arm_mm, "toolWidthMm": machine.tool_width_mm,
+            "beamToToolMm": machine.beam_to_tool_mm, "toolWidthMm": machine.tool_width_mm,
         });
         let answer = json!({ "dimensions": dimensions, "levels": trial.levels(), "setUp": set_up });
         TRIAL.set(Some(trial));

@@ -100,7 +100,7 @@ impl CourseArguments {
     /// # Errors
     /// If it is no field, or its machine has no room for the distance from beam to tool.
     pub fn conditions_of(&self, field: &str) -> Result<Conditions> {
-        let mut conditions = Conditions::load(field)?;
+        let mut conditions = source::field(field)?;
         if let Some(beam_to_tool_mm) = self.beam_to_tool {
             // A second beam cannot be farther back, and a beam cannot be that far ahead on a machine with two.
             if conditions.machine.second_beam_mm > 0.0 && !(300..=1000).contains(&beam_to_tool_mm) {

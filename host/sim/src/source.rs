@@ -1,9 +1,11 @@
 //! Input files of commands: `-` is standard input. Some words are known names instead of files, and a shell's
 //! completion offers them.
 
+use crate::output::tell;
 use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
-use field::conditions::presets;
+use field::conditions::{Conditions, presets};
+use files::FileError;
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
@@ -31,6 +33,16 @@ fn named(name: OsString) -> Result<OsString, String> {
         Some("-") => Err("standard input cannot be read here: name a file".to_owned()),
         _ => Ok(name),
     }
+}
+
+/// The conditions of a field. Prints what is likely wrong with them.
+///
+/// # Errors
+/// If it is neither a preset nor a valid file.
+pub fn field(preset_or_file: &str) -> Result<Conditions, FileError> {
+    let conditions = Conditions::load(preset_or_file)?;
+    conditions.warnings().iter().for_each(|warning| tell!("Warning: {warning}"));
+    Ok(conditions)
 }
 
 /// A value that `parser` reads. A shell's completion offers these names, but other words are also accepted.

@@ -5,7 +5,7 @@
 
 use drawing::{INK, LEFT_ALONE, MARK_SIZE, NOTE, PALE_INK, PLANT, WEED, WEEDED, WRONG};
 use drawing::{Legend, document, line, rectangle, swatch, tenth, words};
-use field::machine::Machine;
+use field::machine::{Arm, Machine};
 use field::row::Row;
 use field::verdict::{Judgement, Verdict};
 use svg::Document;
@@ -18,6 +18,9 @@ const SIDE: f64 = 24.0;
 const LEGEND_Y: f64 = 14.0;
 const ROW_Y: f64 = 150.0;
 const HEIGHT: f64 = 256.0;
+
+/// The servo's length along the row, in pixels.
+const SERVO: f64 = 12.0;
 
 /// How far the weeded strip, the beam and the frame reach from the row's line, in pixels.
 const STRIP: f64 = 18.0;
@@ -64,24 +67,34 @@ pub fn draw(row: &Row, machine: &Machine, judgement: &Judgement, speed_mm_s: f64
         standing = standing.add(drawn);
     }
 
-    // The tool hangs on an arm whose pivot is ahead of it, on the row's line.
-    let pivot = pixels(machine.arm_mm);
-    let mut angles: Vec<(f64, String)> = Vec::new();
+    // From above, a pendulum is a line from the servo's shaft, above the row's line, to the tool beside it. A trailing
+    // arm begins at a pivot ahead of the tool.
+    let shaft = match machine.arm {
+        Arm::Pendulum => 0.0,
+        Arm::Trailing => pixels(machine.arm_mm),
+    };
+    let mut swings: Vec<(f64, [f64; 2])> = Vec::new();
     for &(position_mm, degrees) in &judgement.path {
         let at = share(position_mm);
-        if angles.last().is_none_or(|(last, _)| *last < at) {
-            angles.push((at, format!("{:.1} {pivot} {ROW_Y}", degrees)));
+        if swings.last().is_none_or(|(last, _)| *last < at) {
+            swings.push((at, [machine.forward_mm(degrees), 0.0 - machine.across_mm(degrees)].map(pixels)));
         }
     }
-    if let (Some(first), Some(last)) = (angles.first().cloned(), angles.last().cloned()) {
-        angles.insert(0, (0.0, first.1));
-        angles.push((1.0, last.1));
+    if let (Some(&(_, first)), Some(&(_, last))) = (swings.first(), swings.last()) {
+        swings.insert(0, (0.0, first));
+        swings.push((1.0, last));
     }
+    let each = |text: fn(&[f64; 2]) -> String| swings.iter().map(|(at, way)| (*at, text(way))).collect::<Vec<_>>();
     let width = pixels(machine.tool_width_mm);
-    let tool = Group::new()
-        .add(line(0.0, ROW_Y, pivot, ROW_Y, INK).set("stroke-width", 3))
-        .add(rectangle(-5.0, ROW_Y - width / 2.0, 10.0, width, NOTE).set("rx", 2))
-        .add(animate.transform("rotate", &angles));
+    let blade = rectangle(-5.0, ROW_Y - width / 2.0, 10.0, width, NOTE)
+        .set("rx", 2)
+        .add(animate.transform("translate", &each(|[forward, aside]| format!("{forward} {aside}"))));
+    let arm = line(shaft, ROW_Y, 0.0, ROW_Y, INK)
+        .set("stroke-width", 3)
+        .add(animate.value("x2", &each(|[forward, _]| forward.to_string()), "linear"))
+        .add(animate.value("y2", &each(|[_, aside]| tenth(ROW_Y + aside).to_string()), "linear"));
+    let servo = rectangle(shaft, ROW_Y - SERVO / 2.0, SERVO, SERVO, INK).set("rx", 2);
+    let tool = Group::new().add(arm).add(blade).add(servo);
 
     // The beam is ahead of the tool by this distance.
     let reach = pixels(machine.beam_to_tool_mm);
@@ -94,8 +107,9 @@ pub fn draw(row: &Row, machine: &Machine, judgement: &Judgement, speed_mm_s: f64
     let beam = line(reach, ROW_Y - BEAM, reach, ROW_Y + BEAM, LEFT_ALONE)
         .set("stroke-width", 4)
         .add(animate.value("stroke", &colours, "discrete"));
-    let frame = line(pivot, ROW_Y - BEAM, reach, ROW_Y - BEAM, PALE_INK).set("stroke-width", 6);
-    let post = line(pivot, ROW_Y - BEAM, pivot, ROW_Y, PALE_INK).set("stroke-width", 3);
+    let post = shaft + SERVO;
+    let frame = line(post, ROW_Y - BEAM, reach, ROW_Y - BEAM, PALE_INK).set("stroke-width", 6);
+    let post = line(post, ROW_Y - BEAM, post, ROW_Y, PALE_INK).set("stroke-width", 3);
     let way = [(0.0, "0 0".to_owned()), (1.0, format!("{length} 0"))];
     let rolling = Group::new().add(frame).add(post).add(beam).add(tool).add(animate.transform("translate", &way));
 
@@ -123,7 +137,7 @@ impl Run {
         animation
     }
 
-    /// The animation of a part's position or rotation.
+    /// The animation of a part's position.
     fn transform(&self, kind: &str, frames: &[(f64, String)]) -> AnimateTransform {
         let mut animation = AnimateTransform::new().set("attributeName", "transform").set("type", kind);
         self.schedule(&mut animation, frames);
@@ -158,16 +172,24 @@ mod tests {
     use crate::report::tests::ruined_row;
 
     #[test]
-    fn the_tool_turns_along_the_row_as_it_did_and_a_damaged_plant_is_red() {
+    fn the_tool_swings_across_the_row_as_it_did_and_a_damaged_plant_is_red() {
         let (trial, outcome) = ruined_row();
         let drawn = draw(&trial.row, &trial.machine, &outcome.judgement, 500.0).to_string();
         assert_eq!(drawn.matches(WRONG).count(), 2);
-        let (_, turn) = drawn.split_once("type=\"rotate\"").unwrap();
-        let values = turn.split("values=\"").nth(1).unwrap().split('"').next().unwrap();
-        let angles: Vec<f64> =
-            values.split(';').map(|value| value.split(' ').next().unwrap().parse().unwrap()).collect();
-        // Out at first, and in the row from then on.
-        assert_eq!((angles.first(), angles.last()), (Some(&45.0), Some(&0.0)));
+        let (_, blade) = drawn.split_once("type=\"translate\"").unwrap();
+        let values = blade.split("values=\"").nth(1).unwrap().split('"').next().unwrap();
+        let ways: Vec<&str> = values.split(';').collect();
+        // Out at first, and in the row from then on. A pendulum of 350 mm is 247.5 mm aside at 45 degrees.
+        assert_eq!((ways.first(), ways.last()), (Some(&"0 -89.1"), Some(&"0 0")));
+    }
+
+    #[test]
+    fn a_trailing_arm_carries_the_tool_forward_from_a_pivot_ahead_of_it() {
+        let (trial, outcome) = ruined_row();
+        let machine = Machine { arm: Arm::Trailing, ..trial.machine };
+        let drawn = draw(&trial.row, &machine, &outcome.judgement, 500.0).to_string();
+        // 102.5 mm forward.
+        assert!(drawn.contains("values=\"36.9 -89.1;"), "{drawn}");
     }
 
     #[test]

@@ -42,8 +42,6 @@ export interface Sowing {
 
 export interface Dimensions {
     readonly beamToToolMm: number;
-    /** From the arm's pivot to the tool. */
-    readonly armMm: number;
     readonly toolWidthMm: number;
 }
 

@@ -11,6 +11,9 @@ import type { Trial } from "./trial.ts";
 const ACROSS_MM = { out: 330, other: 170 };
 /** Ground behind the tool in the picture: a share of its length, with a limit. */
 const BEHIND = { share: 0.3, mostMm: 700 };
+/** The servo's length along the row, and the axle's distance ahead of the tool. */
+const SERVO_MM = 50;
+const AXLE_MM = 350;
 /** Mean distance between two short weeds, and their greatest distance from the row's line. */
 const SPECK_SPACING_MM = 14;
 const SPECK_ACROSS_MM = 150;
@@ -86,11 +89,11 @@ export class Drawing {
 
     constructor(svg: SVGSVGElement, { machine }: Trial) {
         this.#svg = svg;
-        const { beamToToolMm, armMm, toolWidthMm } = machine.dimensions;
+        const { beamToToolMm, toolWidthMm } = machine.dimensions;
         set(this.#track, { "stroke-width": toolWidthMm });
         this.#ground.append(this.#specks.group, this.#track, this.#zones, this.#things.group);
         set(this.#beam, { x1: beamToToolMm, x2: beamToToolMm });
-        const wheel = { fill: "var(--pale)", width: 190, height: 34, rx: 10, x: armMm - 150 };
+        const wheel = { fill: "var(--pale)", width: 190, height: 34, rx: 10, x: AXLE_MM - 150 };
         const frameMm = { left: -ACROSS_MM.out + 30, right: ACROSS_MM.other - 10 };
         svg.append(
             this.#soil,
@@ -98,14 +101,14 @@ export class Drawing {
             draw("path", {
                 stroke: "var(--pale)",
                 "stroke-width": 9,
-                d: `M${armMm} ${frameMm.left}V${frameMm.right}`,
+                d: `M${AXLE_MM} ${frameMm.left}V${frameMm.right}M${AXLE_MM} 0H0`,
             }),
             draw("rect", { ...wheel, y: frameMm.left - 17 }),
             draw("rect", { ...wheel, y: frameMm.right - 17 }),
             this.#beam,
             this.#arm,
             this.#blade,
-            draw("circle", { fill: "var(--ink)", cx: armMm, r: 15 }),
+            draw("rect", { fill: "var(--ink)", width: SERVO_MM, height: 30, y: -15, rx: 5 }),
             this.#angle,
         );
     }
@@ -147,11 +150,12 @@ export class Drawing {
                 ),
         );
 
-        const { armMm, toolWidthMm } = machine.dimensions;
+        const { toolWidthMm } = machine.dimensions;
         const tool = { x: trial.tool.alongMm - toolMm, y: -trial.tool.acrossMm };
         const broken = machine.isBroken;
         set(this.#beam, { "stroke-width": broken ? 9 : 4, "stroke-dasharray": broken ? "none" : "12 7" });
-        set(this.#arm, { x1: armMm, y1: 0, x2: tool.x, y2: tool.y });
+        // A pendulum from above: it hangs from the servo over the row's line, and lifts the blade beside it.
+        set(this.#arm, { x1: 0, y1: 0, x2: tool.x, y2: tool.y });
         set(this.#blade, { x: tool.x - 16, y: tool.y - toolWidthMm / 2, width: 32, height: toolWidthMm });
         set(this.#angle, { x: tool.x - 70, y: tool.y - 25 });
         // Added to 0, a negative 0 loses its sign.

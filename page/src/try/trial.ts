@@ -77,7 +77,7 @@ export class Trial {
         return this.uno.isHigh(PIN.lamp);
     }
 
-    /** The tool's position. As in the machine's model, the arm's swing moves it only across the row. */
+    /** The tool's position. The pendulum moves it only across the row. */
     get tool(): TrackPoint {
         return { alongMm: this.machine.toolMm, acrossMm: this.machine.acrossMm };
     }

@@ -20,6 +20,30 @@ fn a_speed_that_no_machine_walks_is_refused_with_its_range() {
 }
 
 #[test]
+fn a_machine_that_strays_into_its_sweeps_gets_a_warning_from_each_command_that_weeds() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("field.toml"), "[driving]\nsteering_mm = 15\n[plot]\nrow_m = 2\n").unwrap();
+    for command in [
+        "sim --elf no.elf",
+        "trial --replications 1 --speeds 1 --brief",
+        "sweep --x k=3..3:1",
+        "sensitivity --replications 1 --speeds 1 crop.canopy_mm=160",
+    ] {
+        for (field, warns) in [("field.toml", true), ("from-the-box", false)] {
+            let words: Vec<&str> = command.split(' ').chain(["--field", field]).collect();
+            let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
+            let warning = "driving.steering_mm is 15, but the sweeps leave 0.0 mm";
+            assert_eq!(message.contains(warning), warns, "{command}: {message}");
+            assert!(!warns || message.contains("Set machine.sweep_from_mm to 65 or more."), "{command}: {message}");
+        }
+    }
+    // The axis may have the value.
+    let words = ["sweep", "--x", "driving.steering_mm=0..20:20", "--field", "from-the-box"];
+    let message = String::from_utf8_lossy(&weeder(folder.path(), &words).stderr).into_owned();
+    assert!(message.contains("driving.steering_mm is 20, but the sweeps leave 0.0 mm"), "{message}");
+}
+
+#[test]
 fn canopies_wider_than_their_spacing_are_refused() {
     assert_refused(&["sim", "--spacing", "100", "--canopy", "150"], "--spacing has to exceed --canopy");
 }

@@ -188,6 +188,56 @@ fn a_machine_steered_by_hand_spares_its_plants_once_it_is_set_up_for_that() {
     assert!(percent(set_up.damaged) <= 1.0 && set_up.swept == 0, "{set_up:?}");
 }
 
+/// How many plants the machine damages on `walked` at 4 km/h of those that a beam sees, and these, with these changes.
+fn damaged_of_seen(changes: &[(&str, f64)], replications: u32) -> (u32, u32) {
+    let mut experiment = Experiment { replications, ..experiment(&[4.0], "walked") };
+    experiment.controllers = vec![Treatment::Firmware];
+    changes.iter().for_each(|&(name, value)| experiment.conditions.set(name, value).unwrap());
+    totals(&run(&experiment))[0].plots.effect.injured_of_seen()
+}
+
+#[test]
+fn a_trailing_arm_damages_plants_unless_its_margin_is_wider_by_what_it_carries() {
+    assert_eq!(damaged_of_seen(&[], 10).0, 0);
+    let trailing = ("machine.arm", 1.0);
+    let (damaged, seen) = damaged_of_seen(&[trailing], 10);
+    assert!(damaged * 1000 > seen, "{damaged} of {seen}");
+    // `weeder design` and `weeder set-up` add 14 mm for a tool of 130 mm.
+    let (few, _) = damaged_of_seen(&[trailing, ("margin_mm", 39.0)], 10);
+    assert!(5 * few < damaged, "{few} of {seen}, not {damaged}");
+}
+
+#[test]
+fn sway_side_play_and_straying_damage_plants_once_they_are_larger_than_the_machine_is_set_up_for() {
+    for change in [("crop.sway_mm", 30.0), ("machine.side_play_mm", 20.0), ("driving.steering_mm", 30.0)] {
+        let (damaged, seen) = damaged_of_seen(&[change], 3);
+        assert!(damaged * 1000 > seen, "{change:?}: {damaged} of {seen}");
+    }
+}
+
+#[test]
+fn the_guard_spares_most_of_the_plants_that_the_beam_does_not_see() {
+    let mut experiment = Experiment { spacings_cm: vec![50.0], replications: 10, ..experiment(&[1.0, 4.0], "walked") };
+    experiment.controllers = vec![Treatment::Firmware];
+    for (name, value) in [("sensors.unseen_percent", 2.0), ("guard_spacing_mm", 500.0), ("guard_scatter_mm", 40.0)] {
+        experiment.conditions.set(name, value).unwrap();
+    }
+    for total in totals(&run(&experiment)) {
+        let Effect { unseen, all_unseen, .. } = total.plots.effect;
+        assert!(all_unseen > 10 && 2 * unseen < all_unseen, "{unseen} of {all_unseen}");
+    }
+}
+
+#[test]
+fn the_elf_weeds_as_much_of_the_default_field_as_its_native_run() {
+    let mut experiment = Experiment { replications: 2, ..experiment(&[2.5], field::conditions::DEFAULT) };
+    experiment.controllers = vec![Treatment::Firmware];
+    let elf = Engine::Uno(trial::firmware::build().expect("the firmware builds"));
+    let [native, elf] = [Engine::Native, elf].map(|engine| totals(&experiment.run(&engine, |_| ()).unwrap())[0].plots);
+    assert!((native.weeded_share - elf.weeded_share).abs() < 0.003, "{} {}", native.weeded_share, elf.weeded_share);
+    assert_eq!((native.effect.injured_of_seen().0, elf.effect.injured_of_seen().0), (0, 0));
+}
+
 #[test]
 fn a_configured_shorter_stroke_weeds_more_and_reaches_no_canopy() {
     let mut shorter = experiment(&[2.5], "transplanted");

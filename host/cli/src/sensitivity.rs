@@ -1,0 +1,193 @@
+//! `weeder sensitivity`: what each assumption of a field costs. Each line changes one assumption, or several that belong
+//! together. All others stay as they are, and so does the seed.
+
+use crate::numbers::{number_within, whole_within};
+use crate::output::say;
+use crate::progress::with_bar;
+use crate::source;
+use anyhow::{Context, Result};
+use clap::Args;
+use comfy_table::CellAlignment;
+use experiments::experiment::{Engine, Experiment, Treatment, totals};
+use experiments::statistics::Share;
+use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use field::conditions::{self, Conditions, PARAMETERS};
+use field::tool_path::Effect;
+use link::settings::Setting;
+use std::str::FromStr;
+use trial::report::number_table;
+
+/// The default changes. The guard is for the default spacing.
+const CHANGES: [&str; 14] = [
+    "crop.canopy_mm=250",
+    "sensors.beam_height_mm=250",
+    "sensors.unseen_percent=2",
+    "sensors.unseen_percent=2,guard_spacing_mm=500,guard_scatter_mm=40",
+    "sensors.dust_per_m=1",
+    "crop.sway_mm=15",
+    "crop.stem_off_mm=25",
+    "crop.double_percent=10",
+    "driving.steering_mm=25",
+    "ground.slip_scatter_percent=6",
+    "machine.side_play_mm=6",
+    "machine.dead_time_scatter_ms=30",
+    "machine.arm=trailing",
+    "margin_mm=20",
+];
+
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  weeder sensitivity
+  weeder sensitivity --field straight driving.steering_mm=5 driving.steering_mm=10
+  weeder sensitivity sensors.unseen_percent=2,guard_spacing_mm=500,guard_scatter_mm=40    two settings belong together
+`weeder sweep --help` lists the names.")]
+pub struct Arguments {
+    /// The changes, each tried by itself.
+    #[arg(value_name = "NAME=VALUE[,NAME=VALUE]", default_values = CHANGES)]
+    changes: Vec<Change>,
+    /// The field: a preset or a TOML file, as for `weeder trial`.
+    #[arg(long, value_name = "PRESET|FILE.toml", value_parser = source::preset_or_file(), hide_possible_values = true, default_value = conditions::DEFAULT)]
+    field: String,
+    /// Forward speeds in km/h, each 0.1 to 8.
+    #[arg(long, value_delimiter = ',', default_value = "1,2.5,4", value_parser = number_within(SPEEDS_KM_H.0..=SPEEDS_KM_H.1))]
+    speeds: Vec<f64>,
+    /// Plant spacing in cm, 5 to 500.
+    #[arg(long, default_value = "50", value_parser = number_within(SPACINGS_CM.0..=SPACINGS_CM.1))]
+    spacing: f64,
+    /// Plots at each speed, 1 to 1000.
+    #[arg(long, default_value = "30", value_parser = whole_within(1..=1000_u32))]
+    replications: u32,
+    /// Random seed, 0 to 18446744073709551615.
+    #[arg(long, default_value = "1", value_parser = whole_within(0..=u64::MAX))]
+    seed: u64,
+}
+
+/// Values of parameters or settings that replace the field's.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Change(Vec<(String, f64)>);
+
+impl FromStr for Change {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let one = |part: &str| {
+            let (name, value) = part.split_once('=')?;
+            let known = PARAMETERS.iter().find(|known| known.name == name);
+            let word = known.and_then(|known| known.words.iter().position(|&word| word == value));
+            let value = word.map(|number| number as f64).or_else(|| value.parse().ok())?;
+            Some((name.to_owned(), value))
+        };
+        let values: Option<Vec<(String, f64)>> = text.split(',').map(one).collect();
+        values.map(Self).ok_or_else(|| "it has to be NAME=VALUE, as crop.canopy_mm=250".to_owned())
+    }
+}
+
+impl Change {
+    /// The names, the values here, and those of the field, each in a cell with a line for each name.
+    fn cells(&self, field: &Conditions) -> [String; 3] {
+        let lines = |text: &dyn Fn(&str, f64) -> String| {
+            self.0.iter().map(|(name, value)| text(name, *value)).collect::<Vec<_>>().join("\n")
+        };
+        let written = |name: &str, value: f64| {
+            let known = PARAMETERS.iter().find(|known| known.name == name);
+            known.map_or_else(|| value.to_string(), |known| known.written(value))
+        };
+        let of_field = |name: &str| {
+            let parameter = field.values().find(|(known, _)| known.name == name).map(|(_, value)| value);
+            let set = || field.settings.get(name).map(|&value| f64::from(value));
+            let default = || Setting::find(name.as_bytes()).map(|setting| f64::from(setting.description().default));
+            parameter.or_else(set).or_else(default).map_or_else(String::new, |value| written(name, value))
+        };
+        [
+            lines(&|name, _| name.to_owned()),
+            lines(&|name, value| written(name, value)),
+            lines(&|name, _| of_field(name)),
+        ]
+    }
+}
+
+/// Runs it and prints the table.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let Arguments { changes, field, speeds, spacing, replications, seed } = arguments;
+    let conditions = source::field(field)?;
+    let experiment = Experiment {
+        speeds_km_h: speeds.clone(),
+        spacings_cm: vec![*spacing],
+        replications: *replications,
+        controllers: vec![Treatment::Firmware],
+        ..Experiment::as_in_the_paper(conditions.clone(), *seed)
+    };
+    let changes: Vec<Change> = [Change::default()].into_iter().chain(changes.iter().cloned()).collect();
+    // All changes are checked before anything is weeded.
+    let changed = changes.iter().map(|change| {
+        let mut conditions = conditions.clone();
+        change.0.iter().try_for_each(|(name, value)| conditions.set(name, *value))?;
+        Ok(Experiment { conditions, ..experiment.clone() })
+    });
+    let changed = changed.collect::<Result<Vec<Experiment>>>()?;
+    let header = ["assumption", "here", "in the\nfield"].map(str::to_owned).into_iter();
+    let weeded = speeds.iter().map(|speed| format!("weeded\nat {speed}\nkm/h\nin %"));
+    let damaged =
+        ["seen\nplants\ndamaged\nin %", "unseen\nplants\ndamaged\nin %", "rows\nwith\nan\nalarm"].map(str::to_owned);
+    let mut table = number_table(header.chain(weeded).chain(damaged), 0);
+    table.column_iter_mut().take(1).for_each(|column| column.set_cell_alignment(CellAlignment::Left));
+    let count = changed.len() as f64;
+    with_bar("weeding", |show| {
+        for (number, (change, experiment)) in changes.iter().zip(&changed).enumerate() {
+            let outcomes = experiment.run(&Engine::Native, |share| show((number as f64 + share) / count));
+            let outcomes = outcomes.with_context(|| format!("with {}", change.cells(&conditions)[0]))?;
+            let totals = totals(&outcomes);
+            let (mut effect, mut alarms) = (Effect::default(), 0);
+            for total in &totals {
+                effect += total.plots.effect;
+                alarms += total.plots.alarms;
+            }
+            let (damaged, seen) = effect.injured_of_seen();
+            let unseen = match effect.all_unseen {
+                0 => "-".to_owned(),
+                all => format!("{:.1}", Share::of(effect.unseen, all).percent()),
+            };
+            let weeded = totals.iter().map(|total| format!("{:.1}", 100.0 * total.plots.weeded_share));
+            let results = [format!("{:.2}", Share::of(damaged, seen).percent()), unseen, alarms.to_string()];
+            let cells = if change.0.is_empty() {
+                ["as in the field".to_owned(), String::new(), String::new()]
+            } else {
+                change.cells(&conditions)
+            };
+            table.add_row(cells.into_iter().chain(weeded).chain(results));
+        }
+        anyhow::Ok(())
+    })?;
+    let rows = experiment.rows();
+    say!(
+        "{table}\nField {field}, seed {seed}: {rows} rows of {} m a line, plants {spacing} cm apart.",
+        conditions.plot.row_m
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_default_change_differs_from_the_default_field() {
+        let field = Conditions::load(conditions::DEFAULT).expect("it is a preset");
+        for text in CHANGES {
+            let change: Change = text.parse().expect("it is a change");
+            let mut changed = field.clone();
+            for (name, value) in &change.0 {
+                changed.set(name, *value).expect("it is in its range");
+            }
+            assert_ne!(changed, field, "{text}");
+        }
+    }
+
+    #[test]
+    fn text_that_is_no_change_is_refused() {
+        for text in ["", "crop.canopy_mm", "crop.canopy_mm=wide", "a=1,", "machine.arm=hanging"] {
+            assert!(text.parse::<Change>().is_err(), "{text}");
+        }
+        assert_eq!("machine.arm=trailing".parse(), Ok(Change(vec![("machine.arm".to_owned(), 1.0)])));
+    }
+}
