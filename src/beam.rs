@@ -53,16 +53,19 @@ impl<'a> Beam<'a> {
         beam
     }
 
-    /// Turns the second beam's interrupt on or off.
-    pub fn watch_second(&self, is_there: bool) {
+    /// Turns the second beam's interrupt on or off. Returns whether it was off and is on: its level is then yet to be told.
+    pub fn watch_second(&self, is_there: bool) -> bool {
         let beams = if is_there { BEAM | SECOND_BEAM } else { BEAM };
         // The mask bits of PCINT0 and PCINT2.
+        let before = self.interrupts.pcmsk0.read().bits();
         self.interrupts.pcmsk0.write(|w| w.pcint().bits(beams));
+        before < beams
     }
 
-    /// Whether the first beam is broken now.
-    pub fn is_broken(&self) -> bool {
-        self.port.pinb.read().bits() & BEAM == 0
+    /// Whether the first beam and the second are broken now.
+    pub fn are_broken(&self) -> (bool, bool) {
+        let levels = self.port.pinb.read().bits();
+        (levels & BEAM == 0, levels & SECOND_BEAM == 0)
     }
 }
 

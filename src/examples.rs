@@ -91,15 +91,14 @@ impl Examples<{ features::COUNT }> for InFlash {
     }
 }
 
-/// The neighbour in a row of flash; `None` if its squared distance exceeds `reach`, which two features of five mostly show.
+/// The neighbour in a row of flash; `None` if it is beyond `reach`, which two features of five mostly show.
 ///
 /// In assembly, because the compiler takes twice the cycles.
 #[inline(always)]
-fn neighbour(row: *const Row, query: &Query, reach: u32) -> Option<Neighbour> {
-    let [reach_low, reach_middle, reach_high, _] = reach.to_le_bytes();
-    let (mut low, mut middle, mut high) = (0, 0, 0);
-    let (mut left, mut label) = (features::COUNT as u8, row.cast::<u8>());
-    // SAFETY: it reads the features of the row, which is in flash, and those of the query. R0 is free for use, and R1 is 0 again.
+fn neighbour(row: *const Row, query: &Query, reach: Neighbour) -> Option<Neighbour> {
+    let (reach_far, reach_near) = reach.parts();
+    let (mut far, mut near, mut left) = (0, 0, features::COUNT as u8);
+    // SAFETY: it reads the row, which is in flash, and the features of the query. R0 is free for use, and R1 is 0 again.
     unsafe {
         asm!(
             "2:",
@@ -110,31 +109,30 @@ fn neighbour(row: *const Row, query: &Query, reach: u32) -> Option<Neighbour> {
             "neg {byte}",
             "3:",
             "mul {byte}, {byte}",
-            "add {low}, r0",
-            "adc {middle}, r1",
+            "add {near:h}, r0",
+            "adc {far:l}, r1",
             "clr r1", // keeps the carry
-            "adc {high}, r1",
-            "cp {reach_low}, {low}",
-            "cpc {reach_middle}, {middle}",
-            "cpc {reach_high}, {high}",
+            "adc {far:h}, r1",
+            "cp {reach_near:h}, {near:h}",
+            "cpc {reach_far:l}, {far:l}",
+            "cpc {reach_far:h}, {far:h}",
             "brcs 4f",
             "dec {left}",
             "brne 2b",
+            "lpm {near:l}, Z",
+            "com {near:l}",
             "4:",
             byte = out(reg) _,
             other = out(reg) _,
-            low = inout(reg) low,
-            middle = inout(reg) middle,
-            high = inout(reg) high,
-            reach_low = in(reg) reach_low,
-            reach_middle = in(reg) reach_middle,
-            reach_high = in(reg) reach_high,
+            far = inout(reg_pair) far,
+            near = inout(reg_pair) near,
+            reach_far = in(reg_pair) reach_far,
+            reach_near = in(reg_pair) reach_near,
             left = inout(reg) left,
             inout("X") query.as_ptr() => _,
-            inout("Z") label,
+            inout("Z") row => _,
             options(nostack, readonly),
         );
     }
-    // SAFETY: the label follows the features.
-    (left == 0).then(|| Neighbour::new(u32::from_le_bytes([low, middle, high, 0]), unsafe { read_byte(label) }))
+    (left == 0).then(|| Neighbour::of_parts(far, near))
 }

@@ -97,7 +97,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
     };
     eeprom::finish(&peripherals.EEPROM);
     read(uninit.readings());
-    let controller = init(uninit, beam.is_broken(), cause);
+    let controller = init(uninit, beam.are_broken().0, cause);
     // The pulse for "tool out" is a setting, so the servo starts after the settings are loaded.
     let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
 
@@ -106,7 +106,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
         idle::begin_turn();
         // Read first: an edge that is still queued then has no later position than the next readings.
         read(controller.next_readings());
-        beam.watch_second(controller.has_second_beam());
+        let is_new = beam.watch_second(controller.has_second_beam());
         // Read before the edges. Then all edges queued before the loss come first, and none follows the level read at the end.
         let lost = beam::take_lost();
         // At most as many as the queue holds, so that edges which keep coming cannot stop the loop.
@@ -116,9 +116,15 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
             controller.take_edge(edge);
         }
         if lost {
-            controller.take_edge(Edge::Lost { broken: beam.is_broken() });
+            let (broken, second_broken) = beam.are_broken();
+            controller.take_edge(Edge::Lost { broken, second_broken });
+        }
+        if is_new {
+            let (broken, second_broken) = beam.are_broken();
+            controller.take_edge(Edge::Seen { position: controller.readings().position, broken, second_broken });
         }
         let orders = controller.step();
+        reset::keep(controller.works_or_did());
         if controller.has_heartbeat() {
             heartbeat::beat(orders.pulse_out);
         }
@@ -157,5 +163,5 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
 /// Starts the controller with the EEPROM's contents. A separate function, so that its stack frame is not part of the loop's.
 #[inline(never)]
 fn init(uninit: &mut UninitWeeder, beam_broken: bool, cause: Cause) -> &mut Weeder {
-    uninit.init(beam_broken, cause)
+    uninit.init(beam_broken, cause, reset::was_working())
 }

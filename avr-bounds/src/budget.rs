@@ -2,12 +2,12 @@
 //!
 //! The file also holds facts that the ELF does not: loop bounds, targets of indirect calls, and the depth of recursion.
 
-use crate::error::BoundsError;
+use crate::error::{BoundsError, with_reason};
 use crate::loops::LoopBounds;
 use crate::proved::{Bounds, Input, Longest};
+use files::{FileError, bounded_file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
 /// The limits of a program, and facts about it. Every key is optional.
@@ -83,9 +83,13 @@ impl Budgets {
     /// # Errors
     /// If it cannot be read, or says what is not known.
     pub fn read(path: &Path) -> Result<Budgets, BoundsError> {
-        let error = |reason: &dyn fmt::Display| BoundsError(format!("{}: {reason}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|reason| error(&reason))?;
-        toml::from_str(&text).map_err(|reason| error(&reason))
+        let unread = |error: FileError| BoundsError(with_reason(&error));
+        let text = bounded_file::text(path).map_err(unread)?;
+        bounded_file::check_nesting(path, &text).map_err(unread)?;
+        toml::from_str(&text).map_err(|error| {
+            let byte = error.span().map_or(0, |span| span.start);
+            unread(FileError::at_byte(path, &text, byte, error.message().trim().replace('\n', ", ")))
+        })
     }
 
     /// Holds bounds against the budgets that there are.

@@ -12,7 +12,7 @@ named! {
     Alarm {
         /// The beam was broken over more ground than any plant covers: an object hangs in it, or it is out of line.
         BeamBlocked = "beam_blocked",
-        /// The beam changes more often than plants and leaves can cause: dust, or a loose wire.
+        /// The beam changes more often than plants and leaves can cause, or for too short a time: dust, sun, or a loose wire.
         BeamFlickers = "beam_flickers",
         /// Edges of the beam came faster than the loop could take them.
         BeamEdgesLost = "beam_edges_lost",
@@ -77,5 +77,7 @@ named! {
         NoPlants = "no_plants",
         /// Too many consecutive detections gave no slip: the stand is too dense for two beams, or the beams see differently.
         SlipUnknown = "slip_unknown",
+        /// A copy of the settings in the EEPROM has changed since it was saved: the other one is in use, and may be older.
+        SettingsOlder = "settings_older",
     }
 }

@@ -24,7 +24,7 @@ pub mod slip;
 
 use self::{
     class::Class,
-    detection::{Detection, End},
+    detection::Detection,
     detector::Detector,
     guard::Guard,
     keep_out::{Canopy, KeepOut, Plan, ScheduleFull},
@@ -153,14 +153,23 @@ impl Ground {
         let (excess, last) = self.corrected_by;
         self.geometry.follow(settings, excess);
         // A slip that is no longer trusted may still be right. The margin grows so that the zones hold for both values.
-        let doubted = u32::from(self.geometry.beam_to_tool().0 as u16) * u32::from(excess.abs_diff(last));
-        self.geometry.widen_margin(Length((doubted >> 8) as i16));
+        if self.has_second_beam() {
+            let doubted = u32::from(self.geometry.beam_to_tool().0 as u16) * u32::from(excess.abs_diff(last));
+            self.geometry.widen_margin(Length((doubted >> 8) as i16));
+        }
     }
 
-    /// Forgets the second beam's measurements: the wheel or the beams' distance may have changed. The second beam ignores earlier
-    /// detections of the first.
-    pub fn forget_slip(&mut self) {
-        self.second_beam.begin(self.detector.frontier());
+    /// No longer trusts the second beam's measurements: the wheel or the beams' distance may have changed. The second beam ignores
+    /// earlier detections of the first. Its level stays, because only its edges are reported, and none may come.
+    pub fn distrust_slip(&mut self) {
+        self.begin_second(self.second_is_broken());
+    }
+
+    /// The second beam starts with a level, where the first beam is.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn begin_second(&mut self, broken: bool) {
+        // A beam that is not there any more would stay broken.
+        self.second_beam.begin(self.detector.frontier(), broken && self.has_second_beam());
     }
 
     /// Recalculates the leads for another speed, see [`Leads::at`].
@@ -180,12 +189,12 @@ impl Ground {
         let least = self.geometry.least_seen();
         let wrapped = scale.wrap(position) - self.leads.response - apart;
         if broken != self.second_beam.is_broken() {
-            self.widen(wrapped, wrapped, self.second_beam.end(wrapped));
+            self.widen(wrapped, wrapped);
         }
         let mut detection = self.second_beam.take_level(wrapped, broken, apart, merge_gap, least)?;
         // A detection behind the last plant has no spacing, so it cannot be classified.
         detection.cut |= !detection.leading.is_ahead_of(self.last_plant);
-        if self.widen(detection.leading, detection.trailing, End::None) {
+        if self.widen(detection.leading, detection.trailing) {
             return None;
         }
         // Only one beam saw this, so it is not certain to be a single plant.
@@ -241,14 +250,15 @@ impl Ground {
             self.unclassified.known = Known::Detection;
         }
         self.guard = Guard::NONE;
-        self.forget_slip();
+        self.distrust_slip();
         self.keep_out.invalidate(self.detector.frontier());
     }
 
-    /// Edges of the beam were lost, so this ground is unknown. The beam's level is now `broken`.
-    pub fn lose_edges(&mut self, broken: bool) {
+    /// Edges of the beams were lost, so this ground is unknown. The beams' levels are now `broken` and `second_broken`.
+    pub fn lose_edges(&mut self, broken: bool, second_broken: bool) {
         self.detector.lose_edges(broken);
         self.forget();
+        self.begin_second(second_broken);
     }
 
     /// Forgets everything, and starts detection at the beam's position. `broken` is its level.
@@ -260,9 +270,10 @@ impl Ground {
         self.unclassified.known = Known::Nothing;
     }
 
-    /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground.
+    /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground,
+    /// as [`unseen`](Self::unseen) tells it.
     pub fn assume_bare(&mut self) {
-        if self.is_unseen() {
+        if self.unseen_beyond(Length::ZERO) > Length::ZERO {
             // Unknown ground has a margin ahead of it. The second margin keeps the tool off its border.
             self.keep_out.set_known_from(self.tool() - self.geometry.margin() - self.geometry.margin());
         }
@@ -270,12 +281,12 @@ impl Ground {
 
     /// Closes the ground from the start of a detection until it is classified.
     pub fn await_class(&mut self, detection: Detection, of_second: bool) {
-        let zone = if self.detector.is_parted() { Length::ZERO } else { self.geometry.stem_zone() };
+        let zone = if self.detector.take_parted() { Length::ZERO } else { self.geometry.stem_zone() };
         self.unclassified =
             Unclassified { detection, canopy: Canopy::of(&detection, zone), of_second, known: Known::Canopy };
         // A wide detection reaches the second beam before the first has seen its end.
         if let Some(begin) = self.second_beam.open() {
-            self.widen(begin, begin, End::Leading);
+            self.widen(begin, begin);
         }
     }
 
@@ -311,12 +322,12 @@ impl Ground {
     }
 
     /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
-    fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, end: End) -> bool {
+    fn widen(&mut self, from: WrappedPosition, to: WrappedPosition) -> bool {
         let within = Length(self.geometry.second_beam().0 >> 2);
         if self.unclassified.known == Known::Canopy {
-            self.unclassified.canopy.widen(from, to, within, within, end);
+            self.unclassified.canopy.widen(from, to, within, within);
         }
-        self.keep_out.widen(from, to, within, end)
+        self.keep_out.widen(from, to, within)
     }
 
     /// Guards the ground of an expected plant once the beam has passed it and seen none. Returns the middle of that ground.
@@ -325,7 +336,7 @@ impl Ground {
     /// [`ScheduleFull`], as for a plant.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn guard(&mut self) -> Option<Result<WrappedPosition, ScheduleFull>> {
+    pub fn guard_missed_plant(&mut self) -> Option<Result<WrappedPosition, ScheduleFull>> {
         // A detection in the beam, or one that is being classified, may be the expected plant.
         let seen_to = self.open().unwrap_or(self.detector.frontier());
         let guarded = self.guard.pass(seen_to, &self.geometry)?;
@@ -408,15 +419,20 @@ impl Ground {
         self.rolled_back_too_far
     }
 
-    /// Whether unseen ground, or the margin ahead of it, keeps the tool out.
+    /// Whether unseen ground, or the margin ahead of it, keeps the tool out. It may lie behind a tool that rolls back.
     pub fn is_unseen(&self) -> bool {
         let (from, to) = self.leads.stretch(true);
-        self.keep_out.open_from(self.geometry.margin()).is_ahead_of(self.tool() + from.min(to))
+        self.unseen_beyond(from.min(to)) > Length::ZERO
     }
 
-    /// The distance until the tool has left unseen ground and its margin.
+    /// The distance until the tool has left unseen ground and its margin; 0 if it has.
     pub fn unseen(&self) -> Ticks {
-        self.ticks((self.keep_out.open_from(self.geometry.margin()) - self.tool()).max(Length::ZERO))
+        self.ticks(self.unseen_beyond(Length::ZERO).max(Length::ZERO))
+    }
+
+    /// How far unseen ground and its margin reach ahead of a place at this distance from the tool.
+    fn unseen_beyond(&self, distance: Length) -> Length {
+        self.keep_out.open_from(self.geometry.margin()) - (self.tool() + distance)
     }
 
     /// The number of keep-out zones at the tool or ahead of it, with an open detection and an unclassified one.
@@ -450,13 +466,14 @@ impl Ground {
         }
     }
 
-    /// Whether the machine is so fast that a plant just behind the beam reaches the tool before the tool is out.
+    /// Whether the machine is so fast that a plant just behind the beam reaches the tool before the tool is out. With a second
+    /// beam, a plant that only that beam sees must not reach it either, but may reach its margin.
     #[cfg_attr(not(target_arch = "avr"), inline)]
     pub fn outruns_the_beam(&self, tool_out: bool) -> bool {
         let out = self.leads.out;
         // Hysteresis: the machine has to slow down by an eighth.
         let lead = if tool_out { out + Length(out.0 / 8) } else { out };
-        (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin()
+        (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin().max(self.geometry.second_beam())
     }
 
     /// Whether any ground between two distances from the tool is closed: unknown, or within the margin of a canopy. An open
@@ -541,6 +558,25 @@ mod tests {
             forgetful.forget();
             assert_eq!(forgetful.zones(), 0, "no plant is known any more");
             assert_eq!(opens(&mut forgetful, 1000), frontier + margin);
+        }
+    }
+
+    #[test]
+    fn a_tool_that_rolls_back_to_forgotten_ground_keeps_its_margin_whatever_the_operator_vouches_for() {
+        let (margin, beam_to_tool) = (95, 764);
+        for ahead in [0, 1, 40, 100] {
+            let (mut ground, _) = ground();
+            ground.roll_to(Position::new(1400));
+            ground.forget();
+            ground.roll_to(Position::new(1400 + margin + ahead + beam_to_tool));
+            ground.lead(&Settings::new(), Speed(-1000), Speed(-1000));
+            assert_eq!((ground.is_unseen(), ground.unseen()), (true, Ticks::ZERO), "it lies behind the tool");
+            ground.assume_bare();
+            ground.roll_to(Position::new(1400 + margin - 1 + beam_to_tool));
+            assert!(ground.is_closed_at_tool());
+            assert_eq!(ground.unseen(), Ticks(1));
+            ground.assume_bare();
+            assert!(!ground.is_closed_at_tool(), "the operator vouches for what status shows");
         }
     }
 
@@ -657,7 +693,7 @@ mod tests {
             settings.set(setting, value).expect("within its range");
             ground.follow(&settings, Position::new(2400));
             assert_eq!(ground.roll_to(Position::new(3300)), None);
-            assert_eq!(ground.guard().is_some(), is_due, "{setting:?}");
+            assert_eq!(ground.guard_missed_plant().is_some(), is_due, "{setting:?}");
         }
     }
 

@@ -1,6 +1,6 @@
-//! Enums whose variants each have a word on the console.
+//! Enums whose variants each have a text on the console.
 
-/// Defines an enum, with a word for each variant. `say::names` writes and reads the words.
+/// Defines an enum, with a text for each variant. The group of texts is in the list of `say::texts`.
 macro_rules! named {
     ($(#[$about:meta])* $Name:ident { $($(#[$doc:meta])* $Variant:ident = $word:literal,)* }) => {
         $(#[$about])*
@@ -11,7 +11,7 @@ macro_rules! named {
         }
 
         impl $Name {
-            /// The words, in the order of declaration.
+            /// The texts, in the order of declaration.
             pub(crate) const WORDS: &[&str] = &[$($word),*];
 
             /// The number of variants.
@@ -23,6 +23,16 @@ macro_rules! named {
                     $(index if index == Self::$Variant as u8 => Some(Self::$Variant),)*
                     _ => None,
                 }
+            }
+
+            /// Its text.
+            pub fn text(self) -> $crate::say::Text {
+                const { $crate::say::Text::first_of(Self::WORDS) }.after(self as u8)
+            }
+
+            /// The variant with this text.
+            pub fn find(text: &[u8]) -> Option<Self> {
+                Self::from_index(const { $crate::say::Text::first_of(Self::WORDS) }.find(Self::COUNT, text))
             }
         }
     };

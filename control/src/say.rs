@@ -5,43 +5,58 @@
 //! [`Line`] once the last one is sent. [`Console`] does one small step in each turn: it reads or writes a few characters, builds a
 //! line, or runs a command. No input can stop the loop.
 //!
-//! All texts are in flash ([`packed`]), with the names of alarms and settings. No module below imports this one. Inside it imports
-//! run `words` -> `texts` -> `packed` -> `names`, `line` -> [`command`], and the modules that build lines -> `answer` -> `execute`
-//! -> this file.
+//! All texts are in flash ([`packed`]), with the names of alarms and settings. No module below imports this one, except for the
+//! texts of its own names. Inside it `texts` lists what `packed` packs. Else imports run `words` -> [`command`] -> `names`, `line`
+//! -> the modules that build lines -> `answer` -> `execute` -> this file.
 
 mod answer;
 pub mod command;
 mod errors;
-mod events;
 mod execute;
 pub mod line;
 mod line_tables;
+mod lines;
 pub mod names;
 pub mod packed;
-mod status;
 mod texts;
 mod version;
 mod words;
 
-pub use self::{answer::Answer, events::write_event, execute::execute, status::write_plot, texts::Text};
+pub use self::{
+    answer::Answer,
+    execute::execute,
+    lines::{write_event, write_plot},
+    packed::Text,
+};
 
-use self::{command::LineBuffer, line::Line};
+use self::{
+    command::{Command, LineBuffer},
+    line::Line,
+};
 use crate::{ground::class::Classifier, memory::Memory, weeder::Controller};
 
 /// Most characters of a line, its end included.
 pub const LINE: usize = 140;
 
 /// The answer in progress, and the line that is being sent.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Console {
     answer: Answer,
+    /// The last command that was typed.
+    command: Command,
     line: Line,
+}
+
+impl Default for Console {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl Console {
     /// A console that sends the greeting first.
     pub const fn new() -> Self {
-        Self { answer: Answer::Greeting, line: Line::new() }
+        Self { answer: Answer::Greeting, command: Command::NONE, line: Line::new() }
     }
 
     /// Whether the console takes a line: only once the last one is answered in full. Until then the bytes wait.
@@ -52,7 +67,7 @@ impl Console {
     /// Takes a line that is complete; a later turn runs it. Returns false for an empty line.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn take(&mut self, typed: &mut LineBuffer) -> bool {
-        let line = typed.read();
+        let line = typed.read(&mut self.command);
         let is_one = line.is_some();
         if let Some(line) = line {
             self.answer = Answer::Typed(line);
@@ -76,7 +91,7 @@ impl Console {
             return true;
         }
         if let Answer::Typed(line) = self.answer {
-            self.answer = execute(line, controller);
+            self.answer = execute(line.map(|()| &self.command), controller);
         } else if !self.answer.is_done() {
             self.answer.write_line(controller, &mut self.line);
         } else if let Some(event) = controller.next_event() {

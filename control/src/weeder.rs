@@ -64,6 +64,8 @@ pub struct Controller<C, M> {
     ground: Ground,
     limits: Limits,
     cause: Cause,
+    /// Whether the reset ended work that the operator has not started again or left.
+    was_working: bool,
     sensors: Sensors,
     bench: Bench,
     distance: Distance,
@@ -101,6 +103,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             limits: Limits::NONE,
             configuration: Configuration::new(memory),
             cause: Cause::PowerOn,
+            was_working: false,
             sensors: Sensors::NONE,
             bench: Bench::Idle,
             distance: Distance::NONE,
@@ -126,13 +129,17 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
     }
 
     /// Starts in HOLD, with the tool out and no known ground. Raises an alarm if the memory holds no settings, or invalid ones.
-    pub fn init(&mut self, beam_broken: bool, cause: Cause) -> &mut Controller<C, M> {
+    pub fn init(&mut self, beam_broken: bool, cause: Cause, was_working: bool) -> &mut Controller<C, M> {
         let controller = &mut self.0;
         let Readings { now, position, .. } = controller.sensors.readings;
         controller.state = controller.configuration.load().map_or(State::Hold, State::Alarm);
         controller.follow_settings();
         controller.ground.begin(position, beam_broken);
         controller.cause = cause;
+        controller.was_working = was_working && cause != Cause::PowerOn;
+        if controller.configuration.has_spoiled_copy() {
+            controller.events.announce(Event::Warning(Warning::SettingsOlder));
+        }
         controller.sensors.init(beam_broken, controller.ground.scale());
         controller.tool.init(now);
         controller.plant_timeout = PlantTimeout::since(position);
@@ -146,7 +153,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub fn new(classifier: C, memory: M, startup: Startup) -> Self {
         let mut uninit = Uninit::new(classifier, memory);
         *uninit.readings() = startup.readings;
-        uninit.init(startup.beam_broken, startup.cause);
+        uninit.init(startup.beam_broken, startup.cause, startup.was_working);
         uninit.0
     }
 
@@ -170,30 +177,34 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(always)]
     pub fn take_edge(&mut self, edge: Edge) {
         match edge {
-            Edge::Seen { position, broken, second_broken } => {
-                if let Some(alarm) = self.sensors.beam.edge(self.sensors.readings.now) {
-                    self.raise(alarm);
-                }
-                let is_of_second = self.ground.has_second_beam() && second_broken != self.ground.second_is_broken();
-                if !is_of_second || broken != self.sensors.beam_broken {
-                    self.beam_edge(position, broken);
-                }
-                if is_of_second {
-                    self.match_second_beam(self.sensors.odometer.place(position), second_broken);
-                }
-            }
-            Edge::Lost { broken } => self.beam_edges_lost(broken),
+            Edge::Seen { position, broken, second_broken } => self.see_levels(position, broken, second_broken),
+            Edge::Lost { broken, second_broken } => self.beam_edges_lost(broken, second_broken),
+        }
+    }
+
+    /// Takes the beams' levels at a position. One of them may be new.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    #[cfg_attr(not(target_arch = "avr"), inline)]
+    fn see_levels(&mut self, position: Position, broken: bool, second_broken: bool) {
+        let second_broken = second_broken && self.ground.has_second_beam();
+        if self.sensors.beam.edge(self.sensors.readings.now, broken || second_broken) {
+            self.forget_and_raise(Alarm::BeamFlickers);
+        }
+        let is_of_second = second_broken != self.ground.second_is_broken();
+        if !is_of_second || broken != self.sensors.beam_broken {
+            self.beam_edge(position, broken);
+        }
+        if is_of_second {
+            self.match_second_beam(self.sensors.odometer.place(position), second_broken);
         }
     }
 
     /// Takes an edge of the first beam, and the position at which it came.
     fn beam_edge(&mut self, position: Position, broken: bool) {
         self.sensors.beam_broken = broken;
-        if broken
-            && self.is_working()
-            && let Some(alarm) = self.sensors.encoder.beam_broke()
-        {
-            self.raise(alarm);
+        if broken && self.is_working() && self.sensors.encoder.beam_broke() {
+            let flickers = self.sensors.beam.short_breaks() > 1;
+            self.forget_and_raise(if flickers { Alarm::BeamFlickers } else { Alarm::EncoderSilent });
         }
         if let Some(detection) = self.ground.edge(self.sensors.odometer.place(position), broken) {
             self.see(detection);
@@ -205,7 +216,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     fn match_second_beam(&mut self, position: Position, broken: bool) {
         let seen = self.ground.match_second_beam(position, broken);
         if let Some(blind) = self.ground.blind() {
-            return self.raise(if blind == Blind::First { Alarm::BeamBlind } else { Alarm::SecondBeamBlind });
+            return self.forget_and_raise(if blind == Blind::First {
+                Alarm::BeamBlind
+            } else {
+                Alarm::SecondBeamBlind
+            });
         }
         if let Some(detection) = seen {
             self.classify(detection, true);
@@ -223,11 +238,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.classify(detection, false);
     }
 
-    /// Edges of the beam were lost. The ground that they covered is unknown. The beam's level is now `broken`.
-    fn beam_edges_lost(&mut self, broken: bool) {
+    /// Edges of the beams were lost. The ground that they covered is unknown. The beams' levels are now these.
+    fn beam_edges_lost(&mut self, broken: bool, second_broken: bool) {
         self.sensors.beam_broken = broken;
-        self.ground.lose_edges(broken);
-        self.raise(Alarm::BeamEdgesLost);
+        self.ground.lose_edges(broken, second_broken);
+        self.forget_and_raise(Alarm::BeamEdgesLost);
     }
 
     /// The last part of a turn, after the edges.
@@ -249,13 +264,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.ground.has_second_beam() {
             self.match_second_beam(position, self.ground.second_is_broken());
         }
-        match self.ground.guard() {
+        match self.ground.guard_missed_plant() {
             Some(Ok(due)) => self.events.add(Event::Guarded(self.ground.position_of(due, position))),
-            Some(Err(ScheduleFull)) => self.raise(Alarm::ScheduleFull),
+            Some(Err(ScheduleFull)) => self.forget_and_raise(Alarm::ScheduleFull),
             None => {}
         }
         if let Some(alarm) = self.fault(doubted) {
-            self.raise(alarm);
+            self.forget_and_raise(alarm);
         }
         let out = self.try_out().unwrap_or(!self.is_working() || self.must_be_out());
         if out != self.tool.is_out() {
@@ -264,7 +279,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         let orders = self.orders();
         self.tool.order(orders.pulse, readings.now);
-        self.warn();
+        self.report_warnings();
         orders
     }
 
@@ -348,19 +363,21 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let (spacing, plan) = (self.ground.spacing(detection), self.ground.plan(detection));
         self.events.add(Event::Detection { vote, leading, spacing, plan });
         if self.ground.classified(vote.class).is_err() {
-            self.raise(Alarm::ScheduleFull);
+            self.forget_and_raise(Alarm::ScheduleFull);
         }
         // The first beam may have reported the same detection: the two count once.
         self.count_misfit(vote.class, width_mm);
     }
 
-    /// Latches an alarm, and forgets the ground, because its detections are no longer trustworthy.
-    fn raise(&mut self, alarm: Alarm) {
+    /// Forgets the ground, because its detections are no longer trustworthy. Then latches the alarm, unless a dry run needs no
+    /// sensor, or another alarm is latched.
+    fn forget_and_raise(&mut self, alarm: Alarm) {
         self.ground.forget();
         let is_ignored = alarm.is_of_a_sensor() && self.bench.needs_no_sensor();
         if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
+        let alarm = self.sensors.beam.explain(alarm, self.sensors.readings.now);
         self.events.add(Event::Alarm { alarm, position: self.sensors.position });
         self.enter(State::Alarm(alarm));
     }
@@ -371,7 +388,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     fn go_to_work(&mut self) {
         if self.configuration.expect_no_contradiction().is_err() {
-            self.raise(Alarm::SettingsContradict);
+            self.forget_and_raise(Alarm::SettingsContradict);
             return;
         }
         self.plant_timeout = PlantTimeout::since(self.sensors.position);
@@ -381,7 +398,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     fn enter(&mut self, state: State) {
         // `hold` and the switch also end a manual test.
-        self.bench = Bench::Idle;
+        (self.bench, self.was_working) = (Bench::Idle, false);
         if state != self.state {
             self.state = state;
             self.events.add(Event::State(state));

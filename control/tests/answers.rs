@@ -9,12 +9,13 @@ use control::{
         class::{Class, Vote},
         keep_out::Plan,
     },
-    measure::reset::Cause,
+    measure::{readings::Readings, reset::Cause},
     memory::Volatile,
     operate::{
         calibration::{Outcome, SwingTimes},
         event::Event,
         plot::Plot,
+        saved::SavedSettings,
         state::State,
     },
     say::{
@@ -22,8 +23,8 @@ use control::{
         command::{LineBuffer, Word},
         line::Line,
     },
-    settings::Setting,
-    units::{Position, Ticks},
+    settings::{Setting, Settings},
+    units::{Instant, Position, Ticks},
 };
 use rig::{Beams, Rig};
 
@@ -146,7 +147,7 @@ fn status_shows_the_distance_to_seen_ground() {
     assert_eq!(
         machine.ask("status"),
         [
-            "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=449",
+            "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=450",
             "lost=0 jumps=0 late=0 missed=0 mistakes=0 dust=0 stack_free=65535 reset=power_on",
             "ok"
         ]
@@ -156,6 +157,38 @@ fn status_shows_the_distance_to_seen_ground() {
     assert!(machine.ask("status")[0].starts_with("state=work tool=out for=unseen_ground "));
     assert_eq!(machine.ask("start now"), ["ok"]);
     assert!(machine.ask("status")[0].ends_with("unseen_mm=0"));
+}
+
+/// The greeting of a machine with saved settings after a reset at work, and the machine.
+fn after_a_reset_at_work(cause: Cause) -> (String, Rig<ByWidth>) {
+    let mut saved = SavedSettings::new(Volatile::new());
+    saved.save();
+    while !saved.carry_on(&Settings::new()) {}
+    let readings = Readings::new(Instant::ZERO, Position::new(0));
+    let classifier = ByWidth::new(LEAST_HOLD_MM, 0);
+    let mut machine = Rig::wake_from(classifier, saved.into_memory(), readings, Beams::default(), cause, true);
+    let mut console = Console::new();
+    console.carry_on(&mut machine);
+    (std::iter::from_fn(|| console.next_byte()).map(char::from).collect(), machine)
+}
+
+#[test]
+fn a_reset_at_work_is_told_in_greeting_and_status_until_the_operator_starts_or_holds() {
+    for cause in [Cause::ResetPin, Cause::BrownOut, Cause::LoopStalled, Cause::Unknown] {
+        for line in ["start", "hold"] {
+            let (greeting, mut machine) = after_a_reset_at_work(cause);
+            assert!(greeting.contains(&format!(", reset by {}, was work, state hold", cause.text())), "{greeting}");
+            let reset = format!(" reset={}", cause.text());
+            assert!(machine.ask("status")[1].ends_with(&format!("{reset} was=work")));
+            assert!(machine.works_or_did(), "another reset does not hide it");
+            assert_eq!(machine.ask(line), ["ok"]);
+            assert!(machine.ask("status")[1].ends_with(&reset), "{line}");
+            assert_eq!(machine.works_or_did(), line == "start");
+        }
+    }
+    let (greeting, mut machine) = after_a_reset_at_work(Cause::PowerOn);
+    assert!(greeting.contains(", reset by power_on, state hold"), "SRAM is random then: {greeting}");
+    assert!(machine.ask("status")[1].ends_with(" reset=power_on"));
 }
 
 #[test]
@@ -249,6 +282,7 @@ fn a_wheel_with_too_few_counts_is_refused_with_the_allowed_value() {
     assert_eq!(machine.ask("set wheel_mm 401"), [refusal]);
     machine.ask("calibrate start");
     machine.at(800).turn_after(1000);
+    machine.stand(200);
     assert_eq!(machine.ask("calibrate 1000 force"), [refusal]);
     assert_eq!(machine.settings().get(Setting::TicksPerM), 0);
 }
@@ -328,12 +362,18 @@ fn a_calibration_answers_its_result_or_the_allowed_values() {
     assert_eq!(machine.ask("calibrate 10000"), ["error: calibrate start first, then roll"]);
     assert_eq!(machine.ask("calibrate start"), ["ok"]);
     machine.at(18_900).turn_after(1000);
+    assert_eq!(machine.ask("calibrate 10000"), ["error: the machine rolls, stop first"]);
+    machine.stand(200);
     assert_eq!(machine.ask("calibrate 500"), ["error: roll 1000 mm at least, 10000 are better"]);
     let refusal = "error: that would be ticks_per_m 3780, the wheel has 1910, look again, or add force";
     assert_eq!(machine.ask("calibrate 5000"), [refusal]);
-    let answer = ["ticks_per_m=1890 from 0 to 20000, default 0, not saved", "ok"];
+    let answer = [
+        "that is 11 permille off the diameter of the wheel",
+        "ticks_per_m=1890 from 0 to 20000, default 0, not saved",
+        "ok",
+    ];
     assert_eq!(machine.ask("calibrate 10000"), answer);
-    assert_eq!(machine.ask("calibrate 5000 force")[0], "ticks_per_m=3780 from 0 to 20000, default 0, not saved");
+    assert_eq!(machine.ask("calibrate 5000 force")[1], "ticks_per_m=3780 from 0 to 20000, default 0, not saved");
 }
 
 #[test]

@@ -128,6 +128,8 @@ fn a_rolled_distance_calibrates_the_wheel() {
     assert_eq!(machine.calibrate(5000, false), Err(CommandError::NotBegun));
     machine.calibrate_start().unwrap();
     machine.at(18_500).stand(1);
+    assert_eq!(machine.calibrate(10_000, false), Err(CommandError::Rolls));
+    machine.stand(200);
     assert_eq!(machine.calibrate(999, false), Err(CommandError::TooShort));
     assert_eq!((machine.calibrate(5000, false), machine.distance().counted()), (Err(CommandError::WheelDiffers), 3700));
     assert_eq!(machine.settings().get(Setting::TicksPerM), 0, "not changed");

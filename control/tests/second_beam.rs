@@ -11,7 +11,7 @@ use control::{
     settings::{Setting, Settings, TICKS_PER_M_LEAST},
 };
 use proptest::prelude::*;
-use rig::Rig;
+use rig::{Beams, Rig};
 use rolling::{MARGIN_MM, Rolling, SECOND_BEAM_MM};
 
 /// A machine at work along plants, from and to, seen by both beams.
@@ -138,6 +138,89 @@ fn an_alarm_resets_the_slip_and_two_plants_give_it_again() {
     rolling.roll_to(4500.0, 500.0);
     assert!(rolling.machine.slip_permille().is_some_and(|slip| (94..=106).contains(&slip)));
     assert_eq!(rolling.alarms().iter().map(|&(alarm, _)| alarm).collect::<Vec<_>>(), [Alarm::BeamEdgesLost]);
+}
+
+#[test]
+fn a_slip_that_an_alarm_made_unknown_costs_no_canopy_before_it_is_known_again() {
+    for percent in [-12.0, 10.0, 15.0] {
+        for alarm_mm in (2400..2900).step_by(50) {
+            let plants = plants(12);
+            let settings =
+                [(Setting::SecondBeamMm, SECOND_BEAM_MM as u16), (Setting::MarginMm, 20), (Setting::LeadInMs, 0)];
+            let mut rolling = Rolling::along(plants.clone(), plants.clone(), &settings).slipping(percent);
+            rolling.roll_to(f64::from(alarm_mm), 500.0);
+            rolling.lose_edges();
+            rolling.machine.clear();
+            rolling.machine.start(false).unwrap();
+            rolling.roll_to(6500.0, 500.0);
+            let least_mm = rolling.least_margin_mm(&plants[3..]);
+            assert!(least_mm > 0.0, "{percent} %, alarm at {alarm_mm} mm: {least_mm} mm");
+        }
+    }
+}
+
+/// X 700, the second beam at 100, margin 50.
+const FAR: [(Setting, u16); 4] =
+    [(Setting::BeamToToolMm, 700), (Setting::SecondBeamMm, 100), (Setting::MarginMm, 50), (Setting::LeadInMs, 0)];
+
+#[test]
+fn a_plant_that_stands_in_the_second_beam_at_power_on_or_after_lost_edges_is_kept() {
+    let plant = (-150.0, 127.0);
+    for stands_at_power_on in [true, false] {
+        let mut rig = machine();
+        if stands_at_power_on {
+            rig.see(Beams { broken: false, second_broken: true });
+        }
+        let mut rolling = Rolling::with(rig, Vec::new(), vec![plant], &FAR);
+        rolling.machine.hold();
+        if !stands_at_power_on {
+            rolling.machine.lose_edges(Beams { broken: false, second_broken: true });
+            rolling.machine.turn();
+            rolling.machine.clear();
+        }
+        // At power-on the operator vouches for the ground behind the first beam.
+        rolling.machine.start(false).unwrap();
+        rolling.weeded_mm.clear();
+        rolling.roll_to(1500.0, 300.0);
+        assert!(!rolling.weeded_mm.is_empty());
+        let least_mm = rolling.least_margin_mm(&[(0.0, plant.1)]);
+        assert!(least_mm > 0.0, "{stands_at_power_on}: {least_mm} mm");
+    }
+}
+
+#[test]
+fn a_second_beam_turned_off_over_a_plant_does_not_keep_the_tool_out() {
+    let mut rolling = with_beams(Vec::new(), vec![(100.0, 300.0)]);
+    rolling.roll_to(400.0, 300.0);
+    rolling.machine.hold();
+    rolling.machine.set(Setting::SecondBeamMm, 0).unwrap();
+    rolling.machine.start(true).unwrap();
+    rolling.weeded_mm.clear();
+    rolling.roll_to(2000.0, 300.0);
+    assert!(rolling.weeded_mm.len() > 100);
+}
+
+#[test]
+fn a_plant_that_only_the_second_beam_sees_is_not_reached_at_any_speed() {
+    let lead_out_ms = 180;
+    for speed_mm_s in [400.0, 700.0, 1000.0, 1100.0, 1200.0, 1290.0] {
+        let plants = plants(14);
+        let settings = [
+            (Setting::SecondBeamMm, SECOND_BEAM_MM as u16),
+            (Setting::LeadOutMs, lead_out_ms),
+            (Setting::LeadInMs, 0),
+            (Setting::MarginMm, 20),
+        ];
+        let mut first = plants.clone();
+        first.remove(8);
+        let mut rolling = Rolling::along(first, plants.clone(), &settings);
+        rolling.roll_to(7500.0, speed_mm_s);
+        let lead_mm = speed_mm_s * f64::from(lead_out_ms) / 1000.0;
+        // The tool still works while it swings.
+        let least_mm = rolling.least_margin_mm(&[(plants[8].0 - lead_mm, plants[8].1)]);
+        assert!(least_mm > 0.0, "{speed_mm_s} mm/s: {least_mm} mm");
+        assert!(speed_mm_s > 1000.0 || !rolling.weeded_mm.is_empty(), "slower, the tool works");
+    }
 }
 
 #[test]

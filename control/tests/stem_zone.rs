@@ -97,12 +97,12 @@ fn a_detection_unclassified_before_the_next_is_kept_from_end_to_end() {
 }
 
 #[test]
-fn the_second_beam_decides_where_a_plant_ends() {
-    for off_mm in [-8.0, 8.0] {
+fn each_end_of_a_plant_is_where_either_beam_saw_it() {
+    for off_mm in [-8.0, 8.0_f64] {
         let plant = (500.0, 650.0);
         let mut rolling = with_beams(vec![plant], vec![(plant.0 + off_mm, plant.1 + off_mm)]);
         rolling.roll_to(1400.0, 300.0);
-        rolling.assert_kept(500.0 + off_mm + MOST_MM, 650.0 + off_mm - MOST_MM);
+        rolling.assert_kept(500.0 + off_mm.min(0.0) + MOST_MM, 650.0 + off_mm.max(0.0) - MOST_MM);
     }
 }
 
@@ -135,6 +135,27 @@ fn a_detection_of_the_second_beam_alone_is_kept_from_end_to_end() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Each beam may miss the tip of a leaf at either end. The second beam stands at any distance.
+    #[test]
+    fn the_stem_zone_never_shrinks_where_a_beam_misses_a_leaf_tip(
+        machine_mm in prop::sample::select(vec![(400_u16, 200_u16), (1000, 900), (700, 100)]),
+        width_mm in 100.0..200.0_f64,
+        missed in prop::array::uniform2(0.0..1.0_f64),
+        speed_mm_s in 100.0..300.0_f64,
+    ) {
+        let (beam_to_tool_mm, second_beam_mm) = machine_mm;
+        let tip_mm = f64::from(second_beam_mm) / 16.0;
+        let plant = (1000.0 - width_mm / 2.0, 1000.0 + width_mm / 2.0);
+        let seen = (plant.0 + missed[0] * tip_mm, plant.1 - missed[1] * tip_mm);
+        prop_assume!(seen.1 > seen.0 + 10.0);
+        let machine = [(Setting::BeamToToolMm, beam_to_tool_mm), (Setting::SecondBeamMm, second_beam_mm)];
+        let mut rolling = Rolling::along(vec![plant], vec![seen], &[&SETTINGS[..], &machine].concat());
+        rolling.roll_to(1500.0 + f64::from(beam_to_tool_mm), speed_mm_s);
+        let (from, to) = rolling.kept_mm(1000.0);
+        let half_mm = (ZONE_MM / 2.0).min(width_mm / 2.0) - TOLERANCE_MM;
+        prop_assert!(from < 1000.0 - half_mm && to > 1000.0 + half_mm, "{from:.1} to {to:.1}");
+    }
 
     /// Plants that have grown together, ragged plants, and weeds that touch. The tool never comes nearer to a stem than a single
     /// plant's trim allows, at each position of the stem in its canopy.

@@ -52,7 +52,7 @@ pub trait Examples<const FEATURES: usize> {
     fn example(&self, index: usize) -> Option<Example<FEATURES>>;
 
     /// Lets the examples of a range of indices join a search. A store whose examples are slow to load may leave one early: once its
-    /// squared distance exceeds [`Nearest::reach`], it cannot be among the nearest.
+    /// squared distance exceeds that of [`Nearest::reach`], it cannot be among the nearest.
     fn join<const CLASSES: usize>(&self, range: Range<usize>, query: &[u8; FEATURES], nearest: &mut Nearest<CLASSES>) {
         for example in range.filter_map(|index| self.example(index)) {
             nearest.join(example.neighbour_of(query));

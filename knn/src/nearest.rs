@@ -62,23 +62,22 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
     /// Out of line, because it takes more code than a call.
     #[inline(never)]
     pub fn join(&mut self, example: Neighbour) {
-        let mut example = example.key();
-        for place in self.places.iter_mut().take(self.k.into()) {
-            let key = place.key();
-            if example < key {
-                *place = Neighbour::of_key(example);
-                example = key;
+        let Some(places) = self.places.get_mut(..self.k.into()) else { return };
+        let mut example = example;
+        for place in places {
+            if example < *place {
+                core::mem::swap(place, &mut example);
             }
         }
     }
 
-    /// The squared distance of the farthest place: no example beyond it can join. While a place is free, none is beyond.
+    /// The farthest of the k places: no example beyond it can join. While a place is free, none is beyond.
     ///
     /// Out of line, because it takes more code than a call.
     #[inline(never)]
     #[must_use]
-    pub fn reach(&self) -> u32 {
-        self.places.get(usize::from(self.k).wrapping_sub(1)).map_or(0, |farthest| farthest.distance())
+    pub fn reach(&self) -> Neighbour {
+        self.places.get(usize::from(self.k).wrapping_sub(1)).copied().unwrap_or(Neighbour::VACANT)
     }
 
     /// The k places, nearest first. Places without an example come last, and hold [`Neighbour::NONE`].

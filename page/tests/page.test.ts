@@ -166,8 +166,9 @@ test("a wheel that is measured once counts once, also where its setting is read 
     const { page } = opened;
     // Until the page has read its settings.
     await pass(page, 2);
-    // The servo was timed, so that the wheel is the next step.
-    const timed = "calibrated lead_out_ms=130 lead_in_ms=55 set=yes\r\n";
+    // The servo was timed, and its leads are in use, so that the wheel is the next step.
+    for (const lead of ["lead_out_ms 100", "lead_in_ms 99"]) await type(page, `set ${lead}`, /^ok$/);
+    const timed = "calibrated lead_out_ms=100 lead_in_ms=99 set=yes\r\n";
     await page.evaluate((line) => globalThis.trial.onText(line + line), timed);
     await type(page, "calibrate start", /^ok$/);
     await pass(page, 4);

@@ -5,10 +5,13 @@ import test from "node:test";
 import { Log } from "../src/link/log.ts";
 import { type Happening, isHold, Refused, Session, type Wire } from "../src/link/session.ts";
 import { CYCLES_PER_SECOND } from "../src/uno/uno.ts";
+import { chance } from "./chance.ts";
 import { wokenUp } from "./operator.ts";
 
 /** Time between two turns of the session. */
 const TURN_MS = 10;
+/** Runs of the operator's actions in any order. */
+const RUNS = 8;
 /** Turns in which a session has asked all its questions. */
 const TURNS = 300;
 
@@ -18,6 +21,9 @@ class Connected {
     readonly session: Session;
     /** Time in which the page slept, and the machine's answers lay unread. */
     sleptMs = 0;
+    /** Text on its way to the machine: the line is stalled until the time. */
+    stalledUntil = 0;
+    #onItsWay: string[] = [];
     readonly #operator = wokenUp();
     /** Number of events before its reset. */
     #resetAt = Number.POSITIVE_INFINITY;
@@ -25,15 +31,13 @@ class Connected {
     /** `lost` says which of the lines, counted from 0, noise on the wire takes. */
     constructor(lost: (line: number) => boolean = () => false) {
         const { uno } = this.#operator;
+        // A restart then raises no alarm.
+        this.#operator.ask("save");
         this.#operator.ask("start now");
         let lines = 0;
         const wire: Wire = {
             send: (text) => {
-                if (text.trim() === "") {
-                    uno.send(text);
-                    return;
-                }
-                if (!lost(lines++)) uno.send(text);
+                if (text.trim() === "" || !lost(lines++)) this.#onItsWay.push(text);
             },
             close: async () => {},
         };
@@ -49,12 +53,18 @@ class Connected {
     async turn(): Promise<void> {
         this.#operator.run(TURN_MS);
         this.session.turn(this.nowMs);
+        if (this.nowMs >= this.stalledUntil) for (const text of this.#onItsWay.splice(0)) this.#operator.uno.send(text);
         // Lets the code that waits for an answer continue.
         await new Promise((done) => setImmediate(done));
     }
 
     has(is: Happening["is"]): boolean {
         return this.happened.some((happening) => happening.is === is);
+    }
+
+    /** Whether the session has ended, and the operator knows that no HOLD goes out. */
+    get isOver(): boolean {
+        return this.happened.some((happening) => happening.is === "lost" && happening.forGood);
     }
 
     sag(): void {
@@ -149,6 +159,68 @@ test("a command that waited while the computer slept is not sent", async () => {
     for (let turns = 0; turns < 10; turns++) await connected.turn();
     await refused;
     assert(!connected.happened.some((happening) => happening.is === "command" && happening.line === "start now"));
+});
+
+/** The operator presses in any order, while the line stalls, noise takes lines, the computer sleeps and the supply sags. */
+async function pressInAnyOrder(seed: number): Promise<string[]> {
+    const random = chance(seed);
+    const machine = new Connected(() => random() < 0.02);
+    const ends: string[] = [];
+    let [lastIsHold, holds] = [false, 0];
+    // As the panel: until it is obeyed, and nothing else goes out.
+    const hold = () => {
+        holds++;
+        const press = holds;
+        const isNewest = () => press === holds;
+        const obeyed = () => {
+            if (isNewest()) holds = 0;
+        };
+        machine.session.hold().then(obeyed, () => isNewest() && !machine.isOver && setImmediate(hold));
+    };
+    for (let turn = 0; turn < 2 * TURNS; turn++) {
+        await machine.turn();
+        const what = Math.floor(random() * 100);
+        if (what < 8 && holds === 0) {
+            const number = ends.push("pending") - 1;
+            lastIsHold = false;
+            machine.session.ask(`start now${" ".repeat(number)}`).then(
+                () => {
+                    ends[number] = "answered";
+                },
+                (error: Error) => {
+                    const isAnswered = error instanceof Refused && !error.message.includes("not sent");
+                    const isUnknown = error.message.includes("may still be done");
+                    ends[number] = isAnswered ? "answered" : isUnknown ? "unknown" : "not sent";
+                },
+            );
+        } else if (what < 11) {
+            lastIsHold = true;
+            hold();
+        } else if (what === 11) machine.session.ask("examples").catch(() => {});
+        else if (what === 12) machine.sleptMs += 8000 * random();
+        else if (what < 15) machine.stalledUntil = machine.nowMs + 4000 * random();
+        else if (what === 15) machine.sag();
+    }
+    machine.stalledUntil = 0;
+    for (let turn = 0; turn < 2 * TURNS && (holds > 0 || ends.includes("pending")); turn++) await machine.turn();
+    for (let turn = 0; turn < TURNS / 3; turn++) await machine.turn();
+    if (lastIsHold && !machine.isOver) assert.notEqual(machine.mode, "work", `seed ${seed}: behind the last HOLD`);
+    for (const [number, end] of ends.entries()) {
+        const line = `start now${" ".repeat(number)}`;
+        const isSent = machine.happened.some((happening) => happening.is === "command" && happening.line === line);
+        if (end === "not sent") assert(!isSent, `seed ${seed}: ${JSON.stringify(line)} was sent`);
+        if (end === "answered") assert(isSent, `seed ${seed}: ${JSON.stringify(line)} was not sent`);
+        assert.notEqual(end, "pending", `seed ${seed}`);
+    }
+    return ends;
+}
+
+test("in any order nothing starts that was told as not sent, and a HOLD that is pressed last holds", async (test) => {
+    const first = Number(process.env["WEEDER_SEED"] ?? 1);
+    test.diagnostic(`WEEDER_SEED=${first}`);
+    const ends: string[] = [];
+    for (let seed = first; seed < first + RUNS; seed++) ends.push(...(await pressInAnyOrder(seed)));
+    for (const end of ["answered", "not sent", "unknown"]) assert(ends.includes(end), `the test tries ${end}`);
 });
 
 test("HOLD is understood however it is typed", () => {

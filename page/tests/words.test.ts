@@ -133,6 +133,7 @@ test("what the session, weeder serve and the project's Rust say in English is kn
     }
     for (const [path, text] of [
         ["../host/link/src/error.rs", en.heard.servedGone],
+        ["../host/link/src/error.rs", en.heard.unanswered],
         ["../host/serve/src/machine.rs", en.heard.servedNoAnswer],
         ["../host/serve/src/machine.rs", en.heard.servedNotThere],
     ] as const)

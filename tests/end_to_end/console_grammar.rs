@@ -105,7 +105,6 @@ fn a_wrong_line_is_answered_by_one_error_with_what_would_be_right() {
     let mut uno = started();
     for (line, remedy) in [
         (&b"hepl"[..], "help"),
-        (b"HELP", "help"),
         (b"help me", "get"),
         (b"help me now", "help [name]"),
         (b"status please", "the command is status"),

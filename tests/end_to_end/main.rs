@@ -25,6 +25,7 @@ mod performance_swing_commands;
 mod power_and_memory_faults;
 mod proved_bounds;
 mod random_walks;
+mod recipes;
 mod recordings;
 mod saved_while_the_servo_is_timed;
 mod second_beam;

@@ -196,7 +196,8 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     ];
     let most = words.iter().map(Vec::len).max().expect("there are groups");
     let longest = words.iter().flatten().map(|word| word.bytes().count()).max().expect("there are words");
-    assert_eq!(by_depth("control::say::packed::find"), [most + 1, longest + 1]);
+    assert_eq!(by_depth("control::say::packed::Text::find"), [most + 1, longest + 1]);
+    assert_eq!(passes("control::say::packed::Text::start"), packed::LARGEST_GROUP);
     assert_eq!(passes("control::say::packed::Characters::next"), packed::HALVINGS + 1);
     // Twice, and once more to find that there is no third time.
     assert_eq!(by_depth("control::ground::Ground::widen"), [3, keep_out::CAPACITY + 1]);

@@ -38,14 +38,3 @@ impl Detection {
         self.cut && self.leading == self.trailing
     }
 }
-
-/// Which end of a detection an edge of the second beam is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// Neither for certain: it may be a leaf's edge.
-    None,
-    /// The beginning.
-    Leading,
-    /// The end, as far as it was seen.
-    Trailing,
-}

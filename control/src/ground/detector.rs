@@ -9,7 +9,7 @@
 //! that length. The beginning of a detection is certain only after such a clear stretch too. At the start, and after forgetting, an
 //! open detection therefore stands for the possible rest of a canopy. The detector does not classify.
 
-use super::detection::{Detection, End};
+use super::detection::Detection;
 use crate::units::{Length, WrappedPosition};
 
 /// Turns beam edges into detections.
@@ -65,27 +65,13 @@ impl Detector {
         self.broken
     }
 
-    /// Which end of a detection the next edge is, if it comes at this position. On known ground or inside a detection it may be a
-    /// leaf's, so neither.
-    pub fn end(&self, position: WrappedPosition) -> End {
-        if self.frontier.is_ahead_of(position) {
-            End::None
-        } else if self.broken {
-            End::Trailing
-        } else if self.detection.is_none() {
-            End::Leading
-        } else {
-            End::None
-        }
-    }
-
     /// Marks the next detection as possibly more than one plant.
     pub fn doubt(&mut self) {
         self.parted = true;
     }
 
     /// Whether gaps show that the last complete detection may be more than one plant. Clears the mark.
-    pub fn is_parted(&mut self) -> bool {
+    pub fn take_parted(&mut self) -> bool {
         core::mem::take(&mut self.parted)
     }
 
@@ -216,7 +202,7 @@ mod tests {
                 assert_eq!(detector.edge(WrappedPosition::new(position), broken, GAP), None);
             }
             detector.roll_to(WrappedPosition::new(300) + GAP, GAP).expect("the gap has been seen");
-            assert_eq!((detector.is_parted(), detector.is_parted()), (parted, false), "{gap}");
+            assert_eq!((detector.take_parted(), detector.take_parted()), (parted, false), "{gap}");
         }
     }
 

@@ -7,10 +7,7 @@
 //! Zones are not merged. Two that overlap close the ground between them. The caller asks about a stretch as long as the servo
 //! needs. So a gap too short to swing in and out is closed too.
 
-use super::{
-    detection::{Detection, End},
-    reach::Geometry,
-};
+use super::{detection::Detection, reach::Geometry};
 use crate::units::{Length, Ticks, WrappedPosition};
 use heapless::Vec;
 
@@ -66,35 +63,26 @@ impl Canopy {
         self.trailing - Length(self.trim.into())
     }
 
-    /// Takes a stretch that the second beam sees, all of a detection or one `end`. Returns whether it lies within `reach` of the
+    /// Takes a stretch that the second beam sees, all of a detection or one end. Returns whether it lies within `reach` of the
     /// canopy.
     ///
-    /// If both beams see an end of a single plant within a quarter of `within`, the second beam's position counts: from there, less
-    /// distance is left for slip. Otherwise the canopy grows to include the stretch. It then keeps its full width, because one beam
-    /// has not seen all of it.
+    /// The canopy grows to include the stretch. It never shrinks: the second beam may have missed the tip of a leaf. If both beams
+    /// see an end of a single plant within a quarter of `within`, its trim stays. Otherwise it then keeps its full width, because
+    /// one beam has not seen all of it.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub(super) fn widen(
-        &mut self,
-        from: WrappedPosition,
-        to: WrappedPosition,
-        reach: Length,
-        within: Length,
-        end: End,
-    ) -> bool {
+    pub(super) fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, reach: Length, within: Length) -> bool {
         if self.leading - to > reach || from - self.trailing > reach {
             return false;
         }
         let (before, behind) = (self.leading - from, to - self.trailing);
-        let near = if self.trim > 0 { Length(within.0 >> 2) } else { Length::ZERO };
-        if before > near {
-            (self.leading, self.trim) = (from, 0);
-        } else if end == End::Leading && before >= -near {
+        if before > Length::ZERO {
             self.leading = from;
         }
-        if behind > near {
-            (self.trailing, self.trim) = (to, 0);
-        } else if end == End::Trailing && behind >= -near {
+        if behind > Length::ZERO {
             self.trailing = to;
+        }
+        if before.max(behind) > Length(within.0 >> 2) {
+            self.trim = 0;
         }
         true
     }
@@ -163,11 +151,11 @@ impl KeepOut {
 
     /// Widens the canopy that the second beam sees between `from` and `to`, see `Canopy::widen`. Returns whether a canopy is within
     /// `within` of that stretch.
-    pub fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, within: Length, end: End) -> bool {
+    pub fn widen(&mut self, from: WrappedPosition, to: WrappedPosition, within: Length) -> bool {
         // First look for a canopy that contains the whole stretch.
         let mut reach = from - to;
         loop {
-            if self.canopies.iter_mut().any(|canopy| canopy.widen(from, to, reach, within, end)) {
+            if self.canopies.iter_mut().any(|canopy| canopy.widen(from, to, reach, within)) {
                 return true;
             }
             if reach == within {

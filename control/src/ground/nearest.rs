@@ -44,7 +44,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
             field: FieldExamples::new(memory),
             query: [0; features::COUNT],
             // Zeros take no flash, and `begin` clears the places.
-            found: Found::new([Neighbour::of_key(0); MAX_K as usize]),
+            found: Found::new([Neighbour::VACANT; MAX_K as usize]),
             asked: 0,
         }
     }

@@ -11,7 +11,7 @@
 //! What it does not do: measure slip on empty ground, or see plants that are nearer to the tool than the second beam.
 
 use super::{
-    detection::{Detection, End},
+    detection::Detection,
     detector::Detector,
     slip::{Slip, SlipChange},
 };
@@ -71,14 +71,13 @@ impl SecondBeam {
         slip: Slip::NONE,
     };
 
-    /// Starts at a position. Forgets earlier detections, and the slip measured with them. The beam's level stays: only its edges
-    /// are reported, and none may come.
+    /// Starts at a position, with the beam's level. Forgets earlier detections, and no longer trusts the slip measured with them.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn begin(&mut self, position: WrappedPosition) {
-        self.detector.begin(position, self.detector.is_broken());
+    pub fn begin(&mut self, position: WrappedPosition, broken: bool) {
+        self.detector.begin(position, broken);
         (self.awaited, self.missed, self.is_crowded) = (0, 0, false);
         self.expected_to = position;
-        self.slip = Slip::NONE;
+        self.slip.distrust();
     }
 
     /// The measured slip.
@@ -94,11 +93,6 @@ impl SecondBeam {
     /// Whether the beam is broken.
     pub fn is_broken(&self) -> bool {
         self.detector.is_broken()
-    }
-
-    /// Which end of a detection an edge at this position is.
-    pub fn end(&self, position: WrappedPosition) -> End {
-        self.detector.end(position)
     }
 
     /// Where the open detection begins.
@@ -277,7 +271,7 @@ mod tests {
 
     fn begun() -> SecondBeam {
         let mut second = SecondBeam::NONE;
-        second.begin(WrappedPosition::new(-1000));
+        second.begin(WrappedPosition::new(-1000), false);
         second
     }
 
@@ -290,10 +284,10 @@ mod tests {
     fn a_plant_in_the_second_beam_is_seen_though_the_ground_is_forgotten() {
         let at = WrappedPosition::new;
         let mut second = SecondBeam::NONE;
-        second.begin(at(0));
+        second.begin(at(0), false);
         second.take_level(at(10), true, APART, GAP, LEAST);
         // The first beam is ahead.
-        second.begin(at(100));
+        second.begin(at(100), second.is_broken());
         let seen: Vec<Detection> = (11..300)
             .filter_map(|position| {
                 let broken = second.is_broken() && position < 200;

@@ -59,6 +59,11 @@ impl Slip {
         if self.is_known { self.excess } else { 0 }
     }
 
+    /// The slip may have changed: it is unknown until detections agree again.
+    pub(super) fn distrust(&mut self) {
+        *self = Self { excess: self.excess, ..Self::NONE };
+    }
+
     /// Whether the slip is known.
     pub(super) fn is_known(&self) -> bool {
         self.is_known

@@ -45,6 +45,8 @@ pub enum Edge {
     Lost {
         /// The first beam's present level.
         broken: bool,
+        /// The second beam's; ignored without a second beam.
+        second_broken: bool,
     },
 }
 
@@ -57,4 +59,6 @@ pub struct Startup {
     pub beam_broken: bool,
     /// Why the machine was reset.
     pub cause: Cause,
+    /// Whether it was at work then. Ignored at power-on.
+    pub was_working: bool,
 }

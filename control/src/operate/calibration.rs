@@ -12,19 +12,20 @@ use crate::{
 /// The shortest stretch that gives the ticks a metre to better than 0.1 %.
 pub const SHORTEST_MM: u16 = 1000;
 
-/// How far a calibrated wheel may differ from its diameter, in tenths: 30 %.
-const TOLERANCE_TENTHS: u32 = 3;
+/// How far a calibrated wheel may differ from its diameter, in thousandths.
+const TOLERANCE_PERMILLE: u16 = 300;
 
 /// A stretch that is being measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Distance {
     begin: Option<Position>,
     counted: u16,
+    off_permille: u16,
 }
 
 impl Distance {
     /// No stretch.
-    pub const NONE: Self = Self { begin: None, counted: 0 };
+    pub const NONE: Self = Self { begin: None, counted: 0, off_permille: 0 };
 
     /// The stretch begins here.
     pub const fn begin(&mut self, position: Position) {
@@ -47,9 +48,10 @@ impl Distance {
         let ticks = (position - begin).0.unsigned_abs().min(u32::MAX / 1000 - 1);
         let counted = ((ticks * 1000 + length_mm / 2) / length_mm).min(u16::MAX.into()) as u16;
         self.counted = counted;
-        // Whole ticks exceed the tolerance exactly if they exceed its whole part.
-        let differs = counted.abs_diff(nominal) > (u32::from(nominal) * TOLERANCE_TENTHS / 10) as u16;
-        if counted == 0 || differs && !forced {
+        // Rounded up, so that the tolerance is exact.
+        self.off_permille =
+            ((u32::from(counted.abs_diff(nominal)) * 1000 + u32::from(nominal - 1)) / u32::from(nominal)) as u16;
+        if counted == 0 || self.off_permille > TOLERANCE_PERMILLE && !forced {
             return Err(CommandError::WheelDiffers);
         }
         Ok(counted)
@@ -58,6 +60,11 @@ impl Distance {
     /// Ticks a metre of the last measurement, at most 65,535.
     pub const fn counted(&self) -> u16 {
         self.counted
+    }
+
+    /// How far the last measurement is from the wheel's diameter, in thousandths.
+    pub const fn off_permille(&self) -> u16 {
+        self.off_permille
     }
 }
 

@@ -48,6 +48,11 @@ impl<M: Memory> Configuration<M> {
         self.saved.value(setting)
     }
 
+    /// Whether a saved copy has changed since it was saved, so that the settings in use may be older.
+    pub fn has_spoiled_copy(&self) -> bool {
+        self.saved.is_spoiled()
+    }
+
     /// Whether the settings have changed since [`follow`](Self::follow).
     pub fn has_changed(&self) -> bool {
         self.changed

@@ -17,7 +17,7 @@ impl PlantTimeout {
     }
 
     /// True once, when the distance exceeds `longest`; 0 disables the check.
-    pub fn warn(&mut self, position: Position, longest: Ticks) -> bool {
+    pub fn take_warning(&mut self, position: Position, longest: Ticks) -> bool {
         if self.warned || longest == Ticks::ZERO || position - self.since <= longest {
             return false;
         }

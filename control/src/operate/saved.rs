@@ -3,7 +3,8 @@
 //! A copy is the table's mark, the number of values, a sequence number, the values, and a CRC-16 of all. A save overwrites the
 //! older copy, one byte at a time, so a power loss leaves the newer copy intact. The save first makes the mark's first byte wrong
 //! and writes it correctly at the end. So a half-written copy is invalid, even if an old copy with one flipped bit is overwritten.
-//! At start-up the newest valid copy is used: right CRC, this firmware's table, all values within their ranges.
+//! At start-up the newest valid copy is used: right CRC, this firmware's table, all values within their ranges. A copy with the
+//! mark of a complete save that is not valid has changed since. The operator is warned, because the other may be older.
 
 use crate::{
     memory::{Memory, SIZE, checksum},
@@ -40,12 +41,14 @@ pub struct SavedSettings<M> {
     next: u8,
     /// Whether there is a valid copy.
     exists: bool,
+    /// Whether the other copy was saved, and is no longer valid.
+    spoiled: bool,
 }
 
 impl<M: Memory> SavedSettings<M> {
     /// The settings before [`load`](Self::load).
     pub const fn new(memory: M) -> Self {
-        Self { memory, older: 0, sequence: 0, left: 0, next: 0, exists: false }
+        Self { memory, older: 0, sequence: 0, left: 0, next: 0, exists: false, spoiled: false }
     }
 
     /// Loads the newest valid copy; `None` if there is none.
@@ -60,20 +63,22 @@ impl<M: Memory> SavedSettings<M> {
         let sequence = |copy| self.memory.read(address(copy) + SEQUENCE);
         // If only one copy is valid, the order does not matter.
         let newer = u8::from(sequence(1).wrapping_sub(sequence(0)).cast_signed() > 0);
-        for turn in 0..2 {
-            let copy = newer ^ turn;
+        // The newer one last. The other too, because the sequence number may have changed.
+        for turn in 1..3 {
+            let copy = newer ^ (turn & 1);
             if self.read(copy, settings) {
                 self.exists = true;
                 (self.older, self.sequence) = (copy ^ 1, self.memory.read(address(copy) + SEQUENCE));
-                return true;
+            } else {
+                self.spoiled |= self.was_saved(copy);
             }
         }
-        false
+        self.exists && self.values(self.newest(), settings)
     }
 
     /// Starts to save the settings; [`carry_on`](Self::carry_on) finishes it.
     pub fn save(&mut self) {
-        self.exists = true;
+        (self.exists, self.spoiled) = (true, false);
         self.older ^= 1;
         self.sequence = self.sequence.wrapping_add(1);
         // A first byte that is already wrong stays: a power loss while it is written can leave any value, also the right one.
@@ -129,6 +134,11 @@ impl<M: Memory> SavedSettings<M> {
         exists
     }
 
+    /// Whether a copy was saved, and has changed since. The next save overwrites it.
+    pub const fn is_spoiled(&self) -> bool {
+        self.exists && self.spoiled
+    }
+
     /// The memory, for a test or another machine.
     pub fn into_memory(self) -> M {
         self.memory
@@ -151,6 +161,12 @@ impl<M: Memory> SavedSettings<M> {
         Setting::all().all(|setting| settings.set(setting, self.value_at(copy, setting)).is_ok())
     }
 
+    /// Whether a copy's first byte is that of a complete save, or has one other bit. An unfinished save has all other bits.
+    fn was_saved(&self, copy: u8) -> bool {
+        let changed = self.memory.read(address(copy)) ^ MARK[0];
+        changed & changed.wrapping_sub(1) == 0
+    }
+
     /// Reads a copy. Returns whether it is valid.
     fn read(&self, copy: u8, settings: &mut Settings) -> bool {
         let byte = |place| self.memory.read(address(copy) + place);
@@ -159,8 +175,11 @@ impl<M: Memory> SavedSettings<M> {
     }
 }
 
-/// The table's mark, as a copy begins with it.
-const MARK: [u8; 2] = TABLE_MARK.to_le_bytes();
+/// The table's mark, as a copy begins with it. Its first byte differs from an erased one in more than one bit.
+const MARK: [u8; 2] = {
+    let [low, high] = TABLE_MARK.to_le_bytes();
+    [if low.count_ones() < 7 { low } else { !low }, high]
+};
 
 /// The bytes of a copy.
 #[inline(never)]
@@ -206,8 +225,7 @@ mod tests {
     #[test]
     fn a_copy_is_mark_number_sequence_values_and_check_with_nothing_in_between() {
         let values = Setting::all().flat_map(|setting| with_k(9).get(setting).to_le_bytes());
-        let mark = TABLE_MARK.to_le_bytes();
-        let mut bytes: Vec<u8> = mark.into_iter().chain([Setting::COUNT, 77]).chain(values).collect();
+        let mut bytes: Vec<u8> = MARK.into_iter().chain([Setting::COUNT, 77]).chain(values).collect();
         bytes.extend(checksum(&bytes).to_le_bytes());
         for copy in 0..2 {
             let mut memory = Volatile::new();
@@ -222,6 +240,34 @@ mod tests {
         for time in 0..600 {
             memory = save(memory, &with_k(1 + time % 15));
             assert_eq!(load(&memory), Some(with_k(1 + time % 15)), "{time}");
+        }
+    }
+
+    /// Whether a start with this memory finds a copy that has changed since it was saved.
+    fn is_spoiled(memory: &Volatile) -> bool {
+        let mut saved = SavedSettings::new(memory.clone());
+        saved.load();
+        saved.is_spoiled()
+    }
+
+    #[test]
+    fn each_changed_bit_of_a_saved_copy_is_told_until_the_next_save_and_an_unfinished_save_is_not() {
+        let memory = save(save(Volatile::new(), &with_k(5)), &with_k(7));
+        assert!(
+            !is_spoiled(&Volatile::new()) && !is_spoiled(&save(Volatile::new(), &with_k(5))) && !is_spoiled(&memory)
+        );
+        for bit in 0..8 * COPY {
+            for copy in 0..2 {
+                let mut changed = memory.clone();
+                changed.bytes[usize::from(address(copy)) + bit / 8] ^= 1 << (bit % 8);
+                assert!(is_spoiled(&changed), "copy {copy}, bit {bit}");
+                assert!(!is_spoiled(&save(changed, &with_k(9))), "copy {copy}, bit {bit}");
+            }
+        }
+        for power in 0..=COPY + 1 {
+            let mut failing = memory.clone();
+            failing.lose_power_after(power);
+            assert!(!is_spoiled(&save(failing, &with_k(9)).with_power()), "{power}");
         }
     }
 

@@ -71,7 +71,7 @@ impl Tool {
     }
 
     /// Closed ground has reached the tool. Returns whether the command came less than `milliseconds` before, and counts that.
-    pub fn is_late(&mut self, now: Instant, milliseconds: u16) -> bool {
+    pub fn count_if_late(&mut self, now: Instant, milliseconds: u16) -> bool {
         self.awaits_ground = false;
         let is_late = !self.is_settled(now, milliseconds);
         if is_late {

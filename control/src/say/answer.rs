@@ -1,12 +1,13 @@
 //! Answers, a line at a time.
 
 use super::{
-    command::{Command, ParseError},
+    command::ParseError,
     errors::{write_command_error, write_parse_error},
     line::Line,
+    lines::{Counts, Status, write_alarm, write_detection, write_example, write_setting},
     names,
-    status::{Counts, Status, write_detection, write_example, write_setting},
-    texts::{self, Text},
+    packed::Text,
+    texts,
     words::Word,
 };
 use crate::{
@@ -27,8 +28,8 @@ pub enum Answer {
     /// Nothing.
     #[default]
     Done,
-    /// The answer to this line, which has not been run yet.
-    Typed(Result<Command, ParseError>),
+    /// The answer to the console's command, which has not been run yet, or to an error.
+    Typed(Result<(), ParseError>),
     /// The commands from this index on.
     Help(u8),
     /// What a setting means.
@@ -39,6 +40,8 @@ pub enum Answer {
     Counts,
     /// A setting's value.
     Get(Setting),
+    /// How far the calibrated wheel is from its diameter; then its setting.
+    Calibrated,
     /// The settings from this index on.
     GetAll(u8),
     /// The examples from this index on.
@@ -69,20 +72,23 @@ impl Answer {
         *self = match *self {
             Self::Done | Self::Typed(_) => return,
             Self::Greeting => {
-                line.say(texts::WEEDER);
+                line.add(texts::WEEDER);
                 line.say(texts::RESET_BY);
-                line.say(controller.cause().text());
+                line.add(controller.cause().text());
+                if controller.was_working() {
+                    line.say(texts::WAS_WORK);
+                }
                 line.say(texts::STATE);
-                line.say(names::state(controller.state()));
+                line.add(names::state(controller.state()));
                 if let State::Alarm(alarm) = controller.state() {
-                    line.alarm(texts::IN_WORDS, alarm);
+                    write_alarm(alarm, line);
                 }
                 line.say(texts::TOOL_OUT);
                 Self::Done
             }
             Self::Help(place) => {
                 if let Some(word) = Word::from_index(place) {
-                    line.say(word.text());
+                    line.add(word.text());
                     explain(word.takes(), word.help(), line);
                 }
                 if place + 1 < Word::COUNT { Self::Help(place + 1) } else { Self::Ok }
@@ -102,6 +108,11 @@ impl Answer {
             Self::Get(setting) => {
                 write_setting(controller, setting, line);
                 Self::Ok
+            }
+            Self::Calibrated => {
+                line.say(texts::OFF_THE_DIAMETER);
+                line.counted(controller.distance().off_permille());
+                Self::Get(Setting::TicksPerM)
             }
             Self::GetAll(place) => {
                 if let Some(setting) = Setting::from_index(place) {
@@ -131,7 +142,7 @@ impl Answer {
                 if place + 1 < controller.detections().len() { Self::Dump(place + 1) } else { Self::Ok }
             }
             Self::Version => {
-                line.say(texts::WEEDER);
+                line.add(texts::WEEDER);
                 Self::Ok
             }
             Self::Ok => {
@@ -153,7 +164,7 @@ impl Answer {
 
 /// The rest of a name, and its explanation.
 fn explain(name: Text, explanation: Text, line: &mut Line) {
-    line.say(name);
+    line.add(name);
     line.say(texts::DASH);
-    line.say(explanation);
+    line.add(explanation);
 }

@@ -4,10 +4,12 @@
 //! Blanks separate words. A line with an error becomes one [`ParseError`] and has no other effect. [`say`](crate::say) runs and
 //! answers commands.
 
-use crate::settings::Setting;
+use super::words::{FORCE, GRAMMAR, KIND, NOTHING, NUMBER, SETTING, VALUE};
+use crate::{named::named, settings::Setting};
+use core::mem;
 use heapless::Vec;
 
-pub use super::words::{Argument, Word};
+pub use super::words::{Action, Argument, Word};
 
 /// Most characters of a line.
 pub const LINE_LENGTH: usize = 80;
@@ -31,20 +33,23 @@ pub struct Command {
 /// Speed of a dry run without an argument: 1.8 km/h.
 const TEST_SPEED_MM_S: u16 = 500;
 
-/// What is wrong with a line, in the order of its texts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Wrong {
-    /// More than [`LINE_LENGTH`] characters.
-    TooLong = 1,
-    /// Characters other than printable ASCII.
-    NotText,
-    /// Bytes were lost before the firmware read them.
-    CharactersLost,
-    /// No command begins like this.
-    UnknownCommand,
-    /// No setting has this name.
-    UnknownSetting,
+named! {
+    /// What is wrong with a line.
+    Wrong {
+        // It is 0, like memory before start-up.
+        /// Nothing, so far.
+        Nothing = "",
+        /// More than [`LINE_LENGTH`] characters.
+        TooLong = "send 80 characters at most",
+        /// Characters other than printable ASCII.
+        NotText = "send letters, digits and blanks only",
+        /// Bytes were lost before the firmware read them.
+        CharactersLost = "characters were lost, send the line again",
+        /// No command begins like this.
+        UnknownCommand = "no such command, help lists them all",
+        /// No setting has this name.
+        UnknownSetting = "no such setting, get lists them all",
+    }
 }
 
 /// Why a line is not a command.
@@ -58,18 +63,32 @@ pub enum ParseError {
     Value(Setting),
 }
 
+impl Command {
+    /// Before a line is parsed: zeros, of which the chip needs no copy in flash.
+    pub(super) const NONE: Self = match (Action::from_index(0), Setting::from_index(0)) {
+        (Some(action), Some(setting)) => Self { action, setting, number: 0, force: false },
+        _ => panic!("there are commands and settings"),
+    };
+}
+
 /// Parses a line.
 ///
 /// # Errors
 /// A [`ParseError`], whose text says what is allowed.
-#[inline(never)]
 pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
+    let mut command = Command::NONE;
+    parse_to(line, &mut command).map(|()| command)
+}
+
+/// Parses a line into a command that stays where it is. After an error the command has no meaning.
+#[inline(never)]
+fn parse_to(line: &[u8], command: &mut Command) -> Result<(), ParseError> {
     let (word, rest) = split_word(line);
     let word = Word::find(word).ok_or(ParseError::Line(Wrong::UnknownCommand))?;
     let usage = Err(ParseError::Usage(word));
     let (first, rest) = split_word(rest);
     let (second, rest) = split_word(rest);
-    let mut command = Command { action: Action::Help, setting: Setting::K, number: TEST_SPEED_MM_S, force: false };
+    let (mut value, mut force) = (TEST_SPEED_MM_S, false);
     let kind = if first.is_empty() {
         NOTHING
     } else if matches!(word, Word::Help | Word::Get | Word::Set) {
@@ -81,16 +100,15 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
         if number > 255 && matches!(word, Word::Teach | Word::Forget) {
             return usage;
         }
-        command.number = number;
+        value = number;
         NUMBER
     };
     let mut row = 0;
-    let takes = loop {
+    let (action, takes) = loop {
         let Some(action) = Action::from_index(row) else { return usage };
-        command.action = action;
         let takes = flash::byte(&GRAMMAR, 2 * usize::from(row) + 1);
         if flash::byte(&GRAMMAR, 2 * usize::from(row)) == word as u8 && takes & KIND == kind {
-            break takes & !KIND;
+            break (action, takes & !KIND);
         }
         row += 1;
     };
@@ -98,114 +116,25 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
     if !is_complete || !split_word(rest).0.is_empty() {
         return usage;
     }
-    if kind == SETTING {
-        command.setting = Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?;
-    }
-    if second.is_empty() {
-        return Ok(command);
-    }
-    let argument = Argument::find(second);
-    if takes & FORCE != 0 {
-        command.force = argument == Some(Argument::Force);
-        return if command.force { Ok(command) } else { usage };
-    }
-    command.number = match argument {
-        Some(Argument::On) if takes & VALUE != 0 && command.setting.is_switched() => 1,
-        Some(Argument::Off) if takes & VALUE != 0 && command.setting.is_switched() => 0,
-        _ => match number(second) {
-            Some(number) => number,
-            None => return if takes & VALUE != 0 { Err(ParseError::Value(command.setting)) } else { usage },
-        },
+    // Another row names no setting, and none that is a switch stands for it.
+    let setting = match kind {
+        SETTING => Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?,
+        _ => Setting::TicksPerRev,
     };
-    Ok(command)
-}
-
-/// What follows the word: an argument, by its number, or one of these.
-const NOTHING: u8 = Argument::COUNT;
-const NUMBER: u8 = NOTHING + 1;
-const SETTING: u8 = NOTHING + 2;
-const KIND: u8 = 0x1F;
-const _: () = assert!(SETTING <= KIND);
-
-/// What follows that: `force` or a speed, which may be left out, or a value. Otherwise nothing.
-const FORCE: u8 = 1 << 5;
-const SPEED: u8 = 1 << 6;
-const VALUE: u8 = 1 << 7;
-
-/// Makes the grammar, one row a command: its action, its word, what follows the word, and what follows that.
-macro_rules! commands {
-    (@) => { NOTHING };
-    (@ number) => { NUMBER };
-    (@ setting) => { SETTING };
-    (@ $argument:ident) => { Argument::$argument as u8 };
-    ($($Action:ident: $word:ident $($argument:ident)? $(+ $more:ident)?;)*) => {
-        /// What a command does, a row of the grammar each.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        #[expect(missing_docs, reason = "the rows say what each is")]
-        pub enum Action { $($Action),* }
-
-        impl Action {
-            const fn from_index(index: u8) -> Option<Self> {
-                match index {
-                    $(index if index == Self::$Action as u8 => Some(Self::$Action),)*
-                    _ => None,
-                }
-            }
+    if !second.is_empty() {
+        match Argument::find(second) {
+            Some(Argument::Force) if takes & FORCE != 0 => force = true,
+            Some(Argument::On) if setting.is_switched() => value = 1,
+            Some(Argument::Off) if setting.is_switched() => value = 0,
+            _ => match number(second) {
+                Some(number) if takes & FORCE == 0 => value = number,
+                _ if takes & VALUE != 0 => return Err(ParseError::Value(setting)),
+                _ => return usage,
+            },
         }
-
-        const ROWS: &[[u8; 2]] = &[$([Word::$word as u8, commands!(@ $($argument)?) $(| $more)?]),*];
-    };
-}
-
-commands! {
-    LabelPlant: Label Plant + FORCE;
-    LabelWeed: Label Weed + FORCE;
-    CalibrateStart: Calibrate Start;
-    CalibrateServo: Calibrate Servo;
-    Calibrate: Calibrate number + FORCE;
-    TestRow: Test Row + SPEED;
-    TestWatchdog: Test Watchdog;
-    Help: Help;
-    Explain: Help setting;
-    Status: Status;
-    GetAll: Get;
-    Get: Get setting;
-    Set: Set setting + VALUE;
-    Save: Save;
-    Revert: Revert;
-    Defaults: Defaults;
-    ServoIn: Servo In;
-    ServoOut: Servo Out;
-    Servo: Servo number;
-    Start: Start;
-    StartNow: Start Now;
-    Hold: Hold;
-    Clear: Clear;
-    EventsOn: Events On;
-    EventsOff: Events Off;
-    PlotOn: Plot On;
-    PlotOff: Plot Off;
-    PlotTeleplot: Plot Teleplot;
-    Examples: Examples;
-    Feature: Teach number;
-    TeachPlant: Teach Plant;
-    TeachWeed: Teach Weed;
-    Forget: Forget number;
-    ForgetAll: Forget All;
-    Dump: Dump;
-    Version: Version;
-}
-
-avr_progmem::progmem! {
-    static progmem GRAMMAR: [u8; 2 * ROWS.len()] = {
-        let (mut bytes, mut place) = ([0; 2 * ROWS.len()], 0);
-        while place < bytes.len() {
-            bytes[place] = ROWS[place / 2][place % 2];
-            place += 1;
-        }
-        bytes
-    };
+    }
+    *command = Command { action, setting, number: value, force };
+    Ok(())
 }
 
 /// The next word of a line, empty at its end, and what follows it.
@@ -234,21 +163,31 @@ fn number(digits: &[u8]) -> Option<u16> {
 }
 
 /// Collects bytes into lines.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct LineBuffer {
     characters: Vec<u8, LINE_LENGTH, u8>,
-    error: Option<Wrong>,
+    error: Wrong,
+}
+
+impl Default for LineBuffer {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl LineBuffer {
     /// An empty line.
     pub const fn new() -> Self {
-        Self { characters: Vec::new(), error: None }
+        Self { characters: Vec::new(), error: Wrong::Nothing }
     }
 
     /// Takes a byte. At a line's end it returns the command or the error; nothing for an empty line.
     pub fn take(&mut self, byte: u8) -> Option<Result<Command, ParseError>> {
-        if self.collect(byte) { self.read() } else { None }
+        if !self.collect(byte) {
+            return None;
+        }
+        let mut command = Command::NONE;
+        Some(self.read(&mut command)?.map(|()| command))
     }
 
     /// First half of [`take`](Self::take): stores a byte. Returns whether it ends the line; the caller then calls
@@ -261,7 +200,7 @@ impl LineBuffer {
                 self.characters.pop();
             }
             b'\t' | b' '..=b'~' => {
-                if self.characters.push(byte).is_err() {
+                if self.characters.push(byte.to_ascii_lowercase()).is_err() {
                     self.fail(Wrong::TooLong);
                 }
             }
@@ -273,18 +212,20 @@ impl LineBuffer {
 
     /// Second half of [`take`](Self::take): parses the line and starts the next. This takes far longer than storing a byte.
     #[inline(never)]
-    pub fn read(&mut self) -> Option<Result<Command, ParseError>> {
-        let line = match self.error.take() {
-            Some(wrong) => Some(Err(ParseError::Line(wrong))),
-            None if split_word(&self.characters).0.is_empty() => None,
-            None => Some(parse(&self.characters)),
+    pub fn read(&mut self, command: &mut Command) -> Option<Result<(), ParseError>> {
+        let line = match mem::replace(&mut self.error, Wrong::Nothing) {
+            Wrong::Nothing if split_word(&self.characters).0.is_empty() => None,
+            Wrong::Nothing => Some(parse_to(&self.characters, command)),
+            wrong => Some(Err(ParseError::Line(wrong))),
         };
         self.characters.clear();
         line
     }
 
     fn fail(&mut self, error: Wrong) {
-        self.error.get_or_insert(error);
+        if self.error == Wrong::Nothing {
+            self.error = error;
+        }
     }
 }
 
@@ -375,7 +316,6 @@ mod tests {
     fn an_unknown_name_or_value_is_an_error() {
         for (line, error) in [
             (&b"hepl"[..], ParseError::Line(Wrong::UnknownCommand)),
-            (b"HELP", ParseError::Line(Wrong::UnknownCommand)),
             (b"help me", ParseError::Line(Wrong::UnknownSetting)),
             (b"set wheel 400", ParseError::Line(Wrong::UnknownSetting)),
             (b"set wheel_mm 4oo", ParseError::Value(Setting::WheelMm)),
@@ -423,6 +363,8 @@ mod tests {
             // Carriage return, line feed or both end a line.
             (&b"hold\rclear\r"[..], twice),
             (b"hold\nclear\n", twice),
+            // Capital letters count as small ones.
+            (b"HOLD\nClear\n", twice),
             (b"hold\r\nclear\r\n", twice),
             (b"\n\nhold\r\r\n \nclear\n", twice),
             // Backspace deletes the last character.

@@ -8,7 +8,7 @@ use crate::{ground::class::Classifier, memory::Memory, operate::plot::Plot, sett
 
 /// Runs a line and begins its answer.
 #[inline(never)]
-pub fn execute<C, M>(line: Result<Command, ParseError>, controller: &mut Controller<C, M>) -> Answer
+pub fn execute<C, M>(line: Result<&Command, ParseError>, controller: &mut Controller<C, M>) -> Answer
 where
     C: Classifier,
     M: Memory,
@@ -20,7 +20,7 @@ where
             return Answer::Wrong(error);
         }
     };
-    let Command { action, setting, number, force } = command;
+    let Command { action, setting, number, force } = *command;
     let mut refused = None;
     let result = match action {
         Action::Help => return Answer::Help(0),
@@ -42,7 +42,7 @@ where
         Action::Calibrate => {
             refused = Some(Setting::TicksPerM);
             match controller.calibrate(number, force) {
-                Ok(()) => return Answer::Get(Setting::TicksPerM),
+                Ok(()) => return Answer::Calibrated,
                 refused => refused,
             }
         }

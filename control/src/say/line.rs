@@ -1,22 +1,41 @@
-//! A line that is being sent: its texts, and the numbers for the `#` in them.
+//! A line that is being sent: its texts, and the numbers and words for each `#` and `@` in them.
 //!
 //! A line's values are taken at once, so they belong to one moment. It is sent a character at a time, because a turn has little
 //! time. Each call unpacks or divides only as far as the next character.
 
-use crate::{
-    alarm::Alarm,
-    say::{
-        packed::Characters,
-        texts::{self, Text},
-    },
+use crate::say::{
+    packed::{Characters, Text, is_same, parts},
+    texts::GROUPS,
 };
 use ufmt::{Formatter, uDisplay, uWrite};
 
-/// Most texts of a line; a setting's line has ten. A power of two, for short arithmetic.
+/// Most texts of a line; a setting's line has 16. A power of two, for short arithmetic.
 pub const TEXTS: usize = 16;
 
-/// Most numbers of a line; a detection's line has six. A power of two too.
+/// Most numbers of a line; the second line about the status has seven. A power of two too.
 const NUMBERS: usize = 8;
+
+/// A text that the code names. One byte numbers it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Said(u8);
+
+impl Said {
+    /// A text of the first group.
+    pub(crate) const fn of(text: &str) -> Self {
+        let (group, mut number, mut place) = (GROUPS[0], 0, 0);
+        while !is_same(group[place], text) {
+            number += parts(group[place]);
+            place += 1;
+        }
+        assert!(number + parts(text) <= u8::MAX as usize, "one byte numbers the texts that the code names");
+        Self(number as u8)
+    }
+
+    /// The same text.
+    pub(crate) const fn text(self) -> Text {
+        Text::FIRST.after(self.0)
+    }
+}
 
 /// A line, or the rest of it.
 #[derive(Clone, Debug)]
@@ -28,6 +47,8 @@ pub struct Line {
     texts_begun: u8,
     numbers: u8,
     numbers_begun: u8,
+    /// The last text that the code named.
+    last: Said,
     text: [Text; TEXTS],
     number: [i32; NUMBERS],
 }
@@ -41,6 +62,7 @@ impl Line {
             texts_begun: 0,
             numbers: 0,
             numbers_begun: 0,
+            last: Said(0),
             text: [Text::FIRST; TEXTS],
             number: [0; NUMBERS],
         }
@@ -51,9 +73,23 @@ impl Line {
         self.texts == 0
     }
 
-    /// Adds a text. Each `#` in it stands for the line's next number.
+    /// Adds a text. In it each `#` stands for the line's next number, and each `@` for the line's next word.
     #[inline(never)]
-    pub(crate) fn say(&mut self, text: Text) {
+    pub(crate) fn say(&mut self, text: Said) {
+        self.last = text;
+        self.add(text.text());
+    }
+
+    /// Adds a word for an `@`, and the last text's part behind it.
+    #[inline(never)]
+    pub(crate) fn word(&mut self, word: Text) {
+        self.add(word);
+        self.say(Said(self.last.0 + 1));
+    }
+
+    /// Adds a text of any group.
+    #[inline(never)]
+    pub(crate) fn add(&mut self, text: Text) {
         debug_assert!(usize::from(self.texts) < TEXTS, "a line has {TEXTS} texts at most");
         self.text[usize::from(self.texts) % TEXTS] = text;
         self.texts += 1;
@@ -71,22 +107,6 @@ impl Line {
         debug_assert!(usize::from(self.numbers) < NUMBERS, "a line has {NUMBERS} numbers at most");
         self.number[usize::from(self.numbers) % NUMBERS] = number;
         self.numbers += 1;
-    }
-
-    /// Adds a number, or `none`.
-    pub(crate) fn optional(&mut self, number: Option<i16>) {
-        self.say(if number.is_some() { texts::NUMBER } else { texts::NONE });
-        self.number(number.unwrap_or(0).into());
-    }
-
-    /// Adds an alarm's code, in a text with two `#`, and its name.
-    #[inline(never)]
-    pub(crate) fn alarm(&mut self, code: Text, alarm: Alarm) {
-        self.say(code);
-        self.say(alarm.text());
-        let (first, second) = alarm.code();
-        self.counted(first.into());
-        self.counted(second.into());
     }
 }
 
@@ -135,6 +155,10 @@ impl Default for Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        say::{lines, texts},
+        settings::Setting,
+    };
     use std::string::{String, ToString};
 
     fn written(mut line: Line) -> String {
@@ -159,15 +183,17 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_its_texts_with_its_numbers_for_each_hash() {
+    fn a_line_is_its_texts_with_its_numbers_for_each_hash_and_its_words_for_each_at() {
         let mut line = Line::new();
-        line.say(texts::OK);
+        line.add(Setting::K.text());
         line.say(texts::RANGE);
-        line.number(-1);
-        line.number(20);
+        line.say(Said::of(lines::LINES[2]));
+        line.word(texts::NUMBER.text());
         line.say(texts::END);
+        [-1, 20, 7, 8].into_iter().for_each(|number| line.number(number));
         assert!(!line.is_done());
-        assert_eq!(written(line), "ok from -1 to 20\r\n");
+        assert_eq!(lines::LINES[2], "swing tool=@ pos=#");
+        assert_eq!(written(line), "k from -1 to 20swing tool=7 pos=8\r\n");
     }
 
     #[test]

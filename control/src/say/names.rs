@@ -1,48 +1,25 @@
-//! Names: the text of each of the machine's words, and the search for a typed word.
+//! Names: the text of each of the machine's words that is not an enum's own.
 
 use crate::{
-    alarm::{Alarm, Warning},
     ground::class::{Class, label},
-    measure::reset::Cause,
-    operate::{state::State, tool::Reason},
+    operate::state::State,
     say::{
-        packed,
-        texts::{self, Text},
+        packed::Text,
+        texts,
         words::{Argument, Word},
     },
     settings::{self, Setting},
 };
 
-/// Gives an enum the texts of its words, `WORDS`, and the search for a word.
-macro_rules! written {
-    ($($Name:ident)*) => {$(
-        impl $Name {
-            const FIRST: Text = Text::first_of(Self::WORDS);
-
-            /// Its word.
-            pub const fn text(self) -> Text {
-                Self::FIRST.plus(self as u8)
-            }
-
-            /// The variant for a word.
-            pub fn find(word: &[u8]) -> Option<Self> {
-                Self::from_index(packed::find(Self::FIRST, Self::COUNT, word))
-            }
-        }
-    )*};
-}
-
-written! { Setting Word Argument Alarm Warning Reason Cause }
-
 impl Setting {
     /// Its help text.
     pub fn help(self) -> Text {
-        const { Text::first_of(settings::HELPS) }.plus(self as u8)
+        const { Text::first_of(settings::HELPS) }.after(self as u8)
     }
 
     /// A blank and its unit; empty for a count or a switch.
     pub fn unit(self) -> Text {
-        const { Text::first_of(settings::UNITS) }.plus(self as u8)
+        const { Text::first_of(settings::UNITS) }.after(self as u8)
     }
 }
 
@@ -51,24 +28,9 @@ impl Setting {
 pub fn state(state: State) -> Text {
     match state {
         State::Hold => Word::Hold.text(),
-        State::Work => texts::WORK,
-        State::Alarm(_) => texts::IN_ALARM,
+        State::Work => texts::WORK.text(),
+        State::Alarm(_) => texts::IN_ALARM.text(),
     }
-}
-
-/// A warning's name.
-pub fn warning(warning: Warning) -> Text {
-    warning.text()
-}
-
-/// The name of the reason for the tool being out.
-pub fn reason(reason: Reason) -> Text {
-    reason.text()
-}
-
-/// The name of a reset's cause.
-pub fn cause(cause: Cause) -> Text {
-    cause.text()
 }
 
 /// The tool's command: `in` or `out`.
@@ -78,7 +40,7 @@ pub fn place(tool_out: bool) -> Text {
 
 /// Yes or no.
 pub fn answer(yes: bool) -> Text {
-    if yes { texts::YES } else { texts::NO }
+    if yes { texts::YES } else { texts::NO }.text()
 }
 
 /// A [label](mod@crate::ground::class::label)'s name.
@@ -91,6 +53,6 @@ pub fn class(class: Class) -> Text {
     match class {
         Class::Plant => Argument::Plant.text(),
         Class::Weed => Argument::Weed.text(),
-        Class::Unknown => texts::UNKNOWN,
+        Class::Unknown => texts::UNKNOWN.text(),
     }
 }

@@ -1,66 +1,242 @@
 //! All texts, packed into one table in flash.
 //!
-//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is one byte: its number
-//! in the table. `texts` defines the texts.
+//! An AVR keeps Rust's string literals in SRAM, which has 2 KiB. So the table is in flash, and a [`Text`] is a place in it. `texts`
+//! lists the texts in groups. The table has an index of the groups; in a group, a text is found by the lengths of those before it. A
+//! text with words is several texts here: its parts before, between and behind the words.
 //!
-//! Frequent fragments take one byte each. A fragment is a pair of bytes, each a character or another fragment. So unpacking needs
-//! no search. The compiler packs, and [`Characters`] unpacks. A test finds the fragments (`fragments.rs`).
+//! # How it works
+//!
+//! A byte of a packed text is a code. The first codes are the characters that occur in texts. Each further code is a fragment: a
+//! pair of earlier codes. The compiler finds the fragments: it gives the most frequent pair a code, replaces the pair by this code
+//! everywhere, and repeats this while codes are free ([`PACKED`]). So unpacking needs no search. [`Characters`] splits a code until
+//! its first half is a character. The second halves wait on a small stack.
 
-mod fragments;
+use crate::say::texts::{GROUPS, UNPACKED};
 
-use self::fragments::FRAGMENTS;
-use crate::say::texts::{COUNT, GROUPS, Text, begins};
+/// A text in flash: its group, and its place there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Text {
+    group: u8,
+    place: u8,
+}
 
-/// The characters in the texts. Each is stored as its index here.
+/// Most digits and second halves on the stack during unpacking; a power of two, for short arithmetic.
+const WAITING: usize = 16;
+
+/// Digits and sign of the longest number.
+const DIGITS: usize = "-2147483648".len();
+
+/// Most steps from a code to its first character.
+pub const HALVINGS: usize = 4;
+
+/// Bits of a text's header with its packed length. The other two are its [`mark`], which excludes most words in a search without
+/// unpacking them.
+const LENGTH: u8 = 0x3F;
+
+/// Stands for a word in a text.
+const WORD: u8 = b'@';
+
+/// No code: during packing it ends a text, or the part of a text before a word.
+const END: u8 = u8::MAX;
+
+/// Most characters of all texts together, with an end each. No value for the chip may have 32 KiB, and an
+/// array has two bytes for each.
+const LONGEST: usize = 16_000;
+
+/// The characters in the texts, and their number. Each is stored as its index here.
 const CHARACTERS: ([u8; 128], usize) = {
-    let said = said();
+    let (mut said, mut group) = ([false; 128], 0);
+    while group < GROUPS.len() {
+        let mut place = 0;
+        while place < GROUPS[group].len() {
+            let (text, mut at) = (GROUPS[group][place].as_bytes(), 0);
+            while at < text.len() {
+                said[text[at] as usize] = true;
+                at += 1;
+            }
+            place += 1;
+        }
+        group += 1;
+    }
     let (mut characters, mut count, mut character) = ([0; 128], 0, 0);
-    while character < said.len() {
-        if said[character] {
-            (characters[count], count) = (character as u8, count + 1);
+    while character < 128 {
+        // Those of numbers and commits, with the `+` of a changed checkout, are always there.
+        if said[character as usize] || matches!(character, b'0'..=b'9' | b'a'..=b'f' | b'-' | b'(' | b')' | b'+') {
+            (characters[count], count) = (character, count + 1);
         }
         character += 1;
     }
     (characters, count)
 };
 
-/// The first byte that is a fragment.
+/// For each character, its code.
+const CODES: [u8; 128] = {
+    let (characters, mut codes, mut code) = (CHARACTERS.0, [END; 128], 0);
+    while code < CHARACTERS.1 {
+        codes[characters[code] as usize] = code as u8;
+        code += 1;
+    }
+    codes
+};
+
+/// The first code of a fragment.
 const FIRST_FRAGMENT: u8 = CHARACTERS.1 as u8;
 
-/// The byte for the digit 0. The other digits follow it.
-const ZERO: u8 = place_of(b'0');
-const _: () = assert!(place_of(b'9') == ZERO + 9);
+/// The code of the digit 0. The other digits follow it.
+const ZERO: u8 = CODES[b'0' as usize];
+const _: () = assert!(CODES[b'9' as usize] == ZERO + 9);
 
-/// Most digits and second halves of fragments on the stack during unpacking; a power of two, for short arithmetic.
-const WAITING: usize = 16;
+/// The table: the fragments, the characters, the index, and the texts, each after a byte with its mark and packed length.
+struct Packed {
+    /// It is longer than needed.
+    table: [u8; 4096],
+    length: usize,
+    /// Offsets of the characters and of the index.
+    letters: usize,
+    index: usize,
+}
 
-/// Digits and sign of the longest number.
-const DIGITS: usize = "-2147483648".len();
-
-/// Most steps from a byte to its first character.
-pub const HALVINGS: usize = 4;
-
-/// Texts for each entry of the index. From an entry on, a text is found by the lengths of those before it.
-const STRIDE: u8 = 16;
-
-/// Bits of a text's header with its packed length. The other two are its [`mark`], which excludes most words in a search without
-/// unpacking them.
-const LENGTH: u8 = 0x3F;
-
-/// Table offsets: the characters after the fragments, then the index, then the texts.
-const LETTERS: usize = 2 * FRAGMENTS.len();
-const INDEX: usize = LETTERS + CHARACTERS.1;
-const TEXTS: usize = INDEX + 2 * (COUNT as usize).div_ceil(STRIDE as usize);
-
-/// The table in a larger array, and its length.
 #[allow(long_running_const_eval, reason = "it packs hundreds of texts, and ends")]
-const PACKED: ([u8; 4096], usize) = table();
+const PACKED: Packed = {
+    // The codes of all texts, which become fewer.
+    let (code, mut codes, mut length, mut group) = (CODES, [END; LONGEST], 0, 0);
+    while group < GROUPS.len() {
+        let mut place = 0;
+        while place < GROUPS[group].len() {
+            assert!(GROUPS[group][place].is_ascii(), "a serial monitor can be trusted with ASCII alone");
+            let (text, mut at) = (GROUPS[group][place].as_bytes(), 0);
+            while at < text.len() {
+                codes[length + at] = if text[at] == WORD { END } else { code[text[at] as usize] };
+                at += 1;
+            }
+            length += text.len() + 1;
+            place += 1;
+        }
+        group += 1;
+    }
+    // Those of the version, at the end, stay as they are. So all else is the same for each commit.
+    let unpacked = UNPACKED.len() + 1;
+    // For each code its halves, the second halves that wait while it is split, the steps to its first character, and whether it may
+    // be a first half.
+    let (mut halves, mut waiting, mut steps, mut splits) = ([[0; 2]; 256], [0; 256], [0; 256], [true; 256]);
+    splits[END as usize] = false;
+    let mut fragment = FIRST_FRAGMENT as usize;
+    while fragment < END as usize {
+        // For each code the place behind its first one, and from there to the next: a pair's second code is there.
+        let mut next = [0; LONGEST];
+        let (mut places, mut at) = ([0; 256], length - unpacked - 1);
+        while at > 0 {
+            at -= 1;
+            let code = codes[at] as usize;
+            (next[at], places[code]) = (places[code], at as u16 + 1);
+        }
+        // The most frequent pair. A fragment takes two bytes, so it has to save three.
+        let (mut most, mut pair, mut first) = (2, [END; 2], 0);
+        while first < fragment {
+            let (mut counts, mut at) = ([0; 256], if splits[first] { places[first] as usize } else { 0 });
+            while at > 0 {
+                let second = codes[at] as usize;
+                counts[second] += 1;
+                if counts[second] > most && second != END as usize {
+                    (most, pair) = (counts[second], [first as u8, second as u8]);
+                }
+                at = next[at - 1] as usize;
+            }
+            first += 1;
+        }
+        let [first, second] = pair;
+        if first == END {
+            break;
+        }
+        halves[fragment] = pair;
+        let [waits, also_waits] = [waiting[first as usize] + 1, waiting[second as usize]];
+        waiting[fragment] = if waits > also_waits { waits } else { also_waits };
+        steps[fragment] = steps[first as usize] + 1;
+        splits[fragment] = waiting[fragment] + 1 + DIGITS < WAITING && steps[fragment] < HALVINGS;
+        let (mut from, mut to) = (0, 0);
+        while from < length {
+            let is_pair = from + 1 < length - unpacked && codes[from] == first && codes[from + 1] == second;
+            codes[to] = if is_pair { fragment as u8 } else { codes[from] };
+            (from, to) = (from + if is_pair { 2 } else { 1 }, to + 1);
+        }
+        length = to;
+        fragment += 1;
+    }
+    let (mut table, mut end) = ([0; 4096], 0);
+    while end < 2 * (fragment - FIRST_FRAGMENT as usize) {
+        table[end] = halves[FIRST_FRAGMENT as usize + end / 2][end % 2];
+        end += 1;
+    }
+    let letters = end;
+    while end < letters + CHARACTERS.1 {
+        table[end] = CHARACTERS.0[end - letters];
+        end += 1;
+    }
+    let index = end;
+    end += 2 * GROUPS.len();
+    let (mut group, mut at) = (0, 0);
+    while group < GROUPS.len() {
+        let mut place = 0;
+        [table[index + 2 * group], table[index + 2 * group + 1]] = (end as u16).to_le_bytes();
+        while place < GROUPS[group].len() {
+            let (text, mut to) = (GROUPS[group][place].as_bytes(), 0);
+            while to <= text.len() {
+                let from = to;
+                while to < text.len() && text[to] != WORD {
+                    to += 1;
+                }
+                let start = end;
+                end += 1;
+                while codes[at] != END {
+                    (table[end], end, at) = (codes[at], end + 1, at + 1);
+                }
+                assert!(end - start - 1 <= LENGTH as usize, "six bits tell a text's packed length");
+                table[start] = mark(text.split_at(to).0.split_at(from).1) | (end - start - 1) as u8;
+                (at, to) = (at + 1, to + 1);
+            }
+            place += 1;
+        }
+        group += 1;
+    }
+    Packed { table, length: end, letters, index }
+};
+
+/// The parts of a text before, between and behind its words.
+pub(super) const fn parts(text: &str) -> usize {
+    let (mut parts, mut at) = (1, 0);
+    while at < text.len() {
+        parts += (text.as_bytes()[at] == WORD) as usize;
+        at += 1;
+    }
+    parts
+}
+
+/// The number of texts in the largest group.
+pub const LARGEST_GROUP: usize = {
+    let (mut largest, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        let (mut texts, mut place) = (0, 0);
+        while place < GROUPS[group].len() {
+            (texts, place) = (texts + parts(GROUPS[group][place]), place + 1);
+        }
+        (largest, group) = (if texts > largest { texts } else { largest }, group + 1);
+    }
+    largest
+};
+
+/// Two bits that differ between words, above the length's bits.
+const fn mark(word: &[u8]) -> u8 {
+    match word.last() {
+        Some(&last) => last.wrapping_add(word.len() as u8) << LENGTH.count_ones(),
+        None => 0,
+    }
+}
 
 avr_progmem::progmem! {
-    static progmem TABLE: [u8; PACKED.1] = {
-        let (mut table, mut place) = ([0; PACKED.1], 0);
+    static progmem TABLE: [u8; PACKED.length] = {
+        let (mut table, mut place) = ([0; PACKED.length], 0);
         while place < table.len() {
-            table[place] = PACKED.0[place];
+            table[place] = PACKED.table[place];
             place += 1;
         }
         table
@@ -74,6 +250,58 @@ fn byte(place: usize) -> u8 {
 }
 
 impl Text {
+    /// The first text of the table.
+    pub(crate) const FIRST: Self = Self { group: 0, place: 0 };
+
+    /// The first text of a group.
+    pub(crate) const fn first_of(group: &[&str]) -> Self {
+        let mut number = 0;
+        while !is_same_group(GROUPS[number], group) {
+            number += 1;
+        }
+        assert!(group.len() <= u8::MAX as usize, "a byte is the place in a group");
+        Self { group: number as u8, place: 0 }
+    }
+
+    /// The text this many places after this one.
+    pub(crate) const fn after(self, places: u8) -> Self {
+        Self { group: self.group, place: self.place + places }
+    }
+
+    /// The index of `word` among `count` texts from this one on; `count` if it is not among them.
+    #[inline(never)]
+    pub(crate) fn find(self, count: u8, word: &[u8]) -> u8 {
+        if word.is_empty() {
+            return count;
+        }
+        let mark = mark(word);
+        let mut start = self.start();
+        let mut characters = Characters::NONE;
+        for place in 0..count {
+            let header = byte(start);
+            if header & !LENGTH == mark {
+                characters.begin_at(start);
+                if word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none() {
+                    return place;
+                }
+            }
+            // The next text follows directly.
+            start += 1 + usize::from(header & LENGTH);
+        }
+        count
+    }
+
+    /// Its offset in the table.
+    #[inline(never)]
+    fn start(self) -> usize {
+        let entry = PACKED.index + 2 * usize::from(self.group);
+        let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
+        for _ in 0..self.place {
+            start += 1 + usize::from(byte(start) & LENGTH);
+        }
+        start
+    }
+
     /// The characters, ASCII.
     pub fn bytes(self) -> Characters {
         let mut characters = Characters::NONE;
@@ -82,38 +310,20 @@ impl Text {
     }
 }
 
-/// The index of `word` among `count` texts from `first` on; `count` if it is not among them.
-#[inline(never)]
-pub(crate) fn find(first: Text, count: u8, word: &[u8]) -> u8 {
-    if word.is_empty() {
-        return count;
+const fn is_same_group(one: &[&str], other: &[&str]) -> bool {
+    let mut same = 0;
+    while same < one.len() && same < other.len() && is_same(one[same], other[same]) {
+        same += 1;
     }
-    let mark = mark(word);
-    let mut start = start(first);
-    let mut characters = Characters::NONE;
-    for place in 0..count {
-        let header = byte(start);
-        if header & !LENGTH == mark {
-            characters.begin_at(start);
-            if word.iter().all(|&character| characters.next() == Some(character)) && characters.next().is_none() {
-                return place;
-            }
-        }
-        // The next text follows directly.
-        start += 1 + usize::from(header & LENGTH);
-    }
-    count
+    same == one.len() && same == other.len()
 }
 
-/// A text's offset in the table.
-#[inline(never)]
-fn start(text: Text) -> usize {
-    let entry = INDEX + 2 * usize::from(text.number() / STRIDE);
-    let mut start = usize::from(u16::from_le_bytes([byte(entry), byte(entry + 1)]));
-    for _ in 0..text.number() % STRIDE {
-        start += 1 + usize::from(byte(start) & LENGTH);
+pub(super) const fn is_same(one: &str, other: &str) -> bool {
+    let (one, other, mut same) = (one.as_bytes(), other.as_bytes(), 0);
+    while same < one.len() && same < other.len() && one[same] == other[same] {
+        same += 1;
     }
-    start
+    same == one.len() && same == other.len()
 }
 
 /// On the host only, where `core::fmt` has room.
@@ -141,7 +351,13 @@ impl Characters {
 
     /// Starts a text, and drops the rest of another.
     pub(crate) fn begin(&mut self, text: Text) {
-        self.begin_at(start(text));
+        self.begin_at(text.start());
+    }
+
+    /// Starts the text at an offset of the table.
+    #[inline(never)]
+    fn begin_at(&mut self, start: usize) {
+        (self.next, self.left, self.halves) = (start + 1, byte(start) & LENGTH, 0);
     }
 
     /// Inserts a number before the rest of the text.
@@ -158,7 +374,7 @@ impl Characters {
             }
         }
         if number < 0 {
-            self.wait(const { place_of(b'-') });
+            self.wait(const { CODES[b'-' as usize] });
         }
     }
 
@@ -166,12 +382,6 @@ impl Characters {
     fn wait(&mut self, code: u8) {
         self.waiting[usize::from(self.halves) % WAITING] = code;
         self.halves += 1;
-    }
-
-    /// Starts the text at an offset of the table.
-    #[inline(never)]
-    fn begin_at(&mut self, start: usize) {
-        (self.next, self.left, self.halves) = (start + 1, byte(start) & LENGTH, 0);
     }
 }
 
@@ -199,193 +409,29 @@ impl Iterator for Characters {
             self.wait(byte(pair + 1));
             code = byte(pair);
         }
-        Some(byte(LETTERS + usize::from(code)))
+        Some(byte(PACKED.letters + usize::from(code)))
     }
 }
-
-/// Two bits that differ between words, above the length's bits.
-const fn mark(word: &[u8]) -> u8 {
-    match word.last() {
-        Some(&last) => last.wrapping_add(word.len() as u8) << LENGTH.count_ones(),
-        None => 0,
-    }
-}
-
-/// The table and its length: fragments, characters, index, and the texts, each after a byte with its mark and packed length.
-const fn table() -> ([u8; 4096], usize) {
-    let mut table = [0; 4096];
-    let mut place = 0;
-    while place < FRAGMENTS.len() {
-        [table[2 * place], table[2 * place + 1]] = split(FRAGMENTS[place].as_bytes());
-        place += 1;
-    }
-    place = 0;
-    while place < FRAGMENTS.len() {
-        let (waiting, halvings) = depth(FIRST_FRAGMENT + place as u8, &table);
-        assert!(waiting + DIGITS < WAITING && halvings <= HALVINGS);
-        place += 1;
-    }
-    let mut character = 0;
-    while character < CHARACTERS.1 {
-        table[LETTERS + character] = CHARACTERS.0[character];
-        character += 1;
-    }
-    let (mut number, mut end, mut group) = (0, TEXTS, 0);
-    while group < GROUPS.len() {
-        let mut place = 0;
-        while place < GROUPS[group].len() {
-            if number % STRIDE as usize == 0 {
-                let entry = INDEX + 2 * (number / STRIDE as usize);
-                [table[entry], table[entry + 1]] = (end as u16).to_le_bytes();
-            }
-            let start = end + 1;
-            end = pack(GROUPS[group][place], &mut table, start);
-            assert!(end - start <= LENGTH as usize, "six bits tell a text's packed length");
-            table[start - 1] = mark(GROUPS[group][place].as_bytes()) | (end - start) as u8;
-            number += 1;
-            place += 1;
-        }
-        group += 1;
-    }
-    (table, end)
-}
-
-/// Writes a text into the table in the fewest bytes. Returns its end.
-const fn pack(text: &str, table: &mut [u8], mut end: usize) -> usize {
-    assert!(text.is_ascii(), "a serial monitor can be trusted with ASCII alone");
-    let text = text.as_bytes();
-    // From the end backwards: the byte that makes the rest shortest, the characters that this byte stands for, and the rest's
-    // length.
-    let mut best = [(0, 0, 0); 128];
-    let mut at = text.len();
-    while at > 0 {
-        at -= 1;
-        best[at] = (place_of(text[at]), 1, best[at + 1].2 + 1);
-        let [mut place, behind] = beginning_with(text[at]);
-        while place < behind {
-            let fragment = FRAGMENTS[place].as_bytes();
-            if begins(text, at, fragment) && best[at + fragment.len()].2 + 1 < best[at].2 {
-                best[at] = (FIRST_FRAGMENT + place as u8, fragment.len(), best[at + fragment.len()].2 + 1);
-            }
-            place += 1;
-        }
-    }
-    while at < text.len() {
-        table[end] = best[at].0;
-        at += best[at].1;
-        end += 1;
-    }
-    end
-}
-
-/// The two bytes of a fragment.
-const fn split(fragment: &[u8]) -> [u8; 2] {
-    let mut at = 1;
-    while at < fragment.len() {
-        let (first, second) = fragment.split_at(at);
-        if let (Some(first), Some(second)) = (code(first), code(second)) {
-            return [first, second];
-        }
-        at += 1;
-    }
-    panic!("a fragment consists of two characters or other fragments");
-}
-
-/// The byte for a part of a text, if there is one.
-const fn code(part: &[u8]) -> Option<u8> {
-    if let [character] = part {
-        return Some(place_of(*character));
-    }
-    let [mut place, behind] = beginning_with(part[0]);
-    while place < behind {
-        if FRAGMENTS[place].len() == part.len() && begins(part, 0, FRAGMENTS[place].as_bytes()) {
-            return Some(FIRST_FRAGMENT + place as u8);
-        }
-        place += 1;
-    }
-    None
-}
-
-/// Second halves on the stack while a byte is unpacked, and the steps to its first character.
-const fn depth(code: u8, table: &[u8]) -> (usize, usize) {
-    let Some(fragment) = code.checked_sub(FIRST_FRAGMENT) else { return (0, 0) };
-    let pair = 2 * fragment as usize;
-    let ((first, halvings), (second, _)) = (depth(table[pair], table), depth(table[pair + 1], table));
-    (if first + 1 > second { first + 1 } else { second }, halvings + 1)
-}
-
-/// Which characters are in a text, in a number, or in the commit of a release.
-const fn said() -> [bool; 128] {
-    let (mut said, mut character) = ([false; 128], 0);
-    while character < 128 {
-        // Those of numbers and commits, with the `+` of a changed checkout.
-        said[character as usize] = matches!(character, b'0'..=b'9' | b'a'..=b'f' | b'-' | b'(' | b')' | b'+');
-        character += 1;
-    }
-    let mut group = 0;
-    while group < GROUPS.len() {
-        let mut place = 0;
-        while place < GROUPS[group].len() {
-            let (text, mut at) = (GROUPS[group][place].as_bytes(), 0);
-            while at < text.len() {
-                said[text[at] as usize] = true;
-                at += 1;
-            }
-            place += 1;
-        }
-        group += 1;
-    }
-    said
-}
-
-/// For each character, its byte.
-const PLACES: [u8; 128] = {
-    let (mut places, mut place) = ([u8::MAX; 128], 0);
-    while place < CHARACTERS.1 {
-        places[CHARACTERS.0[place] as usize] = place as u8;
-        place += 1;
-    }
-    places
-};
-
-/// A character's byte.
-const fn place_of(character: u8) -> u8 {
-    PLACES[character as usize]
-}
-
-/// The fragments that begin with a character: the first index, and the index after the last.
-const fn beginning_with(character: u8) -> [usize; 2] {
-    [STARTS[character as usize], STARTS[character as usize + 1]]
-}
-
-/// For each character, the number of fragments that begin with an earlier one.
-const STARTS: [usize; 129] = {
-    let mut starts = [0; 129];
-    let (mut character, mut place) = (0, 0);
-    while character < starts.len() {
-        while place < FRAGMENTS.len() && (FRAGMENTS[place].as_bytes()[0] as usize) < character {
-            place += 1;
-        }
-        starts[character] = place;
-        character += 1;
-    }
-    assert!(FRAGMENTS.len() + CHARACTERS.1 <= 256 && place == FRAGMENTS.len());
-    starts
-};
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        alarm::Alarm,
+        say::words::{Argument, Word},
+        settings::Setting,
+    };
     use std::string::String;
 
     #[test]
     fn every_text_reads_as_it_was_written() {
-        let mut text = Text::FIRST;
-        for written in GROUPS.iter().copied().flatten() {
-            assert_eq!(String::from_utf8(text.bytes().collect()).expect("ASCII"), **written);
-            text = text.plus(1);
+        for group in GROUPS {
+            let mut text = Text::first_of(group);
+            for part in group.iter().flat_map(|text| text.split('@')) {
+                assert_eq!(String::from_utf8(text.bytes().collect()).expect("ASCII"), part);
+                text = text.after(1);
+            }
         }
-        assert_eq!(text.number(), COUNT);
     }
 
     #[test]
@@ -396,13 +442,14 @@ mod tests {
 
     #[test]
     fn only_a_whole_word_of_the_group_is_found() {
-        let group = GROUPS.last().expect("there are groups");
-        let first = Text::first_of(group);
-        for (place, word) in (0..).zip(*group) {
-            assert_eq!(find(first, group.len() as u8, word.as_bytes()), place);
-            assert_eq!(find(first, place, word.as_bytes()), place, "the group ends before it");
-            for no_word in [&word.as_bytes()[1..], &[word.as_bytes(), b"_"].concat()] {
-                assert_eq!(find(first, group.len() as u8, no_word), group.len() as u8);
+        for group in [Setting::WORDS, Word::WORDS, Argument::WORDS, Alarm::WORDS] {
+            let first = Text::first_of(group);
+            for (place, word) in (0..).zip(group) {
+                assert_eq!(first.find(group.len() as u8, word.as_bytes()), place);
+                assert_eq!(first.find(place, word.as_bytes()), place, "the group ends before it");
+                for no_word in [&word.as_bytes()[1..], &[word.as_bytes(), b"_"].concat()] {
+                    assert_eq!(first.find(group.len() as u8, no_word), group.len() as u8);
+                }
             }
         }
     }

@@ -66,9 +66,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Starts to measure a distance from the machine's position.
     ///
     /// # Errors
-    /// [`CommandError::NotInHold`] and [`CommandError::AlarmLatched`].
+    /// [`CommandError::NotInHold`], [`CommandError::AlarmLatched`] and [`CommandError::Rolls`].
     pub fn calibrate_start(&mut self) -> Result<(), CommandError> {
-        self.expect_hold()?;
+        self.expect_rest()?;
         self.distance.begin(self.sensors.position);
         Ok(())
     }
@@ -76,8 +76,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Sets the wheel's ticks a metre from the distance rolled since [`calibrate_start`](Self::calibrate_start).
     ///
     /// # Errors
-    /// Those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set). Nothing is changed then.
+    /// [`CommandError::Rolls`], and those of [`Distance::end`](crate::operate::calibration::Distance::end) and [`set`](Self::set).
+    /// Nothing is changed then.
     pub fn calibrate(&mut self, distance_mm: u16, force: bool) -> Result<(), CommandError> {
+        self.expect_standing()?;
         let nominal = self.configuration.settings().nominal_ticks_per_m();
         let counted = self.distance.end(self.sensors.position, distance_mm, nominal, force)?;
         self.set(Setting::TicksPerM, counted)
@@ -144,6 +146,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     fn expect_rest(&self) -> Result<(), CommandError> {
         self.expect_hold()?;
+        self.expect_standing()
+    }
+
+    fn expect_standing(&self) -> Result<(), CommandError> {
         if self.sensors.encoder.stands() { Ok(()) } else { Err(CommandError::Rolls) }
     }
 

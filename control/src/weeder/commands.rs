@@ -76,11 +76,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[inline(never)]
     pub(super) fn follow_settings(&mut self) {
         self.configuration.follow();
-        if !self.is_working() {
-            self.ground.forget_slip();
-        }
         let settings = self.configuration.settings();
         self.ground.follow(settings, self.sensors.position);
+        if !matches!(self.state, State::Work) {
+            self.ground.distrust_slip();
+        }
         self.limits = Limits::of(settings, self.ground.wheel(), self.ground.scale());
         self.leads_are_old = true;
     }

@@ -67,23 +67,23 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub(super) fn count_misfit(&mut self, class: Class, width_mm: i16) {
         let enough = self.configuration.get(Setting::MisfitAfter) as u8;
         if self.is_working() && self.unknown_run.count(class, width_mm, enough) {
-            self.raise(Alarm::CropUnknown);
+            self.forget_and_raise(Alarm::CropUnknown);
         }
     }
 
     /// Reports late commands and missing plants, each once.
-    pub(super) fn warn(&mut self) {
+    pub(super) fn report_warnings(&mut self) {
         if !self.is_working() {
             return;
         }
         if self.tool.awaits_ground() && self.ground.is_closed_at_tool() {
             // The speed may vary by an eighth of the lead.
             let lead_ms = self.configuration.get(Setting::LeadOutMs);
-            if self.tool.is_late(self.sensors.readings.now, lead_ms - lead_ms / 8) {
+            if self.tool.count_if_late(self.sensors.readings.now, lead_ms - lead_ms / 8) {
                 self.events.add(Event::Warning(Warning::LateCommand));
             }
         }
-        if self.plant_timeout.warn(self.sensors.position, self.limits.no_plant()) {
+        if self.plant_timeout.take_warning(self.sensors.position, self.limits.no_plant()) {
             self.events.add(Event::Warning(Warning::NoPlants));
         }
     }

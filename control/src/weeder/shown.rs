@@ -2,6 +2,7 @@
 
 use super::Controller;
 use crate::{
+    alarm::Warning,
     ground::{AtTool, class::Classifier},
     measure::{quadrature, readings::Readings, reset::Cause},
     memory::Memory,
@@ -48,9 +49,10 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.ground.zones()
     }
 
-    /// The distance in mm until the tool has left unseen ground and its margin.
+    /// The distance in mm until the tool has left unseen ground and its margin, rounded up: 0 only once it has.
     pub fn unseen_mm(&self) -> i16 {
-        self.ground.millimetres(self.ground.unseen())
+        let unseen = self.ground.unseen();
+        self.ground.millimetres(unseen) + i16::from(unseen > Ticks::ZERO)
     }
 
     /// Whether there is a second beam.
@@ -161,6 +163,25 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// Whether the machine has worked over a long distance without a plant.
     pub fn sees_no_plants(&self) -> bool {
         self.plant_timeout.has_warned()
+    }
+
+    /// The warning whose reason is still there, if any.
+    pub fn present_warning(&self) -> Option<Warning> {
+        if self.sees_no_plants() {
+            Some(Warning::NoPlants)
+        } else {
+            self.configuration.has_spoiled_copy().then_some(Warning::SettingsOlder)
+        }
+    }
+
+    /// Whether the last reset ended work. False once the operator has started, held or cleared again.
+    pub fn was_working(&self) -> bool {
+        self.was_working
+    }
+
+    /// Whether the machine works, or worked at the last reset: the caller keeps this over a reset.
+    pub fn works_or_did(&self) -> bool {
+        self.is_working() || self.was_working
     }
 
     /// The next event to report.

@@ -183,6 +183,35 @@ fn a_dry_run_ends_at_every_accepted_speed() {
 }
 
 #[test]
+fn a_tool_that_rolls_back_to_a_forgotten_canopy_keeps_its_margin_though_the_operator_starts_it_now() {
+    for ahead_mm in (0..120).step_by(5) {
+        for speed in [100, 291, 500] {
+            let lines = format!(
+                "start\nroll 1010 mm at 400 mm/s\n{TOO_FAST}\nclear\nstart\nroll {} mm at 400 mm/s
+                 roll back 60 mm at {speed} mm/s\nstart now\nroll back 60 mm at {speed} mm/s\nroll 300 mm at 400 mm/s",
+                460 + ahead_mm
+            );
+            go(&run(&PLANTS, &lines));
+        }
+    }
+}
+
+#[test]
+fn edges_lost_behind_the_frontier_while_the_beam_is_broken_keep_the_tool_out_at_the_frontier() {
+    // The row goes on behind the first canopy, also to where the machine rolls back.
+    let row = [(136, 2), (1, 258)];
+    let mut run = run(&row, "clear\nstart\nroll 96 mm at 288 mm/s\nroll back 279 mm at 467 mm/s");
+    run.steps.push(Step::LoseEdges { turns: 2 });
+    let on = Run::written(
+        &row,
+        "roll back 209 mm at 380 mm/s\nclear\nstart\nroll 95 mm at 236 mm/s\nroll 101 mm at 572 mm/s\nroll 263 mm at 960 mm/s
+         hold\nset stem_zone_mm 40\nclear\nstart now\nroll 3 mm at 100 mm/s\nroll 3 mm at 100 mm/s",
+    );
+    run.steps.extend(on.steps);
+    go(&run);
+}
+
+#[test]
 fn forgotten_ground_stays_closed_over_any_distance_rolled_back() {
     for back_mm in (500..12_000).step_by(500) {
         for beam_to_tool_mm in [100, 400, 2000] {

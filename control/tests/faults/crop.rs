@@ -91,6 +91,60 @@ fn a_beam_that_flickers_is_an_alarm_and_a_ragged_canopy_is_none() {
     assert_eq!(drive.alarm(), None);
 }
 
+/// A beam that breaks for these milliseconds, this many times a second, until there is an alarm.
+fn flicker(speed_m_s: f64, breaks_ms: impl IntoIterator<Item = u32>, a_second: u32) -> Option<Alarm> {
+    let mut drive = Drive::at_work();
+    if speed_m_s == 0.0 {
+        drive.brake(0.5);
+        drive.roll(0.0, 1.0);
+    }
+    let pass = |drive: &mut Drive, ms: u32| {
+        let seconds = f64::from(ms) / 1000.0;
+        drive.roll(speed_m_s, if speed_m_s > 0.0 { speed_m_s * seconds } else { seconds });
+    };
+    breaks_ms.into_iter().take(60).find_map(|ms| {
+        drive.beam(true);
+        pass(&mut drive, ms);
+        drive.beam(false);
+        pass(&mut drive, 1000 / a_second - ms);
+        drive.alarm()
+    })
+}
+
+#[test]
+fn short_breaks_at_any_speed_are_the_beam_s_fault_whatever_they_look_like() {
+    for a_second in [1, 2, 5, 10, 20] {
+        for speed_m_s in [0.0, 0.28, 0.7] {
+            let mixed = [17, 3, 28, 9, 1, 22, 12, 30, 6].into_iter().cycle();
+            assert_eq!(flicker(speed_m_s, mixed, a_second), Some(Alarm::BeamFlickers), "{speed_m_s} {a_second}");
+        }
+        for ms in 1..=30 {
+            let alarm = flicker(0.0, std::iter::repeat_n(ms, 60), a_second);
+            assert_eq!(alarm, Some(Alarm::BeamFlickers), "{ms} ms standing");
+        }
+    }
+}
+
+#[test]
+fn plants_and_stalks_are_no_flicker() {
+    // Plants that pass while the encoder is dead, and leaves in the wind.
+    for ms in [33, 60, 216] {
+        assert_eq!(flicker(0.0, std::iter::repeat_n(ms, 60), 2), Some(Alarm::EncoderSilent), "{ms} ms");
+    }
+    // Stalks of 15 to 20 mm at 2.5 km/h.
+    let stalks = [22, 28, 25, 29, 23, 26, 27].into_iter().cycle();
+    assert_eq!(flicker(0.7, stalks, 3), Some(Alarm::CropUnknown));
+    // Weeds as short, then an object that stays in the beam.
+    let mut drive = Drive::at_work();
+    for _ in 0..4 {
+        drive.pass(0.7, 0.004);
+        drive.roll(0.7, 0.2);
+    }
+    drive.beam(true);
+    drive.roll(0.7, 0.5);
+    assert_eq!(drive.alarm(), Some(Alarm::BeamBlocked));
+}
+
 #[test]
 fn a_long_distance_without_a_plant_is_one_warning() {
     let mut drive = Drive::at_work();

@@ -2,10 +2,10 @@
 
 use crate::common::{ByWidth, LEAST_HOLD_MM};
 use control::{
-    alarm::Alarm,
+    alarm::{Alarm, Warning},
     measure::reset::Cause,
-    memory::Volatile,
-    operate::{command_error::CommandError, saved::SavedSettings, state::State},
+    memory::{SIZE, Volatile},
+    operate::{command_error::CommandError, event::Event, saved::SavedSettings, state::State},
     settings::{Setting, Settings},
 };
 use rig::{Beams, Rig};
@@ -24,6 +24,28 @@ fn saved(settings: &Settings) -> Volatile {
     saved.save();
     while !saved.carry_on(settings) {}
     saved.into_memory()
+}
+
+#[test]
+fn a_copy_that_has_changed_since_it_was_saved_is_a_warning_until_the_next_save() {
+    let mut saved = SavedSettings::new(self::saved(&Settings::new()));
+    saved.load();
+    let mut settings = Settings::new();
+    settings.set(Setting::K, 7).unwrap();
+    saved.save();
+    while !saved.carry_on(&settings) {}
+    let mut memory = saved.into_memory();
+    let wake = |memory: &Volatile| Rig::wake(ByWidth::new(LEAST_HOLD_MM, 0), memory.clone(), Cause::PowerOn);
+    let mut sound = wake(&memory);
+    assert_eq!((sound.events(), sound.present_warning(), sound.settings()), (vec![], None, &settings));
+    // The second save overwrote the second copy.
+    memory.bytes[SIZE / 2 + 20] ^= 4;
+    let mut machine = wake(&memory);
+    assert_eq!(machine.settings().get(Setting::K), Settings::new().get(Setting::K), "the older ones are in use");
+    assert_eq!(machine.events(), [Event::Warning(Warning::SettingsOlder)], "also while events are off");
+    assert!(machine.ask("status")[1].ends_with(" warning=settings_older"));
+    machine.save().unwrap();
+    assert_eq!(machine.present_warning(), None);
 }
 
 #[test]

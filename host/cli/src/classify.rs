@@ -24,7 +24,7 @@ The status is 1 if a plant would be classified as a weed.")]
 pub struct Arguments {
     /// CSV file with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm, and label if known; - for
     /// standard input.
-    #[arg(value_name = "FILE.csv", value_parser = source::file)]
+    #[arg(value_name = "FILE.csv", value_parser = source::file())]
     file: PathBuf,
     #[arg(
         long,

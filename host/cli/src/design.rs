@@ -20,7 +20,7 @@ Examples:
   weeder design --machine my.toml --json     your machine, for a program")]
 pub struct Arguments {
     /// The machine; omitted values are those of the paper's machine; - for standard input.
-    #[arg(long, value_name = "FILE.toml", value_parser = source::file)]
+    #[arg(long, value_name = "FILE.toml", value_parser = source::file())]
     machine: Option<PathBuf>,
     /// Compare with the paper's printed figures.
     #[arg(long)]

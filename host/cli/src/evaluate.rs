@@ -26,14 +26,14 @@ const REPORT: &str = "report.html";
 pub struct Arguments {
     /// CSV file with a line for each plot: replication, speed_km_h, spacing_cm, weeds_before, weeds_after, plants, damaged,
     /// area_m2, time_s, width_m, power_hp; - for standard input.
-    #[arg(value_name = "FILE.csv", value_parser = source::file)]
+    #[arg(value_name = "FILE.csv", value_parser = source::file())]
     file: PathBuf,
     /// Nominal speeds in km/h, 0.1 to 15, where the table has measured ones: means and analysis of variance take the nearest.
     #[arg(long, value_delimiter = ',', value_parser = number_within(0.1..=15.0))]
     speeds: Vec<f64>,
     /// Log of `weeder record`: each stretch of work is a plot, in the order of the plots' numbers. It gives each plot its
     /// speed, and fills the empty cells of time, plants and area.
-    #[arg(long, value_name = "FILE.csv", value_parser = source::file, conflicts_with = "speeds")]
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file(), conflicts_with = "speeds")]
     log: Option<PathBuf>,
     /// The plot of each stretch of work in the log, 0 to 100000, 0 for none.
     #[arg(long, value_delimiter = ',', requires = "log", value_parser = whole_within(0..=100_000_u32))]

@@ -48,7 +48,7 @@ An Uno has room for 32 examples beside its built-in table. It keeps them without
 Example: weeder examples push chilli.csv --replace")]
     Push {
         /// The table; - for standard input.
-        #[arg(value_name = "FILE.csv", value_parser = source::file)]
+        #[arg(value_name = "FILE.csv", value_parser = source::file())]
         file: PathBuf,
         /// Make the machine forget examples that the table does not have.
         #[arg(long)]
@@ -66,7 +66,7 @@ Example: weeder examples push chilli.csv --replace")]
     #[command(after_help = "Example: weeder examples diff chilli.csv && echo the same")]
     Diff {
         /// The table; - for standard input.
-        #[arg(value_name = "FILE.csv", value_parser = source::file)]
+        #[arg(value_name = "FILE.csv", value_parser = source::file())]
         file: PathBuf,
         /// Print the differences as JSON.
         #[arg(long)]

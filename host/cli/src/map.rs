@@ -28,7 +28,7 @@ Examples:
   weeder map field.csv -o field.geojson --beam-ahead 610 --gps-delay 120    a better measurement")]
 pub struct Arguments {
     /// Records, as `weeder record --gps` writes them; - for standard input.
-    #[arg(value_name = "LOG.csv", required = true, value_parser = source::file)]
+    #[arg(value_name = "LOG.csv", required = true, value_parser = source::file())]
     logs: Vec<PathBuf>,
     /// The map.
     #[arg(long, short, value_name = "FILE.geojson")]

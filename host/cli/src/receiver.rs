@@ -4,8 +4,9 @@
 
 use crate::numbers::{number_within, whole_within};
 use crate::ports::{Chosen, Named, named};
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Result, anyhow, bail, ensure};
 use clap::Args;
+use files::bounded_file;
 use gps::playback::{self, Piece};
 use gps::recorder::Lines;
 use gps::{Antenna, Recorder};
@@ -13,7 +14,6 @@ use link::LinkError;
 use link::log::Kind;
 use link::session::Happening;
 use std::collections::VecDeque;
-use std::fs;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -157,7 +157,7 @@ impl Gps {
                 }
                 if pieces.is_empty() {
                     self.source = Source::Ended;
-                    lines.extend(self.recorder.lost("the file ends here"));
+                    lines.push((Kind::GpsMark, "the file ends here".to_owned()));
                 }
                 lines
             }
@@ -189,7 +189,7 @@ impl Gps {
 fn open(name: &str, baud: u32) -> Result<Source> {
     let path = Path::new(name);
     if path.metadata().is_ok_and(|there| there.is_file()) {
-        let file = fs::read(path).with_context(|| format!("{name} cannot be read"))?;
+        let file = bounded_file::recorded(path)?;
         let pieces = playback::pieces(&file).map_err(|why| anyhow!("{name} is no file for --gps: {why}"))?;
         return Ok(Source::File(pieces, None));
     }

@@ -15,7 +15,7 @@ It shows the first difference between log and replay, and the status is then 1.\
 A swing may differ by 12 ticks plus the distance of 25 ms: the log has the speed ten times a second.\n\nExample:\n  weeder replay row.csv --json | jq .difference")]
 pub struct Arguments {
     /// A log of `weeder record` or `weeder monitor --log`; - for standard input.
-    #[arg(value_name = "LOG.csv", value_parser = source::file)]
+    #[arg(value_name = "LOG.csv", value_parser = source::file())]
     log: PathBuf,
     /// Print the result as JSON.
     #[arg(long)]

@@ -11,7 +11,7 @@ use crate::ports::Port;
 use crate::source;
 use anyhow::{Context, Error, Result, bail};
 use clap::Args;
-use files::whole_file;
+use files::{bounded_file, whole_file};
 use link::row_names::Board;
 use link::set_up::{ManualStep, SetUp, Step, Task, steps};
 use link::settings::{self, Setting, name, range, unit};
@@ -22,8 +22,7 @@ use mechanics::swing::Swing;
 use mechanics::unit::MM;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::fs;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
@@ -46,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", default_value = "set-up.txt")]
     state: PathBuf,
     /// Your machine, as for `weeder design`. Without it, the measures of arm, tool and servo are asked.
-    #[arg(long, value_name = "FILE.toml", value_parser = source::file)]
+    #[arg(long, value_name = "FILE.toml", value_parser = source::file())]
     machine: Option<PathBuf>,
     /// Start again at the first step, and forget the measurements.
     #[arg(long)]
@@ -86,10 +85,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return say!("{}\n{}", simulated::table()?, simulated::about());
     }
     let path = &arguments.state;
-    let kept = match fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
-        Err(error) => return Err(error).with_context(|| format!("{} cannot be read", path.display())),
+    let kept = match bounded_file::text(path) {
+        Err(error) if error.is_absence() => String::new(),
+        text => text?,
     };
     let kept_state =
         State::parse(&kept).with_context(|| format!("{} is no file of `weeder set-up`", path.display()))?;
@@ -470,9 +468,9 @@ impl Guide {
 
     /// Sets and saves.
     fn push(&mut self, wanted: &[(Setting, u16)]) -> Result<()> {
-        let set = settings::push(&mut self.link, wanted, true)?;
+        let set = settings::push(&mut self.link, wanted, &[], true)?;
         for setting in set {
-            say!("  {} is set and saved", name(setting))?;
+            say!("  {setting} is set and saved")?;
         }
         self.state.measured.settings = settings::read(&mut self.link)?;
         Ok(())

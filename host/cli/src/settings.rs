@@ -50,7 +50,7 @@ Opening the port resets most Unos, and unsaved settings are lost.\n\n\
 Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     Push {
         /// A file for all rows, or a folder with a file for each row; - for standard input.
-        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
+        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file())]
         file: PathBuf,
         /// Do not `save` them: the next reset loses them. On most Unos, opening the port is a reset.
         #[arg(long)]
@@ -68,7 +68,7 @@ Example: weeder settings push machine.toml --port /dev/ttyACM0")]
     #[command(after_help = "Example: weeder settings diff machine.toml && echo the same")]
     Diff {
         /// A file for all rows, or a folder with a file for each row; - for standard input.
-        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file)]
+        #[arg(value_name = "FILE.toml|FOLDER", value_parser = source::file())]
         file: PathBuf,
         /// Print the differences as JSON.
         #[arg(long)]
@@ -117,7 +117,7 @@ fn push(file: &Path, save: bool, json: bool, chosen: &Chosen) -> Result<Finding>
     let wanted = chosen.wanted(file)?;
     let pushed = chosen.each(|row, link| {
         let wanted = &wanted[&row.name];
-        Ok(settings::push_all(link, &wanted.settings, &wanted.foreign, save)?)
+        Ok(settings::push(link, &wanted.settings, &wanted.foreign, save)?)
     });
     let in_json = |set: &Vec<String>| json!({ "set": set, "saved": save });
     chosen.show(pushed, json, in_json, |place, set| {

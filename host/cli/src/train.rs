@@ -27,7 +27,7 @@ Examples:
 pub struct Arguments {
     /// CSV files with the columns speed_mm_s,spacing_mm,delay_mm,hold_mm,actuation_mm,label (plant or weed); - for
     /// standard input.
-    #[arg(value_name = "FILE.csv", value_parser = source::file)]
+    #[arg(value_name = "FILE.csv", value_parser = source::file())]
     files: Vec<PathBuf>,
     /// Learn from simulated rows at four speeds and two spacings.
     #[arg(long)]

@@ -72,7 +72,7 @@ pub struct Arguments {
     )]
     field: String,
     /// Examples to teach the firmware first, as with `weeder examples push`; - for standard input.
-    #[arg(long, value_name = "FILE.csv", value_parser = source::file)]
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file())]
     examples: Option<PathBuf>,
     /// The baselines on the same ground.
     #[arg(long, alias = "rivals", value_enum, value_delimiter = ',', default_values_t = [Baseline::Queue, Baseline::Paper, Baseline::Ideal])]

@@ -17,7 +17,7 @@ use crate::trial::{Start, Trial};
 use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 use files::toml_entry::{self, Entry};
-use files::{FileError, near, text_file};
+use files::{FileError, bounded_file, near};
 pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
 use std::io::ErrorKind;
@@ -72,7 +72,7 @@ impl Conditions {
                     meant.unwrap_or_default()
                 );
                 // A file that is there has an error of its own.
-                let text = match text_file::read(path) {
+                let text = match bounded_file::text(path) {
                     Err(FileError::File { source, .. }) if source.kind() == ErrorKind::NotFound => {
                         return Err(FileError::unusable(path, problem, source));
                     }
@@ -90,7 +90,7 @@ impl Conditions {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, FileError> {
-        text_file::check_nesting(path, text)?;
+        bounded_file::check_nesting(path, text)?;
         let conditions: Self = toml::from_str(text).map_err(|error| {
             let byte = error.span().map_or(0, |span| span.start);
             FileError::at_byte(path, text, byte, explain(text, byte, &error))

@@ -6,10 +6,9 @@
 //! commas and separates by semicolons, so semicolons and tabs separate where commas do not give the columns. The caller
 //! interprets the values.
 
-use super::FileError;
+use super::{FileError, bounded_file};
 use csv::StringRecord;
 use std::borrow::Cow;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -37,7 +36,7 @@ impl CsvTable {
     /// # Errors
     /// As [`parse`](Self::parse), and if the file cannot be read.
     pub fn read(path: &Path, columns: &[&str]) -> Result<Self, FileError> {
-        Self::parse(path, bytes(path)?, columns)
+        Self::parse(path, bounded_file::bytes(path)?, columns)
     }
 
     /// Reads a file in which cells may be empty: a spreadsheet leaves out the last ones of a line.
@@ -45,7 +44,7 @@ impl CsvTable {
     /// # Errors
     /// As [`read`](Self::read), but a short line is none.
     pub fn read_with_gaps(path: &Path, columns: &[&str]) -> Result<Self, FileError> {
-        Self::parse_lines(path, bytes(path)?, columns, ShortLines::Filled)
+        Self::parse_lines(path, bounded_file::bytes(path)?, columns, ShortLines::Filled)
     }
 
     /// Parses a file's text. The table must have these columns and at least one line below its header.
@@ -211,14 +210,6 @@ fn opened(text: &str, before: u64, record: &StringRecord) -> Option<u64> {
     goes_on.then(|| behind.find(|(_, line)| is_odd(line)).map_or(before + 1, |(number, _)| number))
 }
 
-/// The content of a file.
-///
-/// # Errors
-/// If it cannot be read.
-pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
-    fs::read(path).map_err(|source| FileError::unread(path, source))
-}
-
 /// A line of a table.
 #[derive(Clone, Copy)]
 pub struct Line<'a> {
@@ -281,6 +272,7 @@ fn with_point(text: &str) -> Cow<'_, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     /// The values of the column `place_mm` with their lines, or the error for a file with this text.
     fn read(text: impl AsRef<[u8]>) -> Result<Vec<(u64, i16)>, String> {

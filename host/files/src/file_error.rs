@@ -44,6 +44,11 @@ impl FileError {
         Self::unusable(path, "cannot be read", source)
     }
 
+    /// Whether there is no such file.
+    pub fn is_absence(&self) -> bool {
+        matches!(self, Self::File { source, .. } if source.kind() == io::ErrorKind::NotFound)
+    }
+
     /// The system cannot write it.
     pub fn unwritten(path: &Path, source: io::Error) -> Self {
         Self::unusable(path, "cannot be written", source)

@@ -16,18 +16,18 @@ pub fn restarted(cause: &str) -> String {
 /// What to check after an alarm, before it is cleared.
 pub fn alarm(alarm: Alarm) -> &'static str {
     match alarm {
-        Alarm::BeamBlocked => "clear the beam, align it, or raise `max_width_mm`",
-        Alarm::BeamFlickers => "clean the beam's lenses, see to its plug and wires",
+        Alarm::BeamBlocked => "clear, clean and align the beam, or raise `max_width_mm`",
+        Alarm::BeamFlickers => "clean and shade the beam; see to its plug and wires",
         Alarm::BeamEdgesLost => "see to the beam's wires and supply: it chatters",
         Alarm::BeamBlind => "see to the first beam's wire at D8, its lens and aim",
         Alarm::SecondBeamBlind => "see to the second beam: wire at D10, lens, aim",
-        Alarm::EncoderSilent => "see to the encoder's coupling; hold to stop in wind",
+        Alarm::EncoderSilent => "see to the encoder's coupling, the beam; hold in wind",
         Alarm::EncoderChannelDead => "see to the wires at D2 and D3 and their pull-ups",
         Alarm::EncoderJumps => "see to the encoder's screen, ground and pull-ups",
         Alarm::TooFast => "drive slower, or beam farther ahead and raise the limit",
         Alarm::RolledBackTooFar => "roll forward to where you stopped, then `clear`",
-        Alarm::ScheduleFull => "set the beam nearer, or raise `merge_gap_mm`",
-        Alarm::CropUnknown => "the crop? `label plant`; else raise `misfit_after`",
+        Alarm::ScheduleFull => "clean the beam, set it nearer, raise `merge_gap_mm`",
+        Alarm::CropUnknown => "crop? `label plant`; weeds? `misfit_after`; else as 1-2",
         Alarm::ToolStuck => "stop; look for a stone, a dead servo, a loose switch",
         Alarm::SettingsLost => "check `get`, set what differs, `save`, `clear`",
         Alarm::SettingsContradict => "`start` says which; change one of them, `save`",
@@ -40,6 +40,7 @@ pub fn warning(warning: Warning) -> &'static str {
     match warning {
         Warning::LateCommand => "drive evenly, look at the plant, or raise `lead_out_ms`",
         Warning::NoPlants => "see whether the beam is as high as the canopy, and clean",
+        Warning::SettingsOlder => "compare `get` with your notes, set what differs, `save`",
         Warning::SlipUnknown => "plants too near for these beams: a smaller `second_beam_mm`, or a wider margin",
     }
 }

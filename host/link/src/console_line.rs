@@ -68,6 +68,8 @@ console_lines! {
         version: String,
         /// The reset cause, in the firmware's word.
         cause: String,
+        /// Whether the machine was at work before.
+        was_at_work: bool,
     }
     /// The answer to `version`.
     Version {
@@ -146,12 +148,14 @@ impl ConsoleLine {
     }
 }
 
-/// Parses `weeder VERSION, reset by CAUSE`, also behind a line that the reset has cut.
+/// Parses `weeder VERSION, reset by CAUSE` and perhaps `, was work`, also behind a line that the reset has cut.
 fn greeting(line: &str) -> Option<ConsoleLine> {
     let (before, behind) = line.split_once(", reset by ")?;
     let version = before.get(before.rfind(NAME)? + NAME.len()..)?;
     let cause = behind.split(|character| !is_of_a_name(character)).next().filter(|cause| !cause.is_empty())?;
-    is_version(version).then(|| ConsoleLine::Greeting { version: version.to_owned(), cause: cause.to_owned() })
+    let was_at_work = behind[cause.len()..].starts_with(", was work,");
+    let (version, cause) = (version.to_owned(), cause.to_owned());
+    is_version(&version).then_some(ConsoleLine::Greeting { version, cause, was_at_work })
 }
 
 /// Parses `weeder VERSION`. A version may be followed by its commit.
@@ -267,7 +271,7 @@ mod tests {
     fn the_firmware_says_its_name_by_itself_and_when_asked() {
         let greeting = |version: &str, cause: &str| {
             let (version, cause) = (version.to_owned(), cause.to_owned());
-            ConsoleLine::Greeting { version, cause }
+            ConsoleLine::Greeting { version, cause, was_at_work: false }
         };
         for cut in ["", "o", "status pos=123 to", "error: no such com", "state is=ho", "weeder 0.1"] {
             let line = format!("{cut}weeder 0.2.0, reset by brown_out, state alarm 5-1 settings_lost, tool out");

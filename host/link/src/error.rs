@@ -57,6 +57,8 @@ pub enum LinkError {
         /// The end of what came.
         received: String,
     },
+    #[error("no answer to `{command}` for {seconds} s: see to the Uno's cable and supply")]
+    Unanswered { command: String, seconds: u64 },
     #[error("the port sends no text: check that nothing else is wired to D0 and D1, and flash the Uno again")]
     Noise,
     #[error("it is not the weeder's firmware that answers, but {0:?}: put it on the Uno by `weeder flash`")]

@@ -11,7 +11,7 @@ use control::operate::state::State;
 use control::say::names;
 use strum::{EnumString, IntoStaticStr};
 
-/// A line, as the tables of [events](control::event_table) and [status](control::status_table) describe it.
+/// A line, as the [tables](control::line_tables) describe it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineDescription {
     /// Its name.
@@ -37,10 +37,20 @@ pub struct ValueDescription {
     pub meaning: &'static str,
 }
 
-macro_rules! event_lines {
-    ($($Event:ident $meaning:literal, $pattern:pat => $beginning:literal {
-        $($key:literal = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
-    } $($tail:literal)?)*) => {
+/// Makes all of the lines from the tables: their types, descriptions and parsers.
+macro_rules! read_lines {
+    (
+        events {$(
+            $Event:ident $meaning:literal, $pattern:pat => $beginning:literal {
+                $($part:literal $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
+            } $($tail:literal)?
+        )*}
+        status $machine:ident {$(
+            $Line:ident $says:literal $($(if $condition:pat = $from:expr =>)? {
+                $($word:literal $of:ident($state:expr) $(=> $to:ident: $To:ty)?, $tells:literal;)*
+            })*;
+        )*}
+    ) => {
         /// An event that the machine reported, as [`Event`] was written.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum EventLine {
@@ -68,7 +78,7 @@ macro_rules! event_lines {
             meaning: $meaning,
             beginning: $beginning,
             values: &[$(ValueDescription {
-                key: $key,
+                key: key($part),
                 kind: stringify!($kind),
                 field: [$(Some((stringify!($field), stringify!($Type))),)? None][0],
                 meaning: $about,
@@ -84,7 +94,7 @@ macro_rules! event_lines {
                 $(
                     let read = |values: Values<'_>| {
                         let _ = &values;
-                        Some(Self::$Event { $($($field: kind::$kind(values.text($key)?)?,)?)* })
+                        Some(Self::$Event { $($($field: kind::$kind(values.text(key($part))?)?,)?)* })
                     };
                     if let Some(event) = behind(line, $beginning).and_then(read) {
                         return Some(event);
@@ -112,22 +122,14 @@ macro_rules! event_lines {
                 }
             }
         }
-    };
-}
 
-control::event_table!(event_lines);
-
-macro_rules! status_lines {
-    ($machine:ident: $($Line:ident $meaning:literal $($(if $pattern:pat = $from:expr =>)? {
-        $($key:literal = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
-    })*;)*) => {
         $(
-            #[doc = $meaning]
+            #[doc = $says]
             #[derive(Clone, Debug, Default, PartialEq, Eq)]
             pub struct $Line {
                 $($($(
-                    #[doc = $about]
-                    pub $field: $Type,
+                    #[doc = $tells]
+                    pub $to: $To,
                 )?)*)*
             }
 
@@ -136,14 +138,13 @@ macro_rules! status_lines {
                 pub fn parse(line: &str) -> Option<Self> {
                     // Version 0.1 had another key for the alarm's name.
                     let line = line.replace(" alarm=", " name=");
-                    let (values, mut read) = (Values(&line), Self::default());
-                    $(read_group!([$($pattern)?] values read $($($field $key $kind)?)*);)*
-                    Some(read)
+                    let values = Values(&line);
+                    Some(Self { $($($($to: Take::take(values.text(key($word)).and_then(kind::$of))?,)?)*)* })
                 }
 
                 /// Its name in [`STATUS`], and its fields by name.
                 pub fn fields(&self) -> Fields {
-                    (stringify!($Line), vec![$($($((stringify!($field), self.$field.clone().into()),)?)*)*])
+                    (stringify!($Line), vec![$($($((stringify!($to), self.$to.clone().into()),)?)*)*])
                 }
             }
         )*
@@ -151,29 +152,59 @@ macro_rules! status_lines {
         /// The lines of the answer to `status`.
         pub const STATUS: &[LineDescription] = &[$(LineDescription {
             name: stringify!($Line),
-            meaning: $meaning,
+            meaning: $says,
             beginning: "",
             values: &[$($(ValueDescription {
-                key: $key,
-                kind: stringify!($kind),
-                field: [$(Some((stringify!($field), stringify!($Type))),)? None][0],
-                meaning: $about,
+                key: key($word),
+                kind: stringify!($of),
+                field: [$(Some((stringify!($to), stringify!($To))),)? None][0],
+                meaning: $tells,
             }),*),*],
         }),*];
+
+        /// Each line's name, keys and fields, from the machine itself.
+        #[cfg(test)]
+        fn fields_of_status($machine: &tests::Machine) -> Vec<(Vec<&'static str>, Fields)> {
+            vec![$({
+                let (mut keys, mut fields) = (Vec::new(), Vec::new());
+                $($(if let $condition = $from)? {
+                    $(keys.push(key($word)); $(fields.push((stringify!($to), Field::from($state)));)?)*
+                })*
+                (keys, (stringify!($Line), fields))
+            }),*]
+        }
     };
 }
 
-/// Reads the fields of a group. Those of a group behind `if` may be missing, or have a value that only a newer firmware knows.
-macro_rules! read_group {
-    ([] $values:ident $read:ident $($field:ident $key:literal $kind:ident)*) => {
-        $($read.$field = kind::$kind($values.text($key)?)?;)*
-    };
-    ([$pattern:pat] $values:ident $read:ident $($field:ident $key:literal $kind:ident)*) => {
-        $($read.$field = $values.text($key).and_then(kind::$kind);)*
-    };
+control::line_tables!(read_lines);
+
+/// The key in a value's part of its line. Empty if it has none.
+const fn key(part: &'static str) -> &'static str {
+    let (bytes, mut start, mut end) = (part.as_bytes(), 0, 0);
+    while end < bytes.len() && bytes[end] != b'=' {
+        start += (bytes[end] == b' ') as usize;
+        end += 1;
+    }
+    if end == bytes.len() { "" } else { part.split_at(end).0.split_at(start).1 }
 }
 
-control::status_table!(status_lines);
+/// Fills a field of the status with its value, if there is one. An optional field may be missing, or have a value that only a newer
+/// firmware knows.
+trait Take<T>: Sized {
+    fn take(value: Option<T>) -> Option<Self>;
+}
+
+impl<T> Take<T> for T {
+    fn take(value: Option<T>) -> Option<T> {
+        value
+    }
+}
+
+impl<T> Take<T> for Option<T> {
+    fn take(value: Option<T>) -> Option<Self> {
+        Some(value)
+    }
+}
 
 /// A line's name, and its fields by their names.
 pub type Fields = (&'static str, Vec<(&'static str, Field)>);
@@ -281,14 +312,23 @@ fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
 
 /// How each kind of value of the tables is read.
 pub(super) mod kind {
-    use super::{Alarm, Class, Warning, names};
+    use super::{Alarm, Class, Mode, Warning, names};
     use control::say::Text;
     use std::str::FromStr;
 
-    pub(super) use self::{number as count, number as optional, number as state, word as cause, word as reason};
+    pub(super) use self::{number as count, word as cause, word as reason};
 
     pub(super) fn number<T: FromStr>(word: &str) -> Option<T> {
         word.parse().ok()
+    }
+
+    /// A number, or another word if there is none.
+    pub(super) fn optional(word: &str) -> Option<i32> {
+        number(word)
+    }
+
+    pub(super) fn state(word: &str) -> Option<Mode> {
+        number(word)
     }
 
     /// A newer firmware may have more of these words.
@@ -361,6 +401,8 @@ mod tests {
     use rig::{Beams, ByExamples, Rig};
     use std::collections::{BTreeMap, BTreeSet};
 
+    pub(super) type Machine = Rig<ByExamples>;
+
     /// The event as the firmware writes it.
     fn line(event: Event) -> String {
         let mut line = Line::new();
@@ -432,25 +474,6 @@ mod tests {
         Reason: reason => Self::Word(reason.text().to_string());
         Cause: cause => Self::Word(cause.text().to_string());
     }
-
-    macro_rules! fields_of_status {
-        ($machine:ident: $($Line:ident $meaning:literal $($(if $pattern:pat = $from:expr =>)? {
-            $($key:literal = $kind:ident($value:expr) $(=> $field:ident: $Type:ty)?, $about:literal;)*
-        })*;)*) => {
-            /// Each line's name, keys and fields, from the machine itself.
-            fn fields_of_status($machine: &Rig<ByExamples>) -> Vec<(Vec<&'static str>, Fields)> {
-                vec![$({
-                    let (mut keys, mut fields) = (Vec::new(), Vec::new());
-                    $($(if let $pattern = $from)? {
-                        $(keys.push($key); $(fields.push((stringify!($field), Field::from($value)));)?)*
-                    })*
-                    (keys, (stringify!($Line), fields))
-                }),*]
-            }
-        };
-    }
-
-    control::status_table!(fields_of_status);
 
     /// Rolls over plants, with noise, and with commands between.
     fn roll(rig: &mut Rig<ByExamples>, chance: &mut ChaCha8Rng) {

@@ -210,7 +210,7 @@ mod tests {
         for (spacing_mm, width_mm) in [(60, 12), (500, 100), (600, 150), (700, 180)] {
             let features = Features::describe(417, spacing_mm, width_mm);
             let told = features_of(&example_of(&features, label::PLANT)).expect("it is an object's");
-            for (told, true_one) in told.values().into_iter().zip(features.values()) {
+            for (told, true_one) in told.values().iter().zip(features.values()) {
                 assert!((told - true_one).abs() <= 10, "{told} for {true_one}");
             }
         }

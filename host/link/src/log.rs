@@ -197,7 +197,7 @@ pub struct Entry {
 /// # Errors
 /// Names the file, the line and what would be right.
 pub fn read(path: &Path) -> Result<Vec<Entry>, FileError> {
-    parse(path, files::csv_table::bytes(path)?)
+    parse(path, files::bounded_file::recorded(path)?)
 }
 
 /// The lines in a log's text.

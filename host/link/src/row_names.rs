@@ -9,10 +9,9 @@
 use super::port::{calling_out, is_same, is_uno, listed};
 use super::settings_file::no_toml;
 use super::{Link, LinkError, find_uno};
-use files::{FileError, text_file, whole_file};
+use files::{FileError, bounded_file, whole_file};
 use serialport::{SerialPortInfo, SerialPortType};
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml_edit::{DocumentMut, InlineTable, Item, Value};
@@ -208,10 +207,9 @@ impl Names {
     /// # Errors
     /// Names the file, the line, and what would be right.
     pub fn read(path: &Path) -> Result<Self, NamesError> {
-        let (head, text) = match fs::read_to_string(path) {
-            Ok(text) => ("", text),
-            Err(error) if error.kind() == ErrorKind::NotFound => (HEAD, String::new()),
-            Err(source) => return Err(FileError::unread(path, source).into()),
+        let (head, text) = match bounded_file::text(path) {
+            Err(error) if error.is_absence() => (HEAD, String::new()),
+            text => ("", text?),
         };
         let (document, rows) = parse(path, &text)?;
         Ok(Self { path: path.into(), head, document, rows })
@@ -295,7 +293,7 @@ impl Names {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Vec<Row>), FileError> {
-    text_file::check_nesting(path, text)?;
+    bounded_file::check_nesting(path, text)?;
     let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let mut rows: Vec<Row> = Vec::new();
     for (name, item) in document.iter() {

@@ -227,8 +227,9 @@ impl Session {
 
     /// Reports a start of the firmware.
     fn start(&mut self, greeting: String) {
-        let ConsoleLine::Greeting { cause, .. } = ConsoleLine::parse(&greeting) else { return };
-        let while_at_work = std::mem::take(&mut self.is_at_work).then_some(cause);
+        let ConsoleLine::Greeting { cause, was_at_work, .. } = ConsoleLine::parse(&greeting) else { return };
+        // The machine may have been at work before this session, whose opening of the port has reset it.
+        let while_at_work = (std::mem::take(&mut self.is_at_work) | was_at_work).then_some(cause);
         self.happened.push_back(Happening::Started { greeting, while_at_work });
     }
 
@@ -283,7 +284,7 @@ impl Session {
         let is_old = |asked: &&Asked| !is_more_to_read && self.waited.saturating_sub(asked.since) > PATIENCE;
         if let Some(Asked { line, .. }) = self.asked.front().filter(is_old) {
             link.discard_unsent();
-            return Err(LinkError::Silent { command: line.clone(), received: String::new() }.into());
+            return Err(LinkError::Unanswered { command: line.clone(), seconds: PATIENCE.as_secs() }.into());
         }
         let next = if std::mem::take(&mut self.is_to_hold) {
             Some((HOLD.to_owned(), None))

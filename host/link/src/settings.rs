@@ -268,20 +268,31 @@ impl Shown {
     }
 }
 
-/// As [`push`], with settings that only the machine knows.
+/// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them. Returns the changed settings.
+///
+/// Sends nothing if the result would contradict itself, or if the machine is at work. Settings that only the machine's
+/// version has, or whose values only it has, are sent as they are, and the machine checks them.
 ///
 /// # Errors
-/// As [`push`], and if the machine does not know one of them.
-pub fn push_all(
+/// These two cases; a setting or a value that the machine does not have; errors of the console; and a value that was not
+/// accepted.
+pub fn push(
     link: &mut Link,
     wanted: &[(Setting, u16)],
     foreign: &[Foreign],
     save: bool,
 ) -> Result<Vec<String>, SettingsError> {
     let shown = read_shown(link)?;
+    let (own, known): (Vec<_>, Vec<_>) =
+        wanted.iter().partition::<Vec<(Setting, u16)>, _>(|(setting, _)| shown.missing.contains(setting));
+    let foreign = foreign.iter().cloned().chain(own.into_iter().map(|(setting, value)| Foreign {
+        problem: format!("{} {value} is wanted", name(setting)),
+        name: name(setting),
+        value,
+    }));
     let mut changed = Vec::new();
     for foreign in foreign {
-        let own = shown.takes(foreign)?;
+        let own = shown.takes(&foreign)?;
         let value = match foreign.value {
             value if !own.is_switched => value.to_string(),
             0 => "off".to_owned(),
@@ -291,59 +302,43 @@ pub fn push_all(
             changed.push((foreign.name.clone(), format!("set {} {value}", foreign.name)));
         }
     }
-    if !changed.is_empty() && status(link)?.mode == Mode::Work {
-        return Err(SettingsError::AtWork);
-    }
-    let mut set: Vec<String> = push(link, wanted, false)?.into_iter().map(name).collect();
-    for (name, command) in changed {
-        link.ask(&command)?;
-        set.push(name);
-    }
-    if save {
-        if status(link)?.mode == Mode::Work {
-            return Err(SettingsError::AtWork);
-        }
-        link.ask("save")?;
-    }
-    Ok(set)
-}
-
-/// Sets some settings, leaves the others unchanged, and reads all back. `save` saves them.
-///
-/// Sends nothing if the result would contradict itself, or if the machine is at work. Returns the changed settings.
-///
-/// # Errors
-/// These two cases; errors of the console; and a value that was not accepted.
-pub fn push(link: &mut Link, wanted: &[(Setting, u16)], save: bool) -> Result<Vec<Setting>, SettingsError> {
-    let before = read(link)?;
+    let before = shown.settings;
     let mut after = before.clone();
-    for &(setting, value) in wanted {
+    for &(setting, value) in &known {
         // Values of settings are in their ranges.
         let _ = after.set(setting, value);
     }
-    if !wanted.iter().any(|&(setting, _)| setting == Setting::TicksPerM) {
+    let wants_calibration = wanted.iter().any(|&(setting, _)| setting == Setting::TicksPerM);
+    if !wants_calibration && !shown.missing.contains(&Setting::TicksPerM) {
         follow_wheel(&before, &mut after);
     }
-    if let Some(contradiction) = after.contradiction() {
+    if let Some(contradiction) = after.contradiction().filter(|_| shown.missing.is_empty()) {
         return Err(SettingsError::Contradiction(explain(contradiction)));
     }
     let steps = steps(&before, &after);
-    let needs_hold = save || steps.iter().any(|(setting, _)| setting.description().hold_only);
+    let needs_hold = save || !changed.is_empty() || steps.iter().any(|(setting, _)| setting.description().hold_only);
     if needs_hold && status(link)?.mode == Mode::Work {
         return Err(SettingsError::AtWork);
     }
-    for &(setting, value) in &steps {
-        link.ask(&format!("set {} {value}", name(setting)))?;
+    let commands = steps.iter().map(|&(setting, value)| format!("set {} {value}", name(setting)));
+    for command in commands.chain(changed.iter().map(|(_, command)| command.clone())) {
+        link.ask(&command)?;
     }
-    let found = read(link)?;
-    if let Some(setting) = Setting::all().find(|&setting| found.get(setting) != after.get(setting)) {
-        let (wanted, found) = (after.get(setting), found.get(setting));
+    let found = read_shown(link)?;
+    let is_compared = |setting: &Setting| !found.missing.contains(setting) && !shown.missing.contains(setting);
+    // A wheel of another version may have reset its calibration.
+    let is_compared =
+        |setting: &Setting| is_compared(setting) && (changed.is_empty() || *setting != Setting::TicksPerM);
+    let differs = |setting: &Setting| found.settings.get(*setting) != after.get(*setting);
+    if let Some(setting) = Setting::all().filter(is_compared).find(differs) {
+        let (wanted, found) = (after.get(setting), found.settings.get(setting));
         return Err(SettingsError::NotTaken { setting: name(setting), wanted, found });
     }
     if save {
         link.ask("save")?;
     }
-    Ok(Setting::all().filter(|&setting| before.get(setting) != after.get(setting)).collect())
+    let set = Setting::all().filter(|&setting| before.get(setting) != after.get(setting)).map(name);
+    Ok(set.chain(changed.into_iter().map(|(name, _)| name)).collect())
 }
 
 /// Asks for the machine's status.

@@ -5,8 +5,7 @@
 //! is checked against the table. The first error gives its line and what would be right.
 
 use super::settings::{Foreign, OtherSetting, Setting, Settings, Shown, help, name, range};
-use files::{FileError, text_file, whole_file};
-use std::fs;
+use files::{FileError, bounded_file, whole_file};
 use std::path::Path;
 use toml_edit::{Decor, DocumentMut, Item, Key, TomlError, Value};
 
@@ -33,7 +32,7 @@ pub struct Named {
 /// # Errors
 /// Names the file, the line, and what would be right.
 pub fn read(path: &Path) -> Result<Named, FileError> {
-    parse(path, &text(path)?).map(|(_, named)| named)
+    parse(path, &bounded_file::text(path)?).map(|(_, named)| named)
 }
 
 /// Writes all settings of a machine into a file, also those that only the machine knows. An existing file keeps its
@@ -42,7 +41,7 @@ pub fn read(path: &Path) -> Result<Named, FileError> {
 /// # Errors
 /// As [`read`], and if the file cannot be written.
 pub fn write(path: &Path, shown: &Shown) -> Result<(), FileError> {
-    let old = if path.exists() { text(path)? } else { HEAD.to_owned() };
+    let old = if path.exists() { bounded_file::text(path)? } else { HEAD.to_owned() };
     let new = updated(path, &old, shown)?;
     let written = whole_file::write(path, |to| to.write_all(new.as_bytes()));
     written.map_err(|source| FileError::unwritten(path, source))
@@ -53,12 +52,6 @@ pub fn is_true(setting: Setting, value: u16) -> Option<bool> {
     setting.is_switched().then_some(value != 0)
 }
 
-fn text(path: &Path) -> Result<String, FileError> {
-    let bytes = fs::read(path).map_err(|source| FileError::unread(path, source))?;
-    String::from_utf8(bytes)
-        .map_err(|_| FileError::at_byte(path, "", 0, "this is no text: a settings file is TOML in UTF-8"))
-}
-
 /// An error in the line where a text is no TOML.
 pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
     let start = error.span().map_or(0, |span| span.start);
@@ -66,7 +59,7 @@ pub(super) fn no_toml(path: &Path, text: &str, error: &TomlError) -> FileError {
 }
 
 fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
-    text_file::check_nesting(path, text)?;
+    bounded_file::check_nesting(path, text)?;
     let document: DocumentMut = text.parse().map_err(|error| no_toml(path, text, &error))?;
     let (mut settings, mut foreign) = (Vec::new(), Vec::new());
     let mut old_merge_gap = None;
@@ -177,6 +170,7 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     /// Parses a file's text. Returns the error's message otherwise, also for a setting of another version.
     fn parsed(text: &str) -> Result<Vec<(Setting, u16)>, String> {

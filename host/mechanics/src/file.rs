@@ -4,7 +4,7 @@
 //! most likely a misspelt key.
 
 use crate::machine::{Input, Machine};
-use files::{FileError, text_file, toml_entry};
+use files::{FileError, bounded_file, toml_entry};
 use std::path::Path;
 
 /// Reads a machine and checks it.
@@ -12,7 +12,7 @@ use std::path::Path;
 /// # Errors
 /// If the file cannot be read, is no TOML, has unknown keys or units, or makes no calculable machine.
 pub fn read(path: &Path) -> Result<Machine, FileError> {
-    parse(path, &text_file::read(path)?)
+    parse(path, &bounded_file::text(path)?)
 }
 
 /// Parses the text of such a file and checks the machine. `path` is named in errors.
@@ -20,7 +20,7 @@ pub fn read(path: &Path) -> Result<Machine, FileError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(path: &Path, text: &str) -> Result<Machine, FileError> {
-    text_file::check_nesting(path, text)?;
+    bounded_file::check_nesting(path, text)?;
     let machine: Machine = toml::from_str(text).map_err(|error| {
         let byte = error.span().map_or(0, |span| span.start);
         FileError::at_byte(path, text, byte, explain(text, byte, error.message()))

@@ -259,6 +259,7 @@ impl<M: Machine> Drive<M> {
                 self.turns(turns)?;
                 self.edges_get_lost = false;
                 self.machine.lose_edges(&self.world)?;
+                self.model.lose_edges();
                 prop_assert!(is_alarm(self.machine.state()) || self.is_tried, "lost edges are no alarm");
                 Ok(())
             }
@@ -350,7 +351,10 @@ impl<M: Machine> Drive<M> {
             + 2 * self.ticks(Setting::BeamToToolMm)
             + self.ticks(Setting::MarginMm)
             + metre as i64;
-        self.target = 0.5 * self.ticks(Setting::TopSpeedMmS) as f64;
+        // Slower if a plant that only the second beam sees would reach the tool.
+        let lead_s = f64::from(self.machine.settings().get(Setting::LeadOutMs) + 1) / 1000.0;
+        let from_beam = (self.ticks(Setting::BeamToToolMm) - self.ticks(Setting::SecondBeamMm)) as f64;
+        self.target = 0.5 * (self.ticks(Setting::TopSpeedMmS) as f64).min(from_beam / lead_s);
         let mut asked_us = self.world.time_us;
         while self.machine.tool_out() || self.is_tried {
             if !M::IS_OPEN && self.world.time_us > asked_us + ASKED_EVERY_US {

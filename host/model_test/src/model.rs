@@ -7,7 +7,7 @@
 //! unknown, because it was never seen or was forgotten. An alarm opens nothing.
 //!
 //! With a stem zone, the tool may work at either end of a detection: beyond the zone, but by at most a fifth of that
-//! part. A second beam may see the end elsewhere, which adds to the limit.
+//! part. A second beam can only add to a detection.
 //!
 //! Guarded ground is closed like a canopy from then on, with or without a plant.
 //!
@@ -55,15 +55,16 @@ pub struct Model {
     /// Whether the beam is broken now, and whether the last stretch goes on at the frontier.
     broken: bool,
     is_growing: bool,
+    /// Whether edges were lost while the beam was broken, anywhere behind the frontier. The machine then expects a plant there.
+    may_be_broken_at_frontier: bool,
     /// In the order of their positions.
     stretches: Vec<Stretch>,
     /// Ground of expected but missed plants, in the order of the machine's reports.
     guarded: Vec<Stretch>,
     /// Gaps that belong to a canopy, each with the frontier at which it was set.
     merge_gaps: Vec<(i64, i64)>,
-    /// Stem zones, each with the frontier at which it was set; and the shift of an end by a second beam.
+    /// Stem zones, each with the frontier at which it was set.
     stem_zones: Vec<(i64, i64)>,
-    moved: i64,
     /// A detection up to this width may have been classified as a weed without an event.
     narrow: i64,
     /// Error of every position: from the machine's resolution of the ground, and a turn of the loop.
@@ -85,11 +86,11 @@ impl Model {
             frontier: place,
             broken,
             is_growing: false,
+            may_be_broken_at_frontier: false,
             stretches: Vec::new(),
             guarded: Vec::new(),
             merge_gaps: Vec::new(),
             stem_zones: Vec::new(),
-            moved: 0,
             narrow: 0,
             slack: 0,
             resolution_slack: 0,
@@ -105,8 +106,7 @@ impl Model {
     /// the ground again as new.
     pub fn follow(&mut self, place: i64, settings: &Settings, narrow_mm: u16) {
         let metre = i64::from(settings.wheel().ticks(1000).0);
-        let [merge_gap, zone, second_beam] =
-            [Setting::MergeGapMm, Setting::StemZoneMm, Setting::SecondBeamMm].map(|set| settings.ticks(set).0.into());
+        let [merge_gap, zone] = [Setting::MergeGapMm, Setting::StemZoneMm].map(|set| settings.ticks(set).0.into());
         if self.frontier - place > 8 * metre - metre / 20 {
             self.known_from = self.known_from.min(place);
             self.may_have_forgotten = true;
@@ -125,7 +125,6 @@ impl Model {
         if self.stem_zones.last().map_or(0, |&(_, last)| last) != zone {
             self.stem_zones.push((self.frontier, zone));
         }
-        self.moved = self.moved.max(second_beam / 16);
         self.narrow = self.narrow.max(settings.wheel().ticks(narrow_mm).0.into());
     }
 
@@ -149,12 +148,15 @@ impl Model {
         self.known_from = self.known_from.min(place);
         self.begin = self.begin.min(place);
         (self.frontier, self.is_growing, self.may_have_forgotten) = (place, false, false);
+        self.may_be_broken_at_frontier = false;
         self.stretches.retain(|stretch| stretch.leading < place);
         self.stretches.iter_mut().for_each(|stretch| stretch.trailing = stretch.trailing.min(place - 1));
         self.guarded.retain(|guarded| guarded.trailing < place);
         self.merge_gaps.clear();
         let zone = self.stem_zones.last().copied();
         self.stem_zones = zone.map(|(_, zone)| (place, zone)).into_iter().collect();
+        // A plant that breaks the beam here is kept from here on.
+        self.touch(0);
     }
 
     /// The machine reports that it guards the ground around a position, where a plant was expected.
@@ -192,7 +194,13 @@ impl Model {
             self.touch(blur);
             self.frontier = place;
             self.touch(blur);
+            self.may_be_broken_at_frontier = false;
         }
+    }
+
+    /// The machine has lost edges of the beam, and now knows its level again.
+    pub fn lose_edges(&mut self) {
+        self.may_be_broken_at_frontier = self.broken;
     }
 
     /// The beam breaks or clears at a position.
@@ -314,7 +322,9 @@ impl Model {
             let reach = reach + self.slack + 2 * stretch.blur;
             stretch.leading - reach <= place && place <= stretch.trailing + reach
         };
-        self.stretches.iter().chain(&self.guarded).any(is_near)
+        let at_frontier = Stretch::closed(self.frontier, self.frontier, 0);
+        self.may_be_broken_at_frontier && is_near(&at_frontier)
+            || self.stretches.iter().chain(&self.guarded).any(is_near)
     }
 
     /// The last canopy between `near` and `far`, if canopies and their margins close all of that ground.
@@ -370,7 +380,7 @@ impl Model {
         let zones = self.stem_zones[first..].iter().filter(|&&(_, zone)| zone > 0);
         let beside = |zone: i64| ((self.widest(stretch) - zone) / 2).clamp(0, zone * 13 / 64);
         let most = zones.map(|&(_, zone)| beside(zone)).max();
-        most.map_or(0, |most| if most > 0 { most + self.moved + 1 } else { 0 })
+        most.map_or(0, |most| if most > 0 { most + 1 } else { 0 })
     }
 
     /// Whether the machine may merge two neighbours.
@@ -397,5 +407,21 @@ impl Model {
             self.stretches[..end].iter().rfind(is_closed)
         };
         found.copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plant_in_the_beam_is_kept_where_ground_is_seen_again_as_new() {
+        let mut model = Model::new(0, false);
+        model.edge(900, true, 0);
+        model.roll_to(1000, 0);
+        model.see_again(950);
+        assert!(model.has_canopy_near(950, 0) && model.canopy_between(940, 960, 0).is_none(), "it may be of no width");
+        model.roll_to(1000, 0);
+        assert!(model.canopy_between(960, 960, 0).is_some());
     }
 }

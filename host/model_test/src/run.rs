@@ -489,6 +489,8 @@ pub fn beams(rolls: usize) -> BoxedStrategy<Run> {
         3 => (-100_i32..=100).prop_map(|share| (share, Step::Stand { ms: 1 })),
         1 => (1_u32..800).prop_map(|ms| (0, Step::Stand { ms })),
         1 => (1_u32..40).prop_map(|times| (0, Step::Tremble { times })),
+        // An alarm: the ground and the slip are forgotten.
+        1 => (1_u32..4).prop_map(|turns| (0, Step::LoseEdges { turns })),
     ];
     let steps = prop::collection::vec(step, 6..rolls);
     let going = roll(200..500, 3000..12_000);

@@ -46,6 +46,8 @@ pub struct Rig<C, M = Volatile> {
     /// The readings for the next turn.
     pub readings: Readings,
     beams: Beams,
+    /// Whether the controller knows the second beam's level.
+    watches_second: bool,
     line: LineBuffer,
 }
 
@@ -66,9 +68,21 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
 
     /// Wakes up with sensors that show this.
     pub fn wake_at(classifier: C, memory: M, readings: Readings, beams: Beams, cause: Cause) -> Self {
-        let startup = Startup { readings, beam_broken: beams.broken, cause };
+        Self::wake_from(classifier, memory, readings, beams, cause, false)
+    }
+
+    /// The same, after a reset of a machine that was at work, or not.
+    pub fn wake_from(
+        classifier: C,
+        memory: M,
+        readings: Readings,
+        beams: Beams,
+        cause: Cause,
+        was_working: bool,
+    ) -> Self {
+        let startup = Startup { readings, beam_broken: beams.broken, cause, was_working };
         let controller = Controller::new(classifier, memory, startup);
-        Self { controller, readings, beams, line: LineBuffer::new() }
+        Self { controller, readings, beams, watches_second: false, line: LineBuffer::new() }
     }
 
     /// The encoder counts to `count`.
@@ -100,7 +114,8 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
     /// Edges found no room to wait in.
     pub fn lose_edges(&mut self, beams: Beams) {
         self.beams = beams;
-        self.controller.take_edge(Edge::Lost { broken: beams.broken });
+        let Beams { broken, second_broken } = beams;
+        self.controller.take_edge(Edge::Lost { broken, second_broken });
     }
 
     /// A turn of the loop.
@@ -113,6 +128,11 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
     pub fn turn_with(&mut self, readings: Readings) -> Orders {
         self.readings = readings;
         *self.controller.next_readings() = readings;
+        let has_second = self.controller.has_second_beam();
+        if has_second && !self.watches_second {
+            self.edge(readings.position, self.beams);
+        }
+        self.watches_second = has_second;
         let orders = self.controller.step();
         self.controller.catch_up();
         orders
@@ -142,7 +162,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         let mut said = Vec::new();
         for byte in bytes {
             let Some(typed) = self.line.take(byte) else { continue };
-            let mut answer = say::execute(typed, &mut self.controller);
+            let mut answer = say::execute(typed.as_ref().map_err(|&error| error), &mut self.controller);
             self.write_all();
             while !answer.is_done() {
                 let mut line = Line::new();

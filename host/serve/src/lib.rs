@@ -28,7 +28,7 @@ use self::places::Places;
 use self::routes::{Served, Visitor, routes};
 use axum::Extension;
 use axum::Router;
-use futures_util::future::select;
+use futures_util::future::{Either, select};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
@@ -45,6 +45,7 @@ use std::time::Duration;
 use thiserror::Error;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio::runtime::{self, Runtime};
+use tokio::task::yield_now;
 use tokio::time::sleep;
 use tokio_io_timeout::TimeoutStream;
 
@@ -66,6 +67,9 @@ const READER_TIME: Duration = Duration::from_secs(5);
 /// Greatest number of connections that wait to be accepted. A client whose first packet is dropped sends it again only
 /// after a second.
 const BACKLOG: u32 = 1024;
+
+/// Turns of a connection's task in which it reads what has come. Its head, its body and the door take some.
+const TURNS_TO_READ: usize = 16;
 
 /// Time between two checks whether to stop.
 const LOOK: Duration = Duration::from_millis(100);
@@ -245,12 +249,24 @@ async fn attend(listener: TcpListener, door: Arc<Door>, places: Places, routes: 
             sleep(LOOK).await;
             continue;
         };
-        let (place, end) = places.take(peer.ip());
-        let visitor = Visitor { address: peer.ip(), door: Arc::clone(&door), place: place.into(), known: None };
+        let (place, mut end) = places.take(peer.ip());
+        let place = Arc::new(place);
+        let visitor = Visitor { address: peer.ip(), door: Arc::clone(&door), place: Arc::clone(&place), known: None };
         let routes = routes.clone().layer(Extension(visitor));
         tokio::spawn(async move {
-            // Closes the connection at its end, or when it loses its place.
-            select(pin!(serve(stream, routes)), end).await;
+            let mut served = pin!(serve(stream, routes));
+            // Closes the connection at its end, or when it loses its place. Before that, what has come is read.
+            while matches!(select(&mut served, end).await, Either::Right(_)) {
+                for _ in 0..TURNS_TO_READ {
+                    if matches!(select(&mut served, pin!(yield_now())).await, Either::Left(_)) {
+                        return;
+                    }
+                }
+                match place.next_end() {
+                    Some(next) => end = next,
+                    None => return,
+                }
+            }
         });
     }
 }

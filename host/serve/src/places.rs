@@ -3,6 +3,7 @@
 //! A connection is in one [`Stage`] at a time, and each stage has its own places. So new connections take no place from
 //! known clients, event streams take none from commands, and neither takes one from HOLD. No connection is refused. If
 //! a stage is full, the client with the most connections in it loses one. So a client with one connection keeps it.
+//! A new connection whose request has come is read before it ends, because its place may be lost before its turn comes.
 //!
 //! The limits of `tower` do not fit: they count requests, and treat all clients alike.
 
@@ -62,6 +63,17 @@ struct Taken {
 pub struct Place {
     number: u64,
     places: Places,
+    /// Its end, after it was lost and the connection has entered a stage for the first time.
+    later: Mutex<Later>,
+}
+
+/// The end of a connection that has lost its first place.
+enum Later {
+    /// It has entered no stage yet.
+    MayCome,
+    Came(End),
+    /// It has entered a stage: its next loss is final.
+    Over,
 }
 
 /// Completes, with an error, when a connection loses its place.
@@ -75,7 +87,7 @@ impl Places {
         let number = table.next;
         table.next += 1;
         table.enter(Taken { number, client: Client::Address(address), stage: Stage::Opening, _end: end });
-        (Place { number, places: self.clone() }, ended)
+        (Place { number, places: self.clone(), later: Mutex::new(Later::MayCome) }, ended)
     }
 }
 
@@ -110,12 +122,29 @@ impl Table {
 }
 
 impl Place {
-    /// Assigns the connection to this client, as the newest of a stage. A connection that has lost its place does not
-    /// enter.
+    /// Assigns the connection to this client, as the newest of a stage. A connection that has lost its place enters only
+    /// with its first request.
     pub fn enter(&self, stage: Stage, client: Client) {
         let mut table = self.places.0.lock();
+        let mut later = self.later.lock();
+        let is_first = matches!(*later, Later::MayCome);
         if let Some(taken) = table.leave(self.number) {
             table.enter(Taken { stage, client, ..taken });
+            if is_first {
+                *later = Later::Over;
+            }
+        } else if is_first {
+            let (end, ended) = oneshot::channel();
+            table.enter(Taken { number: self.number, client, stage, _end: end });
+            *later = Later::Came(ended);
+        }
+    }
+
+    /// The next end of a connection that has lost its place, if its request came in time.
+    pub fn next_end(&self) -> Option<End> {
+        match std::mem::replace(&mut *self.later.lock(), Later::Over) {
+            Later::Came(end) => Some(end),
+            Later::MayCome | Later::Over => None,
         }
     }
 }
@@ -216,11 +245,29 @@ mod tests {
     }
 
     #[test]
+    fn a_first_request_that_came_before_the_end_gets_a_place_once() {
+        let places = Places::default();
+        let mut connections: Vec<_> = (0..=PLACES as u8).map(|last| take(&places, last)).collect();
+        let phone = &mut connections[0];
+        // A request goes through two stages before its connection's end is heard of.
+        phone.0.enter(Stage::Asking, Client::Phone(1));
+        phone.0.enter(Stage::Holding, Client::Phone(1));
+        phone.1 = phone.0.next_end().expect("it has a place again");
+        let mut attack: Vec<_> =
+            (0..PLACES).map(|_| take(&places, 1).enter(Stage::Holding, Client::Phone(1))).collect();
+        assert!(!phone.is_open() && phone.0.next_end().is_none());
+        phone.0.enter(Stage::Holding, Client::Phone(1));
+        assert!(phone.0.next_end().is_none());
+        assert_eq!(open(&mut attack).len(), PLACES);
+    }
+
+    #[test]
     fn a_place_is_free_again_and_one_that_is_lost_does_not_come_back() {
         let places = Places::default();
         let mut connections: Vec<_> = (0..=PLACES).map(|_| take(&places, 1)).collect();
+        assert!(!connections[0].is_open() && connections[0].0.next_end().is_none());
         connections[0].0.enter(Stage::Holding, Client::Phone(1));
-        assert!(!connections[0].is_open());
+        assert!(connections[0].0.next_end().is_none());
         drop(connections);
         assert!(places.0.lock().taken.is_empty());
     }

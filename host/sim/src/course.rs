@@ -7,7 +7,7 @@ use clap::Args;
 use field::conditions::{self, Conditions};
 use field::planting::Planting;
 use field::row::Row;
-use files::csv_table;
+use files::{bounded_file, in_a_line};
 use std::path::PathBuf;
 
 /// The arguments.
@@ -42,8 +42,8 @@ pub struct CourseArguments {
     #[arg(long)]
     ragged: bool,
     /// Read the row from a CSV file with the columns position_mm,width_mm,kind; - for standard input.
-    #[arg(long, value_name = "FILE.csv", value_parser = source::file, conflicts_with_all = ["spacing", "canopy", "plants", "weeds", "seed", "ragged"])]
-    row: Option<PathBuf>,
+    #[arg(long, value_name = "FILE.csv", value_parser = source::file(), conflicts_with_all = ["spacing", "canopy", "plants", "weeds", "seed", "ragged"])]
+    pub row: Option<PathBuf>,
 }
 
 /// The default number of tall weeds in a row. A row without room for them gets fewer.
@@ -62,7 +62,7 @@ impl CourseArguments {
     pub fn nth_row(&self, number: u64) -> Result<Row> {
         let seed = self.seed.wrapping_add(number);
         if let Some(path) = &self.row {
-            return Ok(Row::parse_csv(path, csv_table::bytes(path)?)?);
+            return Ok(Row::parse_csv(path, bounded_file::bytes(path)?)?);
         }
         let gap_mm = self.spacing - self.canopy;
         ensure!(
@@ -85,6 +85,14 @@ impl CourseArguments {
             None => planting.grow_with_room(seed),
         };
         Ok(row?)
+    }
+
+    /// The origin of the row: its seed, or its file.
+    pub fn origin(&self) -> String {
+        match &self.row {
+            None => format!("seed {}", self.seed),
+            Some(path) => format!("row of {}", in_a_line(&path.to_string_lossy())),
+        }
     }
 
     /// The machine and what is around it, in this field.

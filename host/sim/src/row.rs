@@ -13,6 +13,7 @@ use field::row::Row;
 use field::trial::Trial;
 use field::verdict::Verdict;
 use field::wiring;
+use files::in_a_line;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use trial::Outcome;
@@ -50,7 +51,7 @@ pub struct Arguments {
     elf: Option<PathBuf>,
     /// Play a logic analyser's recording to the encoder's pins, and print what the firmware counts; - for standard
     /// input.
-    #[arg(long, value_name = "FILE.vcd", value_parser = source::file, requires_all = ["channel_a", "channel_b"], conflicts_with_all = ["row", "out", "paper"])]
+    #[arg(long, value_name = "FILE.vcd", value_parser = source::file(), requires_all = ["channel_a", "channel_b"], conflicts_with_all = ["row", "out", "paper"])]
     capture: Option<PathBuf>,
     /// The recording's channel for encoder A.
     #[arg(long, value_name = "NAME", requires = "capture")]
@@ -91,9 +92,16 @@ pub fn run(arguments: &Arguments) -> Result<Finding> {
     }
 }
 
+impl Arguments {
+    /// The name of its field.
+    fn field(&self) -> &str {
+        if self.paper { "paper" } else { &self.course.field }
+    }
+}
+
 fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option<&OutFile>) -> Result<Finding> {
     let course = &arguments.course;
-    let conditions = course.conditions_of(if arguments.paper { "paper" } else { &course.field })?;
+    let conditions = course.conditions_of(arguments.field())?;
     let mut trial =
         Trial::at_speed(row, conditions.machine(course.seed), conditions.timing(), mm_s(arguments.course.speed));
     trial.settings = conditions.firmware_settings();
@@ -104,7 +112,8 @@ fn weed(arguments: &Arguments, row: Row, folder: Option<&OutFolder>, vcd: Option
     if !arguments.json {
         let manner = if arguments.paper { ", swings as in the paper" } else { "" };
         let introduction = report::introduction(&trial.row, &trial.machine, &trial.motion);
-        say!("{introduction} at {} km/h{manner}", arguments.course.speed)?;
+        say!("{introduction} at {} km/h{manner}", course.speed)?;
+        say!("Field {}, {}", in_a_line(arguments.field()), course.origin())?;
     }
     let outcome = with_bar("weeding", |show| trial::run(&trial, &elf, show))?;
 
@@ -148,6 +157,8 @@ fn in_json(arguments: &Arguments, trial: &Trial, outcome: &Outcome) -> Value {
     json!({
         "speed_km_h": arguments.course.speed,
         "as_in_the_paper": arguments.paper,
+        "field": arguments.field(),
+        "seed": arguments.course.row.is_none().then_some(arguments.course.seed),
         "damaged": judgement.count(Verdict::Damaged),
         "zones_reached": judgement.reached(),
         "margin_cut": judgement.count(Verdict::MarginCut),

@@ -2,42 +2,37 @@
 //! completion offers them.
 
 use crate::output::tell;
-use clap::builder::{PossibleValue, TypedValueParser};
+use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::{Arg, Command};
 use field::conditions::{Conditions, presets};
 use files::FileError;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
 /// Standard input as a file, if the system has one.
 #[cfg(unix)]
 const STANDARD_INPUT: &str = "/dev/stdin";
 
-/// The file with this name, for the command line.
-///
-/// # Errors
-/// Only if the system has no file for standard input.
-pub fn file(name: &str) -> Result<PathBuf, String> {
-    named(name).map(PathBuf::from)
-}
-
-/// A file's name, or a word with another meaning, such as a preset.
-///
-/// # Errors
-/// As [`file()`].
-pub fn named(name: &str) -> Result<String, String> {
-    match name {
-        #[cfg(unix)]
-        "-" => Ok(STANDARD_INPUT.to_owned()),
-        #[cfg(not(unix))]
-        "-" => Err("standard input cannot be read here: name a file".to_owned()),
-        _ => Ok(name.to_owned()),
-    }
+/// An input file.
+pub fn file() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().try_map(|name| named(name).map(PathBuf::from))
 }
 
 /// A field's preset, or a file; a shell that completes offers the presets.
 pub fn preset_or_file() -> impl TypedValueParser<Value = String> {
-    offering(|| presets().collect(), named)
+    let in_text = |name: OsString| name.into_string().map_err(|name| format!("{name:?} is no UTF-8: rename the file"));
+    offering(|| presets().collect(), OsStringValueParser::new().try_map(move |name| in_text(named(name)?)))
+}
+
+/// A file's name, or a word with another meaning. Fails only if the system has no file for standard input.
+fn named(name: OsString) -> Result<OsString, String> {
+    match name.to_str() {
+        #[cfg(unix)]
+        Some("-") => Ok(STANDARD_INPUT.into()),
+        #[cfg(not(unix))]
+        Some("-") => Err("standard input cannot be read here: name a file".to_owned()),
+        _ => Ok(name),
+    }
 }
 
 /// The conditions of a field. Prints what is likely wrong with them.

@@ -23,8 +23,8 @@ use field::motion::Motion;
 use field::row::Row;
 use field::servo::{Servo, Stroke};
 use field::wiring;
+use files::bounded_file;
 use std::collections::VecDeque;
-use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
@@ -422,13 +422,13 @@ struct EepromFile {
 impl EepromFile {
     /// Reads it; a file that does not exist yet is an erased EEPROM.
     fn open(path: PathBuf) -> Result<EepromFile> {
-        match std::fs::read(&path) {
+        match bounded_file::bytes(&path) {
             Ok(content) if content.len() == EEPROM_BYTES => Ok(EepromFile { path, content }),
             Ok(content) => {
                 let (path, bytes) = (path.display(), content.len());
                 bail!("{path} has {bytes} bytes: a file that keeps the EEPROM has {EEPROM_BYTES}")
             }
-            Err(error) if error.kind() == ErrorKind::NotFound => {
+            Err(error) if error.is_absence() => {
                 let mut file = EepromFile { path, content: Vec::new() };
                 // A file that cannot be written is better known now.
                 file.keep(vec![0xFF; EEPROM_BYTES])?;

@@ -37,7 +37,7 @@ impl Bootloader {
     pub fn read(path: &Path) -> Result<Bootloader, FileError> {
         let wrong = |problem: String| FileError::new(path, problem);
         let right = "take a bootloader's .hex, such as ATmegaBOOT_168_atmega328.hex";
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::unread(path, source))?;
+        let text = String::from_utf8_lossy(&FileError::bytes(path)?).into_owned();
         let pieces = pieces(&text).map_err(|reason| wrong(format!("is no Intel HEX file: {reason}; {right}")))?;
         let start = pieces.iter().map(|(address, _)| *address).min();
         let start = start.ok_or_else(|| wrong(format!("is empty: {right}")))?;

@@ -43,7 +43,7 @@ impl Size {
     ///
     /// Where the file cannot be read or is no ELF for AVR.
     pub fn read(path: &Path) -> Result<Size, FileError> {
-        let bytes = read_bytes(path)?;
+        let bytes = FileError::bytes(path)?;
         parse(path, &bytes).map(|file| size(&file))
     }
 }
@@ -85,7 +85,7 @@ impl Image {
     /// Where the file cannot be read, is neither an ELF for AVR nor HEX, is for another chip, or holds more than the
     /// ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, FileError> {
-        let bytes = read_bytes(path)?;
+        let bytes = FileError::bytes(path)?;
         if is_hex(&bytes) {
             return Ok(Image { flash: hex::flash(path, &bytes)?, ..Image::default() });
         }
@@ -124,10 +124,6 @@ impl Image {
 
 fn is_hex(bytes: &[u8]) -> bool {
     bytes.trim_ascii_start().starts_with(b":")
-}
-
-fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
-    std::fs::read(path).map_err(|source| FileError::unread(path, source))
 }
 
 /// Takes the content of the file at `path` for an ELF for AVR.

@@ -294,21 +294,41 @@ mod tests {
     }
 
     #[test]
-    fn what_other_programs_write_is_read() {
+    fn any_habits_of_other_programs_together_leave_the_levels_as_they_are() {
         let expected = levels(&recording("1 us", "#0 0! 1\" #5 1!"), &CHANNELS).unwrap();
-        let read = |file: &[u8], channels: &[(Pin, &str)]| {
-            let changes = parse(Path::new("pins.vcd"), file, channels).unwrap();
-            changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect::<Vec<_>>()
-        };
-        let vector = recording("1 us", "#0 b0 ! b1 \"\n#5 b1 !");
-        assert_eq!(read(vector.as_bytes(), &CHANNELS), expected);
-        let plain = recording("1 us", "#0 0! 1\"\n#5 1!");
-        assert_eq!(read(plain.trim_end().as_bytes(), &CHANNELS), expected);
-        assert_eq!(read(("\u{feff}".to_owned() + &plain).as_bytes(), &CHANNELS), expected);
-        let latin1 = [b"$date 4. M\xE4rz 2026 $end\n", plain.as_bytes()].concat();
-        assert_eq!(read(&latin1, &CHANNELS), expected);
-        let blank = plain.replace("! A", "! Channel 0").replace("\" B", "\" Channel 1");
-        assert_eq!(read(blank.as_bytes(), &[(Pin::D2, "Channel 0"), (Pin::D3, "analyser.Channel 1")]), expected);
+        for habits in 0..1_u32 << 8 {
+            let has = |habit: u32| habits >> habit & 1 == 1;
+            let samples = match (has(0), has(1)) {
+                (false, false) => "#0\n0!\n1\"\n#5\n1!",
+                (true, false) => "#0\nb0 !\nb1 \"\n#5\nb1 !",
+                (false, true) => "#0\n$dumpvars\n0!\n1\"\n$end\n#5\n1!\n1!",
+                (true, true) => "#0 $dumpvars b0 ! 1\" $end #5 b1 !",
+            };
+            let mut text = recording(if has(2) { "1us" } else { "1 us" }, samples);
+            let mut names = ["A", "B"];
+            if has(3) {
+                names = ["Channel 0", "Channel 1 (index)"];
+                text = text.replace("! A", &format!("! {}", names[0])).replace("\" B", &format!("\" {}", names[1]));
+            }
+            if has(4) {
+                text = text.trim_end().to_owned();
+            }
+            if has(5) {
+                text = text.replace('\n', "\r\n");
+            }
+            let mut file = text.into_bytes();
+            if has(6) {
+                file.splice(0..0, *b"$date 4. M\xE4rz 2026 $end\n$version\n\tAnalyser 2\n$end\n");
+            }
+            if has(7) {
+                file.splice(0..0, *b"\xEF\xBB\xBF");
+            }
+            let channels = [(Pin::D2, names[0]), (Pin::D3, names[1])];
+            let changes = parse(Path::new("pins.vcd"), &*file, &channels)
+                .unwrap_or_else(|error| panic!("{habits:#b}: {error:?}: {}", String::from_utf8_lossy(&file)));
+            let found: Vec<_> = changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect();
+            assert_eq!(found, expected, "{habits:#b}");
+        }
     }
 
     #[test]

@@ -51,7 +51,7 @@ interface Answers {
         cause: string;
         warning?: string;
     };
-    greeting: { version: string; cause: string };
+    greeting: { version: string; cause: string; wasAtWork: boolean };
     version: { version: string };
     end: { error?: string };
     setting: {

@@ -56,7 +56,7 @@ export class Refused extends Error {}
 export const mayForce = (error: unknown): boolean => error instanceof Refused && error.message.includes("force");
 
 /** Whether a typed line means `hold`, as `is_hold` of host/link/src/lib.rs has it: in any case, with any punctuation. */
-export const isHold = (line: string): boolean => /^\s*hold[\s!-/:-@[-`{-~]*$/i.test(line);
+export const isHold = (line: string): boolean => /^\s*hold[\s!-/:-@[-\x60{-~]*$/i.test(line);
 
 /** No machine answers, and what to do. */
 export class NoMachine extends Error {}
@@ -257,12 +257,26 @@ export class Session implements Link {
 
     /** An answer is missing: a connected machine is asked for everything again. */
     #giveUp(question: Question): void {
-        const error = new NoMachine(this.#whyNoAnswer());
-        if (this.#isReady) this.#beginAgain(error, error.message);
-        else {
+        if (this.#isReady) {
+            const { command } = question;
+            const error = new NoMachine(english("unanswered", { command, seconds: PATIENCE_MS / 1000 }));
+            this.#beginAgain(error, error.message);
+        } else {
+            const error = new NoMachine(this.#whyNoAnswer());
             this.#asked.shift();
-            question.failed(error);
+            this.#failSent(question, error);
         }
+    }
+
+    /** Fails a sent question. The machine may have obeyed an operator's command, or may do so later. */
+    #failSent({ failed, isTyped }: Question, error: Error): void {
+        failed(isTyped ? new NoMachine(english("mayBeDone", { why: error.message })) : error);
+    }
+
+    /** Fails all questions. */
+    #failAll(sent: readonly Question[], waiting: readonly Question[], error: Error): void {
+        for (const question of sent) this.#failSent(question, error);
+        for (const { failed } of waiting) failed(error);
     }
 
     /** Why no valid answer came, and what to do. */
@@ -307,11 +321,11 @@ export class Session implements Link {
 
     /** Drops all questions, and asks for version, settings and examples. */
     #beginAgain(error: Error, why: string): void {
-        const dropped = [...this.#asked.splice(0), ...this.#waiting.splice(0)];
+        const [sent, waiting] = [this.#asked.splice(0), this.#waiting.splice(0)];
         this.#beginnings++;
         if (this.#isReady) this.onHappening({ is: "lost", why, forGood: false, isWanted: false });
         this.#isReady = false;
-        for (const { failed } of dropped) failed(error);
+        this.#failAll(sent, waiting, error);
         this.#greetingBy = this.#now;
     }
 
@@ -330,8 +344,7 @@ export class Session implements Link {
         if (this.#ended) return;
         this.#ended = true;
         this.#isReady = false;
-        const error = new NoMachine(why);
-        for (const { failed } of [...this.#asked.splice(0), ...this.#waiting.splice(0)]) failed(error);
+        this.#failAll(this.#asked.splice(0), this.#waiting.splice(0), new NoMachine(why));
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
         void this.wire.close();
     }

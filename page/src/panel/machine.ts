@@ -78,7 +78,7 @@ export class Machine {
                 break;
             case "started": {
                 const said = read(happening.line);
-                if (said.is === "greeting" && (happening.wasAtWork || this.mode === "work"))
+                if (said.is === "greeting" && (said.wasAtWork || happening.wasAtWork || this.mode === "work"))
                     this.restarted = said.cause;
                 this.mode = undefined;
                 break;

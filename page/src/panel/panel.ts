@@ -52,8 +52,8 @@ export class Panel {
     #heard = { text: "", state: "", sinceMs: 0 };
     /** Whether the next state follows this page's own HOLD, whose answer is already signalled. */
     #isHolding = false;
-    /** A HOLD that has not come through: when it is sent again, or undefined while it is on its way. */
-    #holdPending: { againMs: number | undefined } | undefined;
+    /** A HOLD that has not come through: when it is sent again, or undefined while it is on its way; and the reason. */
+    #holdPending: { againMs: number | undefined; why?: string } | undefined;
     #link: Link | undefined;
     #now = 0;
     /** When the strip was last drawn. */
@@ -129,7 +129,7 @@ export class Panel {
         void this.#sendHold(this.#holdPending);
     }
 
-    async #sendHold(pending: { againMs: number | undefined }): Promise<void> {
+    async #sendHold(pending: { againMs: number | undefined; why?: string }): Promise<void> {
         pending.againMs = undefined;
         const said = this.#parts.html("drive-said");
         try {
@@ -142,7 +142,10 @@ export class Panel {
             }
         } catch (error) {
             pending.againMs = this.#now + HOLD_AGAIN_MS;
-            if (this.#holdPending !== pending) return;
+            const { message } = error as Error;
+            // The same reason again would hide what was told since.
+            if (this.#holdPending !== pending || pending.why === message) return;
+            pending.why = message;
             said.classList.add("problem");
             this.#parts.say("drive-said", () => say("holdFailed", { why: told(error).replace(/\.$/, "") }));
         }
@@ -324,12 +327,12 @@ export class Panel {
     }
 }
 
-/** The line of the console about an event, and its kind. */
 /** Whether an event is an alarm, also one that only a newer firmware knows. */
 function isAlarm(event: EventLine): boolean {
     return event.is === "alarm" || (event.is === "newer" && event.isAlarm);
 }
 
+/** The line of the console about an event, and its kind. */
 function inConsole(happening: Happening): Parameters<Console["add"]> | undefined {
     switch (happening.is) {
         case "started":

@@ -374,6 +374,7 @@ export const en = {
         servedSilent:
             "the computer that has the machine's port does not answer: see that this device is in its network, and that weeder serve runs there",
         servedDropped: "this page could not keep up with the machines' output: it connects again",
+        unanswered: "no answer to `{command}` for {seconds} s: see to the Uno's cable and supply",
         servedGone: "the port is gone: plug the Uno in again",
         servedNoAnswer: "the machine does not answer",
         servedNotThere: "the machine is not there",
@@ -447,7 +448,7 @@ export const en = {
 
         // The next step of the set-up (host/link/src/set_up.rs).
         timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
-        takeWorst: "take the calculated lead: `set {name} {worst}`",
+        takeLead: "take the calculated lead: `set {name} {lead}`",
         measureWheel: "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)",
         passPlants: "measure the slip with both beams: roll past {all} plants ({done} done)",
         lowerMargin: "lower the margin: `set margin_mm {margin}`: {sum}",

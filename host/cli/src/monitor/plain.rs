@@ -3,6 +3,9 @@
 //! With several rows a command goes to all, or to the row whose name and colon stand before it. Output lines begin with
 //! the row's name. A `hold` to all goes to all rows at the same moment, and its result includes the time of the last
 //! row.
+//!
+//! A script keeps its order, because it may set values and then hold. But if an answer does not come, a `hold` behind it
+//! goes first, and the lines between are not sent.
 
 use super::addressed;
 use super::input::{self, Line};
@@ -16,6 +19,7 @@ use link::examples::Heading;
 use link::rows::{Heard, Hold, Rows, What};
 use link::session::Happening;
 use link::settings::other_version;
+use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Write};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
@@ -27,18 +31,19 @@ const READ_AHEAD: usize = 64;
 /// Time between two checks of the input.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// Time without a line of an awaited answer after which a `hold` goes first.
+const STALLED: Duration = Duration::from_millis(500);
+
 /// Goes on until the input has ended and its last command has been answered; bad where one was refused. `are_there`
 /// says which rows were there when they were opened.
 ///
 /// # Errors
 /// If a line was not sent, an Uno goes away with commands unanswered, or output or log fail.
 pub fn run(rows: &Rows, are_there: &[bool], chosen: &Chosen, logs: Option<Logs>) -> Result<Finding> {
-    let (sender, commands) = mpsc::sync_channel(READ_AHEAD);
+    let (sender, commands) = mpsc::sync_channel(0);
     // Reading blocks until the operator types, so it has its own thread. The thread ends with the process.
     thread::spawn(move || input::read(io::stdin().lock(), |line| sender.send(line).is_ok()));
-    let standing = are_there.iter().map(|&is_there| Standing { is_there, ..Standing::default() }).collect();
-    let talk = Talk { rows, chosen, logs, standing, hold: None, unsent: Vec::new(), finding: Finding::Good };
-    match talk.run(&commands, &mut io::stdout().lock()) {
+    match Talk::new(rows, are_there, chosen, logs).run(&commands, &mut io::stdout().lock()) {
         // The reader has closed the pipe: it has read enough.
         Err(error) if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => {
             Ok(Finding::Good)
@@ -65,6 +70,10 @@ struct Talk<'a> {
     chosen: &'a Chosen,
     logs: Option<Logs>,
     standing: Vec<Standing>,
+    /// Lines that wait for an answer to the one before.
+    waiting: VecDeque<Line>,
+    /// When the last command was sent, or the last line of an answer came.
+    moved_at: Instant,
     /// A pending `hold` to all of several rows.
     hold: Option<Hold>,
     /// The numbers of lines that could not be sent.
@@ -72,18 +81,44 @@ struct Talk<'a> {
     finding: Finding,
 }
 
-impl Talk<'_> {
+impl<'a> Talk<'a> {
+    fn new(rows: &'a Rows, are_there: &[bool], chosen: &'a Chosen, logs: Option<Logs>) -> Self {
+        let standing = are_there.iter().map(|&is_there| Standing { is_there, ..Standing::default() }).collect();
+        Self {
+            rows,
+            chosen,
+            logs,
+            standing,
+            waiting: VecDeque::new(),
+            moved_at: Instant::now(),
+            hold: None,
+            unsent: Vec::new(),
+            finding: Finding::Good,
+        }
+    }
+
     fn run(mut self, commands: &Receiver<Line>, output: &mut impl Write) -> Result<Finding> {
-        let mut ended = false;
+        let mut has_all = false;
         loop {
-            // One at a time, so that the other commands wait in the pipe.
-            if self.is_idle() && !ended {
+            while !has_all && self.waiting.len() < READ_AHEAD {
                 match commands.try_recv() {
-                    Ok(line) => self.command(&line, output)?,
-                    Err(TryRecvError::Disconnected) => ended = true,
-                    Err(TryRecvError::Empty) => {}
+                    Ok(line) => self.waiting.push_back(line),
+                    Err(TryRecvError::Disconnected) => has_all = true,
+                    Err(TryRecvError::Empty) => break,
                 }
             }
+            let next = if self.is_idle() {
+                self.waiting.pop_front()
+            } else if self.moved_at.elapsed() > STALLED {
+                self.take_hold()
+            } else {
+                None
+            };
+            if let Some(line) = next {
+                self.moved_at = Instant::now();
+                self.command(&line, output)?;
+            }
+            let ended = has_all && self.waiting.is_empty();
             // Two statuses after a command, all its events have come.
             let has_reported = |row: &Standing| !row.is_there || row.statuses >= 2;
             if ended && self.is_idle() && self.standing.iter().all(has_reported) {
@@ -109,14 +144,30 @@ impl Talk<'_> {
         Ok(self.finding)
     }
 
+    /// Refuses the lines before the first waiting `hold`, and returns that.
+    fn take_hold(&mut self) -> Option<Line> {
+        let names = self.chosen.names();
+        let is_hold =
+            |line: &Line| addressed(&line.text, &names, None).is_ok_and(|(_, command)| link::is_hold(command));
+        let place = self.waiting.iter().position(is_hold)?;
+        for line in self.waiting.drain(..place).collect::<Vec<_>>() {
+            self.refuse(&line, "hold came first");
+        }
+        self.waiting.pop_front()
+    }
+
+    fn refuse(&mut self, line: &Line, why: &str) {
+        tell!("error: line {} was not sent: {why}", line.number);
+        self.unsent.push(line.number.to_string());
+    }
+
     /// Types a line to the addressed rows. A line that cannot be sent is reported, and the next one may be `hold`.
     fn command(&mut self, line: &Line, output: &mut impl Write) -> Result<()> {
         let names = self.chosen.names();
         let (to, command) = match addressed(&line.text, &names, None) {
             Ok(sent) => sent,
             Err(why) => {
-                tell!("error: line {} was not sent: {why}", line.number);
-                self.unsent.push(line.number.to_string());
+                self.refuse(line, &why);
                 return Ok(());
             }
         };
@@ -178,6 +229,7 @@ impl Talk<'_> {
             What::Happened(Happening::Event(_, line)) => print(line)?,
             What::Happened(Happening::Answer(line)) => {
                 standing.statuses = 0;
+                self.moved_at = Instant::now();
                 // The lines on standard output are the machine's own.
                 if let Some(head) = standing.heading.before(line) {
                     tell!("{}", self.chosen.under_name(row, head));
@@ -208,5 +260,34 @@ impl Talk<'_> {
             writeln!(output, "{}", hold.summary(&self.chosen.names()))?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::row_names::{Board, Row};
+    use link::rows::Opener;
+    use link::{Link, LinkError};
+    use rig::ScriptedBoard;
+
+    #[test]
+    fn a_hold_goes_before_an_answer_that_does_not_come() {
+        let board = ScriptedBoard::plugged_in();
+        let port = board.clone();
+        let open: Opener = Box::new(move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
+        let (rows, missing) = Rows::open(vec![open]);
+        assert!(missing[0].is_none());
+        let row = Row { name: "Uno".to_owned(), board: Board::Only { beside: None } };
+        let chosen = Chosen { rows: vec![row], are_several: false };
+        let (sender, commands) = mpsc::sync_channel(9);
+        for (number, text) in (1..).zip(["clear", "silence", "clear", "Hold!"]) {
+            sender.send(Line { number, text: text.to_owned() }).unwrap();
+        }
+        drop(sender);
+        let ended = Talk::new(&rows, &[true], &chosen, None).run(&commands, &mut Vec::new());
+        assert!(ended.is_err());
+        assert_eq!(board.typed()[..4], ["events on", "clear", "silence", "hold"]);
+        assert!(!board.typed()[4..].contains(&"clear".to_owned()));
     }
 }

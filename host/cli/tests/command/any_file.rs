@@ -1,6 +1,7 @@
 //! Random input for every file that a host tool reads: damaged real files, and noise. Each is read, or refused with a
 //! message in one line that names the file. No input may cause a panic or unbounded memory.
 
+use avr_bounds::Budgets;
 use experiments::evaluation::{self, Analysis};
 use experiments::training::table;
 use field::conditions::Conditions;
@@ -9,7 +10,7 @@ use field::row::Row;
 use field::trial::Trial;
 use field::verdict::Timing;
 use field::wiring;
-use files::csv_table;
+use files::bounded_file;
 use gps::{Job, Wanted, map, picture};
 use link::row_names::Names;
 use link::{log, replay, settings_file};
@@ -27,11 +28,11 @@ type Reader = (&'static str, fn(&Path) -> Result<(), Box<dyn Error>>, fn() -> Ve
 /// Longest row that is also rolled along, in mm. Longer rows only take longer.
 const ROLLED_MM: f64 = 20_000.0;
 
-const READERS: [Reader; 11] = [
+const READERS: [Reader; 12] = [
     (
         "row.csv",
         |path| {
-            let row = Row::parse_csv(path, csv_table::bytes(path)?)?;
+            let row = Row::parse_csv(path, bounded_file::bytes(path)?)?;
             let span = row.span_mm();
             if span.end - span.start < ROLLED_MM {
                 let trial = Trial::at_speed(row, Machine::default(), Timing::default(), 700.0);
@@ -78,6 +79,15 @@ const READERS: [Reader; 11] = [
                 "220,status,state=alarm tool=out pos=1700 speed_mm_s=0 windows=0 unseen_mm=0",
             ];
             (lines.join("\n") + "\n").into_bytes()
+        },
+    ),
+    (
+        "budgets.toml",
+        |path| Ok(Budgets::read(path).map(drop)?),
+        || {
+            b"# of main\nstack_bytes = 700\n[loops]\nwait = { passes = 9, because = \"the converter\" }\n\
+              [calls]\nmain = [\"a\", \"b\"]\n"
+                .to_vec()
         },
     ),
     (

@@ -3,6 +3,8 @@
 use crate::common::{self, weeder};
 use std::fs;
 use std::path::Path;
+#[cfg(unix)]
+use std::process::Command;
 
 /// Asserts that these arguments are refused with a message that contains `words`.
 #[track_caller]
@@ -85,6 +87,57 @@ fn a_row_that_no_machine_can_roll_along_is_refused_with_its_line() {
         &["sim", "--row", row.to_str().unwrap()],
         "line 3: the row is 18000 m long: it has to be at most 6000 m",
     );
+}
+
+/// `FILE` stands for the file in arguments.
+#[cfg(unix)]
+const READERS: [&str; 16] = [
+    "evaluate FILE",
+    "trial --field FILE",
+    "sweep --x speed=1..2:1 --field FILE",
+    "sim --row FILE",
+    "sim --capture FILE --channel-a A --channel-b B",
+    "design --machine FILE",
+    "settings push FILE --port uno",
+    "examples push FILE --port uno",
+    "train FILE",
+    "classify FILE",
+    "replay FILE",
+    "map FILE --out map.geojson",
+    "merge FILE",
+    "set-up --state FILE --port uno",
+    "hex weeder.hex --elf FILE",
+    "virtual-uno --stand --bootloader optiboot --eeprom FILE",
+];
+
+#[cfg(unix)]
+#[test]
+fn a_file_without_end_and_a_folder_are_refused_by_every_reader() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["/dev/zero", "/"] {
+        for command in READERS {
+            let arguments: Vec<&str> =
+                command.split(' ').map(|word| if word == "FILE" { file } else { word }).collect();
+            common::assert_refused(folder.path(), &arguments, file);
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_whose_name_is_no_text_is_read() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let name = OsStr::from_bytes(b"M\xE4rz.csv");
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/trial-example.csv");
+    fs::copy(example, folder.path().join(name)).unwrap();
+    let mut evaluate = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let output = evaluate.current_dir(folder.path()).arg("evaluate").arg(name).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut trial = Command::new(env!("CARGO_BIN_EXE_weeder"));
+    let output = trial.args(["trial", "--field"]).arg(name).output().unwrap();
+    assert!(String::from_utf8_lossy(&output.stderr).contains("is no UTF-8: rename the file"));
 }
 
 #[test]

@@ -314,7 +314,7 @@ fn roll(uno: &mut Uno, distance_mm: f64) {
         Motion::starting_at(0.0).change_speed(SPEED_MM_S, ACCELERATION_MM_S2).stop_at(distance_mm, ACCELERATION_MM_S2);
     let start_cycle = uno.cycle();
     uno.drive(machine.pin_changes(&row, &motion, start_cycle));
-    uno.run_until(cycle_at(start_cycle, motion.duration_s() + 0.1)).expect("the firmware runs");
+    uno.run_until(cycle_at(start_cycle, motion.duration_s() + 0.3)).expect("the firmware runs");
 }
 
 /// A program that runs until the test is over.

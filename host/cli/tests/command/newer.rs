@@ -13,12 +13,13 @@ use std::time::Duration;
 use uno::pty::Pty;
 
 /// The answer to `get`: `wheel_mm` has a wider range, `k` is gone, and two settings are new.
-fn settings(lamp: &str) -> String {
+fn settings([lamp, wheel, margin]: [&str; 3]) -> String {
     let line = |setting: Setting| {
         let (name, wanted) = (setting.text(), setting.description());
         let unit = setting.unit();
         match name.to_string().as_str() {
-            "wheel_mm" => "wheel_mm=900 mm from 200 to 1200, default 400\r\n".to_owned(),
+            "wheel_mm" => format!("wheel_mm={wheel} mm from 200 to 1200, default 400\r\n"),
+            "margin_mm" => format!("margin_mm={margin} mm from 0 to 200, default 50\r\n"),
             "k" => String::new(),
             _ if setting.is_switched() => format!("{name}=off on or off, default off\r\n"),
             _ => {
@@ -44,16 +45,20 @@ impl Newer {
         let (port, is_over) = (pty.path().to_owned(), Arc::new(AtomicBool::new(false)));
         let over = Arc::clone(&is_over);
         let machine = thread::spawn(move || {
-            let (mut line, mut bytes, mut lamp) = (String::new(), [0; 64], "off");
+            let (mut line, mut bytes, mut own) = (String::new(), [0; 64], ["off", "900", "50"]);
             while !over.load(Ordering::Relaxed) {
                 let count = pty.read(&mut bytes).expect("the terminal works");
                 for &byte in &bytes[..count] {
                     match byte {
                         b'\n' => {
-                            if line == "set lamp on" {
-                                lamp = "on";
+                            match line.as_str() {
+                                "set lamp on" => own[0] = "on",
+                                "set wheel_mm 1100" => own[1] = "1100",
+                                "set wheel_mm 500" => own[1] = "500",
+                                "set margin_mm 60" => own[2] = "60",
+                                _ => {}
                             }
-                            let said = answer(&line, lamp);
+                            let said = answer(&line, own);
                             let mut said = said.as_bytes();
                             while !said.is_empty() {
                                 said = &said[pty.write(said).expect("the terminal works")..];
@@ -83,11 +88,11 @@ impl Drop for Newer {
     }
 }
 
-fn answer(line: &str, lamp: &str) -> String {
+fn answer(line: &str, own: [&str; 3]) -> String {
     let answer = match line {
         "" => return String::new(),
         "version" => "weeder 99.1.0 (abc)\r\n".to_owned(),
-        "get" => settings(lamp),
+        "get" => settings(own),
         "examples" => "tilt deg=4 pos=9\r\nbuilt_in 0 plant 1 2 3 4 5\r\n".to_owned(),
         "status" => "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=450 mood=good\r\nlost=0 moon=full\r\n"
             .to_owned(),
@@ -142,6 +147,18 @@ fn settings_of_a_newer_firmware_are_pulled_compared_and_pushed() {
     fs::write(&file, "lamp = true\n").expect("it can be written");
     let differs = printed(&machine.weeder(&["settings", "diff", name, "--json"], ""), 1);
     assert!(differs.contains("\"setting\": \"lamp\""), "{differs}");
+    // A value in this program's range goes out, although the machine's present one is outside of it.
+    for (wheel, set) in [(1100, "margin_mm, wheel_mm, lamp"), (500, "wheel_mm")] {
+        let text = format!("margin_mm = 60\nwheel_mm = {wheel}\nlamp = true\n");
+        fs::write(&file, text).expect("it can be written");
+        let pushed = printed(&machine.weeder(&["settings", "push", name], ""), 0);
+        assert!(pushed.starts_with(&format!("Set: {set}\n")), "{pushed}");
+        let same = printed(&machine.weeder(&["settings", "diff", name], ""), 0);
+        assert!(same.starts_with("The machine has the settings of "), "{same}");
+    }
+    fs::write(&file, "k = 5\n").expect("it can be written");
+    let gone = printed(&machine.weeder(&["settings", "push", name], ""), 2);
+    assert!(gone.contains("k 5 is wanted") && gone.contains("nothing was sent"), "{gone}");
     fs::write(&file, "lmap = true\n").expect("it can be written");
     let unknown = printed(&machine.weeder(&["settings", "push", name], ""), 2);
     assert!(

@@ -189,5 +189,5 @@ fn the_printed_bound_is_named_for_kept_margins() {
 fn a_folder_is_no_file_to_read() {
     let output = weeder(&["classify", Path::new("/").to_str().unwrap()], Stdio::piped());
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("/ cannot be read: Is a directory"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("/ is a folder, and a file is needed"));
 }

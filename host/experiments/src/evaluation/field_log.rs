@@ -76,7 +76,7 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
     ensure!(
         plots.len() == stretches.len(),
         "the log has {} stretches of work, but there are {} plots. Say which plot each stretch is, such as `--plots 1,0,2`, \
-         with 0 for none and a plot twice if it was weeded in two parts:\n{}",
+         with 0 for none and a plot twice if it was weeded in two parts: {}",
         stretches.len(),
         plots.len(),
         list(stretches)
@@ -93,7 +93,8 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
         }
         let of_log = OfLog::of(record, &of_plot);
         let m2 = |width_m: f64| of_log.distance_m.map(|m| m * width_m).filter(|m2| *m2 > 0.0);
-        record.speed_km_h = of_log.speed_km_h.unwrap_or(record.speed_km_h);
+        // More digits would only seem to be measured.
+        record.speed_km_h = of_log.speed_km_h.map_or(record.speed_km_h, |km_h| (km_h * 1000.0).round() / 1000.0);
         record.time_s = record.time_s.or(Some(of_log.time_s).filter(|time_s| *time_s > 0.0));
         record.plants = record.plants.or(of_log.plants);
         record.area_m2 = record.area_m2.or_else(|| m2(record.width_m?));
@@ -102,15 +103,15 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
     Ok(joined)
 }
 
-/// The stretches, a line each.
+/// The stretches, in a line.
 fn list(stretches: &[Worked]) -> String {
     let line = |(number, worked): (usize, &Worked)| {
         let Worked { lines, time_ms, distance_mm, .. } = worked;
         let seconds = time_ms.end.saturating_sub(time_ms.start) as f64 / 1000.0;
         let metres = optional(distance_mm.map(|mm| mm / 1000.0), |m| fixed(m, 1));
-        format!("  stretch {number}: from line {} of the log, {seconds:.0} s, {metres} m", lines.start)
+        format!("stretch {number} from line {} of the log, {seconds:.0} s, {metres} m", lines.start)
     };
-    (1..).zip(stretches).map(line).collect::<Vec<_>>().join("\n")
+    (1..).zip(stretches).map(line).collect::<Vec<_>>().join("; ")
 }
 
 /// A table of what the log has.
@@ -170,7 +171,7 @@ mod tests {
         let mut records = [plot(1, 1.8), plot(2, 1.8)];
         let error = join(&mut records, &stretches, &[]).expect_err("there are four").to_string();
         assert!(error.starts_with("the log has 4 stretches of work, but there are 2 plots."), "{error}");
-        assert!(error.ends_with("stretch 4: from line 200 of the log, 60 s, 30.0 m"), "{error}");
+        assert!(error.ends_with("; stretch 4 from line 200 of the log, 60 s, 30.0 m"), "{error}");
         let joined = join(&mut records, &stretches, &[0, 1, 1, 2]).expect("they match");
         // With the pause between the two parts.
         assert_eq!((joined[0].time_s, joined[0].distance_m), (70.0, Some(30.0)));

@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn a_label_is_refused_by_the_built_in_examples_alone() {
         let plant = Features::describe(556, 500, 150);
-        let taught = Example::new(control::ground::examples::scale().quantise(&plant.values()), label::WEED);
+        let taught = Example::new(control::ground::examples::scale().quantise(plant.values()), label::WEED);
         let examples = [&EXAMPLES[..], &[taught; 5]].concat();
         let mut classifier = ReplayClassifier::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
         assert_eq!(classifier.classify(&plant, 3).class, Class::Weed, "the field has taught it so");

@@ -234,6 +234,10 @@ fn a_restart_at_work_is_reported_with_its_cause_and_one_in_hold_is_not() {
         assert_eq!(restart_at_work(&happened), Some("brown_out"), "{happened:?}");
         assert_eq!(restart_at_work(&talk.second()), None);
     }
+    // What happened before the session, only the machine knows.
+    let told = b"weeder 0.2.0, reset by reset_pin, was work, state hold, tool out; help lists the commands\r\n";
+    talk.board.say(told);
+    assert_eq!(restart_at_work(&talk.second()), Some("reset_pin"));
     talk.board.say(&[&b"state is=work\r\nalarm code=3-1 name=too_fast pos=1\r\n"[..], greeting].concat());
     assert_eq!(restart_at_work(&talk.second()), None);
 }

@@ -180,6 +180,36 @@ fn hold_is_obeyed_under_an_attack_of_half_open_connections() {
     hold_is_obeyed_under("half open", true, |host, _| format!("GET / HTTP/1.1\r\nHost: {host}"));
 }
 
+/// The server accepts all of them before it reads from any, so that each place is taken and lost at once.
+#[test]
+fn a_new_hold_is_read_although_a_crowd_of_half_open_connections_comes_with_it() {
+    let folder = folder();
+    let (_uno, port) = uno(&folder, "uno", &["--stand"]);
+    let served = serve(&folder, &[&port], &["--allow-start"]);
+    served.make_ready(0);
+    let phone = served.pair();
+    let signal = |name: &str| {
+        let id = served.process.0.id().to_string();
+        assert!(Command::new("kill").args([name, &id]).status().expect("kill is there").success());
+    };
+    for (host, cookie) in [(&served.lan, phone.as_str()), (&served.here, "")] {
+        assert_eq!(served.command(&served.here, "", "start").0, 200);
+        signal("-STOP");
+        let half_open = |number: u8| {
+            let stream = connect_from([127, 0, 1, number], host);
+            (&stream).write_all(b"GET / HTTP/1.1\r\n").expect("it is connected");
+            stream
+        };
+        let mut crowd: Vec<TcpStream> = (1..100).map(half_open).collect();
+        let mut client = BufReader::new(connect(host, 0));
+        let hold = request(host, cookie, "POST", "/machines/0/command", "Content-Length: 4\r\n\r\nhold");
+        client.get_mut().write_all(hold.as_bytes()).expect("it is connected");
+        crowd.extend((100..250).map(half_open));
+        signal("-CONT");
+        assert_eq!(answer(&mut client), (200, "ok\n".to_owned()));
+    }
+}
+
 #[test]
 fn hold_is_obeyed_under_an_attack_of_event_streams() {
     hold_is_obeyed_under("streams", true, |host, cookie| request(host, cookie, "GET", "/events", "\r\n"));

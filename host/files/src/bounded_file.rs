@@ -1,13 +1,16 @@
-//! Reads a text file that people made, up to a limit: a device or a recording without end is refused. [`check_nesting`]
-//! refuses TOML that would exhaust the parser's stack.
+//! Reads a file up to a limit: a device or a recording without end is refused. [`check_nesting`] refuses TOML that would
+//! exhaust the parser's stack.
 
 use crate::FileError;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-/// The longest file, in MiB. Those that people write have some KiB.
-const MOST_MIB: u64 = 16;
+/// The longest file that people write, in MiB. Most have some KiB.
+const WRITTEN_MIB: u64 = 16;
+
+/// The longest record, in MiB. A machine and its receiver send some 60 in a day.
+const RECORDED_MIB: u64 = 256;
 
 /// The deepest nesting of tables, lists and dotted keys in TOML. No file of the tools nests more than three.
 const MOST_NESTED: usize = 40;
@@ -16,9 +19,37 @@ const MOST_NESTED: usize = 40;
 ///
 /// # Errors
 /// If it cannot be read, is a folder, is too long, or is no UTF-8: with the line.
-pub fn read(path: &Path) -> Result<String, FileError> {
-    let unread = |source| FileError::unread(path, source);
+pub fn text(path: &Path) -> Result<String, FileError> {
+    let bytes = bytes(path)?;
     let wrong = |problem: String| FileError::Line { path: path.into(), line: 0, problem };
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return Err(wrong("saved as UTF-16: save it as UTF-8".to_owned()));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let valid = String::from_utf8_lossy(&error.as_bytes()[..error.utf8_error().valid_up_to()]).into_owned();
+        FileError::at_byte(path, &valid, valid.len(), "this is no UTF-8: save the file as UTF-8")
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
+}
+
+/// The content of a file that people wrote.
+///
+/// # Errors
+/// If it cannot be read, is a folder, or is too long.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
+    up_to(path, WRITTEN_MIB)
+}
+
+/// The content of a record that a program wrote, which may be much longer.
+///
+/// # Errors
+/// As [`bytes`].
+pub fn recorded(path: &Path) -> Result<Vec<u8>, FileError> {
+    up_to(path, RECORDED_MIB)
+}
+
+fn up_to(path: &Path, most_mib: u64) -> Result<Vec<u8>, FileError> {
+    let unread = |source| FileError::unread(path, source);
     let file = File::open(path).map_err(unread)?;
     if file.metadata().is_ok_and(|there| there.is_dir()) {
         return Err(FileError::unusable(
@@ -28,18 +59,12 @@ pub fn read(path: &Path) -> Result<String, FileError> {
         ));
     }
     let mut bytes = Vec::new();
-    file.take((MOST_MIB << 20) + 1).read_to_end(&mut bytes).map_err(unread)?;
-    if bytes.len() as u64 > MOST_MIB << 20 {
-        return Err(wrong(format!("longer than {MOST_MIB} MiB: no such file is read")));
+    file.take((most_mib << 20) + 1).read_to_end(&mut bytes).map_err(unread)?;
+    if bytes.len() as u64 > most_mib << 20 {
+        let problem = format!("longer than {most_mib} MiB: no such file is read");
+        return Err(FileError::Line { path: path.into(), line: 0, problem });
     }
-    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        return Err(wrong("saved as UTF-16: save it as UTF-8".to_owned()));
-    }
-    let text = String::from_utf8(bytes).map_err(|error| {
-        let valid = String::from_utf8_lossy(&error.as_bytes()[..error.utf8_error().valid_up_to()]).into_owned();
-        FileError::at_byte(path, &valid, valid.len(), "this is no UTF-8: save the file as UTF-8")
-    })?;
-    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
+    Ok(bytes)
 }
 
 /// Checks the nesting of TOML before it is parsed.
@@ -123,15 +148,15 @@ mod tests {
         let refused = |bytes: &[u8]| {
             let path = folder.path().join("my.toml");
             std::fs::write(&path, bytes).unwrap();
-            read(&path).unwrap_err().to_string()
+            text(&path).unwrap_err().to_string()
         };
-        assert!(read(folder.path()).unwrap_err().to_string().contains("is a folder"));
+        assert!(text(folder.path()).unwrap_err().to_string().contains("is a folder"));
         assert!(refused(b"\xFF\xFEk\0").contains("saved as UTF-16"));
         assert!(refused(b"k = 3\nm = \"\xE4\"").contains("line 2: this is no UTF-8"));
         assert!(refused(&vec![b' '; (16 << 20) + 1]).contains("longer than 16 MiB"));
         std::fs::write(folder.path().join("bom"), "\u{feff}k = 3").unwrap();
-        assert_eq!(read(&folder.path().join("bom")).unwrap(), "k = 3");
+        assert_eq!(text(&folder.path().join("bom")).unwrap(), "k = 3");
         #[cfg(unix)]
-        assert!(read(Path::new("/dev/zero")).unwrap_err().to_string().contains("longer than 16 MiB"));
+        assert!(text(Path::new("/dev/zero")).unwrap_err().to_string().contains("longer than 16 MiB"));
     }
 }
