@@ -177,20 +177,24 @@ test("what the session, weeder serve and the project's Rust say in English is kn
 });
 
 test("what the machine refuses, and settings that contradict each other, are known by the tables", () => {
-    const texts = readFileSync("../control/src/say/texts.rs", "utf8");
-    const refusals = texts.slice(texts.lastIndexOf("command_errors! {"), texts.indexOf("macro_rules! commands"));
+    const source = (file: string) => readFileSync(`../control/src/${file}.rs`, "utf8");
+    const texts = source("say/texts");
     const named = (name: string) => new RegExp(`\\b${name} = "([^"]*)"`).exec(texts)?.[1] ?? assert.fail(name);
-    const mistakes = ["TOO_LONG", "NOT_TEXT", "CHARACTERS_LOST", "UNKNOWN_COMMAND", "UNKNOWN_SETTING"].map(named);
     const again = named("LOOK_AGAIN");
+    const refusals = [...source("operate/command_error").matchAll(/^ +(\w+) = "([^"]+)",$/gm)];
+    const mistakes = [...source("say/command").matchAll(/^ +\w+ = "([^"]+)",$/gm)];
+    assert(mistakes.length >= 5);
     const said = [
-        ...[...refusals.matchAll(/\w+ "([^"]*)";/g)].map(([, text = ""]) => text),
-        ...mistakes,
+        ...refusals.map(([, name = "", text = ""]) =>
+            name.startsWith("TakenFor")
+                ? `${named("TAKEN_FOR")}${text}${again}`
+                : text + (name === "WheelDiffers" ? again : ""),
+        ),
+        ...mistakes.map(([, text = ""]) => text),
         `${named("USAGE")}servo in|out|US`,
         `margin_mm${named("TAKES_A_NUMBER")}${named("RANGE")}`,
         `end_switch${named("TAKES")}${named("ON_OR_OFF")}`,
         `servo_in_us${named("HOLD_TO_SET")}`,
-        `${named("WHEEL_DIFFERS")}${again}`,
-        `${named("TAKEN_FOR")}plant${again}`,
     ].map((text) => text.replaceAll("#", "123"));
     assert(said.length >= 26, said.join("\n"));
     const contradictions = [
