@@ -72,7 +72,7 @@ fn the_status_has_every_figure() {
         ("speed_mm_s", "0"),
         ("windows", "0"),
         ("lost", "0"),
-        ("unseen_mm", "449"),
+        ("unseen_mm", "450"),
         ("jumps", "0"),
         ("late", "0"),
         ("missed", "0"),

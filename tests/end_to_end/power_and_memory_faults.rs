@@ -58,7 +58,13 @@ fn a_reset_at_any_moment_wakes_up_in_hold_with_the_tool_out_and_tells_its_cause(
             run.uno.run_until(cycle).expect("the firmware runs");
             restart(&mut run.uno);
             let greeting = greeting_with_the_tool_out_since(&mut run.uno, cycle);
-            assert!(greeting.contains(&format!("reset by {cause}, state hold,")), "{greeting:?}");
+            assert!(
+                greeting.contains(&format!(
+                    "reset by {cause}{}, state hold,",
+                    if cause == "power_on" { "" } else { ", was work" }
+                )),
+                "{greeting:?}"
+            );
             let said = status(&mut run.uno);
             let expected = ["hold", "out", cause];
             assert_eq!(["state", "tool", "reset"].map(|key| value(&said, key)), expected, "{said}");
@@ -77,7 +83,7 @@ fn a_loop_that_stalls_has_the_tool_put_out_and_the_machine_reset_and_the_cause_t
         let stalled = run.uno.cycle();
         run.uno.stall().expect("the firmware runs");
         let greeting = run.uno.run_until_serial("commands\r\n", CYCLES_PER_SECOND).expect("the watchdog resets it");
-        assert!(greeting.contains("reset by loop_stalled, state hold,"), "{greeting:?}");
+        assert!(greeting.contains("reset by loop_stalled, was work, state hold,"), "{greeting:?}");
         // The timer's interrupt puts it out 200 ms after the last turn, well before the watchdog's reset.
         let reset = run.uno.resets()[0].cycle;
         let ms_after = |cycle: u64| (cycle - stalled) as f64 / (CYCLES_PER_SECOND as f64 / 1000.0);
@@ -156,7 +162,7 @@ fn started_with(eeprom: &[u8]) -> (String, Uno) {
 }
 
 fn k(uno: &mut Uno) -> String {
-    ask(uno, "get k").remove(0)
+    ask(uno, "get k").into_iter().find(|line| line.starts_with("k=")).expect("an answer")
 }
 
 #[test]
@@ -199,6 +205,7 @@ fn any_corrupted_byte_of_a_copy_leaves_the_other_copy() {
             let (greeting, mut uno) = started_with(&corrupted);
             assert!(greeting.contains("state hold,"), "{greeting:?}");
             assert!(k(&mut uno).starts_with(left), "byte {byte} from {begin} on");
+            assert_eq!(value(&status(&mut uno), "warning"), "settings_older", "byte {byte} from {begin} on");
         }
     }
 }

@@ -131,7 +131,7 @@ fn nothing_that_was_scheduled_survives_a_reset() {
         let after = status(&mut run.uno);
         assert_eq!((number(&after, "pos"), number(&after, "windows")), (0, 0), "{after}");
         // From beam to tool, and the saved margin.
-        assert!((459..=460).contains(&number(&after, "unseen_mm")), "{after}");
+        assert!((460..=461).contains(&number(&after, "unseen_mm")), "{after}");
         let pulses = run.uno.pulses(wiring::SERVO);
         let mut since = pulses.iter().filter(|pulse| pulse.rise > cycle);
         assert!(since.all(|pulse| (pulse.width_us() - 2000.0).abs() < 0.1));

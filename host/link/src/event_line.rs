@@ -390,12 +390,12 @@ mod tests {
     use control::ground::examples::EXAMPLES;
     use control::ground::keep_out::Plan;
     use control::ground::nearest::Nearest;
-    use control::measure::reset::Cause;
+    use control::measure::{readings::Readings, reset::Cause};
     use control::memory::Volatile;
     use control::operate::tool::Reason;
     use control::say::line::Line;
     use control::say::write_event;
-    use control::units::{Position, Ticks};
+    use control::units::{Instant, Position, Ticks};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rig::{Beams, ByExamples, Rig};
@@ -506,7 +506,10 @@ mod tests {
         let causes: Vec<Cause> = (0..).map_while(Cause::from_index).collect();
         for _ in 0..100 {
             let cause = causes[chance.random_range(0..causes.len())];
-            let mut rig = Rig::wake(Nearest::new(&EXAMPLES[..], Volatile::new()), Volatile::new(), cause);
+            let (classifier, readings) =
+                (Nearest::new(&EXAMPLES[..], Volatile::new()), Readings::new(Instant::ZERO, Position::new(0)));
+            let mut rig =
+                Rig::wake_from(classifier, Volatile::new(), readings, Beams::default(), cause, chance.random());
             for _ in 0..50 {
                 roll(&mut rig, &mut chance);
                 let lines = rig.ask("status");

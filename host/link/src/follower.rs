@@ -10,7 +10,7 @@
 use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
 use crate::{ConsoleLine, EventLine, Status};
-use control::say::command::{self, Action, Command};
+use control::say::command::{Action, Command};
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 
@@ -199,7 +199,7 @@ impl Follower {
             Kind::Answer => match ConsoleLine::parse(&entry.text) {
                 ConsoleLine::End { error } => match self.unanswered.pop_front() {
                     Some(command) => {
-                        if let (None, Ok(command)) = (&error, command::parse(command.text.as_bytes())) {
+                        if let (None, Ok(command)) = (&error, crate::command(&command.text)) {
                             self.in_use.carry_out(&command);
                         }
                         Followed::Answered(command, error.is_none())

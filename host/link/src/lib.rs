@@ -46,6 +46,7 @@ pub use self::lines::LineReader;
 pub use self::port::{Claim, claim, converter_at, find_uno, is_same, listen, open_other, open_to_flash, try_port};
 pub use control::{ground::class::Class, say::names};
 
+use control::say::command::{Command, ParseError, parse};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
@@ -352,6 +353,14 @@ impl Link {
 /// Whether this text can be typed into the console: one line of printable ASCII, and short enough.
 pub fn is_command(line: &str) -> bool {
     line.len() <= COMMAND_LENGTH && line.bytes().all(|byte| matches!(byte, b' '..=b'~'))
+}
+
+/// The command that the firmware reads from a typed line, in small or capital letters.
+///
+/// # Errors
+/// A [`ParseError`] where the firmware answers with an error.
+pub fn command(line: &str) -> Result<Command, ParseError> {
+    parse(line.to_ascii_lowercase().as_bytes())
 }
 
 /// Whether a line means `hold`: in any case, with any punctuation at its end. An operator in a hurry types it.

@@ -35,8 +35,7 @@ use self::stretch::{Happened, Stretch};
 use super::EventLine;
 use super::log::{Entry, Kind};
 use super::settings::Setting;
-use control::say::command::{self, Action};
-use files::in_a_line;
+use control::say::command::Action;
 use std::fmt;
 use thiserror::Error;
 
@@ -210,8 +209,7 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
             Happened::Command(line) => {
                 // The status that shows the new state must come nearer to the command.
                 if stretch.is_reported_by_event(place) {
-                    starts_now =
-                        command::parse(line.as_bytes()).is_ok_and(|command| command.action == Action::StartNow);
+                    starts_now = crate::command(line).is_ok_and(|command| command.action == Action::StartNow);
                     continue;
                 }
                 if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {
@@ -219,7 +217,7 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
                     last_ms = entry.time_ms;
                 }
                 if !player.command(line) {
-                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, in_a_line(line)));
+                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, line));
                     break;
                 }
             }
@@ -294,9 +292,13 @@ mod tests {
     }
 
     #[test]
-    fn typed_text_is_shown_without_control_characters() {
-        let typed = |status| if status == 2 { vec![(Kind::Command, "test \u{1b}[2J")] } else { Vec::new() };
-        assert_eq!(replay(&log(20, typed)).unwrap().notes, [r"line 6: not replayed from `test \u{1b}[2J` on"]);
+    fn a_replay_ends_at_a_command_that_it_cannot_carry_out_and_not_at_one_that_the_machine_refused() {
+        for (line, notes) in
+            [("TEST row 500", vec!["line 6: not replayed from `TEST row 500` on"]), ("test \u{1b}[2J", vec![])]
+        {
+            let typed = |status| if status == 2 { vec![(Kind::Command, line)] } else { Vec::new() };
+            assert_eq!(replay(&log(20, typed)).unwrap().notes, notes);
+        }
     }
 
     #[test]

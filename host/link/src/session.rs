@@ -13,7 +13,7 @@
 use super::moment::Moment;
 use super::settings::{self, Settings, SettingsError, Shown};
 use super::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
-use control::say::command::{Action, parse};
+use control::say::command::Action;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -382,7 +382,7 @@ fn parse_answer(question: &str, answer: Vec<String>) -> Result<Option<Happening>
 /// The question to ask again after this command was answered by `ok`; `None` if it changes nothing.
 fn changed_by(command: &str) -> Option<String> {
     Some(
-        match parse(command.as_bytes()).ok()?.action {
+        match crate::command(command).ok()?.action {
             Action::Set | Action::Save | Action::Revert | Action::Defaults | Action::Calibrate => SETTINGS,
             Action::LabelPlant
             | Action::LabelWeed

@@ -420,7 +420,7 @@ mod tests {
         model.edge(900, true, 0);
         model.roll_to(1000, 0);
         model.see_again(950);
-        assert!(model.has_canopy_near(950, 0) && model.canopy_between(940, 960, 0).is_none(), "it may be of no width");
+        assert!(model.has_canopy_near(950, 0) && model.canopy_between(955, 960, 0).is_none(), "it has no width yet");
         model.roll_to(1000, 0);
         assert!(model.canopy_between(960, 960, 0).is_some());
     }

@@ -4,7 +4,7 @@
 use super::hub::Hub;
 use super::knowledge::Stale;
 use super::rules::Order;
-use control::say::command::{Action, parse};
+use control::say::command::Action;
 use link::advice;
 use link::moment::Moment;
 use link::rows::Opener;
@@ -268,7 +268,7 @@ impl Talk {
                 let Some(mut asked) = self.asked.pop_front() else { return };
                 let answer = std::mem::take(&mut asked.answer);
                 // The pages need the events.
-                if parse(command.as_bytes()).is_ok_and(|command| command.action == Action::EventsOff) {
+                if link::command(&command).is_ok_and(|command| command.action == Action::EventsOff) {
                     session.turn_events_on();
                 }
                 asked.end(&Ok(answer));

@@ -6,7 +6,7 @@
 //! `clear` only if the operator allowed this when starting `weeder serve`. All other commands are refused over the
 //! network, and so are commands that this version does not know.
 
-use control::say::command::{Action, parse};
+use control::say::command::Action;
 use thiserror::Error;
 
 /// The origin of a command.
@@ -67,7 +67,7 @@ pub fn allow(line: &str, reach: Reach) -> Result<Order, Forbidden> {
     if link::is_hold(line) {
         return Ok(Order::Hold);
     }
-    match (reach, parse(line.as_bytes()).map(|command| command.action)) {
+    match (reach, link::command(line).map(|command| command.action)) {
         // The machine itself reports errors in the line.
         (Reach::Here, _) => Ok(Order::Type),
         (Reach::Lan { .. }, Err(_)) => Err(Forbidden::Unknown),

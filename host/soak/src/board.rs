@@ -11,7 +11,7 @@ use control::ground::{class::Listed, nearest::Nearest};
 use control::measure::reset::Cause;
 use control::memory::{SIZE, Volatile};
 use control::operate::state::State;
-use control::say::command::{Action, parse};
+use control::say::command::Action;
 use control::settings::{Setting, Settings};
 use field::machine::{channels, encoder_edge};
 use field::wiring;
@@ -174,7 +174,7 @@ impl Board {
 
     /// The line that was begun was answered.
     fn end(&mut self, line: &str, is_ok: bool) {
-        let (true, Ok(command)) = (is_ok, parse(line.as_bytes())) else { return };
+        let (true, Ok(command)) = (is_ok, link::command(line)) else { return };
         self.in_use.carry_out(&command);
         match command.action {
             Action::Set | Action::GetAll => self.begin_rest(),

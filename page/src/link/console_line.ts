@@ -49,6 +49,7 @@ interface Answers {
         dust: number;
         stackFree: number;
         cause: string;
+        was?: Mode;
         warning?: string;
     };
     greeting: { version: string; cause: string; wasAtWork: boolean };

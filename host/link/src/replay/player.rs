@@ -12,7 +12,7 @@ use control::ground::class::label;
 use control::measure::reset::Cause;
 use control::memory::Volatile;
 use control::operate::event::Event;
-use control::say::command::{self, Action, Command};
+use control::say::command::{Action, Command};
 use control::units::{Instant, Interval, Position, Ticks};
 use control::{measure::readings::Readings, operate::state::State};
 use rig::{Beams, Rig};
@@ -291,7 +291,7 @@ impl<'a> Player<'a> {
 
     /// Executes a typed line. False if it cannot be replayed.
     pub(super) fn command(&mut self, line: &str) -> bool {
-        let Ok(Command { action, setting, number, force }) = command::parse(line.as_bytes()) else { return true };
+        let Ok(Command { action, setting, number, force }) = crate::command(line) else { return true };
         match action {
             // If the log lacks the answer: the firmware refused what the replay refuses.
             Action::Start | Action::StartNow => _ = self.rig.start(action == Action::StartNow),
@@ -307,8 +307,8 @@ impl<'a> Player<'a> {
             Action::TeachWeed => _ = self.rig.teach(label::WEED),
             Action::Forget | Action::ForgetAll => return false,
             _ => {
-                let word = line.split_whitespace().next().unwrap_or_default();
-                return !["servo", "calibrate", "test", "defaults", "revert"].contains(&word);
+                let word = line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase();
+                return !["servo", "calibrate", "test", "defaults", "revert"].contains(&&*word);
             }
         }
         self.step();
@@ -354,7 +354,7 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
             }
             Happened::Command(line) => {
                 // Later holds have the new margin.
-                if let Ok(Command { action: Action::Set, setting, number, .. }) = command::parse(line.as_bytes()) {
+                if let Ok(Command { action: Action::Set, setting, number, .. }) = crate::command(line) {
                     let _ = settings.change(setting, number);
                 }
             }

@@ -6,7 +6,7 @@ use crate::examples::{Taught, taught};
 use crate::log::{Entry, Kind};
 use crate::settings::{Setting, Settings, shown};
 use crate::{ConsoleLine, EventLine, Mode, Status};
-use control::say::command::{self, Action};
+use control::say::command::Action;
 use files::in_a_line;
 use std::collections::VecDeque;
 
@@ -161,7 +161,7 @@ impl<'a> Stretch<'a> {
     /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in.
     pub(super) fn position_of_command(&self, last: (i32, u64), place: usize) -> Option<i32> {
         if let (_, Happened::Command(line)) = self.happened[place]
-            && command::parse(line.as_bytes()).is_ok_and(|command| command.action == Action::StartNow)
+            && crate::command(line).is_ok_and(|command| command.action == Action::StartNow)
             && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
         {
             return Some(position);
@@ -194,7 +194,7 @@ impl<'a> Stretch<'a> {
     /// requested status between them.
     pub(super) fn is_reported_by_event(&self, place: usize) -> bool {
         let Happened::Command(line) = self.happened[place].1 else { return false };
-        let brings = match command::parse(line.as_bytes()).map(|command| command.action) {
+        let brings = match crate::command(line).map(|command| command.action) {
             Ok(Action::Start | Action::StartNow) => Mode::Work,
             Ok(Action::Hold | Action::Clear) => Mode::Hold,
             _ => return false,
