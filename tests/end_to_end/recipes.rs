@@ -61,7 +61,7 @@ fn a_setting_a_command_an_alarm_and_an_event_are_added_as_contributing_says() {
     let copied = folder.join("sources");
     copy(&sources.join("control"), &copied.join("control"));
     // Nothing else changes.
-    for entry in fs::read_dir(&sources).expect("the sources can be read") {
+    for entry in fs::read_dir(sources).expect("the sources can be read") {
         let name = entry.expect("the sources can be read").file_name();
         if !["control", "target", ".git"].contains(&&*name.to_string_lossy()) {
             symlink(sources.join(&name), copied.join(&name)).expect("a link can be made");

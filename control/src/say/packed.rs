@@ -8,7 +8,7 @@
 //!
 //! A byte of a packed text is a code. The first codes are the characters that occur in texts. Each further code is a fragment: a
 //! pair of earlier codes. The compiler finds the fragments: it gives the most frequent pair a code, replaces the pair by this code
-//! everywhere, and repeats this while codes are free ([`PACKED`]). So unpacking needs no search. [`Characters`] splits a code until
+//! everywhere, and repeats this while codes are free (`PACKED`). So unpacking needs no search. [`Characters`] splits a code until
 //! its first half is a character. The second halves wait on a small stack.
 
 use crate::say::texts::{GROUPS, UNPACKED};

@@ -303,7 +303,7 @@ fn taught_examples_spare_the_plants_of_another_field_too() {
         assert!(chosen.chosen.len() <= 32, "{}", crop.name);
         let mut model = Model::built_in();
         let example =
-            |object: &Labelled| Example::new(model.scale.quantise(&object.features.values()), label_of(object.kind));
+            |object: &Labelled| Example::new(model.scale.quantise(object.features.values()), label_of(object.kind));
         let taught: Vec<_> = chosen.chosen.iter().map(example).collect();
         model.examples.extend(taught);
         let confusion = model.classify(&synthetic::objects(crop, 2).unwrap());
