@@ -170,8 +170,14 @@ test("a wheel that is measured once counts once, also where its setting is read 
     for (const lead of ["lead_out_ms 100", "lead_in_ms 99"]) await type(page, `set ${lead}`, /^ok$/);
     const timed = "calibrated lead_out_ms=100 lead_in_ms=99 set=yes\r\n";
     await page.evaluate((line) => globalThis.trial.onText(line + line), timed);
+    // A stretch is measured from a stop to a stop.
+    await page.locator("#speed").fill("0");
+    await pass(page, 1);
     await type(page, "calibrate start", /^ok$/);
+    await page.locator("#speed").fill("2.5");
     await pass(page, 4);
+    await page.locator("#speed").fill("0");
+    await pass(page, 1);
     await type(page, "calibrate 1900 force", /^ticks_per_m=/);
     await type(page, "get", /^ticks_per_m=/);
     const next = part(page, "margin-said").filter({ hasText: "Next, measure 10 m:" });

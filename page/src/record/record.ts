@@ -37,7 +37,7 @@ const HOUR_S = 7200;
 /** The look of a detection, by its class. */
 const CLASSES = ["canopy", "weed", "canopy unknown"];
 /** The legend of the map: see host/gps/src/picture.rs. */
-const MAP_LEGEND = ["mapWeeded", "mapLeft", "plant", "mapKept", "legendWeed", "mapLabel", "stateAlarm"] as const;
+const MAP_LEGEND = ["mapWeeded", "mapLeft", "plant", "mapKept", "legendWeed", "mapLabel", "mapAlarm"] as const;
 
 /** A log that is shown. */
 interface Row {

@@ -328,6 +328,7 @@ export const en = {
         mapLeft: "not weeded",
         mapKept: "unknown, kept",
         mapLabel: "label",
+        mapAlarm: "alarm, restart",
         mapMissing: "without a position:",
         north: "north is up",
     },

@@ -324,6 +324,7 @@ export const es: Language = {
         mapLeft: "sin desherbar",
         mapKept: "desconocido, respetado",
         mapLabel: "etiqueta",
+        mapAlarm: "alarma, reinicio",
         mapMissing: "sin posición:",
         north: "el norte está arriba",
     },

@@ -323,6 +323,7 @@ export const fr: Language = {
         mapLeft: "non désherbé",
         mapKept: "inconnu, épargné",
         mapLabel: "étiquette",
+        mapAlarm: "alarme, redémarrage",
         mapMissing: "sans position :",
         north: "le nord est en haut",
     },

@@ -317,6 +317,7 @@ export const hi: Language = {
         mapLeft: "निराई नहीं हुई",
         mapKept: "अनजान, छोड़ा गया",
         mapLabel: "लेबल",
+        mapAlarm: "अलार्म, रीस्टार्ट",
         mapMissing: "बिना स्थिति:",
         north: "उत्तर ऊपर है",
     },
