@@ -221,11 +221,14 @@ mod tests {
 
     #[test]
     fn unknown_commands_are_not_passed_on_over_the_network() {
-        for line in ["START", "starts", "start later", "start now now", "set k", "launch", "help me", "servo", "\u{1}"]
-        {
+        for line in ["starts", "start later", "start now now", "set k", "launch", "help me", "servo", "\u{1}"] {
             assert!(allow(line, STARTING).is_err(), "{line:?}");
         }
         assert_eq!(allow("launch", Reach::Here), Ok(Order::Type));
+        // The machine reads capital letters as small ones.
+        assert_eq!(allow("START", STARTING), Ok(Order::Type));
+        assert_eq!(allow("START", WATCHING), allow("start", WATCHING));
+        assert!(allow("Set margin_mm 5", STARTING).is_err());
     }
 
     #[test]
