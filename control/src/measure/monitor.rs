@@ -338,7 +338,7 @@ impl BeamMonitor {
     /// The alarm for detections that fit no crop. They are a fault of the beam if its breaks were short.
     pub fn explain(&self, alarm: Alarm, now: Instant) -> Alarm {
         let is_of_breaks = match alarm {
-            // An object that stays in the beam is none, whatever came before.
+            // An object that stays in the beam is no short break.
             Alarm::BeamBlocked => now.coarse().since(self.broke_at) <= SHORT_BREAK,
             Alarm::BeamBlind | Alarm::SecondBeamBlind | Alarm::ScheduleFull | Alarm::CropUnknown => true,
             _ => false,

@@ -64,7 +64,7 @@ pub enum ParseError {
 }
 
 impl Command {
-    /// Before a line is parsed: zeros, of which the chip needs no copy in flash.
+    /// Before a line is parsed. It is all zeros, so the chip needs no copy in flash.
     pub(super) const NONE: Self = match (Action::from_index(0), Setting::from_index(0)) {
         (Some(action), Some(setting)) => Self { action, setting, number: 0, force: false },
         _ => panic!("there are commands and settings"),

@@ -17,9 +17,9 @@ const NUMBERS: usize = 8;
 
 /// A text that the code names. One byte numbers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Said(u8);
+pub(crate) struct NamedText(u8);
 
-impl Said {
+impl NamedText {
     /// A text of the first group.
     pub(crate) const fn of(text: &str) -> Self {
         let (group, mut number, mut place) = (GROUPS[0], 0, 0);
@@ -48,7 +48,7 @@ pub struct Line {
     numbers: u8,
     numbers_begun: u8,
     /// The last text that the code named.
-    last: Said,
+    last: NamedText,
     text: [Text; TEXTS],
     number: [i32; NUMBERS],
 }
@@ -62,7 +62,7 @@ impl Line {
             texts_begun: 0,
             numbers: 0,
             numbers_begun: 0,
-            last: Said(0),
+            last: NamedText(0),
             text: [Text::FIRST; TEXTS],
             number: [0; NUMBERS],
         }
@@ -75,7 +75,7 @@ impl Line {
 
     /// Adds a text. In it each `#` stands for the line's next number, and each `@` for the line's next word.
     #[inline(never)]
-    pub(crate) fn say(&mut self, text: Said) {
+    pub(crate) fn say(&mut self, text: NamedText) {
         self.last = text;
         self.add(text.text());
     }
@@ -84,7 +84,7 @@ impl Line {
     #[inline(never)]
     pub(crate) fn word(&mut self, word: Text) {
         self.add(word);
-        self.say(Said(self.last.0 + 1));
+        self.say(NamedText(self.last.0 + 1));
     }
 
     /// Adds a text of any group.
@@ -187,7 +187,7 @@ mod tests {
         let mut line = Line::new();
         line.add(Setting::K.text());
         line.say(texts::RANGE);
-        line.say(Said::of(lines::LINES[2]));
+        line.say(NamedText::of(lines::LINES[2]));
         line.word(texts::NUMBER.text());
         line.say(texts::END);
         [-1, 20, 7, 8].into_iter().for_each(|number| line.number(number));

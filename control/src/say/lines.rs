@@ -14,7 +14,7 @@ use crate::{
         state::State,
     },
     say::{
-        line::{Line, Said},
+        line::{Line, NamedText},
         packed::Text,
         texts,
         words::Argument,
@@ -46,7 +46,7 @@ macro_rules! write_lines {
         pub fn write_event(event: &Event, line: &mut Line) {
             match *event {
                 $($pattern => {
-                    line.say(const { Said::of(concat!($beginning, $($part,)* $($tail)?)) });
+                    line.say(const { NamedText::of(concat!($beginning, $($part,)* $($tail)?)) });
                     $(kind::$kind(line, $value);)*
                 })*
             }
@@ -61,7 +61,7 @@ macro_rules! write_lines {
                 /// Builds the line.
                 pub(super) fn write<C: Classifier, M: Memory>($machine: &Controller<C, M>, line: &mut Line) {
                     $($(if let $condition = $from)? {
-                        line.say(const { Said::of(concat!($($word),*)) });
+                        line.say(const { NamedText::of(concat!($($word),*)) });
                         $(kind::$of(line, $state);)*
                     })*
                 }
@@ -175,7 +175,7 @@ pub(super) fn write_setting<C: Classifier, M: Memory>(
 
 /// A text, then a setting's value.
 #[inline(never)]
-fn write_value(text: Said, setting: Setting, value: u16, line: &mut Line) {
+fn write_value(text: NamedText, setting: Setting, value: u16, line: &mut Line) {
     line.say(text);
     if !setting.is_switched() {
         line.say(texts::NUMBER);

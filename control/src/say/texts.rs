@@ -9,7 +9,7 @@ use crate::{
     operate::{command_error::CommandError, tool::Reason},
     say::{
         command::Wrong,
-        line::Said,
+        line::NamedText,
         lines, version,
         words::{self, Argument, Word},
     },
@@ -59,7 +59,7 @@ macro_rules! said {
     ($($NAME:ident = $text:literal;)*) => {
         const SAID: &[&str] = &[$($text),*];
 
-        $(pub(crate) const $NAME: Said = Said::of($text);)*
+        $(pub(crate) const $NAME: NamedText = NamedText::of($text);)*
     };
 }
 

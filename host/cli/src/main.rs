@@ -18,6 +18,7 @@ mod examples;
 mod figures;
 mod flash;
 mod hex;
+mod input;
 mod map;
 mod merge;
 mod monitor;

@@ -4,7 +4,6 @@
 //! adds the keyboard. [`plain`] works without a screen: lines in, lines out.
 
 mod command_line;
-mod input;
 mod model;
 mod pager;
 mod plain;

@@ -5,7 +5,10 @@
 //! monitor and on the page.
 
 mod simulated;
+mod state;
 
+use self::state::State;
+use crate::input;
 use crate::output::{say, tell};
 use crate::ports::Port;
 use crate::source;
@@ -20,7 +23,6 @@ use mechanics::design::Design;
 use mechanics::machine::Machine;
 use mechanics::swing::Swing;
 use mechanics::unit::MM;
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -105,92 +107,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn typed_lines() -> Receiver<String> {
     let (sender, typed) = mpsc::channel();
     // Reading blocks until the user types, so it has its own thread. The thread ends with the process.
-    thread::spawn(move || {
-        let mut lines = io::stdin().lines().map_while(Result::ok);
-        lines.try_for_each(|line| sender.send(line.trim().to_owned()))
-    });
+    thread::spawn(move || input::read(io::stdin().lock(), |line| sender.send(line.text.trim().to_owned()).is_ok()));
     typed
-}
-
-/// The completed steps, the measurements, and the user's measures.
-#[derive(Default)]
-struct State {
-    /// The board, in words. Empty in a new file.
-    board: String,
-    done: BTreeSet<usize>,
-    /// The user's measures in a machine file's units, by section and key.
-    asked: BTreeMap<String, f64>,
-    /// With the board's settings as they were last.
-    measured: SetUp,
-}
-
-/// The first line of its file.
-const HEAD: &str = "# What `weeder set-up` has done and measured: it goes on from here.";
-
-/// The beginnings of its other lines. The settings come behind a typed `get`, as in a log.
-const BOARD: &str = "board ";
-const DONE: &str = "done ";
-const ASK: &str = "machine ";
-const GET: &str = "> get";
-
-/// A board with its own number begins so, in words.
-const NUMBER: &str = "serial number ";
-
-impl State {
-    fn parse(text: &str) -> Result<Self> {
-        let mut lines = text.lines();
-        match lines.next() {
-            None | Some(HEAD) => {}
-            Some(_) => bail!("its first line has to be `{HEAD}`; give another --state"),
-        }
-        let of = |beginning: &'static str| lines.clone().filter_map(move |line| line.strip_prefix(beginning));
-        let asked = of(ASK)
-            .filter_map(|line| line.split_once(' '))
-            .filter_map(|(key, value)| Some((key.to_owned(), value.parse().ok()?)));
-        Ok(Self {
-            board: of(BOARD).next().unwrap_or_default().to_owned(),
-            done: of(DONE).filter_map(|number| number.parse().ok()).collect(),
-            asked: asked.collect(),
-            measured: SetUp::of_lines(lines),
-        })
-    }
-
-    fn text(&self) -> String {
-        let mut lines = vec![HEAD.to_owned(), format!("{BOARD}{}", self.board)];
-        lines.extend(self.done.iter().map(|number| format!("{DONE}{number}")));
-        lines.extend(self.asked.iter().map(|(key, value)| format!("{ASK}{key} {value}")));
-        lines.extend(self.measured.lines());
-        lines.push(GET.to_owned());
-        let value = |setting| format!("{}={}", name(setting), self.measured.settings.get(setting));
-        lines.extend(Setting::all().map(value));
-        lines.push(String::new());
-        lines.join("\n")
-    }
-
-    /// Takes the board that is there.
-    ///
-    /// # Errors
-    /// If the file belongs to a board with another serial number.
-    fn take_board(&mut self, board: &Board, path: &Path) -> Result<()> {
-        let named = match board {
-            Board::SerialNumber(number) => format!("{NUMBER}{number}"),
-            Board::Port(port) => format!("port {port}"),
-            Board::Only { .. } => String::new(),
-        };
-        if [&self.board, &named].iter().all(|words| words.starts_with(NUMBER)) && self.board != named {
-            let path = path.display();
-            bail!(
-                "{path} belongs to the board with {}, and this one has {named}: give another --state, or start \
-                 {path} again with --again",
-                self.board
-            );
-        }
-        if !self.board.is_empty() && self.board != named {
-            tell!("{} was made for a board at {}. This one is at {named}.", path.display(), self.board);
-        }
-        self.board = named;
-        Ok(())
-    }
 }
 
 /// How the user ends a step early.

@@ -3,6 +3,7 @@
 use crate::course::CourseArguments;
 use crate::ctrl_c;
 use crate::flash;
+use crate::input;
 use crate::numbers::{number_within, whole_within};
 use crate::output::{say, tell};
 use anyhow::{Result, anyhow, ensure};
@@ -190,19 +191,17 @@ fn typed_runs() -> Receiver<Run> {
     let (asked, runs) = mpsc::channel();
     // Reading blocks until a person types, so it has its own thread. The thread ends with the process.
     thread::spawn(move || {
-        for line in io::stdin().lines().map_while(Result::ok) {
-            let run = match line.trim() {
+        input::read(io::stdin().lock(), |line| {
+            let run = match line.text.trim() {
                 "" => Some(Run::AlongRow),
                 typed => typed.parse().ok().filter(|mm| RUN_MM.contains(mm)).map(|mm| Run::OverGround(mm.into())),
             };
             let Some(run) = run else {
                 tell!("error: type Enter, or millimetres from {} to {}", RUN_MM.start(), RUN_MM.end());
-                continue;
+                return true;
             };
-            if asked.send(run).is_err() {
-                break;
-            }
-        }
+            asked.send(run).is_ok()
+        });
     });
     runs
 }

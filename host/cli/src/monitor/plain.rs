@@ -8,7 +8,7 @@
 //! goes first, and the lines between are not sent.
 
 use super::addressed;
-use super::input::{self, Line};
+use crate::input::{self, Line};
 use crate::output::tell;
 use crate::ports::Chosen;
 use crate::program::Finding;

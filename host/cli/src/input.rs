@@ -1,4 +1,4 @@
-//! The plain monitor's input: bytes from a shell, a script or another program, as lines.
+//! What is typed or piped into a command: bytes from a shell, a script or another program, as lines.
 //!
 //! CR, LF or both end a line. A byte order mark is dropped, and UTF-16 is read, because some shells write both. A byte
 //! that is no text spoils its own line only. Lines are bounded, so that input without line ends is refused too.
@@ -31,6 +31,8 @@ impl Encoding {
     /// The encoding that the first bytes show, and the length of their byte order mark. `None` if more bytes are needed.
     fn of(first: &[u8], is_all: bool) -> Option<(Self, usize)> {
         Some(match *first {
+            // Enter alone is a whole line, so nothing waits for a second byte.
+            [b'\r' | b'\n', ..] => (Self::Bytes, 0),
             [0xEF, 0xBB, 0xBF, ..] => (Self::Bytes, 3),
             [0xFF, 0xFE, ..] => (Self::LittleEndian, 2),
             [0xFE, 0xFF, ..] => (Self::BigEndian, 2),
@@ -153,6 +155,8 @@ mod tests {
             let mut lines = Lines::default();
             let hold = lines.take(format!("hold{end}").as_bytes(), false);
             assert_eq!(hold, [Line { number: 1, text: "hold".to_owned() }], "{end:?}");
+            let enter = Lines::default().take(end.as_bytes(), false);
+            assert_eq!(enter, [Line { number: 1, text: String::new() }], "{end:?}");
         }
     }
 
