@@ -2,10 +2,10 @@
 //!
 //! The file also holds facts that the ELF does not: loop bounds, targets of indirect calls, and the depth of recursion.
 
-use crate::error::{BoundsError, with_reason};
+use crate::error::BoundsError;
+use crate::file;
 use crate::loops::LoopBounds;
 use crate::proved::{Bounds, Input, Longest};
-use files::{FileError, bounded_file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -83,12 +83,11 @@ impl Budgets {
     /// # Errors
     /// If it cannot be read, or says what is not known.
     pub fn read(path: &Path) -> Result<Budgets, BoundsError> {
-        let unread = |error: FileError| BoundsError(with_reason(&error));
-        let text = bounded_file::text(path).map_err(unread)?;
-        bounded_file::check_nesting(path, &text).map_err(unread)?;
+        let text = file::toml(path)?;
         toml::from_str(&text).map_err(|error| {
-            let byte = error.span().map_or(0, |span| span.start);
-            unread(FileError::at_byte(path, &text, byte, error.message().trim().replace('\n', ", ")))
+            let line = error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+            let problem = error.message().trim().replace('\n', ", ");
+            BoundsError(format!("{}, line {line}: {problem}", path.display()))
         })
     }
 

@@ -2,10 +2,10 @@
 //! loop bounds.
 
 use crate::chip::{CHIPS, Chip};
-use crate::error::{BoundsError, with_reason};
+use crate::error::BoundsError;
+use crate::file;
 use crate::loops;
 use addr2line::Loader;
-use files::bounded_file;
 use object::read::elf::{ElfFile32, ElfSymbol32, ProgramHeader};
 use object::{
     Architecture, LittleEndian, Object, ObjectSection, ObjectSymbol, RelocationFlags, RelocationTarget, SectionKind,
@@ -96,7 +96,7 @@ impl Program {
     pub fn read(path: &Path, chip: Option<&str>) -> Result<Program, BoundsError> {
         let error = |reason: String| BoundsError(format!("{} {reason}", path.display()));
         let not_elf = |reason| error(format!("is not a readable ELF file ({reason})"));
-        let bytes = bounded_file::bytes(path).map_err(|reason| BoundsError(with_reason(&reason)))?;
+        let bytes = file::bytes(path)?;
         let architecture = object::File::parse(&*bytes).map_err(not_elf)?.architecture();
         if architecture != Architecture::Avr {
             return Err(error(format!("was made for {architecture:?}: an ELF for AVR is needed")));

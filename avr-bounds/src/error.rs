@@ -24,11 +24,6 @@ pub(crate) fn printable(text: &str) -> String {
     text.chars().map(letter).collect()
 }
 
-/// An error and its reason.
-pub(crate) fn with_reason(error: &dyn std::error::Error) -> String {
-    error.source().map_or_else(|| error.to_string(), |reason| format!("{error}: {reason}"))
-}
-
 impl BoundsError {
     /// An instruction that cannot be followed.
     pub(crate) fn at(place: &Place, problem: Problem) -> BoundsError {

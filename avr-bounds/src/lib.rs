@@ -50,6 +50,7 @@ mod decode;
 mod effects;
 mod elf;
 mod error;
+mod file;
 mod flow;
 mod loops;
 mod order;
