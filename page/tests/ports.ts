@@ -52,7 +52,7 @@ export class VirtualUno implements Device {
     static async start(test: TestContext, ...options: string[]): Promise<VirtualUno> {
         const folder = mkdtempSync(join(tmpdir(), "weeder-page-"));
         const child = spawn(WEEDER, ["virtual-uno", "--link", join(folder, "uno"), ...options], {
-            stdio: ["ignore", "ignore", "pipe"],
+            stdio: ["pipe", "ignore", "pipe"],
         });
         let said = "";
         child.stderr?.on("data", (text) => {
@@ -65,6 +65,11 @@ export class VirtualUno implements Device {
             await wait(50);
         }
         return uno;
+    }
+
+    /** Types a line in the terminal where it was started. */
+    type(line: string): void {
+        this.#process.stdin?.write(`${line}\n`);
     }
 
     open(): void {

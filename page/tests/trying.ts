@@ -26,9 +26,17 @@ export async function rollTo(page: Page, toolMm: number): Promise<void> {
     while (await page.evaluate((mm) => globalThis.trial.machine.toolMm < mm, toolMm)) await pass(page, 0.5);
 }
 
-/** Lets time pass on the chip. */
+/**
+ * Lets time pass on the chip. As in the page's own frames, the panel has its turn after a tenth of a second at most: it
+ * would take its own pause for the machine's silence otherwise.
+ */
 export async function pass(page: Page, seconds: number): Promise<void> {
-    await page.evaluate((seconds) => globalThis.trial.advance(seconds, Number.POSITIVE_INFINITY), seconds);
+    await page.evaluate(async (seconds) => {
+        for (let left = seconds; left > 0; left -= 0.1) {
+            globalThis.trial.advance(Math.min(left, 0.1), Number.POSITIVE_INFINITY);
+            await new Promise(requestAnimationFrame);
+        }
+    }, seconds);
 }
 
 /** Types a command, and waits until the console shows the command again and an answer like this. */

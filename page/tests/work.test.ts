@@ -229,13 +229,17 @@ test("a port that another program has is told with the way out", async () => {
 });
 
 test("the wheel is calibrated over a measured stretch", async (test) => {
-    const { page, errors } = await atHold(test, PHONE);
+    const { page, errors, uno } = await atHold(test, PHONE, "--roll");
     await page.getByRole("tab", { name: "Calibrate" }).click();
     await part(page, "wheel-end").click();
     await part(page, "wheel-said").filter({ hasText: "calibrate start first, then roll" }).waitFor();
     await part(page, "wheel-begin").click();
-    const rolled = part(page, "wheel-rolled").filter({ hasText: /^[3-9]\.\d\d m/ });
+    await part(page, "wheel-said").filter({ hasText: "Roll to the other mark" }).waitFor();
+    uno.type("4000");
+    const rolled = part(page, "wheel-rolled").filter({ hasText: /^(3\.9|4\.)/ });
     await rolled.waitFor();
+    // A stretch ends where the machine stands.
+    await part(page, "speed").filter({ hasText: /^0\.0/ }).waitFor();
     // Twice the wheel's value: no wheel has such a large error.
     const measuredMm = 2000 * Number.parseFloat((await rolled.textContent()) ?? "");
     await part(page, "wheel-mm").fill(measuredMm.toFixed(0));

@@ -32,10 +32,7 @@ export async function makeInstallable(onNewer: (load: () => void) => void): Prom
     // The worker has a newer page, which did not start.
     serviceWorker.addEventListener("message", ({ data }) => {
         if (data !== "newer") return;
-        onNewer(() => {
-            serviceWorker.controller?.postMessage("try again");
-            location.reload();
-        });
+        onNewer(() => serviceWorker.controller?.postMessage("try again"));
     });
     const follow = () => registration.installing?.addEventListener("statechange", look);
     registration.addEventListener("updatefound", follow);

@@ -82,6 +82,12 @@ async function watch(id: string): Promise<void> {
     await client.navigate(client.url);
 }
 
+/** Shows the newer page once more. The request for it must not overtake the message. */
+async function tryAgain(client: Client | null): Promise<void> {
+    await (await caches.open(NAME)).delete(DEAD);
+    await client?.navigate(client.url);
+}
+
 /** A file of the page, and whether it is a newer page that was not seen to start. */
 async function choose(request: Request): Promise<{ file: Response; isNew: boolean }> {
     const own = await caches.open(NAME);
@@ -110,7 +116,7 @@ worker.addEventListener("fetch", (event) => {
 worker.addEventListener("message", (event) => {
     const { data, source } = event;
     if (data === "take over") void worker.skipWaiting();
-    else if (data === "try again") event.waitUntil(caches.open(NAME).then((cache) => cache.delete(DEAD)));
+    else if (data === "try again") event.waitUntil(tryAgain(source));
     else if (data.started !== BUILD) source?.postMessage("newer");
     else {
         for (const start of starts) start();
