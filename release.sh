@@ -63,13 +63,13 @@ cargo bench-firmware --locked
 cargo tester-firmware --locked
 inside=$target/release-inside
 rm -rf "$inside"
-mkdir -p "$inside/tester"
+mkdir -p "$inside/yard/tester"
 for name in weeder-firmware knn-bench tester-firmware; do
     avr-objcopy --strip-debug "$(dirname "$elf")/$name.elf" "$inside/$name.elf"
 done
 cp budgets.toml "$inside/"
-cp tester/budgets.toml "$inside/tester/"
-# As in host/uno/src/hex.rs.
+cp yard/tester/budgets.toml "$inside/yard/tester/"
+# As in yard/virtual-uno/src/hex.rs.
 avr-gcc -mmcu=atmega328p -DF_CPU=16000000L -DBAUD_RATE=115200 -w -Os -mrelax -nostdlib -fno-split-wide-types \
     -fno-inline-small-functions -nostartfiles -Wl,--section-start=.text=0x7e00 -o "$inside/optiboot.elf" \
     /usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c
@@ -97,7 +97,7 @@ sed -e '/^#/d' -e 's|^firmware = .*|firmware = "../weeder.hex"|' -e 's|^elf = .*
 # The manual, with the sources that docs/ links. Other links to sources do not work here.
 mkdir "$folder/manual"
 cp -r README.md CHANGELOG.md CONTRIBUTING.md CITATION.cff LICENSE-MIT LICENSE-APACHE docs "$folder/manual/"
-cp --parents avr-bounds/README.md "$folder/manual/"
+cp --parents yard/avr-bounds/README.md "$folder/manual/"
 grep -oh '](\.\./[^)#]*' docs/*.md | sed 's|^](\.\./||' | LC_ALL=C sort -u | xargs cp --parents --target-directory="$folder/manual"
 cargo install --quiet --locked mdbook --version 0.5.4 --no-default-features --features search --root "$target/mdbook"
 "$target/mdbook/bin/mdbook" build --dest-dir "$folder/book"

@@ -1,13 +1,13 @@
 //! Alarms: a fault puts the tool out. The firmware names it, blinks its code, and latches it until it is cleared.
 
 use crate::common::{
-    Run, ask, bare_ground, is_out_at_the_pin, named, number, refusal, run_for_ms, status, steady, throw_switch, trial,
+    Run, ask, bare_ground, is_out_at_the_pin, named, number, pass, refusal, run_for_ms, status, steady, throw_switch,
     value,
 };
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
-use field::trial::{Start, Trial};
 use field::wiring;
 use uno::Uno;
 use uno::{CYCLES_PER_SECOND, PinChange};
@@ -24,7 +24,7 @@ fn with_a_blocked_beam(start: Start) -> Run {
     let row = Row::new(vec![Canopy::plant(1300.0, 600.0)]).expect("a plant is a row");
     let machine = Machine { beam_to_tool_mm: 900.0, ..Machine::default() };
     let motion = steady(mm_s(2.0), 1800.0);
-    let mut run = Run::begin(Trial { machine, start, ..trial(row, motion) }, &[]);
+    let mut run = Run::begin(Pass { machine, start, ..pass(row, motion) }, &[]);
     // 400 mm after the beginning of the blocked stretch.
     run.roll_to(1390.0);
     assert!(!is_out_at_the_pin(&run.uno));
@@ -82,7 +82,7 @@ fn a_beam_that_stays_broken_is_an_alarm_that_puts_the_tool_out() {
 #[test]
 fn a_beam_that_stays_broken_at_standstill_is_no_alarm() {
     let row = Row::new(vec![Canopy::plant(300.0, 150.0)]).expect("a plant is a row");
-    let mut run = Run::begin(trial(row, steady(mm_s(1.0), 300.0).go_on_for(4.0)), &[]);
+    let mut run = Run::begin(pass(row, steady(mm_s(1.0), 300.0).go_on_for(4.0)), &[]);
     run.roll_to_the_end();
     assert_eq!(run.events("alarm"), [""; 0]);
     assert_eq!(value(&status(&mut run.uno), "state"), "work");
@@ -93,7 +93,7 @@ fn more_plants_than_the_schedule_holds_are_an_alarm() {
     let plants = (0..20).map(|number| Canopy::plant(300.0 + 110.0 * f64::from(number), 90.0));
     let row = Row::new(plants.collect()).expect("the plants stand apart");
     let machine = Machine { beam_to_tool_mm: 2000.0, ..Machine::default() };
-    let mut run = Run::begin(Trial { machine, ..trial(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_mm 3"]);
+    let mut run = Run::begin(Pass { machine, ..pass(row, steady(mm_s(2.5), 2300.0)) }, &["set merge_gap_mm 3"]);
     run.roll_to_the_end();
     assert_alarm(&mut run, "3-3 schedule_full");
     assert_blinks(&mut run.uno, [3, 3]);
@@ -107,7 +107,7 @@ fn a_crop_of_stalks_that_the_built_in_examples_do_not_know_is_an_alarm_before_th
     {
         let stalk = |(width_mm, number)| Canopy::plant(before_mm + spacing_mm * f64::from(number), width_mm);
         let row = Row::new(widths_mm.into_iter().zip(0..).map(stalk).collect()).expect("the stalks stand apart");
-        let mut run = Run::begin(trial(row, steady(mm_s(speed_km_h), before_mm + 5.5 * spacing_mm)), &[]);
+        let mut run = Run::begin(pass(row, steady(mm_s(speed_km_h), before_mm + 5.5 * spacing_mm)), &[]);
         run.roll_to_the_end();
         assert_alarm(&mut run, "3-4 crop_unknown");
     }
@@ -117,7 +117,7 @@ fn a_crop_of_stalks_that_the_built_in_examples_do_not_know_is_an_alarm_before_th
 fn stalks_are_no_alarm_where_it_is_off() {
     let stalks = (0..9).map(|number| Canopy::plant(300.0 + 250.0 * f64::from(number), 20.0));
     let row = Row::new(stalks.collect()).expect("the stalks stand apart");
-    let mut run = Run::begin(trial(row, steady(mm_s(2.0), 2700.0)), &["set misfit_after 0"]);
+    let mut run = Run::begin(pass(row, steady(mm_s(2.0), 2700.0)), &["set misfit_after 0"]);
     run.roll_to_the_end();
     assert_eq!(run.events("alarm"), [""; 0]);
     assert_eq!(run.events("weed").len() + run.events("unknown").len(), 9, "{:#?}", run.lines());
@@ -125,7 +125,7 @@ fn stalks_are_no_alarm_where_it_is_off() {
 
 #[test]
 fn a_beam_that_flickers_faster_than_it_can_be_followed_is_an_alarm() {
-    let mut run = Run::begin(trial(bare_ground(), steady(mm_s(2.0), 900.0)), &[]);
+    let mut run = Run::begin(pass(bare_ground(), steady(mm_s(2.0), 900.0)), &[]);
     run.roll_to(600.0);
     assert!(!is_out_at_the_pin(&run.uno));
     let begin = run.uno.cycle();

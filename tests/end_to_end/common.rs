@@ -1,21 +1,21 @@
 //! Shared code of the tests: a started Uno, an operator at its console, and a run along a row.
 //!
-//! A [`Run`] is a trial that a test can inspect and operate meanwhile. This file makes no verdicts: the tests do.
+//! A [`Run`] is a pass that a test can inspect and operate meanwhile. This file makes no verdicts: the tests do.
 
 use field::machine::{Machine, cycle_at, encoder_edge};
 use field::motion::Motion;
+use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
 use field::servo::Command;
-use field::trial::{Start, Trial};
 use field::verdict::{Judgement, PlantOutcome, Timing, Verdict, judge};
 use field::wiring;
 use std::ops::Range;
 use std::path::PathBuf;
-use trial::Outcome;
-use trial::console::{self, ConsoleError};
-use trial::firmware;
 use uno::PinChange;
 use uno::Uno;
+use uno_run::Outcome;
+use uno_run::console::{self, ConsoleError};
+use uno_run::firmware;
 
 /// Greatest distance between a swing's command at the pin and its ideal position.
 pub const SWING_TOLERANCE_TICKS: f64 = 12.0;
@@ -28,7 +28,7 @@ pub fn elf() -> PathBuf {
 /// An Uno after its start, with inputs at rest, the switch off and the beam clear. The alarm for missing saved settings
 /// is cleared.
 pub fn started() -> Uno {
-    trial::boot(&elf(), &[]).expect("the firmware wakes up")
+    uno_run::boot(&elf(), &[]).expect("the firmware wakes up")
 }
 
 /// Types a command and returns the lines of its answer, without the `ok`.
@@ -103,9 +103,9 @@ pub fn bare_ground() -> Row {
     Row::new(vec![Canopy::plant(100_000.0, 100.0)]).expect("a plant is a row")
 }
 
-/// A trial of the usual machine and timing, started by `start`.
-pub fn trial(row: Row, motion: Motion) -> Trial {
-    Trial {
+/// A pass of the usual machine and timing, started by `start`.
+pub fn pass(row: Row, motion: Motion) -> Pass {
+    Pass {
         row,
         machine: Machine::default(),
         motion,
@@ -116,10 +116,10 @@ pub fn trial(row: Row, motion: Motion) -> Trial {
     }
 }
 
-/// Runs a trial to its end.
+/// Runs a pass to its end.
 #[track_caller]
-pub fn outcome(trial: &Trial) -> Outcome {
-    trial::run(trial, &elf(), |_| {}).expect("the firmware runs")
+pub fn outcome(pass: &Pass) -> Outcome {
+    uno_run::run(pass, &elf(), |_| {}).expect("the firmware runs")
 }
 
 /// Asserts that every plant was kept, with the margin less its tolerance on both sides.
@@ -172,44 +172,44 @@ pub fn exchange(uno: &mut Uno, bytes: &[u8]) -> Vec<String> {
 pub struct Run {
     /// The Uno.
     pub uno: Uno,
-    trial: Trial,
+    pass: Pass,
     start_cycle: u64,
     heard: String,
 }
 
 impl Run {
-    /// Starts the firmware, types these commands and those of the trial's start, and sets the machine in motion.
+    /// Starts the firmware, types these commands and those of the pass's start, and sets the machine in motion.
     #[track_caller]
-    pub fn begin(trial: Trial, commands: &[&str]) -> Self {
-        Self::begin_altered(trial, commands, |_, changes| changes)
+    pub fn begin(pass: Pass, commands: &[&str]) -> Self {
+        Self::begin_altered(pass, commands, |_, changes| changes)
     }
 
     /// As [`Run::begin`], with changed levels on the pins: `alter` gets the cycle at which the motion begins, and the
     /// changes of a machine without faults.
     #[track_caller]
     pub fn begin_altered(
-        trial: Trial,
+        pass: Pass,
         commands: &[&str],
         alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>,
     ) -> Self {
-        let inputs = trial.machine.beams_before(&trial.row, &trial.motion);
-        Self::set_off(trial::boot(&elf(), &inputs).expect("it wakes up"), trial, commands, alter)
+        let inputs = pass.machine.beams_before(&pass.row, &pass.motion);
+        Self::set_off(uno_run::boot(&elf(), &inputs).expect("it wakes up"), pass, commands, alter)
     }
 
     /// As [`Run::begin_altered`], with a firmware that has woken up already.
     #[track_caller]
     pub fn set_off(
         mut uno: Uno,
-        trial: Trial,
+        pass: Pass,
         commands: &[&str],
         alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>,
     ) -> Self {
-        trial::set_up(&trial, &mut uno).expect("the firmware takes the trial's settings");
+        uno_run::set_up(&pass, &mut uno).expect("the firmware takes the pass's settings");
         ask(&mut uno, "events on");
         for command in commands {
             ask(&mut uno, command);
         }
-        match trial.start {
+        match pass.start {
             Start::Command => uno.send(b"start\n"),
             Start::Now => uno.send(b"start now\n"),
             Start::Switch => uno.set(wiring::WORK_SWITCH, false),
@@ -217,14 +217,14 @@ impl Run {
         run_for_ms(&mut uno, 100);
         uno.received();
         let start_cycle = uno.cycle();
-        uno.drive(alter(start_cycle, trial.machine.pin_changes(&trial.row, &trial.motion, start_cycle)));
-        Self { uno, trial, start_cycle, heard: String::new() }
+        uno.drive(alter(start_cycle, pass.machine.pin_changes(&pass.row, &pass.motion, start_cycle)));
+        Self { uno, pass, start_cycle, heard: String::new() }
     }
 
     /// Rolls on until the machine first reaches a position.
     #[track_caller]
     pub fn roll_to(&mut self, place_mm: f64) {
-        let passing = self.trial.motion.passings(place_mm).next().expect("the machine comes to the place");
+        let passing = self.pass.motion.passings(place_mm).next().expect("the machine comes to the place");
         self.uno.run_until(cycle_at(self.start_cycle, passing.time_s)).expect("the firmware runs");
     }
 
@@ -247,7 +247,7 @@ impl Run {
     }
 
     fn end_cycle(&self) -> u64 {
-        cycle_at(self.start_cycle, self.trial.motion.duration_s())
+        cycle_at(self.start_cycle, self.pass.motion.duration_s())
     }
 
     /// The cycles of the whole motion.
@@ -257,7 +257,7 @@ impl Run {
 
     /// The machine's position at a cycle.
     pub fn place_mm(&self, cycle: u64) -> f64 {
-        self.trial.motion.position_mm(field::machine::time_at_s(self.start_cycle, cycle))
+        self.pass.motion.position_mm(field::machine::time_at_s(self.start_cycle, cycle))
     }
 
     /// Every line that the firmware has sent so far.
@@ -275,13 +275,13 @@ impl Run {
 
     /// The result for the row.
     pub fn judgement(&self) -> Judgement {
-        let Trial { row, machine, motion, timing, .. } = &self.trial;
+        let Pass { row, machine, motion, timing, .. } = &self.pass;
         judge(row, machine, motion, *timing, &self.uno.pulses(wiring::SERVO), self.start_cycle)
     }
 
     /// The commands at the servo's pin.
     pub fn commands(&self) -> Vec<Command> {
-        self.trial.machine.servo.commands(&self.uno.pulses(wiring::SERVO))
+        self.pass.machine.servo.commands(&self.uno.pulses(wiring::SERVO))
     }
 
     /// The first command after a cycle.

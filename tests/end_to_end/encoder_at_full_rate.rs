@@ -3,8 +3,8 @@
 use crate::common::{ask, elf, encoder_steps, number, run_for_ms, started, status};
 use field::wiring;
 use std::path::Path;
-use trial::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
 use uno::{CYCLES_PER_SECOND, PinChange};
+use uno_run::bench::encoder::{self, Counted, Direction, JITTER, Load, Turning};
 
 /// Counts a second that the firmware follows while its status streams at 115200 baud and the beam flickers. This holds
 /// for any timing of the edges: even, and early and late by 30 % of the time between two.

@@ -1,8 +1,8 @@
 //! The paper's experiment with the real firmware on the virtual Uno.
 
-use experiments::experiment::{Engine, Experiment, Treatment};
 use field::conditions::Conditions;
-use trial::firmware;
+use study::experiment::{Engine, Experiment, Treatment};
+use uno_run::firmware;
 
 /// Over all plots, in-row weeding may fall short of the servo's bound by this share of the ground. A single plot may
 /// fall short by more: a weed as wide as a plant is kept, and one of them in these 7 m costs 3 %.

@@ -8,8 +8,8 @@ use field::row::{Canopy, Row};
 use field::wiring;
 use link::settings::{self, SettingsError};
 use link::{EventLine, Link, LinkError, Mode, Status};
-use trial::UnoPort;
 use uno::Uno;
+use uno_run::UnoPort;
 
 /// A link to a firmware that has just woken up.
 fn link() -> Link {
@@ -24,7 +24,7 @@ fn a_link_waits_for_the_greeting_and_knows_the_version() {
 
 #[test]
 fn half_a_line_typed_before_the_link_was_there_harms_nothing() {
-    let mut uno = trial::boot(&elf(), &[]).expect("the firmware wakes up");
+    let mut uno = uno_run::boot(&elf(), &[]).expect("the firmware wakes up");
     uno.send(b"set whe");
     let mut link = Link::over(UnoPort::new(uno), false).expect("the firmware answers");
     let status = link.ask("status").expect("the firmware knows the command").join(" ");
@@ -94,7 +94,7 @@ fn every_line_of_a_row_being_weeded_is_understood() {
     let row = row.expect("plants and a weed are a row");
     let machine = Machine::default();
     let motion = Motion::steady(0.0, 1000.0, 500.0, 2200.0).change_speed(0.0, 1000.0);
-    let mut uno = trial::boot(&elf(), &machine.beams_before(&row, &motion)).expect("the firmware wakes up");
+    let mut uno = uno_run::boot(&elf(), &machine.beams_before(&row, &motion)).expect("the firmware wakes up");
     uno.send(b"events on\nstart\n");
     uno.run_for_ms(100).expect("the firmware runs");
     uno.received();

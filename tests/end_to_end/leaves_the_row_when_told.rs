@@ -1,8 +1,8 @@
 //! `hold` and the work switch put the tool out at once, at every position.
 
-use crate::common::{Run, bare_ground, is_out_at_the_pin, run_for_ms, status, steady, trial, value};
+use crate::common::{Run, bare_ground, is_out_at_the_pin, pass, run_for_ms, status, steady, value};
 use field::motion::mm_s;
-use field::trial::{Start, Trial};
+use field::pass::{Pass, Start};
 use field::wiring;
 use uno::CYCLES_PER_SECOND;
 use uno::SENT_BYTE_CYCLES;
@@ -15,7 +15,7 @@ const BOUNCING_MS: f64 = 20.0;
 
 /// The machine weeds bare ground.
 fn weeding(start: Start) -> Run {
-    let mut run = Run::begin(Trial { start, ..trial(bare_ground(), steady(mm_s(2.5), 2000.0)) }, &[]);
+    let mut run = Run::begin(Pass { start, ..pass(bare_ground(), steady(mm_s(2.5), 2000.0)) }, &[]);
     run.roll_to(900.0);
     assert!(!is_out_at_the_pin(&run.uno));
     run

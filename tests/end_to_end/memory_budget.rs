@@ -3,13 +3,13 @@
 use crate::common::{Run, ask, elf};
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::Pass;
 use field::planting::Planting;
-use field::trial::Trial;
 use field::verdict::Timing;
 use std::fs;
 use std::process::Command;
-use trial::firmware::workspace_root;
 use uno::elf::{Image, Size};
+use uno_run::firmware::workspace_root;
 
 /// The budgets, as in .ci/run.
 const FLASH_BYTES: u64 = 30_500;
@@ -21,7 +21,7 @@ const STACK_BYTES: usize = 768;
 #[test]
 fn the_stack_stays_within_its_reserve() {
     let row = Planting { plants: 4, weeds: 2, ..Planting::default() }.grow(1).expect("everything has room");
-    let mut run = Run::begin(Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5)), &[]);
+    let mut run = Run::begin(Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5)), &[]);
     run.roll_to_the_end();
     for command in ["status", "help", "help k", "get", "dump", "label plant", "examples", "forget all", "set k 5"] {
         ask(&mut run.uno, command);

@@ -7,16 +7,16 @@
 use field::conditions::{Conditions, presets};
 use field::driving::drive;
 use field::native::{self, Sensors};
+use field::pass::{Pass, Start};
 use field::servo::{Command, Servo};
 use field::stand::Stand;
-use field::trial::{Start, Trial};
 use model_test::cases;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use trial::firmware;
 use uno::Pulse;
+use uno_run::firmware;
 
 /// Greatest difference of a swing: a servo's frame.
 const FRAME_S: f64 = 0.020;
@@ -40,7 +40,7 @@ fn swings(servo: &Servo, pulses: &[Pulse]) -> Vec<Command> {
 }
 
 /// A short row under the conditions of a preset, with its own speed and spacing.
-fn random_row(seed: u64) -> Trial {
+fn random_row(seed: u64) -> Pass {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let presets: Vec<&str> = presets().collect();
     let mut conditions = Conditions::preset(presets.choose(&mut rng).unwrap()).unwrap().unwrap();
@@ -48,7 +48,7 @@ fn random_row(seed: u64) -> Trial {
     conditions.set("driving.stops_per_100_m", 0.0).unwrap();
     let stand = Stand::grow(&conditions, rng.random_range(400.0..700.0), &mut rng).unwrap();
     let drive = drive(&conditions, &stand.span_mm, rng.random_range(0.8..3.0), &mut rng);
-    Trial {
+    Pass {
         row: stand.row,
         machine: conditions.machine(rng.random()),
         motion: drive.motion,
@@ -66,10 +66,10 @@ fn the_native_run_swings_as_the_firmware_does_on_random_rows() {
     let swings: usize = (0..rows)
         .into_par_iter()
         .map(|seed| {
-            let trial = random_row(seed);
-            let servo = trial.machine.servo;
-            let on_the_uno = trial::run(&trial, &elf, |_| ()).unwrap();
-            let by_the_native_run = native::weed(&trial, &Sensors::new(&trial, native::TURN_S)).unwrap();
+            let pass = random_row(seed);
+            let servo = pass.machine.servo;
+            let on_the_uno = uno_run::run(&pass, &elf, |_| ()).unwrap();
+            let by_the_native_run = native::weed(&pass, &Sensors::new(&pass, native::TURN_S)).unwrap();
             let (real, native) = (swings(&servo, &on_the_uno.pulses), swings(&servo, &by_the_native_run.pulses));
             assert_eq!(real.len(), native.len(), "row {seed}: {real:?} {native:?}");
             for (real, native) in real.iter().zip(&native) {

@@ -1,6 +1,6 @@
 //! Bench commands on the real ELF: the servo driven directly and timed, and a row without sensors.
 
-use crate::common::{Run, ask, assert_all_kept, exchange, refusal, run_for_ms, started, status, trial, value};
+use crate::common::{Run, ask, assert_all_kept, exchange, pass, refusal, run_for_ms, started, status, value};
 use field::machine::Machine;
 use field::motion::{Motion, mm_s};
 use field::row::{Canopy, Row};
@@ -115,7 +115,7 @@ fn a_command_in_the_turn_in_which_a_played_row_ends_leaves_the_real_plants_alone
         ask(&mut uno, "hold");
         let row = Row::new((0..4).map(|plant| Canopy::plant(700.0 + 600.0 * f64::from(plant), 150.0)).collect());
         let motion = Motion::starting_at(0.0).change_speed(mm_s(2.0), 3000.0).roll_to(3100.0);
-        let mut run = Run::set_off(uno, trial(row.expect("the plants stand apart"), motion), &[], |_, changes| changes);
+        let mut run = Run::set_off(uno, pass(row.expect("the plants stand apart"), motion), &[], |_, changes| changes);
         run.roll_to_the_end();
         let seen = run.events("plant").len() + run.events("unknown").len();
         assert_eq!(seen, 4, "{command}: {:#?}", run.lines());

@@ -4,14 +4,14 @@
 use crate::common::outcome;
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::Pass;
 use field::planting::Planting;
-use field::trial::Trial;
 use field::verdict::{Judgement, Timing, Verdict};
 
 fn judgement(timing: Timing, speed_km_h: f64) -> Judgement {
     let planting = Planting { plants: 6, spacing_mm: 600.0, ..Planting::default() };
     let row = planting.grow(1).expect("the plants have room");
-    outcome(&Trial::at_speed(row, Machine::default(), timing, mm_s(speed_km_h))).judgement
+    outcome(&Pass::at_speed(row, Machine::default(), timing, mm_s(speed_km_h))).judgement
 }
 
 /// The tool's mean depth in the canopies; negative if it stays outside.

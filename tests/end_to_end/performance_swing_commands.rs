@@ -4,7 +4,7 @@
 use crate::common::elf;
 use field::machine::Machine;
 use model_test::cases;
-use trial::bench::swings::{Lateness, Rows, lateness};
+use uno_run::bench::swings::{Lateness, Rows, lateness};
 
 /// Greatest and mean distance of a command from its ideal position at 2.5 km/h, in ticks.
 const WORST_TICKS: f64 = 9.0;

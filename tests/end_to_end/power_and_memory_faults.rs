@@ -3,18 +3,18 @@
 
 use crate::common::{
     Run, ask, assert_a_swing_each, assert_all_kept, assert_commands_in_place, bare_ground, elf, is_out_at_the_pin,
-    number, refusal, run_for_ms, started, status, steady, trial, value,
+    number, pass, refusal, run_for_ms, started, status, steady, value,
 };
 use control::memory::{SIZE, Volatile};
 use control::operate::saved::{COPY, SavedSettings};
 use control::settings::{Setting, Settings};
 use field::motion::mm_s;
+use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
-use field::trial::{Start, Trial};
 use field::wiring;
-use trial::power_up;
 use uno::CYCLES_PER_SECOND;
 use uno::Uno;
+use uno_run::power_up;
 
 /// Longest time from a reset to the greeting.
 const GREETING_CYCLES: u64 = CYCLES_PER_SECOND / 2;
@@ -37,7 +37,7 @@ fn greeting_with_the_tool_out_since(uno: &mut Uno, cycle: u64) -> String {
 fn at_work() -> Run {
     let row = Row::new(vec![Canopy::plant(1500.0, 150.0)]).expect("a plant is a row");
     let motion = steady(mm_s(2.0), 3000.0);
-    let mut run = Run::begin(Trial { start: Start::Now, ..trial(row, motion) }, &["save"]);
+    let mut run = Run::begin(Pass { start: Start::Now, ..pass(row, motion) }, &["save"]);
     run.roll_to(1000.0);
     assert!(!is_out_at_the_pin(&run.uno));
     run
@@ -292,8 +292,8 @@ fn nothing_happens_where_position_and_time_wrap() {
 
     let row = Row::new((0..4).map(|number| Canopy::plant(600.0 + 500.0 * f64::from(number), 150.0)).collect())
         .expect("the plants stand apart");
-    let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(2.0), 2900.0)) };
-    let mut run = Run::set_off(uno, trial, &[], |_, changes| changes);
+    let pass = Pass { start: Start::Now, ..pass(row, steady(mm_s(2.0), 2900.0)) };
+    let mut run = Run::set_off(uno, pass, &[], |_, changes| changes);
     run.roll_to_the_end();
     let judgement = run.judgement();
     assert_all_kept(&judgement);
@@ -307,8 +307,7 @@ fn nothing_happens_where_position_and_time_wrap() {
 
 #[test]
 fn a_work_switch_left_on_over_a_reset_starts_nothing() {
-    let mut run =
-        Run::begin(Trial { start: Start::Switch, ..trial(bare_ground(), steady(mm_s(2.0), 900.0)) }, &["save"]);
+    let mut run = Run::begin(Pass { start: Start::Switch, ..pass(bare_ground(), steady(mm_s(2.0), 900.0)) }, &["save"]);
     run.roll_to(700.0);
     assert!(!is_out_at_the_pin(&run.uno));
     let cycle = run.uno.cycle();

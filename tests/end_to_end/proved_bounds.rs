@@ -15,17 +15,17 @@ use control::say::{line, packed};
 use control::settings::Setting;
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::Pass;
 use field::planting::Planting;
-use field::trial::Trial;
 use field::verdict::Timing;
 use knn::MAX_K;
 use model_test::{cases, is_thorough};
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
-use trial::firmware::workspace_root;
 use uno::elf::Image;
 use uno::{CYCLES_PER_SECOND, Uno};
+use uno_run::firmware::workspace_root;
 
 /// Counts in a second beside which the loop still gets time to answer.
 const BUSY_PER_S: u64 = 150_000;
@@ -130,8 +130,8 @@ fn weeding_and_every_command_stay_within_the_bounds() {
     let bounds = proved();
     let row =
         Planting { plants: 4, weeds: 2, ragged: true, ..Planting::default() }.grow(1).expect("everything has room");
-    let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5));
-    let mut run = Run::begin(trial, &[]);
+    let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(2.5));
+    let mut run = Run::begin(pass, &[]);
     run.uno.measure_interrupts();
     run.uno.measure_turns();
     run.roll_on_asking("status", 40);

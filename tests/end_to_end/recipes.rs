@@ -6,8 +6,8 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
-use trial::firmware::workspace_root;
 use uno::elf::Size;
+use uno_run::firmware::workspace_root;
 
 /// Bytes below the Uno's bootloader.
 const FLASH_BYTES: u64 = 32_256;
@@ -87,7 +87,7 @@ fn a_setting_a_command_an_alarm_and_an_event_are_added_as_contributing_says() {
     let Size { flash, .. } = Size::read(&elf).expect("the ELF can be read");
     assert!(flash <= FLASH_BYTES, "{flash} bytes of flash");
 
-    let mut uno = trial::boot(&elf, &[]).expect("the firmware wakes up");
+    let mut uno = uno_run::boot(&elf, &[]).expect("the firmware wakes up");
     assert_eq!(ask(&mut uno, "get lamp_percent"), ["lamp_percent=50 % from 0 to 100, default 50, not saved"]);
     assert_eq!(ask(&mut uno, "set lamp_percent 70"), [""; 0]);
     assert!(ask(&mut uno, "help lamp_percent")[0].ends_with("brightness of the lamp"));

@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
-use trial::replay::{Counted, replay};
 use uno::recording;
+use uno_run::replay::{Counted, replay};
 
 /// Writes the steps as a waveform file, lets the firmware count it, and compares with the sum of the steps.
 #[track_caller]

@@ -1,11 +1,11 @@
 //! A second beam: it measures the wheel's slip plant by plant. A torn wire of either beam is reported before it costs a
 //! plant.
 
-use crate::common::{Run, is_out_at_the_pin, named, number, started, status, steady, trial, value};
+use crate::common::{Run, is_out_at_the_pin, named, number, pass, started, status, steady, value};
 use field::machine::{Machine, cycle_at};
 use field::motion::mm_s;
+use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
-use field::trial::{Start, Trial};
 use field::verdict::{Judgement, Verdict};
 use field::wiring;
 use uno::{Pin, PinChange};
@@ -21,9 +21,9 @@ fn plants(count: usize) -> Row {
 }
 
 /// A machine with two beams, along seven plants. `slip` returns the wheel's slip in each leg.
-fn slipping(speed_km_h: f64, second_beam_mm: f64, slip: impl FnMut() -> f64) -> Trial {
-    let trial = trial(plants(PLANTS), steady(mm_s(speed_km_h), 4300.0).with_slip(slip));
-    Trial { machine: Machine { second_beam_mm, ..Machine::default() }, start: Start::Now, ..trial }
+fn slipping(speed_km_h: f64, second_beam_mm: f64, slip: impl FnMut() -> f64) -> Pass {
+    let pass = pass(plants(PLANTS), steady(mm_s(speed_km_h), 4300.0).with_slip(slip));
+    Pass { machine: Machine { second_beam_mm, ..Machine::default() }, start: Start::Now, ..pass }
 }
 
 fn count(judgement: &Judgement, verdict: Verdict) -> usize {
@@ -66,9 +66,9 @@ fn the_slip_is_reported_plant_by_plant_and_dropped_by_an_alarm() {
 
 /// Seven plants at 2 km/h. The wire of a beam tears at a position of the machine: its pin stays on the pull-up.
 fn with_torn_wire(pin: Pin, torn_mm: f64) -> Run {
-    let trial = slipping(2.0, SECOND_BEAM_MM, || 0.0);
-    let torn_s = trial.motion.passings(torn_mm).next().expect("the machine comes there").time_s;
-    Run::begin_altered(trial, &[], |start_cycle, mut changes| {
+    let pass = slipping(2.0, SECOND_BEAM_MM, || 0.0);
+    let torn_s = pass.motion.passings(torn_mm).next().expect("the machine comes there").time_s;
+    Run::begin_altered(pass, &[], |start_cycle, mut changes| {
         let torn = cycle_at(start_cycle, torn_s);
         changes.retain(|change| change.pin != pin || change.cycle < torn);
         changes

@@ -1,12 +1,12 @@
 //! Encoder and beam fail during work: the firmware detects and names the fault, and has the tool out of the row.
 
 use crate::common::{
-    Run, ask, bare_ground, is_out_at_the_pin, named, number, run_for_ms, started, status, steady, trial, value,
+    Run, ask, bare_ground, is_out_at_the_pin, named, number, pass, run_for_ms, started, status, steady, value,
 };
 use field::machine::cycle_at;
 use field::motion::{Motion, mm_s};
+use field::pass::{Pass, Start};
 use field::row::{Canopy, Row};
-use field::trial::{Start, Trial};
 use field::verdict::Verdict;
 use field::wiring;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange};
@@ -23,9 +23,9 @@ fn plants() -> Row {
 
 /// A run at work at 2 km/h whose pins `alter` changes from the fault's cycle on.
 fn with_fault(row: Row, length_mm: f64, alter: impl FnOnce(u64, Vec<PinChange>) -> Vec<PinChange>) -> Run {
-    let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(2.0), length_mm)) };
-    let time_s = trial.motion.passings(FAULT_MM).next().expect("the machine comes there").time_s;
-    Run::begin_altered(trial, &[], |start_cycle, changes| alter(cycle_at(start_cycle, time_s), changes))
+    let pass = Pass { start: Start::Now, ..pass(row, steady(mm_s(2.0), length_mm)) };
+    let time_s = pass.motion.passings(FAULT_MM).next().expect("the machine comes there").time_s;
+    Run::begin_altered(pass, &[], |start_cycle, changes| alter(cycle_at(start_cycle, time_s), changes))
 }
 
 /// Asserts that the alarm of this name and code was reported once, and that the tool is out.
@@ -64,9 +64,9 @@ fn an_encoder_that_falls_silent_harms_no_plant_and_is_an_alarm() {
 
 /// Drops the encoder's edges while `is_lost` is true. It gets the time in seconds since the machine passed a position.
 fn losing_edges(row: Row, speed_km_h: f64, from_mm: f64, length_mm: f64, is_lost: impl Fn(f64) -> bool) -> Run {
-    let trial = Trial { start: Start::Now, ..trial(row, steady(mm_s(speed_km_h), length_mm)) };
-    let from_s = trial.motion.passings(from_mm).next().expect("the machine comes there").time_s;
-    Run::begin_altered(trial, &[], |start_cycle, mut changes| {
+    let pass = Pass { start: Start::Now, ..pass(row, steady(mm_s(speed_km_h), length_mm)) };
+    let from_s = pass.motion.passings(from_mm).next().expect("the machine comes there").time_s;
+    Run::begin_altered(pass, &[], |start_cycle, mut changes| {
         let from = cycle_at(start_cycle, from_s);
         let since_s = |cycle: u64| (cycle - from) as f64 / CYCLES_PER_SECOND as f64;
         changes.retain(|change| change.cycle < from || !is_encoder(change) || !is_lost(since_s(change.cycle)));
@@ -123,8 +123,8 @@ fn an_encoder_that_loses_one_edge_in_ten_costs_one_plant_at_most() {
 fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_they_come() {
     // 17 a second, each for 0.1 ms.
     for (speed_km_h, is_alarm) in [(1.0, true), (4.0, false)] {
-        let trial = Trial { start: Start::Now, ..trial(plants(), steady(mm_s(speed_km_h), 3500.0)) };
-        let mut run = Run::begin_altered(trial.clone(), &[], |start_cycle, changes| {
+        let pass = Pass { start: Start::Now, ..pass(plants(), steady(mm_s(speed_km_h), 3500.0)) };
+        let mut run = Run::begin_altered(pass.clone(), &[], |start_cycle, changes| {
             let level_at = |pin: Pin, cycle: u64| {
                 changes
                     .iter()
@@ -132,7 +132,7 @@ fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_
                     .find(|change| change.pin == pin && change.cycle <= cycle)
                     .is_some_and(|change| change.high)
             };
-            let spikes = (5..(trial.motion.duration_s() * 17.0) as u64).flat_map(|number| {
+            let spikes = (5..(pass.motion.duration_s() * 17.0) as u64).flat_map(|number| {
                 let cycle = start_cycle + number * CYCLES_PER_SECOND / 17;
                 let is_quiet = !changes.iter().any(|c| is_encoder(c) && (cycle..cycle + 3200).contains(&c.cycle));
                 let spike = [wiring::ENCODER_A, wiring::ENCODER_B].map(|pin| {
@@ -150,7 +150,7 @@ fn spikes_on_both_channels_are_not_counted_and_are_an_alarm_by_the_way_on_which_
         assert_eq!(alarms.len(), usize::from(is_alarm), "{speed_km_h} km/h: {alarms:?}");
         assert!(alarms.iter().all(|alarm| value(alarm, "name") == "encoder_jumps"), "{alarms:?}");
         let status = status(&mut run.uno);
-        let rolled = trial.machine.ticks(&trial.motion, trial.motion.duration_s());
+        let rolled = pass.machine.ticks(&pass.motion, pass.motion.duration_s());
         assert!(number(&status, "jumps") > 20, "{status}");
         assert!((number(&status, "pos") - rolled).abs() <= 2, "{status}, and {rolled} were rolled");
         assert_eq!(damaged(&run), 0);
@@ -191,8 +191,8 @@ fn an_encoder_whose_channels_change_at_once_is_an_alarm() {
 #[test]
 fn a_machine_that_is_pushed_faster_than_its_limit_is_an_alarm() {
     let motion = Motion::steady(0.0, 3000.0, mm_s(2.0), 1000.0).change_speed(mm_s(4.0), 3000.0).roll_to(2500.0);
-    let trial = Trial { start: Start::Now, ..trial(bare_ground(), motion) };
-    let mut run = Run::begin(trial, &["set top_speed_mm_s 900"]);
+    let pass = Pass { start: Start::Now, ..pass(bare_ground(), motion) };
+    let mut run = Run::begin(pass, &["set top_speed_mm_s 900"]);
     run.roll_to(1000.0);
     assert!(!is_out_at_the_pin(&run.uno));
     assert_alarm(&mut run, "3-1 too_fast");
@@ -215,8 +215,7 @@ fn a_beam_that_flickers_in_dust_is_an_alarm() {
 #[test]
 fn a_beam_that_is_never_broken_is_a_warning_until_a_plant_comes() {
     let row = Row::new(vec![Canopy::plant(2500.0, 150.0)]).expect("a plant is a row");
-    let mut run =
-        Run::begin(Trial { start: Start::Now, ..trial(row, steady(mm_s(2.5), 3000.0)) }, &["set no_plant_m 1"]);
+    let mut run = Run::begin(Pass { start: Start::Now, ..pass(row, steady(mm_s(2.5), 3000.0)) }, &["set no_plant_m 1"]);
     run.roll_to(950.0);
     assert_eq!(run.events("warning"), [""; 0]);
     run.roll_to(1100.0);
@@ -238,7 +237,7 @@ fn a_speed_that_jumps_before_a_window_has_its_late_command_counted_and_told() {
         .roll_to(jump_mm)
         .change_speed(mm_s(4.0), 100_000.0)
         .roll_to(jump_mm + 500.0);
-    let mut run = Run::begin(Trial { start: Start::Now, ..trial(row, motion) }, &[]);
+    let mut run = Run::begin(Pass { start: Start::Now, ..pass(row, motion) }, &[]);
     run.roll_to(jump_mm);
     assert!(!is_out_at_the_pin(&run.uno));
     run.roll_to_the_end();
@@ -259,7 +258,7 @@ fn rolling_back_farther_than_ground_is_remembered_is_an_alarm() {
         .stop_at(9000.0, 1000.0)
         .change_speed(-mm_s(2.5), 1000.0)
         .stop_at(200.0, 1000.0);
-    let mut run = Run::begin(Trial { start: Start::Now, ..trial(bare_ground(), motion) }, &["set no_plant_m 0"]);
+    let mut run = Run::begin(Pass { start: Start::Now, ..pass(bare_ground(), motion) }, &["set no_plant_m 0"]);
     run.roll_to(8900.0);
     assert_eq!(run.events("alarm"), [""; 0]);
     assert_alarm(&mut run, "3-2 rolled_back_too_far");
@@ -268,7 +267,7 @@ fn rolling_back_farther_than_ground_is_remembered_is_an_alarm() {
 #[test]
 fn an_end_switch_that_does_not_follow_is_an_alarm() {
     // In HOLD the tool is out, so the switch must be closed.
-    let mut run = Run::begin(trial(bare_ground(), steady(mm_s(1.0), 100.0)), &["hold"]);
+    let mut run = Run::begin(pass(bare_ground(), steady(mm_s(1.0), 100.0)), &["hold"]);
     run.uno.set(wiring::END_SWITCH, false);
     run_for_ms(&mut run.uno, 50);
     ask(&mut run.uno, "set end_switch on");

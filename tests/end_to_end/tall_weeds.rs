@@ -3,14 +3,14 @@
 use crate::common::{Run, assert_a_swing_each, assert_all_kept, number, status};
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::Pass;
 use field::planting::Planting;
 use field::row::{Canopy, Row};
-use field::trial::Trial;
 use field::verdict::Timing;
 
 fn roll_along(planting: Planting, seed: u64, speed_km_h: f64) -> Run {
     let row = planting.grow(seed).expect("everything has room");
-    let mut run = Run::begin(Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h)), &[]);
+    let mut run = Run::begin(Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h)), &[]);
     run.roll_to_the_end();
     run
 }
@@ -35,8 +35,8 @@ fn what_is_narrower_than_the_least_width_is_dust_that_is_counted_and_no_object()
     let dust = (0..8).map(|number| Canopy::weed(450.0 + 40.0 * f64::from(number), 4.0));
     let row = Row::new(dust.chain([Canopy::plant(300.0, 150.0), Canopy::weed(800.0, 18.0)]).collect());
     let row = row.expect("all of them stand apart");
-    let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(2.0));
-    let mut run = Run::begin(trial, &["set min_width_mm 8"]);
+    let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(2.0));
+    let mut run = Run::begin(pass, &["set min_width_mm 8"]);
     run.roll_to_the_end();
     assert_all_kept(&run.judgement());
     assert_eq!(run.events("alarm"), [""; 0]);

@@ -3,8 +3,8 @@
 use crate::common::{Run, assert_all_kept, assert_commands_in_place, number};
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::Pass;
 use field::planting::Planting;
-use field::trial::Trial;
 use field::verdict::Timing;
 
 /// Beam edges and counter each have a grain of a tick.
@@ -19,9 +19,9 @@ fn assert_near(line: &str, key: &str, true_ticks: f64) {
 #[track_caller]
 fn assert_schedules_as_the_equations_say(machine: Machine) {
     let row = Planting { plants: 5, ..Planting::default() }.grow(3).expect("the plants have room");
-    let trial = Trial::at_speed(row.clone(), machine, Timing::default(), mm_s(2.0));
-    let start_mm = trial.motion.start_mm();
-    let mut run = Run::begin(trial, &[]);
+    let pass = Pass::at_speed(row.clone(), machine, Timing::default(), mm_s(2.0));
+    let start_mm = pass.motion.start_mm();
+    let mut run = Run::begin(pass, &[]);
     run.roll_to_the_end();
     let judgement = run.judgement();
     assert_all_kept(&judgement);

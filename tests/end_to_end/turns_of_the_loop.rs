@@ -4,7 +4,7 @@
 //! millisecond. In that time a machine at 5 km/h rolls 1.4 mm. Longer work is divided over several turns. The time is
 //! counted in cycles from one reset of the watchdog to the next, interrupts included. Sleep is not counted: an interrupt ends it.
 
-use crate::common::{Run, encoder_steps, run_for_ms, started, steady, trial};
+use crate::common::{Run, encoder_steps, pass, run_for_ms, started, steady};
 use control::ground::field_examples;
 use control::say::command::{LINE_LENGTH, Word};
 use control::settings::Setting;
@@ -136,7 +136,7 @@ fn under_way_after(commands: &[&str], plants: usize) -> Run {
     let planting = Planting { plants, weeds: plants / 2, spacing_mm: 300.0, ragged: true, ..Planting::default() };
     let row = planting.grow(1).expect("everything has room");
     let end_mm = row.span_mm().end;
-    Run::begin(trial(row, steady(1000.0, end_mm)), commands)
+    Run::begin(pass(row, steady(1000.0, end_mm)), commands)
 }
 
 #[test]

@@ -2,18 +2,18 @@
 //! the beam has seen.
 
 use crate::common::{
-    Run, SWING_TOLERANCE_TICKS, assert_all_kept, bare_ground, elf, is_out_at_the_pin, number, run_for_ms, started,
-    status, steady, throw_switch, trial, value,
+    Run, SWING_TOLERANCE_TICKS, assert_all_kept, bare_ground, elf, is_out_at_the_pin, number, pass, run_for_ms,
+    started, status, steady, throw_switch, value,
 };
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::Start;
 use field::row::{Canopy, Row};
-use field::trial::Start;
 use field::verdict::Timing;
 use field::wiring;
-use trial::boot;
 use uno::Uno;
 use uno::{CYCLES_PER_SECOND, PinChange};
+use uno_run::boot;
 
 /// Time in which the servo shows a decision: a frame and the loop's turn.
 const FRAME_MS: u64 = 25;
@@ -64,7 +64,7 @@ fn the_tool_enters_the_row_a_margin_behind_the_start_of_the_seen_ground() {
     let Timing { margin_mm, lead_in_ms, .. } = Timing::default();
     for start in [Start::Command, Start::Switch] {
         let (machine, speed_mm_s) = (Machine::default(), mm_s(2.0));
-        let mut run = Run::begin(field::trial::Trial { start, ..trial(bare_ground(), steady(speed_mm_s, 700.0)) }, &[]);
+        let mut run = Run::begin(field::pass::Pass { start, ..pass(bare_ground(), steady(speed_mm_s, 700.0)) }, &[]);
         let begin = run.cycles().start;
         run.roll_to_the_end();
         let command = run.first_command_after(begin);
@@ -78,7 +78,7 @@ fn the_tool_enters_the_row_a_margin_behind_the_start_of_the_seen_ground() {
 
 #[test]
 fn the_status_says_how_far_seen_ground_still_is() {
-    let mut run = Run::begin(trial(bare_ground(), steady(mm_s(1.0), 1000.0)), &[]);
+    let mut run = Run::begin(pass(bare_ground(), steady(mm_s(1.0), 1000.0)), &[]);
     let mut uno_says = |place_mm: f64| {
         run.roll_to(place_mm);
         number(&status(&mut run.uno), "unseen_mm")
@@ -106,7 +106,7 @@ fn a_plant_in_the_beam_at_power_up_is_kept() {
     for centre_mm in [0.0, -55.0, -60.0, -65.0] {
         let plants = vec![Canopy::plant(centre_mm, 150.0), Canopy::plant(700.0, 150.0)];
         let row = Row::new(plants).expect("the plants stand apart");
-        let mut run = Run::begin(trial(row, steady(mm_s(2.0), 1300.0)), &[]);
+        let mut run = Run::begin(pass(row, steady(mm_s(2.0), 1300.0)), &[]);
         run.roll_to_the_end();
         assert_all_kept(&run.judgement());
         assert!(run.commands().len() > 2, "the tool was in the row at all");
@@ -118,7 +118,7 @@ fn a_plant_in_the_beam_at_power_up_is_kept() {
 fn nothing_that_was_scheduled_survives_a_reset() {
     for restart in [Uno::reset, Uno::power_cycle] {
         let row = Row::new(vec![Canopy::plant(300.0, 150.0)]).expect("a plant is a row");
-        let mut run = Run::begin(trial(row, steady(mm_s(2.0), 500.0)), &["set margin_mm 60", "save"]);
+        let mut run = Run::begin(pass(row, steady(mm_s(2.0), 500.0)), &["set margin_mm 60", "save"]);
         run.roll_to_the_end();
         let before = status(&mut run.uno);
         assert_eq!((value(&before, "state"), number(&before, "windows")), ("work", 1), "{before}");

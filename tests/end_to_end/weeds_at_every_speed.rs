@@ -3,8 +3,8 @@
 use crate::common::{assert_a_swing_each, assert_all_kept, assert_commands_in_place, assert_position_exact, outcome};
 use field::machine::Machine;
 use field::motion::mm_s;
+use field::pass::Pass;
 use field::planting::Planting;
-use field::trial::Trial;
 use field::verdict::Timing;
 use model_test::cases;
 
@@ -24,7 +24,7 @@ fn assert_weeds_at(speed_km_h: f64) {
     let machine = Machine::default();
     for seed in 1..=cases(4) {
         let row = PLANTING.grow(seed).expect("the plants have room");
-        let outcome = outcome(&Trial::at_speed(row, machine, Timing::default(), mm_s(speed_km_h)));
+        let outcome = outcome(&Pass::at_speed(row, machine, Timing::default(), mm_s(speed_km_h)));
         assert_all_kept(&outcome.judgement);
         assert_a_swing_each(&outcome.judgement, &machine.servo.commands(&outcome.pulses));
         assert_commands_in_place(&outcome.judgement);

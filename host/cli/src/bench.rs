@@ -6,10 +6,10 @@ use anyhow::Result;
 use clap::Args;
 use knn_bench::Task;
 use serde_json::{Value, json};
-use trial::bench::table::Figures;
-use trial::bench::{self, encoder, servo, swings};
-use trial::firmware;
 use uno::elf::Size;
+use uno_run::bench::table::Figures;
+use uno_run::bench::{self, encoder, servo, swings};
+use uno_run::firmware;
 
 #[derive(Args)]
 #[command(after_help = "\

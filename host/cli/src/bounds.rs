@@ -9,8 +9,8 @@ use avr_bounds::command::{Options, Report, report};
 use avr_bounds::{Budgets, Held, Program};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use trial::firmware;
 use uno::elf::Image;
+use uno_run::firmware;
 
 #[derive(Args)]
 #[command(after_help = "\

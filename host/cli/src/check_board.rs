@@ -6,14 +6,14 @@ use crate::output::{print, tell};
 use crate::program::Finding;
 use crate::progress::with_bar;
 use anyhow::Result;
-use check::Boards;
-use check::desk::Desk;
-use check::run::{Extent, run as check_run};
+use check_board::Boards;
+use check_board::desk::Desk;
+use check_board::run::{Extent, run as check_run};
 use clap::Args;
 use link::row_names::plugged;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use trial::firmware;
+use uno_run::firmware;
 
 #[derive(Args)]
 #[command(after_help = "\

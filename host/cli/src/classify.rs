@@ -8,11 +8,11 @@ use crate::program::Finding;
 use crate::source;
 use anyhow::Result;
 use clap::Args;
-use experiments::training::table::{self, Recorded};
-use experiments::training::{Confusion, MAX_K, Model, class_of, label_of};
 use field::row::Kind;
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use study::training::table::{self, Recorded};
+use study::training::{Confusion, MAX_K, Model, class_of, label_of};
 
 #[derive(Args)]
 #[command(after_help = "\

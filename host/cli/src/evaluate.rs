@@ -6,12 +6,12 @@ use crate::output::{self, say, tell};
 use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
-use experiments::evaluation::field_log::{self, OfLog};
-use experiments::evaluation::{self, Analysis, ResponseAnalysis};
-use experiments::page::Page;
-use link::worked::worked;
+use logbook::worked::worked;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use study::evaluation::field_log::{self, OfLog};
+use study::evaluation::{self, Analysis, ResponseAnalysis};
+use study::page::Page;
 
 /// The report's name in its folder.
 const REPORT: &str = "report.html";
@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (analysis, joined) = match &arguments.log {
         Some(log) => {
             let levels_km_h = records.iter().map(|record| record.speed_km_h).collect();
-            let stretches = worked(&link::log::read(log)?);
+            let stretches = worked(&logbook::log::read(log)?);
             let joined = field_log::join(&mut records, &stretches, &arguments.plots)?;
             joined.iter().filter_map(OfLog::warning).for_each(|warning| tell!("{warning}"));
             (Analysis::at_levels(records, levels_km_h), Some(joined))

@@ -9,11 +9,11 @@ use crate::source;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
 use comfy_table::{Table, presets};
-use experiments::training::{Labelled, label_of, listing, table};
 use field::row::Kind;
 use link::examples::{self, Taught, contradiction, example_of, features_of};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
+use study::training::{Labelled, label_of, listing, table};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \

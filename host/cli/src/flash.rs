@@ -14,10 +14,10 @@ use link::row_names::Board;
 use std::io;
 use std::path::{self, Path};
 use std::process::Command;
-use trial::firmware;
 use uno::bootloader::check_room;
 use uno::elf::Image;
 use uno::hex;
+use uno_run::firmware;
 
 #[derive(Args)]
 #[command(after_help = "\

@@ -41,8 +41,8 @@ mod virtual_uno;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use sim::program::Finding;
-use sim::{course, destination, numbers, output, program, progress, row, source};
+use frame::program::Finding;
+use frame::{course, destination, numbers, output, program, progress, row, source};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

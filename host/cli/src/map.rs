@@ -12,7 +12,7 @@ use gps::job::{self, Wanted};
 use gps::summary::{Stand, Summary};
 use gps::wheel::Ratio;
 use gps::{Job, map, picture};
-use link::log;
+use logbook::log;
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -6,12 +6,12 @@ use crate::program::Finding;
 use crate::{part, part::Shown, soak, sweep, trial};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use experiments::shard::{self, Header};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use study::shard::{self, Header};
 
 #[derive(Args)]
 #[command(after_help = "\

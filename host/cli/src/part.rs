@@ -7,13 +7,13 @@ use crate::destination::{OutFile, OutFolder, OutName, Replace};
 use crate::output::{say, tell};
 use anyhow::{Context, Result};
 use clap::{Args, builder::PossibleValuesParser};
-use experiments::shard::{self, Header, Numbered, Program, Shard};
-use experiments::sweep::RESULTS;
 use serde::Serialize;
 use std::env;
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
+use study::shard::{self, Header, Numbered, Program, Shard};
+use study::sweep::RESULTS;
 
 /// How to show a study's result.
 #[derive(Args)]

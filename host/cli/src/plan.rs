@@ -5,9 +5,9 @@ use crate::numbers::{number_within, whole_within};
 use crate::output::{self, print, say};
 use anyhow::Result;
 use clap::Args;
-use experiments::plan::Plan;
-use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
-use experiments::table::distinct;
+use study::plan::Plan;
+use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use study::table::distinct;
 
 #[derive(Args)]
 #[command(after_help = "\

@@ -5,7 +5,7 @@ use crate::program::Finding;
 use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
-use link::{log, replay};
+use logbook::{log, replay};
 use serde_json::json;
 use std::path::PathBuf;
 

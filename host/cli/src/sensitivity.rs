@@ -8,14 +8,14 @@ use crate::source;
 use anyhow::{Context, Result};
 use clap::Args;
 use comfy_table::CellAlignment;
-use experiments::experiment::{Engine, Experiment, Treatment, totals};
-use experiments::statistics::Share;
-use experiments::sweep::{SPACINGS_CM, SPEEDS_KM_H};
 use field::conditions::{self, Conditions, PARAMETERS};
 use field::tool_path::Effect;
 use link::settings::Setting;
 use std::str::FromStr;
-use trial::report::number_table;
+use study::experiment::{Engine, Experiment, Treatment, totals};
+use study::statistics::Share;
+use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
+use uno_run::report::number_table;
 
 /// The default changes. The guard is for the default spacing.
 const CHANGES: [&str; 14] = [

@@ -13,7 +13,7 @@ use std::net::Ipv4Addr;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
-use trial::firmware;
+use uno_run::firmware;
 
 /// The default TCP port.
 const HTTP_PORT: u16 = 8866;

@@ -1,7 +1,7 @@
 //! `weeder set-up`: the steps of the manual's page, on a machine or on the simulated one.
 //!
 //! It asks, measures, sets, and saves after each step. A file stores the completed steps and the measurements, so that
-//! a set-up can be continued. The steps come from the manual's page, and the margin from [`link::set_up`], as in the
+//! a set-up can be continued. The steps come from the manual's page, and the margin from [`set_up`], as in the
 //! monitor and on the page.
 
 mod simulated;
@@ -16,13 +16,13 @@ use anyhow::{Context, Error, Result, bail};
 use clap::Args;
 use files::{bounded_file, whole_file};
 use link::row_names::Board;
-use link::set_up::{ManualStep, SetUp, Step, Task, steps};
 use link::settings::{self, Setting, name, range, unit};
 use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
 use mechanics::design::Design;
 use mechanics::machine::Machine;
 use mechanics::swing::Swing;
 use mechanics::unit::MM;
+use set_up::{ManualStep, SetUp, Step, Task, steps};
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

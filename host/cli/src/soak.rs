@@ -8,13 +8,13 @@ use crate::program::Finding;
 use crate::progress::{Show, with_bar};
 use anyhow::{Result, ensure};
 use clap::Args;
-use experiments::shard::{Numbered, Shard};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use soak::{Plan, SoakError, Tally};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use trial::firmware;
+use study::shard::{Numbered, Shard};
+use uno_run::firmware;
 
 /// The name of the command in its parts.
 pub const COMMAND: &str = "soak";

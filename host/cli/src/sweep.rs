@@ -10,16 +10,16 @@ use anyhow::Result;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use comfy_table::Table;
-use experiments::experiment::{PlotOutcome, Treatment};
-use experiments::shard::Shard;
-use experiments::sweep::{Axis, Point, RESULTS, SPACINGS_CM, SPEEDS_KM_H, Sweep};
-use experiments::table::in_two_lines;
 use field::conditions::{self, Conditions, PARAMETERS};
 use link::settings::{self, Setting};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::sync::LazyLock;
-use trial::report::number_table;
+use study::experiment::{PlotOutcome, Treatment};
+use study::shard::Shard;
+use study::sweep::{Axis, Point, RESULTS, SPACINGS_CM, SPEEDS_KM_H, Sweep};
+use study::table::in_two_lines;
+use uno_run::report::number_table;
 
 /// The name of the command in its parts.
 pub const COMMAND: &str = "sweep";

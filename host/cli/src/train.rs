@@ -8,14 +8,14 @@ use crate::source::{self, offering};
 use anyhow::{Result, bail, ensure};
 use clap::builder::TypedValueParser;
 use clap::{ArgGroup, Args};
-use experiments::training::synthetic::{CROPS, Crop};
-use experiments::training::{
-    self, Beside, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic,
-    table,
-};
 use link::examples::CAPACITY;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use study::training::synthetic::{CROPS, Crop};
+use study::training::{
+    self, Beside, Confusion, DEFAULT_MOST_EXAMPLES, Labelled, MOST_EXAMPLES, Training, listing, regions, synthetic,
+    table,
+};
 
 #[derive(Args)]
 #[command(group = ArgGroup::new("objects").required(true).args(["files", "synthetic"]), after_help = "\

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
-use trial::firmware;
-use trial::live::rows::{LiveRows, Ran};
-use trial::live::{Course, Run, Sender, Setup};
 use uno::bootloader::Bootloader;
+use uno_run::firmware;
+use uno_run::live::rows::{LiveRows, Ran};
+use uno_run::live::{Course, Run, Sender, Setup};
 
 #[derive(Args)]
 #[command(after_help = "\

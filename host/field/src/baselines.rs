@@ -12,14 +12,14 @@
 //! [`ideal`] knows every stem and the servo's slowest swing. It has the tool out over the zones round the stems, timed
 //! for that swing, and in the row everywhere else. No controller can save a plant that it damages. It is no upper
 //! bound: it allows for the slowest swing each time, and keeps the whole length of a round zone. The upper bound is
-//! [`crate::optimum`]. Both baselines use the machine and the servo of the [`Trial`].
+//! [`crate::optimum`]. Both baselines use the machine and the servo of the [`Pass`].
 
 use crate::budget::{Part, Reason, Reasons, part_of};
 use crate::ground::union;
 use crate::native::{Sensors, ServoLine, Turn, beams_before, turns};
+use crate::pass::{Pass, Weeded};
+use crate::row::Stem;
 use crate::servo::Servo;
-use crate::stand::Stem;
-use crate::trial::{Trial, Weeded};
 use control::operate::servo;
 use std::ops::Range;
 use uno::Pulse;
@@ -43,20 +43,20 @@ const TURN_S: f64 = 0.001;
 /// Shortest gap between two servo pulses, the firmware's default; 0 for fixed frames.
 const SERVO_GAP_MS: u8 = 3;
 
-/// The paper's controller weeds the trial's row.
-pub fn as_in_the_paper(trial: &Trial) -> Weeded {
-    let Trial { machine, motion, row, .. } = trial;
-    let tick_mm = trial.machine.tick_mm();
+/// The paper's controller weeds the pass's row.
+pub fn as_in_the_paper(pass: &Pass) -> Weeded {
+    let Pass { machine, motion, row, .. } = pass;
+    let tick_mm = pass.machine.tick_mm();
     let ticks = |mm: f64| (mm / tick_mm).round() as i64;
     let (delay, hold) = (ticks(machine.beam_to_tool_mm - PAPER_MARGIN_MM), ticks(2.0 * PAPER_MARGIN_MM));
     let margin = hold / 2;
-    let sensors = Sensors::new(trial, PAPER_TURN_S);
+    let sensors = Sensors::new(pass, PAPER_TURN_S);
     let mut turns = sensors.turns();
-    let mut broken = beams_before(trial).broken;
+    let mut broken = beams_before(pass).broken;
     let mut canopy: Option<Range<i64>> = None;
     let mut slot: Option<(Range<i64>, Part)> = None;
     let mut reasons = Reasons::default();
-    let pulses = swing(trial, PAPER_TURN_S, 0, |time_s| {
+    let pulses = swing(pass, PAPER_TURN_S, 0, |time_s| {
         let Some(Turn { position, edges, .. }) = turns.next() else { return false };
         if let Some(last) = edges.last() {
             broken = last.beams.broken;
@@ -87,9 +87,9 @@ pub fn as_in_the_paper(trial: &Trial) -> Weeded {
     Weeded { pulses, start_cycle: 0, alarm: false, reasons: reasons.until(motion.duration_s()) }
 }
 
-/// The ideal controller weeds the trial's row.
-pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
-    let Trial { machine, motion, .. } = trial;
+/// The ideal controller weeds the pass's row.
+pub fn ideal(pass: &Pass, stems: &[Stem]) -> Weeded {
+    let Pass { machine, motion, .. } = pass;
     let Servo { dead_time_ms, scatter, out_us, .. } = machine.servo;
     // A command may wait for a pulse and the gap behind it, and the loop for its turn.
     let wait_s = (out_us / 1000.0 + f64::from(SERVO_GAP_MS)) / 1000.0 + 2.0 * TURN_S;
@@ -112,7 +112,7 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
     // If there is no time to swing in and out again, the tool stays out.
     let swings_s = union(windows.into_iter().map(|window| window.start..window.end + slowest_s).collect());
     let mut out_s = swings_s.into_iter().map(|swing| swing.start..swing.end - slowest_s).peekable();
-    let pulses = swing(trial, TURN_S, SERVO_GAP_MS, |time_s| {
+    let pulses = swing(pass, TURN_S, SERVO_GAP_MS, |time_s| {
         while out_s.next_if(|out| out.end <= time_s).is_some() {}
         out_s.peek().is_some_and(|out| out.start <= time_s)
     });
@@ -120,11 +120,11 @@ pub fn ideal(trial: &Trial, stems: &[Stem]) -> Weeded {
 }
 
 /// A loop that has the tool out while `is_out` says so at the time of a turn. The tool begins in the row.
-fn swing(trial: &Trial, turn_s: f64, gap_ms: u8, mut is_out: impl FnMut(f64) -> bool) -> Vec<Pulse> {
-    let Servo { in_us, out_us, .. } = trial.machine.servo;
+fn swing(pass: &Pass, turn_s: f64, gap_ms: u8, mut is_out: impl FnMut(f64) -> bool) -> Vec<Pulse> {
+    let Servo { in_us, out_us, .. } = pass.machine.servo;
     let [in_row, out] = [in_us, out_us].map(|microseconds| servo::from_us(microseconds.round() as u16));
     let mut line = ServoLine::new(in_row, gap_ms);
-    for turn in 0..=turns(trial, turn_s) {
+    for turn in 0..=turns(pass, turn_s) {
         let time_s = f64::from(turn) * turn_s;
         line.command(if is_out(time_s) { out } else { in_row }, time_s);
     }
@@ -142,11 +142,11 @@ mod tests {
     const PLACES: [f64; 8] = [500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0, 3500.0, 4000.0];
 
     /// Plants over whose canopy the tool was not fully out.
-    fn reached_by(controller: impl Fn(&Trial) -> Weeded, speed_km_h: f64) -> usize {
+    fn reached_by(controller: impl Fn(&Pass) -> Weeded, speed_km_h: f64) -> usize {
         let row = Row::new(PLACES.map(|place_mm| Canopy::plant(place_mm, 150.0)).to_vec()).unwrap();
-        let trial = Trial::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
-        let Weeded { pulses, .. } = controller(&trial);
-        let judgement = judge(&trial.row, &trial.machine, &trial.motion, trial.timing, &pulses, 0);
+        let pass = Pass::at_speed(row, Machine::default(), Timing::default(), mm_s(speed_km_h));
+        let Weeded { pulses, .. } = controller(&pass);
+        let judgement = judge(&pass.row, &pass.machine, &pass.motion, pass.timing, &pulses, 0);
         assert!(judgement.weeded_share > 0.1);
         judgement.reached()
     }
@@ -156,7 +156,7 @@ mod tests {
         for speed_km_h in [1.0, 1.5, 2.0, 2.5, 3.0] {
             let reached = |protected_mm: f64| {
                 let stems = PLACES.map(|along_mm| Stem { along_mm, across_mm: 0.0, protected_mm, is_seen: true });
-                reached_by(|trial| ideal(trial, &stems), speed_km_h)
+                reached_by(|pass| ideal(pass, &stems), speed_km_h)
             };
             // Stroke as wide as the canopy, and narrower.
             assert_eq!(reached(75.0), 0, "at {speed_km_h} km/h");

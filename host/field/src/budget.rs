@@ -1,6 +1,6 @@
 //! The loss budget: how a row's ground divides into weeded ground and losses. Its parts add up to the whole row.
 //!
-//! A controller records its reason for keeping the tool out, over the time of the trial ([`Reason`]). The tool's path
+//! A controller records its reason for keeping the tool out, over the time of the pass ([`Reason`]). The tool's path
 //! shows which ground was weeded ([`Budget::of`]). Weeded ground is [`Part::Weeded`], for any reason of the controller.
 //! Other ground belongs to the reason that held when the tool passed it. If the controller had the ground open and the
 //! tool did not weed it, the ground is [`Part::Swings`]: dead time, travel, and the lead that waits for both.

@@ -5,20 +5,14 @@
 //! public data of plant positions in a row, in millimetres, was found. So scatter and shares are assumed, and the table
 //! says so.
 //!
-//! [`crate::stand`] and [`crate::driving`] apply the conditions.
+//! [`crate::stand`], [`crate::driving`] and [`crate::pass`] apply the conditions.
 
 mod parameters;
 
-use crate::machine::{Dirt, Machine};
-use crate::motion::Motion;
-use crate::row::Row;
-use crate::servo::{Scatter, Servo};
-use crate::trial::{Start, Trial};
-use crate::verdict::Timing;
 use control::settings::{SECOND_BEAM_LEAST_MM, SLIPPING_BEAM_TO_TOOL_MM, Setting};
 use files::toml_entry::{self, Entry};
 use files::{FileError, bounded_file, near};
-pub use parameters::{Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
+pub use parameters::{Arm, Conditions, Crop, Driving, Ground, Mechanism, PARAMETERS, Parameter, Plot, Sensors, Weeds};
 use std::fmt::Display;
 use std::io::ErrorKind;
 use std::ops::Range;
@@ -198,66 +192,6 @@ impl Conditions {
         *self = changed;
         Ok(())
     }
-
-    /// The machine. The seed selects its servo's and encoder's random deviations.
-    pub fn machine(&self, seed: u64) -> Machine {
-        let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, arm, tool_width_mm, .. } = self.machine;
-        let Mechanism { dead_time_ms, dead_time_scatter_ms, travel_ms, load_kg_cm, stall_kg_cm, .. } = self.machine;
-        let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
-        // The stroke follows from the firmware's settings.
-        let default = Servo::default();
-        let in_us = self.setting_or(Setting::ServoInUs, default.in_us);
-        let out_us = self.setting_or(Setting::ServoOutUs, default.out_us);
-        Machine {
-            beam_to_tool_mm,
-            second_beam_mm,
-            arm_mm,
-            arm,
-            tool_width_mm,
-            servo: Servo { in_us, out_us, dead_time_ms, travel_ms, scatter },
-            beam_mm: self.sensors.beam_mm,
-            beam_response_ms: self.sensors.beam_response_ms,
-            dirt: Dirt { share: self.sensors.lost_pulses_percent / 100.0, seed },
-            ..Machine::default()
-        }
-    }
-
-    /// The firmware's margin, leads and stem zone.
-    pub fn timing(&self) -> Timing {
-        let of = |setting: Setting| self.setting_or(setting, setting.description().default.into()) as u32;
-        Timing {
-            margin_mm: of(Setting::MarginMm),
-            lead_out_ms: of(Setting::LeadOutMs),
-            lead_in_ms: of(Setting::LeadInMs),
-            stem_zone_mm: of(Setting::StemZoneMm),
-        }
-    }
-
-    /// The trial of a row and a motion with this machine and these settings. The seed is that of [`Self::machine`].
-    pub fn trial(&self, row: Row, motion: Motion, seed: u64) -> Trial {
-        Trial {
-            row,
-            machine: self.machine(seed),
-            motion,
-            timing: self.timing(),
-            start: Start::Command,
-            settings: self.firmware_settings(),
-            examples: Vec::new(),
-        }
-    }
-
-    /// A setting of the firmware, or what it is otherwise.
-    fn setting_or(&self, setting: Setting, otherwise: f64) -> f64 {
-        self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
-    }
-
-    /// The firmware's other settings, without those from machine and timing.
-    pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
-        let timing = [Setting::MarginMm, Setting::LeadOutMs, Setting::LeadInMs];
-        // In the table's order, the wheel comes before its calibration. The other way round, the wheel would reset it.
-        let others = Setting::all().filter(|setting| !timing.contains(setting));
-        others.filter_map(|setting| Some((setting, *self.settings.get(&setting.text().to_string())?))).collect()
-    }
 }
 
 impl Mechanism {
@@ -360,19 +294,6 @@ mod tests {
         let changes = [("crop.spacing_scatter_mm", 12.5), ("plot.rows", 2.0), ("k", 5.0)];
         assert_eq!(conditions, Conditions::with("transplanted", &changes));
         assert_eq!(conditions.firmware_settings(), [(Setting::K, 5)]);
-    }
-
-    #[test]
-    fn a_calibrated_wheel_is_set_after_its_diameter_which_would_reset_it() {
-        let conditions = parse("[settings]\nticks_per_m = 2010\nwheel_mm = 400\n").unwrap();
-        assert_eq!(conditions.firmware_settings(), [(Setting::WheelMm, 400), (Setting::TicksPerM, 2010)]);
-    }
-
-    #[test]
-    fn margin_and_leads_are_set_once_as_the_timing() {
-        let conditions = parse("[settings]\nlead_out_ms = 200\nmargin_mm = 40\n").unwrap();
-        assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Conditions::default().timing() });
-        assert!(conditions.firmware_settings().is_empty());
     }
 
     #[test]

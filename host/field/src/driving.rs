@@ -9,11 +9,10 @@
 //! The machine strays as a whole, tool and sweeps together, without an angle to the row. It does not change what the
 //! beam sees.
 
+use crate::chance::scatter;
 use crate::conditions::Conditions;
 use crate::ground::interpolated;
-use crate::motion::{Motion, mm_s};
-use crate::planting::scatter;
-use crate::trial::run_up_mm;
+use crate::motion::{Motion, mm_s, run_up_mm};
 use rand::{Rng, RngExt};
 use std::ops::Range;
 

@@ -7,7 +7,7 @@
 //! - **The machine**: [`motion`] is its motion. [`machine`] converts motion and row into levels on the Uno's pins.
 //!   [`servo`] converts pulses into the tool's angle. [`wiring`] assigns wires to pins. A [`rolling`] machine joins
 //!   these parts, without an end.
-//! - **The controllers**: a [`trial`] is a row, a machine and the firmware's settings. The [`native`] run weeds it by
+//! - **The controllers**: a [`pass`] is a row, a machine and the firmware's settings. The [`native`] run weeds it by
 //!   the firmware's own decisions, compiled for the PC. The [`baselines`] are models.
 //! - **The result**: [`verdict`] judges canopies and margins, [`tool_path`] counts stems and weeds, and [`optimum`] is
 //!   the upper bound for every controller.
@@ -17,6 +17,7 @@
 
 pub mod baselines;
 pub mod budget;
+mod chance;
 pub mod conditions;
 pub mod driving;
 pub mod ground;
@@ -24,6 +25,7 @@ pub mod machine;
 pub mod motion;
 pub mod native;
 pub mod optimum;
+pub mod pass;
 pub mod planting;
 pub mod rolling;
 pub mod row;
@@ -31,7 +33,6 @@ pub mod servo;
 pub mod sight;
 pub mod stand;
 pub mod tool_path;
-pub mod trial;
 pub mod verdict;
 pub mod wheel;
 pub mod wiring;

@@ -12,6 +12,7 @@
 //!
 //! The encoder has no jitter. If its disc is dirty, pulses of its channel A are missing.
 
+use crate::conditions::Arm;
 use crate::motion::{Motion, marks};
 use crate::row::Row;
 use crate::servo::Servo;
@@ -19,32 +20,9 @@ use crate::sight::half_covered;
 use crate::wiring;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::ops::Range;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange};
-
-/// How the arm hangs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Arm {
-    /// It hangs from the servo's shaft, which lies along the row. A stroke lifts the tool.
-    #[default]
-    Pendulum,
-    /// It lies along the row behind an upright shaft. A stroke carries the tool forward.
-    Trailing,
-}
-
-impl Arm {
-    /// The arms' names, by number.
-    pub const NAMES: [&str; 2] = ["pendulum", "trailing"];
-}
-
-impl From<Arm> for f64 {
-    fn from(arm: Arm) -> Self {
-        Self::from(arm as u8)
-    }
-}
 
 /// Dimensions of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -383,6 +383,13 @@ pub fn marks(distance_mm: f64, pitch_mm: f64) -> i64 {
     towards_zero - i64::from(towards_zero as f64 > marks)
 }
 
+/// Distance that the machine rolls ahead of the row, to reach its speed and have the tool in the row.
+pub(crate) fn run_up_mm(speed_mm_s: f64, acceleration_mm_s2: f64) -> f64 {
+    const LEAST_MM: f64 = 200.0;
+    const SWING_IN_S: f64 = 0.6;
+    LEAST_MM + SWING_IN_S * speed_mm_s + speed_mm_s.powi(2) / (2.0 * acceleration_mm_s2)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

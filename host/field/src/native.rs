@@ -11,7 +11,7 @@
 use crate::budget::{Part, Reasons, part_of};
 use crate::machine::{Machine, PULSE_TICKS, time_at_s};
 use crate::motion::{Motion, marks};
-use crate::trial::{Start, Trial, Weeded};
+use crate::pass::{Pass, Start, Weeded};
 use crate::wiring;
 use control::ground::AtTool;
 use control::ground::class::label;
@@ -138,12 +138,12 @@ pub struct Seen {
 }
 
 impl Sensors {
-    /// The readings of a trial, for a loop with turns of `turn_s`. The motion begins at time 0.
-    pub fn new(trial: &Trial, turn_s: f64) -> Self {
-        let Trial { machine, motion, row, .. } = trial;
+    /// The readings of a pass, for a loop with turns of `turn_s`. The motion begins at time 0.
+    pub fn new(pass: &Pass, turn_s: f64) -> Self {
+        let Pass { machine, motion, row, .. } = pass;
         let mut edges = machine.beam_changes(row, motion, 0);
         edges.sort_by_key(|edge| edge.cycle);
-        let mut beams = beams_before(trial);
+        let mut beams = beams_before(pass);
         let edges = edges.into_iter().map(|edge| {
             let broken = if edge.pin == wiring::BEAM { &mut beams.broken } else { &mut beams.second_broken };
             *broken = !edge.high;
@@ -152,7 +152,7 @@ impl Sensors {
         let mut edges: Vec<Seen> = edges.collect();
         let mut to_come = edges.iter_mut().peekable();
         let (mut wheel_mm, mut encoder) = (motion.wheel_course(), Encoder::of(machine, motion));
-        let counts = (0..=turns(trial, turn_s)).map(|turn| {
+        let counts = (0..=turns(pass, turn_s)).map(|turn| {
             let time_s = f64::from(turn) * turn_s;
             while let Some(edge) = to_come.next_if(|edge| edge.time_s <= time_s) {
                 edge.position = encoder.count(encoder.clean_ticks(motion.wheel_mm(edge.time_s)));
@@ -236,29 +236,29 @@ impl<'a> Encoder<'a> {
 }
 
 /// The beams' levels before the motion begins.
-pub fn beams_before(trial: &Trial) -> Beams {
-    let Trial { machine, motion, row, .. } = trial;
+pub fn beams_before(pass: &Pass) -> Beams {
+    let Pass { machine, motion, row, .. } = pass;
     let before = machine.beams_before(row, motion);
     let is_broken = |pin| before.iter().any(|beam| beam.pin == pin && !beam.high);
     Beams { broken: is_broken(wiring::BEAM), second_broken: is_broken(wiring::SECOND_BEAM) }
 }
 
-/// Weeds the trial's row with the firmware's decisions. The motion begins at time and cycle 0. `sensors` must come from this
-/// trial, with turns of [`TURN_S`].
+/// Weeds the pass's row with the firmware's decisions. The motion begins at time and cycle 0. `sensors` must come from this
+/// pass, with turns of [`TURN_S`].
 ///
 /// # Errors
 /// If they refuse a setting or the start.
-pub fn weed(trial: &Trial, sensors: &Sensors) -> Result<Weeded, Refused> {
-    run(trial, sensors, |_| ())
+pub fn weed(pass: &Pass, sensors: &Sensors) -> Result<Weeded, Refused> {
+    run(pass, sensors, |_| ())
 }
 
 /// The slip that the second beam measures, in thousandths, plant by plant.
 ///
 /// # Errors
 /// As [`weed`].
-pub fn slips_permille(trial: &Trial, sensors: &Sensors) -> Result<Vec<i16>, Refused> {
+pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refused> {
     let (mut slips, mut tells) = (Vec::new(), false);
-    run(trial, sensors, |weeder| {
+    run(pass, sensors, |weeder| {
         if !tells {
             weeder.enable_events(true);
             tells = true;
@@ -274,24 +274,24 @@ pub fn slips_permille(trial: &Trial, sensors: &Sensors) -> Result<Vec<i16>, Refu
 
 /// Weeds the row. Calls `listen` after each turn.
 #[inline(always)]
-fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
+fn run(pass: &Pass, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
     let readings = Readings::new(instant(0), Position::new(0));
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
-    let mut weeder: Weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(trial), Cause::PowerOn);
+    let mut weeder: Weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(pass), Cause::PowerOn);
     type_line(&mut weeder, "clear")?;
-    for (setting, value) in trial.firmware_settings() {
+    for (setting, value) in pass.firmware_settings() {
         type_line(&mut weeder, &format!("set {} {value}", setting.text()))?;
     }
-    for example in &trial.examples {
+    for example in &pass.examples {
         example.features.into_iter().for_each(|feature| weeder.enter_feature(feature));
         type_line(&mut weeder, if example.label == label::PLANT { "teach plant" } else { "teach weed" })?;
     }
-    type_line(&mut weeder, if trial.start == Start::Now { "start now" } else { "start" })?;
+    type_line(&mut weeder, if pass.start == Start::Now { "start now" } else { "start" })?;
 
-    let mut why = Why::new(trial, &mut weeder)?;
+    let mut why = Why::new(pass, &mut weeder)?;
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
-    for (turn, Turn { time_s, position, edges }) in (0..=turns(trial, TURN_S)).zip(sensors.turns()) {
+    for (turn, Turn { time_s, position, edges }) in (0..=turns(pass, TURN_S)).zip(sensors.turns()) {
         for &Seen { position, beams, .. } in edges {
             weeder.edge(Position::new(position as i32), beams);
         }
@@ -302,13 +302,13 @@ fn run(trial: &Trial, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) ->
             why.look(&mut weeder, orders.pulse != orders.pulse_out, time_s);
         }
     }
-    let (pulses, reasons) = (line.into_pulses(), why.reasons.until(trial.motion.duration_s()));
+    let (pulses, reasons) = (line.into_pulses(), why.reasons.until(pass.motion.duration_s()));
     Ok(Weeded { pulses, start_cycle: 0, alarm: weeder.state() != State::Work, reasons })
 }
 
 /// Why the decisions keep the tool out, turn by turn.
 struct Why<'a> {
-    trial: &'a Trial,
+    pass: &'a Pass,
     reasons: Reasons,
     /// The slowest swing: after this time a commanded tool has arrived.
     slowest_s: f64,
@@ -322,14 +322,14 @@ struct Why<'a> {
 }
 
 impl<'a> Why<'a> {
-    fn new(trial: &'a Trial, weeder: &mut Weeder) -> Result<Self, Refused> {
+    fn new(pass: &'a Pass, weeder: &mut Weeder) -> Result<Self, Refused> {
         let is_guarding = weeder.settings().get(Setting::GuardSpacingMm) > 0;
         if is_guarding {
             type_line(weeder, "events on")?;
         }
-        let slowest_s = trial.machine.servo.slowest_s() + SERVO_FRAME_S;
+        let slowest_s = pass.machine.servo.slowest_s() + SERVO_FRAME_S;
         Ok(Self {
-            trial,
+            pass,
             reasons: Reasons::default(),
             slowest_s,
             in_since_s: None,
@@ -387,16 +387,16 @@ impl<'a> Why<'a> {
         if self.guarded.iter().any(|middle| !middle.is_ahead_of(end)) {
             return Part::Guarded;
         }
-        let Trial { machine, motion, row, .. } = self.trial;
+        let Pass { machine, motion, row, .. } = self.pass;
         let tool_mm = machine.tool_mm(motion.position_mm(time_s));
         let place_mm = |place: Position| tool_mm + f64::from((place - tool).0) * machine.tick_mm();
         part_of(&(place_mm(begin)..place_mm(end)), row)
     }
 }
 
-/// The number of the last turn of a loop in a trial.
-pub(crate) fn turns(trial: &Trial, turn_s: f64) -> u32 {
-    (trial.motion.duration_s() / turn_s).ceil() as u32
+/// The number of the last turn of a loop in a pass.
+pub(crate) fn turns(pass: &Pass, turn_s: f64) -> u32 {
+    (pass.motion.duration_s() / turn_s).ceil() as u32
 }
 
 /// The firmware's clock in a turn.
@@ -440,18 +440,18 @@ mod tests {
                 .change_speed(speed_mm_s, 900.0)
                 .roll_to(3500.0)
                 .with_slip(|| rng.random_range(-0.05..0.1));
-            let trial = Trial { motion, ..Trial::at_speed(row, machine, Timing::default(), speed_mm_s) };
+            let pass = Pass { motion, ..Pass::at_speed(row, machine, Timing::default(), speed_mm_s) };
             let mut told = 0;
-            for Turn { time_s, position, edges } in Sensors::new(&trial, TURN_S).turns() {
-                assert_eq!(position, count_at(&trial.machine, &trial.motion, time_s), "seed {seed} at {time_s} s");
+            for Turn { time_s, position, edges } in Sensors::new(&pass, TURN_S).turns() {
+                assert_eq!(position, count_at(&pass.machine, &pass.motion, time_s), "seed {seed} at {time_s} s");
                 for edge in edges {
                     assert!(time_s - TURN_S < edge.time_s && edge.time_s <= time_s, "seed {seed} at {time_s} s");
-                    let count = count_at(&trial.machine, &trial.motion, edge.time_s);
+                    let count = count_at(&pass.machine, &pass.motion, edge.time_s);
                     assert_eq!(edge.position, count, "seed {seed} at {} s", edge.time_s);
                 }
                 told += edges.len();
             }
-            let all = trial.machine.pin_changes(&trial.row, &trial.motion, 0);
+            let all = pass.machine.pin_changes(&pass.row, &pass.motion, 0);
             let of_beams = all.iter().filter(|change| [wiring::BEAM, wiring::SECOND_BEAM].contains(&change.pin));
             assert!(told > 40, "{told}");
             assert_eq!(told, of_beams.count(), "seed {seed}");

@@ -3,6 +3,7 @@
 //! A [`Planting`] has the numbers and sizes, and a seed selects the row: the same seed gives the same row on every
 //! machine. Scatter is evenly distributed, so that it has limits that a test can check.
 
+use crate::chance::scatter;
 use crate::counted;
 use crate::row::{Canopy, Kind, Problem, Row};
 use rand::seq::SliceRandom;
@@ -192,11 +193,6 @@ impl Sowing {
 
 /// The narrowest gap between two canopies that takes a weed of any width and its margins.
 const NARROWEST_GAP_MM: f64 = 2.0 * WEED_MARGIN_MM + WEED_WIDTHS_MM.end;
-
-/// A deviation evenly spread over plus and minus `within`.
-pub(crate) fn scatter(rng: &mut impl Rng, within: f64) -> f64 {
-    rng.random_range(-1.0..=1.0) * within
-}
 
 /// Leaves and gaps over a canopy's span; leaves reach to both ends.
 pub(crate) fn leaves(rng: &mut impl Rng, canopy_mm: Range<f64>) -> Vec<Range<f64>> {

@@ -8,8 +8,8 @@
 //!
 //! All positions are millimetres along the ground, from an origin of the row's own.
 
+use crate::conditions::Crop;
 use crate::ground::union;
-use crate::stand::Stem;
 use files::CsvTable;
 use serde::Serialize;
 use std::io;
@@ -94,6 +94,32 @@ impl Canopy {
             return Err(Problem::Width(self.width_mm));
         }
         Ok(())
+    }
+}
+
+/// A crop plant's stem, and the zone round it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stem {
+    /// Its place along the row.
+    pub along_mm: f64,
+    /// Its place across the row.
+    pub across_mm: f64,
+    /// Radius of the zone that no tool may enter.
+    pub protected_mm: f64,
+    /// Whether its plant breaks the beam.
+    pub is_seen: bool,
+}
+
+impl Stem {
+    /// A stem on the row's line, with the default field's zone.
+    pub(crate) fn at(along_mm: f64) -> Self {
+        let protected_mm = Crop::default().protected_mm / 2.0;
+        Self { along_mm, across_mm: 0.0, protected_mm, is_seen: true }
+    }
+
+    /// Half of the zone's width across the row, at this distance from the stem along it; 0 beyond the zone.
+    pub(crate) fn half_chord_mm(&self, beside_mm: f64) -> f64 {
+        (self.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt()
     }
 }
 

@@ -10,8 +10,8 @@
 //! Widths out of range are ignored. There is no overshoot and no acceleration: dead time and travel time stand for
 //! them. If dead time and load scatter, each command has its own random values.
 
+use crate::chance::scatter;
 use crate::ground::{interpolated, spans_where};
-use crate::planting::scatter;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::{Range, RangeInclusive};

@@ -8,42 +8,17 @@
 //! Positions are millimetres along the row, and across it from its line, positive to the left. The stand does not
 //! depend on the machine or on its work.
 
-use crate::conditions::{Conditions, Crop};
+use crate::chance::scatter;
+use crate::conditions::Conditions;
 use crate::ground::union;
-use crate::planting::{leaves, scatter};
-use crate::row::{Canopy, Kind, Problem, Row};
+use crate::planting::leaves;
+use crate::row::{Canopy, Kind, Problem, Row, Stem};
 use crate::sight::width_at;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, LogNormal, Normal, Poisson};
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
-
-/// A crop plant's stem, and the zone round it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stem {
-    /// Its place along the row.
-    pub along_mm: f64,
-    /// Its place across the row.
-    pub across_mm: f64,
-    /// Radius of the zone that no tool may enter.
-    pub protected_mm: f64,
-    /// Whether its plant breaks the beam.
-    pub is_seen: bool,
-}
-
-impl Stem {
-    /// A stem on the row's line, with the default field's zone.
-    pub(crate) fn at(along_mm: f64) -> Self {
-        let protected_mm = Crop::default().protected_mm / 2.0;
-        Self { along_mm, across_mm: 0.0, protected_mm, is_seen: true }
-    }
-
-    /// Half of the zone's width across the row, at this distance from the stem along it; 0 beyond the zone.
-    pub(crate) fn half_chord_mm(&self, beside_mm: f64) -> f64 {
-        (self.protected_mm.powi(2) - beside_mm.powi(2)).max(0.0).sqrt()
-    }
-}
 
 /// A weed of any height.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -37,16 +37,16 @@ fn weed(preset: &str, number: u64, spacing_mm: f64, speed_km_h: f64) -> (Option<
     };
     let stand = Stand::grow(&conditions, spacing_mm, &mut chance(0)).expect("the plants stand apart");
     let drive = drive(&conditions, &stand.span_mm, speed_km_h, &mut chance(1));
-    let trial = conditions.trial(stand.row.clone(), drive.motion.clone(), chance(2).random());
+    let pass = conditions.pass(stand.row.clone(), drive.motion.clone(), chance(2).random());
     let readings = Readings::new(Instant::ZERO, Position::new(0));
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
-    let mut weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(&trial), Cause::PowerOn);
+    let mut weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(&pass), Cause::PowerOn);
     weeder.clear();
-    for (setting, value) in trial.firmware_settings() {
+    for (setting, value) in pass.firmware_settings() {
         weeder.set(setting, value).expect("the field's settings do not contradict each other");
     }
     weeder.start(false).expect("nothing is wrong yet");
-    let sensors = Sensors::new(&trial, TURN_S);
+    let sensors = Sensors::new(&pass, TURN_S);
     let alarm = sensors.turns().find_map(|now| {
         for seen in now.edges {
             weeder.edge(Position::new(seen.position as i32), seen.beams);
@@ -57,8 +57,8 @@ fn weed(preset: &str, number: u64, spacing_mm: f64, speed_km_h: f64) -> (Option<
             _ => None,
         }
     });
-    let place_mm = alarm.map_or(f64::INFINITY, |(_, time_s)| trial.motion.position_mm(time_s));
-    let plants = trial.row.plants().filter(|plant| plant.span_mm().start < place_mm).count();
+    let place_mm = alarm.map_or(f64::INFINITY, |(_, time_s)| pass.motion.position_mm(time_s));
+    let plants = pass.row.plants().filter(|plant| plant.span_mm().start < place_mm).count();
     (alarm.map(|(alarm, _)| alarm), plants)
 }
 

@@ -18,10 +18,10 @@ use crate::plane::Place;
 use crate::receiver::{Counts, Fix, Heard, Jump, Mark, Receiver, WHEEL_GAP_MS};
 use crate::track::{Basis, Found, Missing, Offset, STANDING_M, Track};
 use crate::wheel::{self, Ratio};
-use link::follower::{Followed, Follower};
-use link::log::{Entry, Kind};
 use link::settings::Setting;
 use link::{Class, EventLine, Mode, Status};
+use logbook::follower::{Followed, Follower};
+use logbook::log::{Entry, Kind};
 use std::ops::Range;
 
 /// Time before and after a stretch in which the machine is assumed to have stood, in ms. A fix in this time belongs to

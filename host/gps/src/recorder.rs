@@ -8,9 +8,9 @@
 use crate::antenna::Antenna;
 use crate::receiver::{Heard, Receiver};
 use crate::sentence::{Finder, Line};
-use link::follower::{Distance, tick_mm};
-use link::log::Kind;
 use link::session::Happening;
+use logbook::follower::{Distance, tick_mm};
+use logbook::log::Kind;
 
 /// A receiver that is silent for this long is lost, in ms. Every receiver sends a line within five seconds.
 const SILENCE_MS: u64 = 5_000;

@@ -7,9 +7,9 @@ use gps::sentence::{Quality, framed};
 use gps::track::Basis;
 use gps::{Antenna, Job, Recorder, Wanted, playback};
 use link::Status;
-use link::log::{Entry, Kind};
 use link::session::Happening;
 use link::settings::{Setting, Settings};
+use logbook::log::{Entry, Kind};
 use proptest::prelude::*;
 use std::path::Path;
 

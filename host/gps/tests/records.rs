@@ -9,7 +9,7 @@ use gps::simulated::gga;
 use gps::summary::{Stand, Summary};
 use gps::{Job, Wanted, map, picture};
 use link::Class;
-use link::log::{Entry, Kind};
+use logbook::log::{Entry, Kind};
 use proptest::prelude::*;
 
 /// Ticks in a millimetre.

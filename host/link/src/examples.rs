@@ -89,7 +89,7 @@ pub fn read(link: &mut Link) -> Result<Vec<(u16, Taught)>, ExamplesError> {
 }
 
 /// The example in a line of the answer to `examples`: whether it is from the field, and its number.
-pub(super) fn taught(line: &str) -> Option<(bool, u16, Taught)> {
+pub fn taught(line: &str) -> Option<(bool, u16, Taught)> {
     let ConsoleLine::Example { from_field, number, label, features } = ConsoleLine::parse(line) else { return None };
     let label = if label == Class::Plant { label::PLANT } else { label::WEED };
     Some((from_field, number, Example::new(features, label)))

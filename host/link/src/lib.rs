@@ -19,22 +19,17 @@ mod console_line;
 mod error;
 mod event_line;
 pub mod examples;
-pub mod follower;
 mod lines;
-pub mod log;
 pub mod moment;
 #[cfg(not(target_arch = "wasm32"))]
 mod port;
-pub mod replay;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod row_names;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod rows;
 pub mod session;
-pub mod set_up;
 pub mod settings;
 pub mod settings_file;
-pub mod worked;
 
 pub use self::console_line::{ANSWERS, ConsoleLine};
 pub use self::error::LinkError;

@@ -351,7 +351,7 @@ pub fn status(link: &mut Link) -> Result<Status, LinkError> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
     use control::ground::{examples::EXAMPLES, nearest::Nearest};
     use control::measure::reset::Cause;
@@ -361,7 +361,7 @@ pub(super) mod tests {
     use rig::Rig;
 
     /// The factory settings with some other values.
-    pub(crate) fn settings(values: &[(Setting, u16)]) -> Settings {
+    fn settings(values: &[(Setting, u16)]) -> Settings {
         let mut settings = Settings::new();
         for &(setting, value) in values {
             settings.set(setting, value).unwrap();

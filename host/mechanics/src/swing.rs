@@ -12,9 +12,9 @@
 
 use crate::machine::{Machine, SwingInputs};
 use crate::unit::{KG_CM, MM};
-use link::set_up::{circle, saved_ms};
 use link::settings::Setting;
 use serde::Serialize;
+use set_up::{circle, saved_ms};
 use uom::si::f64::Torque;
 use uom::si::time::second;
 

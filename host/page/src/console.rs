@@ -1,11 +1,11 @@
 //! The console for the page: the meaning of lines, the order of changed settings, and the next step of setting up a
 //! machine.
 
-use link::set_up::{self, SetUp, Step, Task};
 use link::settings::{Setting, Settings, explain, follow_wheel, name, steps, unit};
 use link::{ConsoleLine, Field, Values};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
+use set_up::{SetUp, Step, Task};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 

@@ -6,16 +6,17 @@
 //! Distances are millimetres of the tool's travel since the start of the log, by the wheel. After a reset, or for
 //! another machine, the ground continues one metre farther. An event without a position has that of the line before.
 //!
-//! After `revert` the settings can be missing ([`link::follower`]): a log of an earlier version has them only if `save`
+//! After `revert` the settings can be missing ([`logbook::follower`]): a log of an earlier version has them only if `save`
 //! was typed before. Then the picture stops, and says when. It goes on where `get` has shown the values, or at the next
 //! connection.
 
 use gps::job::{Job, Wanted};
 use gps::picture::{Words, draw};
-use link::follower::{Followed, Follower};
-use link::log::{Entry, Kind, Pieces};
 use link::settings::Setting;
-use link::{Class, EventLine, Mode, Values, replay};
+use link::{Class, EventLine, Mode, Values};
+use logbook::follower::{Followed, Follower};
+use logbook::log::{Entry, Kind, Pieces};
+use logbook::replay;
 use serde_json::{Value, json};
 use std::cell::RefCell;
 use std::path::Path;

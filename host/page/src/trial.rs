@@ -11,10 +11,10 @@ use field::planting::{Planting, Sowing};
 use field::rolling::Rolling;
 use field::row::{Canopy, Kind, Row};
 use field::verdict::{Timing, Verdict, judge};
-use link::set_up::{Task, steps};
 use link::settings::{Setting, name};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use set_up::{Task, steps};
 use std::cell::RefCell;
 use uno::Pulse;
 

@@ -16,7 +16,7 @@ use control::settings::{Setting, Settings};
 use field::machine::{channels, encoder_edge};
 use field::wiring;
 use link::Values;
-use link::follower::InUse;
+use logbook::follower::InUse;
 use model_test::Failure;
 use model_test::decisions::from_the_field;
 use model_test::drive::is_end;
@@ -24,8 +24,8 @@ use model_test::machine::{Attended, Checked, Machine, World};
 use model_test::run::Beginning;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use trial::console::ask;
 use uno::{CYCLES_PER_SECOND, Pin, PinChange, Uno};
+use uno_run::console::ask;
 
 const CYCLES_A_US: u64 = CYCLES_PER_SECOND / 1_000_000;
 

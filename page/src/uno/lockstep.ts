@@ -2,7 +2,7 @@
 //
 // Each line of standard input is a turn: the cycle until which the clock runs, and the inputs until then. Each line of
 // standard output has the Uno's outputs in that turn. The first line has the firmware. `weeder check-board
-// --second-simulator` uses it instead of the weeder (host/check/src/second.rs is the other end).
+// --second-simulator` uses it instead of the weeder (yard/check-board/src/second.rs is the other end).
 
 import { createInterface } from "node:readline";
 import { Uno } from "./uno.ts";

@@ -447,7 +447,7 @@ export const en = {
         contradictBeam:
             "margin_mm, lead_out_ms, beam_response_ms and top_speed_mm_s together need a beam_to_tool_mm of {needed} or more: raise it, or lower one of them",
 
-        // The next step of the set-up (host/link/src/set_up.rs).
+        // The next step of the set-up (host/set_up/src/lib.rs).
         timeServo: "time the servo: `calibrate servo` ({done} of {all} done)",
         takeLead: "take the calculated lead: `set {name} {lead}`",
         measureWheel: "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)",

@@ -6,9 +6,9 @@ use link::advice;
 use link::examples::Heading;
 use link::rows::{Heard, Hold, What};
 use link::session::Happening;
-use link::set_up::{SetUp, Step};
 use link::settings::{self, Setting, Settings};
 use link::{Class, EventLine, Mode, Status};
+use set_up::{SetUp, Step};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 

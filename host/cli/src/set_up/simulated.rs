@@ -2,12 +2,12 @@
 
 use anyhow::{Context, Result};
 use comfy_table::{CellAlignment, Table};
-use experiments::experiment::{Engine, Experiment, Total, Treatment, totals};
 use field::conditions::{self, Conditions};
-use link::set_up::{Task, steps};
 use link::settings::{Setting, Settings, name};
-use trial::by_the_manual::Novice;
-use trial::report::number_table;
+use set_up::{Task, steps};
+use study::experiment::{Engine, Experiment, Total, Treatment, totals};
+use uno_run::by_the_manual::Novice;
+use uno_run::report::number_table;
 
 /// Plots of each spacing.
 const REPLICATIONS: u32 = 10;

@@ -3,8 +3,8 @@
 use crate::output::tell;
 use anyhow::{Result, bail};
 use link::row_names::Board;
-use link::set_up::SetUp;
 use link::settings::{Setting, name};
+use set_up::SetUp;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

@@ -2,21 +2,22 @@
 //! message in one line that names the file. No input may cause a panic or unbounded memory.
 
 use avr_bounds::Budgets;
-use experiments::evaluation::{self, Analysis};
-use experiments::training::table;
 use field::conditions::Conditions;
 use field::machine::Machine;
+use field::pass::Pass;
 use field::row::Row;
-use field::trial::Trial;
 use field::verdict::Timing;
 use field::wiring;
 use files::bounded_file;
 use gps::{Job, Wanted, map, picture};
 use link::row_names::Names;
-use link::{log, replay, settings_file};
+use link::settings_file;
+use logbook::{log, replay};
 use proptest::prelude::*;
 use std::error::Error;
 use std::path::Path;
+use study::evaluation::{self, Analysis};
+use study::training::table;
 use uno::bootloader::Bootloader;
 use uno::elf::Image;
 use uno::hex;
@@ -35,8 +36,8 @@ const READERS: [Reader; 12] = [
             let row = Row::parse_csv(path, bounded_file::bytes(path)?)?;
             let span = row.span_mm();
             if span.end - span.start < ROLLED_MM {
-                let trial = Trial::at_speed(row, Machine::default(), Timing::default(), 700.0);
-                let changes = trial.machine.pin_changes(&trial.row, &trial.motion, 0);
+                let pass = Pass::at_speed(row, Machine::default(), Timing::default(), 700.0);
+                let changes = pass.machine.pin_changes(&pass.row, &pass.motion, 0);
                 assert!(changes.len() < 200_000, "{}", changes.len());
             }
             Ok(())

@@ -160,7 +160,7 @@ fn a_report_that_cannot_be_written_is_an_error() {
 
 #[test]
 fn measured_speeds_are_evaluated_at_the_nominal_ones_that_are_offered() {
-    let table = concat!(env!("CARGO_MANIFEST_DIR"), "/../experiments/tests/tables/speeds-as-measured.csv");
+    let table = concat!(env!("CARGO_MANIFEST_DIR"), "/../study/tests/tables/speeds-as-measured.csv");
     let words = said(Path::new("."), &["evaluate", table]);
     let (_, offer) = words.split_once("add --speeds ").unwrap();
     let (speeds, _) = offer.split_once(':').unwrap();

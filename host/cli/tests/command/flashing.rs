@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
-use trial::firmware;
 use uno::elf::Image;
 use uno::pty::Pty;
+use uno_run::firmware;
 
 /// Path in Debian's arduino-core-avr, which setup.sh installs.
 const BOOTLOADERS: &str = "/usr/share/arduino/hardware/arduino/avr/bootloaders";

@@ -7,10 +7,10 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
-use trial::firmware;
-use trial::live::Setup;
-use trial::live::rows::{Background, LiveRows};
 use uno::pty::Pty;
+use uno_run::firmware;
+use uno_run::live::Setup;
+use uno_run::live::rows::{Background, LiveRows};
 
 /// How many lines of a kind a log has by now.
 fn lines_of(log: &Path, kind: &str) -> usize {

@@ -16,9 +16,9 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 use tempfile::TempDir;
-use trial::console::ask;
-use trial::firmware;
 use uno::Uno;
+use uno_run::console::ask;
+use uno_run::firmware;
 
 /// The repository's folder.
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
@@ -247,7 +247,7 @@ fn every_file_that_contributing_and_the_page_of_the_sources_name_is_there() {
 #[test]
 fn the_manual_s_page_of_the_console_names_every_command() {
     let page = fs::read_to_string(Path::new(ROOT).join("docs/console.md")).expect("there is such a page");
-    let mut uno = trial::boot(&firmware::build().expect("the firmware builds"), &[]).expect("the firmware wakes up");
+    let mut uno = uno_run::boot(&firmware::build().expect("the firmware builds"), &[]).expect("the firmware wakes up");
     let help = ask(&mut uno, "help").expect("it has help");
     assert!(help.len() > 10, "{help:?}");
     for usage in help.iter().filter_map(|line| line.split_once(" - ")).map(|(usage, _)| usage) {
@@ -262,7 +262,7 @@ fn every_console_line_in_the_manual_gets_ok_and_the_printed_answer() {
     let mut typed = 0;
     for page in pages() {
         for block in page.blocks("console") {
-            let mut uno = trial::boot(&elf, &[]).expect("the firmware wakes up");
+            let mut uno = uno_run::boot(&elf, &[]).expect("the firmware wakes up");
             let mut said = String::new();
             for line in block {
                 let place = format!("{}: {line}", page.path.display());

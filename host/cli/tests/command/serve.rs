@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use trial::firmware;
+use uno_run::firmware;
 use ureq::Agent;
 
 mod attacks;

@@ -2,10 +2,9 @@
 
 use crate::common::said;
 use crate::typed::{printed, typed};
-use experiments::experiment::{Engine, Experiment, Total, Treatment, totals};
 use field::conditions::Conditions;
-use link::set_up::{ManualStep, Task, steps};
 use link::settings::{Setting, name};
+use set_up::{ManualStep, Task, steps};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,8 +12,9 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::thread;
 use std::time::Duration;
+use study::experiment::{Engine, Experiment, Total, Treatment, totals};
 use tempfile::TempDir;
-use trial::by_the_manual::Novice;
+use uno_run::by_the_manual::Novice;
 
 /// The page of the manual.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/set-up.md");

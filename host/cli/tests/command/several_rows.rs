@@ -7,9 +7,9 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 use tempfile::TempDir;
-use trial::firmware;
-use trial::live::Setup;
-use trial::live::rows::{Background, LiveRows, Mishap};
+use uno_run::firmware;
+use uno_run::live::Setup;
+use uno_run::live::rows::{Background, LiveRows, Mishap};
 
 /// Standing rows. A folder has links to their ports: `row0` and so on.
 fn rows(folder: &TempDir, count: usize) -> Background {

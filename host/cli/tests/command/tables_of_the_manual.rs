@@ -6,12 +6,12 @@
 use control::alarm::{Alarm, Warning};
 use control::settings::{Description, Setting};
 use expect_test::{ExpectFile, expect_file};
-use experiments::evaluation::published;
 use field::conditions::{Conditions, Parameter};
 use field::wiring;
 use link::settings::{help, name, unit};
 use link::{EVENTS, LineDescription, STATUS, ValueDescription, advice};
 use std::fmt::Write;
+use study::evaluation::published;
 use svg::node::element::tag::Type;
 use svg::parser::Event;
 

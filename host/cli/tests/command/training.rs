@@ -1,8 +1,8 @@
 //! `weeder train` and `weeder classify`, as they are called.
 
 use crate::common::{assert_refused, said, weeder};
-use experiments::training::MOST_EXAMPLES;
 use std::fs;
+use study::training::MOST_EXAMPLES;
 use tempfile::TempDir;
 
 /// The table that the firmware is built from.

@@ -3,7 +3,6 @@
 //! [`Conditions`] and its tables, their TOML form and [`PARAMETERS`] are made from it. Checks of combined values are
 //! elsewhere.
 
-use crate::machine::Arm;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -33,6 +32,28 @@ impl Parameter {
     /// Its values.
     pub fn range(&self) -> String {
         if self.words.is_empty() { format!("{} to {}", self.least, self.greatest) } else { self.words.join(" or ") }
+    }
+}
+
+/// How the arm hangs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Arm {
+    /// It hangs from the servo's shaft, which lies along the row. A stroke lifts the tool.
+    #[default]
+    Pendulum,
+    /// It lies along the row behind an upright shaft. A stroke carries the tool forward.
+    Trailing,
+}
+
+impl Arm {
+    /// The arms' names, by number.
+    pub const NAMES: [&str; 2] = ["pendulum", "trailing"];
+}
+
+impl From<Arm> for f64 {
+    fn from(arm: Arm) -> Self {
+        Self::from(arm as u8)
     }
 }
 

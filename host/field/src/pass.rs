@@ -1,0 +1,199 @@
+//! A pass: all inputs of weeding a row, except the controller.
+//!
+//! The machine's motion does not depend on the firmware. So a pass is complete before it runs: row, machine, motion,
+//! and the firmware's settings. The controller is the [native run](crate::native), one of its
+//! [`baselines`](crate::baselines), or the real firmware, which is in another crate.
+
+use crate::budget::Reason;
+use crate::conditions::{Conditions, Mechanism};
+use crate::machine::{Dirt, Machine};
+use crate::motion::{Motion, run_up_mm};
+use crate::row::Row;
+use crate::servo::{Scatter, Servo};
+use crate::verdict::Timing;
+use control::ground::features;
+use control::settings::Setting;
+use knn::Example;
+use uno::Pulse;
+
+/// How the firmware is put to work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// By the command `start`: the tool enters the row when ground that the beam has seen reaches it.
+    Command,
+    /// By the command `start now`: the tool enters the row at once.
+    Now,
+    /// By the work switch, from high to low.
+    Switch,
+}
+
+/// The inputs of a pass.
+#[derive(Clone, Debug)]
+pub struct Pass {
+    /// The row's plants and weeds.
+    pub row: Row,
+    /// The machine.
+    pub machine: Machine,
+    /// How it rolls.
+    pub motion: Motion,
+    /// The firmware's margin and leads.
+    pub timing: Timing,
+    /// How the firmware is put to work.
+    pub start: Start,
+    /// Further settings, applied after the settings of machine and timing.
+    pub settings: Vec<(Setting, u16)>,
+    /// Examples that are taught in addition to the built-in ones.
+    pub examples: Vec<Example<{ features::COUNT }>>,
+}
+
+/// A controller's work on a pass's row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weeded {
+    /// The servo's pulses, the first of each width.
+    pub pulses: Vec<Pulse>,
+    /// The cycle at which the motion began.
+    pub start_cycle: u64,
+    /// Whether the firmware was not at work at the end.
+    pub alarm: bool,
+    /// Why the tool was in the row or out of it, from the beginning of the motion to its end.
+    pub reasons: Vec<Reason>,
+}
+
+/// How fast the machine gains its speed.
+const ACCELERATION_MM_S2: f64 = 1000.0;
+
+/// How fast it brakes at the end.
+const BRAKING_MM_S2: f64 = 3000.0;
+
+/// Distance that the tool rolls on behind the row.
+const RUN_OUT_MM: f64 = 100.0;
+
+/// The firmware's greatest top speed, 10.8 km/h. A machine is set to a quarter more than its speed, if the distance
+/// from beam to tool allows it.
+const TOP_SPEED_MM_S: f64 = 3000.0;
+
+/// The firmware's least top speed. No setting contradicts it.
+const SLOWEST_TOP_SPEED_MM_S: f64 = 100.0;
+
+impl Pass {
+    /// A pass of the whole row at one speed, from a standstill ahead of it until the tool has passed its end.
+    pub fn at_speed(row: Row, machine: Machine, timing: Timing, speed_mm_s: f64) -> Self {
+        let span = row.span_mm();
+        let motion = Motion::steady(
+            span.start - run_up_mm(speed_mm_s, ACCELERATION_MM_S2),
+            ACCELERATION_MM_S2,
+            speed_mm_s,
+            span.end + machine.beam_to_tool_mm + RUN_OUT_MM,
+        );
+        // A real machine does not stop at once. To the firmware that would be a failed encoder.
+        let motion = motion.change_speed(0.0, BRAKING_MM_S2);
+        Self { row, machine, motion, timing, start: Start::Command, settings: Vec::new(), examples: Vec::new() }
+    }
+
+    /// The firmware's settings, in an order without intermediate contradictions.
+    pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
+        let Machine { wheel_mm, ticks_per_rev, beam_to_tool_mm, second_beam_mm, servo, .. } = self.machine;
+        let Timing { margin_mm, lead_out_ms, lead_in_ms, .. } = self.timing;
+        let notice_mm = beam_to_tool_mm - f64::from(margin_mm) - 2.0;
+        // The firmware's own calculation: the lead, an eighth of it, and the sensor's response.
+        let notice_s = f64::from(lead_out_ms) * 1.125e-3 + 0.002;
+        let wanted_mm_s = (1.25 * self.motion.top_speed_mm_s()).max(SLOWEST_TOP_SPEED_MM_S);
+        let top_speed_mm_s = wanted_mm_s.min(notice_mm / notice_s).min(TOP_SPEED_MM_S);
+        let mut settings = vec![
+            (Setting::TopSpeedMmS, SLOWEST_TOP_SPEED_MM_S as u16),
+            (Setting::TicksPerRev, ticks_per_rev as u16),
+            (Setting::WheelMm, wheel_mm.round() as u16),
+            (Setting::BeamToToolMm, beam_to_tool_mm.round() as u16),
+            (Setting::SecondBeamMm, second_beam_mm.round() as u16),
+            (Setting::MarginMm, margin_mm as u16),
+            (Setting::LeadOutMs, lead_out_ms as u16),
+            (Setting::LeadInMs, lead_in_ms as u16),
+            (Setting::ServoInUs, servo.in_us.round() as u16),
+            (Setting::ServoOutUs, servo.out_us.round() as u16),
+            (Setting::TopSpeedMmS, top_speed_mm_s as u16),
+        ];
+        settings.extend(&self.settings);
+        settings
+    }
+}
+
+/// A field as the firmware meets it.
+impl Conditions {
+    /// The machine. The seed selects its servo's and encoder's random deviations.
+    pub fn machine(&self, seed: u64) -> Machine {
+        let Mechanism { beam_to_tool_mm, second_beam_mm, arm_mm, arm, tool_width_mm, .. } = self.machine;
+        let Mechanism { dead_time_ms, dead_time_scatter_ms, travel_ms, load_kg_cm, stall_kg_cm, .. } = self.machine;
+        let scatter = Scatter { dead_time_ms: dead_time_scatter_ms, load: load_kg_cm / stall_kg_cm, seed };
+        // The stroke follows from the firmware's settings.
+        let default = Servo::default();
+        let in_us = self.setting_or(Setting::ServoInUs, default.in_us);
+        let out_us = self.setting_or(Setting::ServoOutUs, default.out_us);
+        Machine {
+            beam_to_tool_mm,
+            second_beam_mm,
+            arm_mm,
+            arm,
+            tool_width_mm,
+            servo: Servo { in_us, out_us, dead_time_ms, travel_ms, scatter },
+            beam_mm: self.sensors.beam_mm,
+            beam_response_ms: self.sensors.beam_response_ms,
+            dirt: Dirt { share: self.sensors.lost_pulses_percent / 100.0, seed },
+            ..Machine::default()
+        }
+    }
+
+    /// The firmware's margin, leads and stem zone.
+    pub fn timing(&self) -> Timing {
+        let of = |setting: Setting| self.setting_or(setting, setting.description().default.into()) as u32;
+        Timing {
+            margin_mm: of(Setting::MarginMm),
+            lead_out_ms: of(Setting::LeadOutMs),
+            lead_in_ms: of(Setting::LeadInMs),
+            stem_zone_mm: of(Setting::StemZoneMm),
+        }
+    }
+
+    /// The pass of a row and a motion with this machine and these settings. The seed is that of [`Self::machine`].
+    pub fn pass(&self, row: Row, motion: Motion, seed: u64) -> Pass {
+        Pass {
+            row,
+            machine: self.machine(seed),
+            motion,
+            timing: self.timing(),
+            start: Start::Command,
+            settings: self.firmware_settings(),
+            examples: Vec::new(),
+        }
+    }
+
+    /// A setting of the firmware, or what it is otherwise.
+    fn setting_or(&self, setting: Setting, otherwise: f64) -> f64 {
+        self.settings.get(&setting.text().to_string()).map_or(otherwise, |&value| value.into())
+    }
+
+    /// The firmware's other settings, without those from machine and timing.
+    pub fn firmware_settings(&self) -> Vec<(Setting, u16)> {
+        let timing = [Setting::MarginMm, Setting::LeadOutMs, Setting::LeadInMs];
+        // In the table's order, the wheel comes before its calibration. The other way round, the wheel would reset it.
+        let others = Setting::all().filter(|setting| !timing.contains(setting));
+        others.filter_map(|setting| Some((setting, *self.settings.get(&setting.text().to_string())?))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_calibrated_wheel_is_set_after_its_diameter_which_would_reset_it() {
+        let conditions = Conditions::with("transplanted", &[("ticks_per_m", 2010.0), ("wheel_mm", 400.0)]);
+        assert_eq!(conditions.firmware_settings(), [(Setting::WheelMm, 400), (Setting::TicksPerM, 2010)]);
+    }
+
+    #[test]
+    fn margin_and_leads_are_set_once_as_the_timing() {
+        let conditions = Conditions::with("transplanted", &[("lead_out_ms", 200.0), ("margin_mm", 40.0)]);
+        assert_eq!(conditions.timing(), Timing { lead_out_ms: 200, margin_mm: 40, ..Conditions::default().timing() });
+        assert!(conditions.firmware_settings().is_empty());
+    }
+}

@@ -1,0 +1,400 @@
+//! The log of a session: one line for each input and output, as a CSV file for any program and for the replay.
+//!
+//! The columns are `time_ms` since the log was opened, `kind` and `line`. `line` is the firmware's own text. The log
+//! also holds the machine's version, settings and examples at each connection, so that it can be replayed alone. It
+//! holds the output of a satellite receiver as lines whose kind begins with `gps`. Each line is written before the next
+//! is read. So a power failure damages at most the last line.
+
+use files::{CsvTable, FileError, in_a_line};
+use link::session::Happening;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use strum::{EnumString, IntoStaticStr, VariantNames};
+use thiserror::Error;
+
+/// The kind of a line in a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantNames)]
+#[strum(serialize_all = "snake_case")]
+pub enum Kind {
+    /// The Uno is connected; the version.
+    Connected,
+    /// The firmware has started; its greeting, with the cause.
+    Started,
+    /// The Uno is gone; why.
+    Lost,
+    /// One of its settings, `name=value`.
+    Setting,
+    /// One of its examples.
+    Example,
+    /// Its status.
+    Status,
+    /// An event.
+    Event,
+    /// A typed command.
+    Command,
+    /// A line of its answer.
+    Answer,
+    /// Positions of beam and tool relative to a satellite receiver's antenna.
+    Antenna,
+    /// The receiver's port was opened; its name.
+    GpsFound,
+    /// The receiver's port is gone, or silent; why.
+    GpsLost,
+    /// A sentence of the receiver.
+    Gps,
+    /// A line of the receiver that came damaged.
+    GpsDamaged,
+    /// A fault in the receiver's fixes.
+    GpsMark,
+}
+
+impl Kind {
+    /// Its name in the file.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Whether the operator sees such a line: the receiver was connected, was lost, or has a fault.
+    pub fn is_for_the_operator(self) -> bool {
+        matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
+    }
+}
+
+/// The first line of a log.
+const HEADER: &str = "time_ms,kind,line";
+
+/// Why a log cannot be written.
+#[derive(Debug, Error)]
+pub enum LogError {
+    /// The file cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file is no log.
+    #[error("{0} exists already and is no log: choose another name")]
+    NoLog(PathBuf),
+}
+
+/// Writes a log.
+pub struct LogWriter {
+    path: PathBuf,
+    file: csv::Writer<File>,
+    began: Instant,
+    /// Lines below the header that were found at opening.
+    found: u64,
+    /// Lines that were written since.
+    pub added: u64,
+}
+
+impl LogWriter {
+    /// Opens a log. An existing one is continued.
+    ///
+    /// # Errors
+    /// If the file cannot be written, or is something else.
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let failed = |source| FileError::unwritten(path, source);
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        if !bytes.is_empty() && !bytes.starts_with(HEADER.as_bytes()) {
+            return Err(LogError::NoLog(path.into()));
+        }
+        // Removes a last line that a power failure has cut off. It would damage the next line.
+        let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+        file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
+        let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
+        let mut log =
+            Self { path: path.into(), file: csv::Writer::from_writer(file), began: Instant::now(), found, added: 0 };
+        if whole == 0 {
+            log.record(HEADER.split(','))?;
+        }
+        Ok(log)
+    }
+
+    /// The time of a line written now, in milliseconds.
+    pub fn now_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// Writes an event of the session.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&mut self, happening: &Happening) -> Result<(), LogError> {
+        self.write_at(self.now_ms(), happening)
+    }
+
+    /// Writes an event of the session, with a time from another clock.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
+        match happening {
+            Happening::Connected { version, shown, examples, .. } => {
+                self.line(time_ms, Kind::Connected, version)?;
+                // As they came: a newer firmware has settings, or values, that this program does not know.
+                for line in shown.iter().filter(|line| line.contains('=')) {
+                    let value = line.split([' ', ',']).next().unwrap_or_default();
+                    self.line(time_ms, Kind::Setting, value)?;
+                }
+                examples.iter().try_for_each(|example| self.line(time_ms, Kind::Example, example))
+            }
+            Happening::Started { greeting, .. } => self.line(time_ms, Kind::Started, greeting),
+            Happening::Lost(why) => self.line(time_ms, Kind::Lost, why),
+            Happening::Status(_, line) => self.line(time_ms, Kind::Status, line),
+            Happening::Event(_, line) => self.line(time_ms, Kind::Event, line),
+            Happening::Command(line) => self.line(time_ms, Kind::Command, line),
+            Happening::Answer(line) => self.line(time_ms, Kind::Answer, line),
+            // What `revert` restored, or another session set, follows from no other line.
+            Happening::Settings(_, lines) => lines.iter().try_for_each(|line| self.line(time_ms, Kind::Answer, line)),
+            // They follow from the commands.
+            Happening::Late(_) | Happening::Answered { .. } | Happening::Examples(_) => Ok(()),
+        }
+    }
+
+    /// Writes lines that do not come from a session, with this time.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn lines_at(&mut self, time_ms: u64, lines: &[(Kind, String)]) -> Result<(), LogError> {
+        lines.iter().try_for_each(|(kind, line)| self.line(time_ms, *kind, line))
+    }
+
+    /// Lines in the file, without the header.
+    pub fn lines(&self) -> u64 {
+        self.found + self.added
+    }
+
+    fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
+        self.added += 1;
+        // A record is one line of the table, even if the system's message about a lost port has several.
+        self.record([time_ms.to_string().as_str(), kind.name(), &in_a_line(line)])
+    }
+
+    fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {
+        let written = self.file.write_record(fields).map_err(io::Error::from).and_then(|()| self.file.flush());
+        Ok(written.map_err(|source| FileError::unwritten(&self.path, source))?)
+    }
+}
+
+/// A line of a log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// The line in the file, counted from 1.
+    pub number: u64,
+    /// The PC's time since the log was opened.
+    pub time_ms: u64,
+    /// Its kind.
+    pub kind: Kind,
+    /// Its text.
+    pub text: String,
+}
+
+/// Reads a log.
+///
+/// # Errors
+/// Names the file, the line and what would be right.
+pub fn read(path: &Path) -> Result<Vec<Entry>, FileError> {
+    parse(path, files::bounded_file::recorded(path)?)
+}
+
+/// The lines in a log's text.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
+    let table = CsvTable::parse(path, text, &HEADER.split(',').collect::<Vec<_>>())?;
+    table
+        .lines()
+        .map(|line| {
+            let kind = line.text("kind").parse().map_err(|_| {
+                let known = Kind::VARIANTS.join(", ");
+                line.error(format!("kind is `{}`: it has to be one of {known}", line.text("kind")))
+            })?;
+            let time_ms = line.value("time_ms", "a whole number of milliseconds")?;
+            Ok(Entry { number: line.number(), time_ms, kind, text: line.text("line").to_owned() })
+        })
+        .collect()
+}
+
+/// Reads a log in pieces, so that the whole text is not in memory.
+pub struct Pieces {
+    path: PathBuf,
+    /// The header, and below it the wanted lines of a piece.
+    table: String,
+    /// The number of each of these lines in the log.
+    numbers: Vec<u64>,
+    /// The beginning of an incomplete line.
+    cut: Vec<u8>,
+    /// Lines that were read.
+    lines: u64,
+    is_empty: bool,
+}
+
+impl Pieces {
+    /// A log before its first line. The path is for error messages.
+    pub fn new(path: &Path) -> Self {
+        let (table, numbers, cut) = (String::new(), Vec::new(), Vec::new());
+        Self { path: path.into(), table, numbers, cut, lines: 0, is_empty: true }
+    }
+
+    /// Parses the lines that end in the next bytes of the log, without the unwanted ones.
+    ///
+    /// # Errors
+    /// As [`read`], except for a log without lines.
+    pub fn take(&mut self, bytes: &[u8], is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
+        let end = |bytes: &[u8]| bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+        let whole = end(bytes);
+        self.cut.extend_from_slice(&bytes[..whole]);
+        let mut text = if whole == 0 { Vec::new() } else { std::mem::take(&mut self.cut) };
+        // The last line is complete only when the next one shows that no quotation mark is open.
+        let last = end(&text[..text.len().saturating_sub(1)]);
+        if text[last..].iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
+            self.cut = text.split_off(last);
+        }
+        self.cut.extend_from_slice(&bytes[whole..]);
+        self.lines(text, is_wanted)
+    }
+
+    /// Parses the last line, if no line feed ends it.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn end(mut self, is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
+        let last = std::mem::take(&mut self.cut);
+        let entries = self.lines(last, is_wanted)?;
+        // For an empty log this returns the error for a missing header.
+        if self.is_empty { self.parse() } else { Ok(entries) }
+    }
+
+    fn lines(&mut self, text: Vec<u8>, mut is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
+        let no_text = "this is not text: a log is a CSV file in UTF-8".to_owned();
+        let failed = |_| FileError::Line { path: self.path.clone(), line: self.lines + 1, problem: no_text };
+        let text = String::from_utf8(text).map_err(failed)?;
+        let text = if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n") } else { text };
+        for line in text.split_inclusive('\n') {
+            self.lines += 1;
+            let is_text = line != "\n" && !line.starts_with('#');
+            if is_text && (self.numbers.is_empty() || is_wanted(line)) {
+                self.table.push_str(line);
+                self.numbers.push(self.lines);
+            }
+        }
+        if self.numbers.len() < 2 {
+            return Ok(Vec::new());
+        }
+        self.is_empty = false;
+        let entries = self.parse();
+        self.table.truncate(self.table.find('\n').map_or(0, |end| end + 1));
+        self.numbers.truncate(1);
+        entries
+    }
+
+    /// Parses the table. Entries and errors have the numbers of the log's lines.
+    fn parse(&self) -> Result<Vec<Entry>, FileError> {
+        let numbered = |line: u64| self.numbers.get((line as usize).wrapping_sub(1)).copied().unwrap_or(line);
+        let entries = parse(&self.path, self.table.clone().into_bytes()).map_err(|error| match error {
+            FileError::Line { path, line, problem } => FileError::Line { path, line: numbered(line), problem },
+            file @ FileError::File { .. } => file,
+        })?;
+        Ok(entries.into_iter().map(|entry| Entry { number: numbered(entry.number), ..entry }).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_log_is_read_back_and_continued_after_a_cut_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let answer = "speed_mm_s,spacing_mm \"quoted\"";
+        LogWriter::open(&path).unwrap().write(&Happening::Answer(answer.to_owned())).unwrap();
+        let mut cut = fs::read(&path).unwrap();
+        cut.extend(b"17,sta");
+        fs::write(&path, cut).unwrap();
+        LogWriter::open(&path).unwrap().write(&Happening::Lost("no\nport".to_owned())).unwrap();
+        let entries: Vec<(u64, Kind, String)> =
+            read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
+        assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
+    }
+
+    #[test]
+    fn what_the_machine_shows_after_a_change_is_in_the_log() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let lines = vec!["wheel_mm=410 mm from 200 to 800, default 400, saved 410".to_owned()];
+        LogWriter::open(&path)
+            .unwrap()
+            .write(&Happening::Settings(link::settings::Settings::new(), lines.clone()))
+            .unwrap();
+        let [entry] = &read(&path).unwrap()[..] else { panic!("one line") };
+        assert_eq!((entry.kind, &entry.text), (Kind::Answer, &lines[0]));
+    }
+
+    #[test]
+    fn a_log_in_pieces_is_that_log_and_its_errors_are_in_the_same_lines() {
+        let whole = "# monday\n\nkind,time_ms,line\n# early\nlost,0,\"a, b\"\n\nstatus,1,x\nstatus,2,y\nevent,3,z";
+        for text in [whole.to_owned(), whole.replace('\n', "\r\n"), whole.replace('\n', "\r")] {
+            for text in [text.clone(), format!("{text}\n"), text.replace("lost", "gossip"), text.replace("y", "\"y")] {
+                let as_one = parse(Path::new("log"), text.clone().into_bytes()).map_err(|error| error.to_string());
+                for length in [1, 2, 7, 40, 1000] {
+                    let mut pieces = Pieces::new(Path::new("log"));
+                    let in_pieces = || {
+                        let mut entries = Vec::new();
+                        for piece in text.as_bytes().chunks(length) {
+                            entries.extend(pieces.take(piece, |_| true)?);
+                        }
+                        entries.extend(pieces.end(|_| true)?);
+                        Ok(entries)
+                    };
+                    assert_eq!(
+                        in_pieces().map_err(|error: FileError| error.to_string()),
+                        as_one,
+                        "{text:?} by {length}"
+                    );
+                }
+            }
+        }
+        for nothing in ["", "# a comment\n", "time_ms,kind,line\n#\n"] {
+            let mut pieces = Pieces::new(Path::new("log"));
+            assert!(pieces.take(nothing.as_bytes(), |_| true).unwrap().is_empty());
+            assert!(pieces.end(|_| true).is_err(), "{nothing:?}");
+        }
+    }
+
+    #[test]
+    fn lines_that_are_not_wanted_are_left_out_and_the_others_keep_their_numbers() {
+        let mut pieces = Pieces::new(Path::new("log"));
+        let is_wanted = |line: &str| !line.contains(",status,");
+        let text = format!("{HEADER}\n0,status,a\n1,event,b\n2,status,c\n3,event,d\n");
+        let taken = pieces.take(text.as_bytes(), is_wanted).unwrap();
+        assert_eq!(taken.iter().map(|entry| entry.number).collect::<Vec<_>>(), [3, 5]);
+        assert!(pieces.end(is_wanted).unwrap().is_empty());
+    }
+
+    #[test]
+    fn another_file_is_not_written_over() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), "my diary\n").unwrap();
+        assert!(matches!(LogWriter::open(file.path()), Err(LogError::NoLog(_))));
+        assert_eq!(fs::read_to_string(file.path()).unwrap(), "my diary\n");
+    }
+
+    #[test]
+    fn a_line_that_is_none_of_a_log_is_named() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for (line, wrong) in [
+            ("0,gossip,hello", "line 2: kind is `gossip`: it has to be one of connected, started, lost, setting"),
+            ("soon,event,swing", "line 2: time_ms is `soon`: it has to be a whole number of milliseconds"),
+        ] {
+            fs::write(file.path(), format!("{HEADER}\n{line}\n")).unwrap();
+            let error = read(file.path()).unwrap_err().to_string();
+            assert!(error.contains(wrong), "{error}");
+        }
+    }
+}

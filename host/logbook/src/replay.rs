@@ -1,0 +1,315 @@
+//! Replays a log: the firmware's decisions, repeated on the PC from the inputs in the log.
+//!
+//! A log holds the positions where the beam broke and cleared, position and speed ten times a second, the settings, the
+//! examples, and the typed commands. From these [`replay`] rebuilds the machine's motion and the beam's edges, tick by
+//! tick. [`control::weeder::Controller`] decides on them again. The replay compares its events with the log's: each
+//! detection with its class and votes, each swing with its position, and each alarm.
+//!
+//! # Accuracy
+//!
+//! - A detection's edges are right to [`DETECTION_TICKS`]. The lead of a swing depends on the speed, which the log
+//!   holds ten times a second. So a swing may differ by [`SWING_TICKS`], and by the distance that the machine travels
+//!   in [`SWING_MS`]: 17 mm at 2.5 km/h. The speed also decides whether the gap between two zones is long enough to
+//!   swing in. So the log is replayed at three paces: even, and as slow and as fast as the log allows. A swing differs
+//!   only if no pace reproduces it.
+//! - The votes of a detection depend on the speed class, which the line does not tell. Votes agree if any possible
+//!   speed class gives them. Detections from before the start of the log are taken as logged.
+//! - The log does not hold the position of a change of state. The next swing shows the change, and its position is not
+//!   compared. Without a swing the tool was already out, and the statuses before and after the change suffice. The time
+//!   of a typed command is not exact: a busy PC records it late.
+//! - An alarm from the encoder, the beam, the end switch or the stack depends on inputs that the log lacks. The replay
+//!   raises it at its logged position.
+//! - If a log begins on ground that was already seen, the tool's swings there are not compared.
+//! - A refused command is left out, because it had no effect.
+//! - A replay ends at a bench command (`servo`, `calibrate`, `test`), where examples were forgotten, or where a second
+//!   beam was set. A log of a machine with a second beam is not replayed.
+
+mod classifier;
+mod compare;
+mod player;
+mod stretch;
+
+use self::compare::{Bounds, Heard, compare};
+use self::player::{Pace, Player};
+use self::stretch::{Happened, Stretch};
+use super::log::{Entry, Kind};
+use control::say::command::Action;
+use link::EventLine;
+use link::settings::Setting;
+use std::fmt;
+use thiserror::Error;
+
+/// Tolerance of a detection's position and width, in ticks.
+pub const DETECTION_TICKS: i32 = 3;
+
+/// Tolerance of a swing's position, in ticks: 6 mm at the default wheel. [`SWING_MS`] adds to it.
+pub const SWING_TICKS: i32 = 12;
+
+/// Tolerance of a swing's position, as the machine's travel in this time, in milliseconds.
+pub const SWING_MS: i32 = 25;
+
+/// Why a log cannot be replayed.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages say what each means")]
+pub enum ReplayError {
+    #[error(
+        "the log has no machine in it: `weeder record` and `weeder monitor --log` write one with its settings and status"
+    )]
+    Nothing,
+    #[error("line {line} of the log: {problem}")]
+    Line { line: u64, problem: String },
+}
+
+/// A difference between log and replay.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The log's line, if it has one.
+    pub line: Option<u64>,
+    /// The log's value.
+    pub logged: String,
+    /// The replay's value.
+    pub replayed: String,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { line, logged, replayed } = self;
+        match line {
+            Some(line) => write!(formatter, "line {line}: the log has {logged}, the replay {replayed}"),
+            None => write!(formatter, "the log has {logged}, the replay {replayed}"),
+        }
+    }
+}
+
+/// The result of a replay.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Replayed {
+    /// Objects on which both agree.
+    pub objects: usize,
+    /// Swings on which both agree.
+    pub swings: usize,
+    /// Alarms that both raised by themselves.
+    pub alarms: usize,
+    /// Greatest distance between a swing of the log and the replay's, in ticks.
+    pub farthest_swing: i32,
+    /// The first difference.
+    pub difference: Option<Difference>,
+    /// Notes on skipped parts, with the reasons.
+    pub notes: Vec<String>,
+}
+
+/// Replays a log.
+///
+/// # Errors
+/// If it holds no machine, or a line says what cannot be.
+pub fn replay(log: &[Entry]) -> Result<Replayed, ReplayError> {
+    replay_with(log, |_| {})
+}
+
+/// As [`replay`]. Calls `tell` with the progress, from 0 to 1, a hundred times at most.
+///
+/// # Errors
+/// As [`replay`].
+pub fn replay_with(log: &[Entry], mut tell: impl FnMut(f64)) -> Result<Replayed, ReplayError> {
+    // Replayed lines, of the total at all paces.
+    let (mut done, all) = (0, Pace::ALL.len() * log.len());
+    let mut advance = || {
+        let before = 100 * done / all;
+        done += 1;
+        if before < 100 * done / all {
+            tell(done as f64 / all as f64);
+        }
+    };
+    let mut replayed = Replayed::default();
+    let mut stretches = 0;
+    let mut rest = log;
+    while let Some(start) = rest.iter().position(|entry| entry.kind == Kind::Connected) {
+        rest = &rest[start + 1..];
+        let end =
+            rest.iter().position(|entry| matches!(entry.kind, Kind::Connected | Kind::Lost)).unwrap_or(rest.len());
+        if let Some(stretch) = Stretch::read(&rest[..end])? {
+            stretches += 1;
+            replay_stretch(&stretch, &mut replayed, &mut advance)?;
+        }
+        rest = &rest[end..];
+    }
+    if stretches == 0 { Err(ReplayError::Nothing) } else { Ok(replayed) }
+}
+
+/// The result of a stretch at one pace.
+struct Played {
+    logged: Vec<Heard>,
+    replayed: Vec<Heard>,
+    /// Notes on skipped parts, with the reasons.
+    notes: Vec<String>,
+    /// The last position.
+    end: i32,
+}
+
+/// Replays a stretch and adds its result.
+fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl FnMut()) -> Result<(), ReplayError> {
+    replayed.notes.extend_from_slice(&stretch.notes);
+    if stretch.settings.get(Setting::SecondBeamMm) > 0 {
+        replayed.notes.push("a machine with a second beam is not replayed: the log lacks its edges".to_owned());
+        return Ok(());
+    }
+    let compared_from = stretch.compared_from();
+    if compared_from > i32::MIN {
+        replayed.notes.push(format!(
+            "the log begins with ground already seen: swings before pos={compared_from} are not compared"
+        ));
+    }
+
+    let mut played = Vec::new();
+    for pace in Pace::ALL {
+        played.push(play(stretch, pace, advance)?);
+    }
+    let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
+    // The logged values are the same at every pace.
+    let Played { logged, notes, end, .. } = &played[0];
+    let bounds = Bounds { first: stretch.first.position, compared_from, end: *end };
+    compare(logged, &heard, &bounds, replayed);
+    replayed.notes.extend_from_slice(notes);
+    Ok(())
+}
+
+/// Replays a stretch at one pace. Calls `advance` for each line.
+fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Played, ReplayError> {
+    let mut player = Player::new(stretch, pace);
+    let mut logged: Vec<Heard> = Vec::new();
+    // The PC's time when the machine was at its present position.
+    let mut last_ms = stretch.happened.first().map_or(0, |(entry, _)| entry.time_ms);
+    let mut notes = Vec::new();
+    // Whether the next start treats unseen ground as bare.
+    let mut starts_now = false;
+    for (place, (entry, happened)) in stretch.happened.iter().enumerate() {
+        advance();
+        match happened {
+            Happened::Status(status) => {
+                if !player.roll(status, entry.time_ms.saturating_sub(last_ms)) {
+                    let problem = "the machine cannot have rolled so far since the status before".to_owned();
+                    return Err(ReplayError::Line { line: entry.number, problem });
+                }
+                last_ms = entry.time_ms;
+            }
+            Happened::Event(event) => {
+                let mut is_given = false;
+                if let Some(at) = stretch.position_of_change(place) {
+                    player.roll_to(at, stretch.next_status(place));
+                }
+                match event {
+                    EventLine::State { mode } => player.enter(*mode, std::mem::take(&mut starts_now)),
+                    EventLine::Alarm { .. } => is_given = player.raise(),
+                    EventLine::Swing { .. } => is_given = stretch.follows_change(place),
+                    _ => {}
+                }
+                logged.push(Heard { line: entry.number, steps: 0, event: *event, speed: player.speed(), is_given });
+            }
+            Happened::Refused => {}
+            Happened::Command(line) => {
+                // The status that shows the new state must come nearer to the command.
+                if stretch.is_reported_by_event(place) {
+                    starts_now = link::command(line).is_ok_and(|command| command.action == Action::StartNow);
+                    continue;
+                }
+                if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {
+                    player.roll_to(at, stretch.next_status(place));
+                    last_ms = entry.time_ms;
+                }
+                if !player.command(line) {
+                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, line));
+                    break;
+                }
+            }
+        }
+    }
+    let end = player.position();
+    Ok(Played { logged, replayed: player.heard, notes, end })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The log of a machine that rolls at half a metre a second over bare ground. At each status, ten times a second,
+    /// `happens` adds typed lines, answers or events.
+    fn log(statuses: u64, happens: impl Fn(u64) -> Vec<(Kind, &'static str)>) -> Vec<Entry> {
+        let mut lines = vec![(0, Kind::Connected, "0.2.0".to_owned())];
+        for status in 0..statuses {
+            let (time_ms, position) = (100 * status, status as i64 * 95);
+            let unseen_mm = 450_u64.saturating_sub(50 * status);
+            let line = format!("state=hold tool=out pos={position} speed_mm_s=500 windows=0 unseen_mm={unseen_mm}");
+            lines.push((time_ms, Kind::Status, line));
+            lines.extend(happens(status).into_iter().map(|(kind, line)| (time_ms + 1, kind, line.to_owned())));
+        }
+        let entry = |(place, (time_ms, kind, text))| Entry { number: place as u64 + 2, time_ms, kind, text };
+        lines.into_iter().enumerate().map(entry).collect()
+    }
+
+    #[test]
+    fn a_command_that_the_firmware_refused_is_not_carried_out() {
+        let refused = "error: an alarm is latched, look after it and clear it first";
+        let start = |end: &'static str| vec![(Kind::Command, "start"), (Kind::Answer, end)];
+        let never = log(20, |status| if status == 2 { start(refused) } else { Vec::new() });
+        let replayed = replay(&never).unwrap();
+        assert_eq!((replayed.difference, replayed.swings), (None, 0));
+
+        // If the same start was accepted, the tool swings into the row.
+        let taken = log(20, |status| if status == 2 { start("ok") } else { Vec::new() });
+        let difference = replay(&taken).unwrap().difference.expect("the log has no swing");
+        assert!(difference.replayed.contains("swing tool=in"), "{difference}");
+    }
+
+    #[test]
+    fn where_a_second_beam_sees_more_than_the_log_holds_nothing_is_replayed() {
+        let set = |status| {
+            if status == 2 { vec![(Kind::Command, "set second_beam_mm 200"), (Kind::Answer, "ok")] } else { Vec::new() }
+        };
+        assert_eq!(replay(&log(20, set)).unwrap().notes, ["line 6: not replayed from `set second_beam_mm 200` on"]);
+        let setting = "second_beam_mm=200 mm from 0 to 900, default 0, saved 0";
+        let mut has_one = log(20, |_| Vec::new());
+        has_one.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: setting.to_owned() });
+        assert_eq!(replay(&has_one).unwrap().notes.len(), 1);
+    }
+
+    #[test]
+    fn events_and_settings_that_only_a_newer_version_knows_are_left_out_and_named() {
+        let newer = |status| match status {
+            2 => vec![(Kind::Event, "tilt deg=4 pos=9"), (Kind::Event, "alarm code=9-1 name=boredom pos=9")],
+            3 => vec![(Kind::Event, "tilt deg=5 pos=9"), (Kind::Example, "tilt deg=5")],
+            _ => Vec::new(),
+        };
+        let mut entries = log(20, newer);
+        entries.insert(1, Entry { number: 2, time_ms: 0, kind: Kind::Setting, text: "tilt_deg=7".to_owned() });
+        let replayed = replay(&entries).unwrap();
+        assert_eq!(replayed.difference, None);
+        let left_out = |what: &str| format!("the {what}, which this version does not know, is left out");
+        assert_eq!(replayed.notes, ["setting `tilt_deg`", "event `tilt`", "event `alarm`"].map(left_out));
+        // A known setting with another value is another machine.
+        entries[1].text = "wheel_mm=900".to_owned();
+        let error = replay(&entries).unwrap_err().to_string();
+        assert!(error.contains("`wheel_mm=900` is out of the range of this version"), "{error}");
+    }
+
+    #[test]
+    fn a_replay_ends_at_a_command_that_it_cannot_carry_out_and_not_at_one_that_the_machine_refused() {
+        for (line, notes) in
+            [("TEST row 500", vec!["line 6: not replayed from `TEST row 500` on"]), ("test \u{1b}[2J", vec![])]
+        {
+            let typed = |status| if status == 2 { vec![(Kind::Command, line)] } else { Vec::new() };
+            assert_eq!(replay(&log(20, typed)).unwrap().notes, notes);
+        }
+    }
+
+    #[test]
+    fn answers_belong_to_commands_in_their_order() {
+        // `hold` does not wait for the previous answer.
+        let log = log(20, |status| match status {
+            2 => vec![(Kind::Command, "set margin_mm 9999"), (Kind::Command, "start")],
+            3 => vec![(Kind::Answer, "error: margin_mm takes a whole number from 0 to 200"), (Kind::Answer, "ok")],
+            _ => Vec::new(),
+        });
+        let difference = replay(&log).unwrap().difference.expect("the start was taken");
+        assert!(difference.replayed.contains("swing tool=in"), "{difference}");
+    }
+}

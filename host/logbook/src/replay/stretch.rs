@@ -1,0 +1,240 @@
+//! A stretch of a log, from one start of the link to its end: its lines in order, and the machine's positions that
+//! follow from them.
+
+use super::{DETECTION_TICKS, ReplayError};
+use crate::log::{Entry, Kind};
+use control::say::command::Action;
+use files::in_a_line;
+use link::examples::{Taught, taught};
+use link::settings::{Setting, Settings, shown};
+use link::{ConsoleLine, EventLine, Mode, Status};
+use std::collections::VecDeque;
+
+/// The content of a log line.
+pub(super) enum Happened<'a> {
+    Status(Status),
+    Event(EventLine),
+    Command(&'a str),
+    /// A command that the firmware answered with an error. It had no effect.
+    Refused,
+}
+
+/// A log from one start of the link to its end.
+pub(super) struct Stretch<'a> {
+    pub(super) settings: Settings,
+    /// All examples, the built-in ones first, and the number of built-in ones.
+    pub(super) examples: Vec<Taught>,
+    pub(super) built_in: usize,
+    /// The first of its statuses.
+    pub(super) first: Status,
+    pub(super) happened: Vec<(&'a Entry, Happened<'a>)>,
+    /// Notes on lines that only a newer version knows.
+    pub(super) notes: Vec<String>,
+}
+
+impl<'a> Stretch<'a> {
+    /// Reads a stretch. `None` if the machine sent nothing.
+    pub(super) fn read(entries: &'a [Entry]) -> Result<Option<Self>, ReplayError> {
+        let mut settings = Settings::new();
+        let (mut examples, mut built_in) = (Vec::new(), 0);
+        let mut happened = Vec::new();
+        let mut notes: Vec<String> = Vec::new();
+        let mut skip = |entry: &Entry, what: &str| {
+            let name = entry.text.split([' ', '=']).next().unwrap_or_default();
+            let note = format!("{what} `{}`, which this version does not know, is left out", in_a_line(name));
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        };
+        // Indices in `happened` of commands without an answer so far. Answers come in the order of commands.
+        let mut unanswered = VecDeque::new();
+        for entry in entries {
+            let wrong = |problem: &str| {
+                let problem = format!("`{}` is {problem}", entry.text);
+                ReplayError::Line { line: entry.number, problem }
+            };
+            match entry.kind {
+                Kind::Setting => {
+                    let Some((setting, value)) = shown(&entry.text) else {
+                        let name = entry.text.split('=').next().unwrap_or_default();
+                        if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
+                            return Err(wrong("no setting"));
+                        }
+                        skip(entry, "the setting");
+                        continue;
+                    };
+                    // With another value than the machine's, the decisions are others.
+                    settings.set(setting, value).map_err(|_| wrong("out of the range of this version"))?;
+                }
+                Kind::Example => {
+                    // The list may end with the number of damaged examples.
+                    if entry.text.starts_with("spoiled=") {
+                        continue;
+                    }
+                    if matches!(EventLine::parse(&entry.text), Some(EventLine::Newer { .. })) {
+                        skip(entry, "the event");
+                        continue;
+                    }
+                    let (from_field, _, example) = taught(&entry.text).ok_or_else(|| wrong("no example"))?;
+                    examples.push(example);
+                    built_in += usize::from(!from_field);
+                }
+                Kind::Status => {
+                    let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
+                    happened.push((entry, Happened::Status(status)));
+                }
+                Kind::Event => {
+                    let event = EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
+                    if let EventLine::Newer { .. } = event {
+                        skip(entry, "the event");
+                        continue;
+                    }
+                    happened.push((entry, Happened::Event(event)));
+                }
+                Kind::Command => {
+                    unanswered.push_back(happened.len());
+                    happened.push((entry, Happened::Command(&entry.text)));
+                }
+                Kind::Answer => {
+                    let ConsoleLine::End { error } = ConsoleLine::parse(&entry.text) else { continue };
+                    if let (Some(place), Some(_)) = (unanswered.pop_front(), error) {
+                        happened[place] = (happened[place].0, Happened::Refused);
+                    }
+                }
+                Kind::Connected | Kind::Started | Kind::Lost => {}
+                // Satellite positions have no effect on the machine's decisions.
+                Kind::Antenna | Kind::GpsFound | Kind::GpsLost | Kind::Gps | Kind::GpsDamaged | Kind::GpsMark => {}
+            }
+        }
+        let first = happened.iter().find_map(status).cloned();
+        Ok(first.map(|first| Self { settings, examples, built_in, first, happened, notes }))
+    }
+
+    /// The position from which the machine is replayed. If the log shows where watching began, it is that, or a little
+    /// earlier if the machine has rolled since: a detection there is seen in full. Else it is the front of the first
+    /// detection in the log that the machine had reached by then, and the gap that the firmware wants to see ahead of it.
+    pub(super) fn began(&self) -> i32 {
+        let first = self.first.position;
+        // There the tool had all of this to go: the distance from the beam, and the margin ahead of unseen ground.
+        let all_mm = self.settings.get(Setting::BeamToToolMm) + self.settings.get(Setting::MarginMm);
+        let rolled = if self.first.unseen_mm > 0 {
+            let unseen_mm = self.first.unseen_mm.min(all_mm.into()) as u16;
+            if unseen_mm == all_mm {
+                return first;
+            }
+            self.settings.wheel().ticks(all_mm - unseen_mm).0
+        } else {
+            let front = self.reached_at_first().map_or(first, |(front, _)| front);
+            first.wrapping_sub(front).wrapping_add(self.settings.ticks(Setting::MergeGapMm).0)
+        };
+        first.wrapping_sub(rolled).wrapping_sub(DETECTION_TICKS + 1)
+    }
+
+    /// Front and end of the first detection in the log whose front the machine had reached when the log began.
+    fn reached_at_first(&self) -> Option<(i32, i32)> {
+        let widest = self.settings.ticks(Setting::MaxWidthMm).0;
+        let margins = 2 * self.settings.ticks(Setting::MarginMm).0;
+        self.happened.iter().find_map(|(_, happened)| match happened {
+            Happened::Event(EventLine::Detection { position, hold, .. }) => {
+                let before = self.first.position.wrapping_sub(*position);
+                let end = position.wrapping_add(hold.wrapping_sub(margins));
+                (0..=widest).contains(&before).then_some((*position, end))
+            }
+            _ => None,
+        })
+    }
+
+    /// The first position from which the log has all inputs of the tool's swings. A machine that has just started has
+    /// no zones, and the ground that it has seen was bare.
+    pub(super) fn compared_from(&self) -> i32 {
+        if self.first.unseen_mm > 0 && self.first.zones == 0 {
+            return i32::MIN;
+        }
+        let first = self.first.position;
+        let reached = self.reached_at_first().map_or(0, |(_, end)| end.wrapping_sub(first).max(0));
+        // The zone of the last canopy before.
+        let zone = [Setting::BeamToToolMm, Setting::MarginMm].map(|setting| self.settings.ticks(setting).0);
+        zone.into_iter().fold(first.saturating_add(reached), i32::saturating_add)
+    }
+
+    /// The machine's position at a typed command that changes no state: between its last position, with that time, and
+    /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in.
+    pub(super) fn position_of_command(&self, last: (i32, u64), place: usize) -> Option<i32> {
+        if let (_, Happened::Command(line)) = self.happened[place]
+            && link::command(line).is_ok_and(|command| command.action == Action::StartNow)
+            && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
+        {
+            return Some(position);
+        }
+        let (entry, next) = self.happened[place..].iter().find_map(|told| Some((told.0, status(told)?)))?;
+        let whole_ms = entry.time_ms.checked_sub(last.1).filter(|&time_ms| time_ms > 0)?;
+        let share = self.happened[place].0.time_ms.saturating_sub(last.1).min(whole_ms) as f64 / whole_ms as f64;
+        let distance = f64::from(next.position.wrapping_sub(last.0)) * share;
+        Some(last.0.wrapping_add(distance as i32))
+    }
+
+    /// The position of a state change that an event reports. An alarm has its own position. Else the next swing has it.
+    /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows.
+    pub(super) fn position_of_change(&self, place: usize) -> Option<i32> {
+        let mode = match &self.happened[place].1 {
+            Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
+            Happened::Event(EventLine::State { mode }) => mode,
+            _ => return None,
+        };
+        let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
+        // A swing after the next change of state belongs to that change.
+        let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
+        match (until_next.find_map(swing_or_status), mode) {
+            (Some((position, true)), _) | (Some((position, false)), Mode::Work) => Some(position),
+            _ => self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position),
+        }
+    }
+
+    /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
+    /// requested status between them.
+    pub(super) fn is_reported_by_event(&self, place: usize) -> bool {
+        let Happened::Command(line) = self.happened[place].1 else { return false };
+        let brings = match link::command(line).map(|command| command.action) {
+            Ok(Action::Start | Action::StartNow) => Mode::Work,
+            Ok(Action::Hold | Action::Clear) => Mode::Hold,
+            _ => return false,
+        };
+        let mut statuses = 0;
+        let soon = self.happened[place + 1..].iter().take_while(|(_, happened)| {
+            statuses += u8::from(matches!(happened, Happened::Status(_)));
+            statuses < 2
+        });
+        let told = soon.into_iter().find_map(|(_, happened)| match happened {
+            Happened::Event(EventLine::State { mode }) => Some(*mode),
+            _ => None,
+        });
+        told == Some(brings)
+    }
+
+    /// Whether a swing belongs to a change of state directly before it.
+    pub(super) fn follows_change(&self, place: usize) -> bool {
+        let before = self.happened[..place].iter().rev().map(|(_, happened)| happened);
+        before
+            .take_while(|happened| !matches!(happened, Happened::Status(_) | Happened::Event(EventLine::Swing { .. })))
+            .any(|happened| matches!(happened, Happened::Event(EventLine::State { .. })))
+    }
+
+    /// The next status after an index.
+    pub(super) fn next_status(&self, place: usize) -> Option<&Status> {
+        self.happened[place..].iter().find_map(status)
+    }
+}
+
+/// The position in a swing or a status, and whether it is a swing.
+fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)> {
+    match happened {
+        Happened::Event(EventLine::Swing { position, .. }) => Some((*position, true)),
+        Happened::Status(status) => Some((status.position, false)),
+        _ => None,
+    }
+}
+
+/// The status in a line of the log.
+fn status<'a>((_, happened): &'a (&Entry, Happened<'_>)) -> Option<&'a Status> {
+    if let Happened::Status(status) = happened { Some(status) } else { None }
+}

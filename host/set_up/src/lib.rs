@@ -1,0 +1,646 @@
+//! Setting up a machine: the steps of the manual's page, the next measurement, and the least margin.
+//!
+//! [`SetUp`] reads the lines of a session, live or afterwards. It counts the measurements and returns the next
+//! [`Step`]: to measure once more, to set the worst measured lead, or to set the least margin. It begins with the first
+//! `calibrate`, so it asks for nothing on a machine that is already set up. It sets nothing itself.
+//!
+//! Around whole canopies the leads are the worst measured times. The margin is a sum of three parts. The first is the
+//! scatter of slip over the distance from the last detection of the plant to the tool. The second is the distance
+//! travelled in the servo's scatter, at the paper's fastest speed. The third is the firmware's own worst error.
+//!
+//! Beside a stem zone the leads are shorter by what the zone's [`circle`] allows at the highest speed, and by the servo's
+//! scatter. The margin pays for that scatter. It is calculated for 1 km/h, where speed gives no slack, and has a fourth
+//! part: stems stand beyond the zone's middle. For a trailing arm it has a fifth part, what the arm carries the tool
+//! along the row.
+//!
+//! The margin covers only measured values: if one is missing there is no sum, and the default margin stays. A few measurements do not show the
+//! worst case, so each scatter has a least value. Times that were measured over another stroke do not count.
+
+pub mod circle;
+mod steps;
+
+pub use steps::{ManualStep, Task, steps};
+
+use control::settings::{Setting, Settings};
+use link::EventLine;
+use link::session::Happening;
+use link::settings::shown;
+use std::{collections::VecDeque, fmt};
+
+/// Required timings of the servo, each with six swings out and six in.
+const TIMINGS: usize = 2;
+
+/// The newest plants that count for the scatter of slip, as measured by a second beam.
+const PLANTS: usize = 12;
+
+/// The servo's least scatter, in milliseconds. By eye it is two frames of a phone's slow motion, and as much for the
+/// servo. By an end switch, twelve swings out miss up to 12 ms of the default servo's slowest swing, and the pulse on the
+/// line adds 2.
+const SERVO_MS: u16 = 15;
+
+/// The least scatter of a wheel's slip within some metres, as a share. Stretches of 10 m average it out. Assumed as for
+/// the simulated field (`ground.slip_scatter_percent`).
+const SLIP: f64 = 0.03;
+
+/// The paper's fastest speed, 2.5 km/h.
+const SPEED_M_S: f64 = 2.5 / 3.6;
+
+/// The firmware's own worst error of a swing, in millimetres: measured by `weeder bench-uno`, rounded up.
+const FIRMWARE_MM: f64 = 5.0;
+
+/// Beside a stem zone the margin is calculated for this speed, 1 km/h.
+const SLOW_M_S: f64 = 1.0 / 3.6;
+
+/// How far a stem's protected ground may reach beyond its zone, as a share of the zone. In the field `walked` it is 10 of
+/// 110 mm, and the tool has 3 mm of side play.
+const STEM_SHARE: f64 = 0.1146;
+
+/// The servo's scatter beside a stem zone, as a time on its way out and in. The way out has the dead time's scatter, the
+/// load's, and a command's wait for the pulse. The way in has the dead time's only. Leads that are shortened by the same
+/// time on both ways damage plants behind the tool, at 4 km/h twice as many as at 1 km/h.
+const SCATTER_OUT_MS: f64 = 20.0;
+const SCATTER_IN_MS: f64 = 9.0;
+
+/// What the two measured leads differ by beside the stroke: the longest wait of a command, and the scatter of a hobby
+/// servo's dead time.
+const BESIDE_STROKE_MS: f64 = 40.0;
+
+/// The next step.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Step {
+    /// Time the servo. It has been timed this many times.
+    TimeServo(usize),
+    /// Set a lead to the one that follows from the measured times.
+    SetLead(Setting, u16),
+    /// Measure the wheel. It has been measured this many times.
+    MeasureWheel(usize),
+    /// Drive on with the second beam. This many plants have measured the slip.
+    PassPlants(usize),
+    /// The margin can, or must, be changed to this one.
+    SetMargin(Margin),
+    /// The margin is right.
+    Ready(Margin),
+}
+
+/// The parts of a margin, each in millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margin {
+    /// The slip's scatter.
+    pub slip_mm: f64,
+    /// The servo's.
+    pub servo_mm: f64,
+    /// The firmware's.
+    pub firmware_mm: f64,
+    /// The stems', beside a stem zone. `None` around whole canopies.
+    pub stems_mm: Option<f64>,
+    /// A trailing arm's; 0 for a pendulum.
+    pub arm_mm: f64,
+    /// The margin in use.
+    pub in_use_mm: u16,
+}
+
+impl Margin {
+    /// The least sufficient margin, in whole millimetres: the sum.
+    pub fn least_mm(&self) -> u16 {
+        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, arm_mm, .. } = self;
+        (slip_mm + servo_mm + firmware_mm + stems_mm.unwrap_or(0.0) + arm_mm).ceil() as u16
+    }
+}
+
+impl Step {
+    /// Its name, in two or three words.
+    fn name(&self) -> &'static str {
+        match self {
+            Self::TimeServo(_) => "time the servo",
+            Self::SetLead(..) => "set the lead",
+            Self::MeasureWheel(_) => "measure the wheel",
+            Self::PassPlants(_) => "pass some plants",
+            Self::SetMargin(_) | Self::Ready(_) => "set the margin",
+        }
+    }
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TimeServo(done) => write!(f, "time the servo: `calibrate servo` ({done} of {TIMINGS} done)"),
+            Self::SetLead(lead, lead_ms) => write!(f, "take the calculated lead: `set {} {lead_ms}`", lead.text()),
+            Self::MeasureWheel(done) => {
+                let all = SetUp::STRETCHES;
+                write!(f, "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)")
+            }
+            Self::PassPlants(done) => {
+                write!(f, "measure the slip with both beams: roll past {PLANTS} plants ({done} done)")
+            }
+            Self::SetMargin(margin) => {
+                let word = if margin.least_mm() < margin.in_use_mm { "lower" } else { "raise" };
+                write!(f, "{word} the margin: `set margin_mm {}`: {margin}", margin.least_mm())
+            }
+            Self::Ready(margin) => write!(f, "the margin pays for {margin}: `save`"),
+        }
+    }
+}
+
+impl fmt::Display for Margin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, arm_mm, .. } = self;
+        let mut sum = format!("slip {slip_mm:.0} + servo {servo_mm:.0}");
+        if *arm_mm > 0.0 {
+            sum += &format!(" + arm {arm_mm:.0}");
+        }
+        match stems_mm {
+            Some(stems_mm) => write!(f, "{sum} + stem {stems_mm:.0} + {firmware_mm:.0} mm"),
+            None => write!(f, "{sum} + {firmware_mm:.0} mm at 2.5 km/h"),
+        }
+    }
+}
+
+/// The servo, timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Timing {
+    /// The leads in milliseconds, out and in. `None` if the operator sets them by eye.
+    leads: Option<(u16, u16)>,
+    /// The pulse widths of the stroke.
+    pulses: (u16, u16),
+}
+
+/// The measurements of a machine in a session.
+#[derive(Clone, Debug, Default)]
+pub struct SetUp {
+    /// Whether the line that is being answered measures the wheel.
+    measures_the_wheel: bool,
+    /// Whether the margin was set in this session.
+    sets_margin: bool,
+    /// The width of a tool on a trailing arm, mm. `None` for a pendulum.
+    pub trailing_tool_mm: Option<u16>,
+    /// The settings in use, as far as the session shows them.
+    pub settings: Settings,
+    timings: Vec<Timing>,
+    ticks_per_m: Vec<u16>,
+    slip_permille: VecDeque<i32>,
+}
+
+/// The pulse widths of the servo's stroke, in and out.
+fn pulses(settings: &Settings) -> (u16, u16) {
+    (settings.get(Setting::ServoInUs), settings.get(Setting::ServoOutUs))
+}
+
+impl SetUp {
+    /// Required measurements of the wheel. Few stretches do not show the slip.
+    pub const STRETCHES: usize = 3;
+
+    /// Measurements of the wheel so far.
+    pub fn stretches(&self) -> usize {
+        self.ticks_per_m.len()
+    }
+
+    /// Forgets the measurements of another wheel.
+    pub fn forget_stretches(&mut self) {
+        self.ticks_per_m.clear();
+    }
+
+    /// Reads the lines of a session. Typed lines begin with `> `.
+    pub fn of_lines<'a>(lines: impl IntoIterator<Item = &'a str>) -> Self {
+        let mut set_up = Self::default();
+        lines.into_iter().for_each(|line| set_up.take_line(line));
+        set_up
+    }
+
+    /// Reads a line of a session. Typed lines begin with `> `.
+    pub fn take_line(&mut self, line: &str) {
+        match (line.strip_prefix("> "), EventLine::parse(line)) {
+            (Some(typed), _) => self.take_command(typed),
+            (None, Some(event)) => self.take_event(&event),
+            (None, None) => self.take_answer(line),
+        }
+    }
+
+    /// The lines from which [`SetUp::of_lines`] makes the same measurements.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        for Timing { leads, pulses: (in_us, out_us) } in &self.timings {
+            lines.extend([format!("servo_in_us={in_us}"), format!("servo_out_us={out_us}")]);
+            lines.push(leads.map_or("calibrated by=eye, as seen".to_owned(), |(out_ms, in_ms)| {
+                format!("calibrated lead_out_ms={out_ms} lead_in_ms={in_ms} set=yes")
+            }));
+        }
+        for ticks in &self.ticks_per_m {
+            lines.extend(["> calibrate 10000".to_owned(), format!("ticks_per_m={ticks}")]);
+        }
+        lines.extend(self.slip_permille.iter().map(|permille| format!("slip permille={permille}")));
+        lines
+    }
+
+    /// Listens to what happened.
+    pub fn take(&mut self, happening: &Happening) {
+        match happening {
+            Happening::Connected { settings, .. } | Happening::Settings(settings, _) => {
+                self.settings = settings.clone();
+            }
+            Happening::Command(line) => self.take_command(line),
+            Happening::Answer(line) => self.take_answer(line),
+            Happening::Event(event, _) => self.take_event(event),
+            _ => {}
+        }
+    }
+
+    fn take_command(&mut self, line: &str) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        self.measures_the_wheel = matches!(words[..], ["calibrate", length, ..] if length.parse::<u16>().is_ok());
+        self.sets_margin |= matches!(words[..], ["set", "margin_mm", _]);
+    }
+
+    fn take_answer(&mut self, line: &str) {
+        let Some((setting, value)) = shown(line) else { return };
+        // A value out of range is noise.
+        let _ = self.settings.set(setting, value);
+        if setting == Setting::TicksPerM && self.measures_the_wheel {
+            self.ticks_per_m.push(value);
+        }
+    }
+
+    fn take_event(&mut self, event: &EventLine) {
+        let pulses = pulses(&self.settings);
+        match *event {
+            EventLine::CalibratedBySwitch { out_ms, in_ms, .. } => {
+                self.timings.push(Timing { leads: Some((out_ms, in_ms)), pulses });
+            }
+            EventLine::CalibratedByEye {} => self.timings.push(Timing { leads: None, pulses }),
+            EventLine::Slip { permille } => {
+                self.slip_permille.push_back(permille);
+                if self.slip_permille.len() > PLANTS {
+                    self.slip_permille.pop_front();
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The servo's timings over the present stroke.
+    fn timed(&self, settings: &Settings) -> Vec<Timing> {
+        self.timings.iter().copied().filter(|timing| timing.pulses == pulses(settings)).collect()
+    }
+
+    /// The steps that are missing until the margin can be lowered, in the best order.
+    pub fn missing(&self, settings: &Settings) -> Vec<Step> {
+        let mut missing = Vec::new();
+        let timings = self.timed(settings);
+        if timings.len() < TIMINGS {
+            missing.push(Step::TimeServo(timings.len()));
+        } else {
+            for (lead, lead_ms) in leads(&timings, settings) {
+                let set_ms = settings.get(lead);
+                let is_unsafe = if lead == Setting::LeadOutMs { set_ms < lead_ms } else { set_ms > lead_ms };
+                // Around whole canopies, safer leads are the operator's.
+                if is_unsafe || keeps_stems(settings) && set_ms != lead_ms {
+                    missing.push(Step::SetLead(lead, lead_ms));
+                }
+            }
+        }
+        // Until two plants have measured the slip, only the wheel counts, also with a second beam. If the machine has
+        // no measured value, the measurements were of another wheel.
+        let is_in_use = settings.get(Setting::TicksPerM) > 0;
+        let stretches = if is_in_use { self.ticks_per_m.len() } else { 0 };
+        if stretches < Self::STRETCHES {
+            missing.push(Step::MeasureWheel(stretches));
+        }
+        if settings.get(Setting::SecondBeamMm) > 0 && self.slip_permille.len() < PLANTS {
+            missing.push(Step::PassPlants(self.slip_permille.len()));
+        }
+        missing
+    }
+
+    /// The parts of the margin.
+    ///
+    /// # Errors
+    /// The missing steps, if not everything was measured.
+    pub fn margin(&self, settings: &Settings) -> Result<Margin, Vec<Step>> {
+        let missing = self.missing(settings);
+        if !missing.is_empty() {
+            return Err(missing);
+        }
+        let beam_to_tool_mm = f64::from(settings.get(Setting::BeamToToolMm));
+        let second_beam_mm = f64::from(settings.get(Setting::SecondBeamMm));
+        let slip_mm = if second_beam_mm > 0.0 {
+            // The firmware corrects each zone by the slip of the plants just before it. Only a change since then is left.
+            let changes = self.slip_permille.iter().zip(self.slip_permille.iter().skip(1));
+            let change = changes.map(|(before, after)| before.abs_diff(*after)).max().unwrap_or(0);
+            (f64::from(change) / 1000.0).max(SLIP) * (beam_to_tool_mm - second_beam_mm)
+        } else {
+            let in_use = settings.get(Setting::TicksPerM);
+            let farthest = self.ticks_per_m.iter().map(|ticks| ticks.abs_diff(in_use)).max().unwrap_or(0);
+            (f64::from(farthest) / f64::from(in_use.max(1)) + SLIP) * beam_to_tool_mm
+        };
+        let timings = self.timed(settings);
+        let (outs, ins) = extremes(&timings);
+        let scatter_ms = range(outs).max(range(ins)).max(SERVO_MS);
+        let speed_m_s = if keeps_stems(settings) { SLOW_M_S } else { SPEED_M_S };
+        let stems_mm = keeps_stems(settings).then(|| STEM_SHARE * f64::from(settings.get(Setting::StemZoneMm)));
+        let (in_us, out_us) = pulses(settings);
+        let arm_mm = self.trailing_tool_mm.map_or(0.0, |tool_mm| {
+            let (pulse_us, zone_mm) = (in_us.abs_diff(out_us), f64::from(settings.get(Setting::StemZoneMm)));
+            let top_mm_s = settings.get(Setting::TopSpeedMmS).into();
+            let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, circle::aside_mm(pulse_us));
+            circle::carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
+        });
+        Ok(Margin {
+            slip_mm,
+            servo_mm: f64::from(scatter_ms) * speed_m_s,
+            firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
+            stems_mm,
+            arm_mm,
+            in_use_mm: settings.get(Setting::MarginMm),
+        })
+    }
+
+    /// Why the tasks of a step are not done with these settings. `None` if they are, or if no setting and no
+    /// measurement shows it.
+    pub fn open(&self, tasks: &[Task], settings: &Settings) -> Option<String> {
+        let first_missing =
+            |is_it: fn(&Step) -> bool| self.missing(settings).into_iter().find(is_it).map(|step| step.to_string());
+        tasks.iter().find_map(|task| match *task {
+            Task::Set(setting @ (Setting::SecondBeamMm | Setting::StemZoneMm), _) => {
+                (settings.get(setting) == 0).then(|| format!("{} is 0", setting.text()))
+            }
+            Task::TimeServo => first_missing(|step| matches!(step, Step::TimeServo(_) | Step::SetLead(..))),
+            Task::MeasureWheel(_) => first_missing(|step| matches!(step, Step::MeasureWheel(_))),
+            Task::SetMargin => match self.margin(settings) {
+                Err(missing) => missing.first().map(Step::to_string),
+                Ok(margin) => {
+                    let default_mm = Setting::MarginMm.description().default;
+                    let is_done = margin.in_use_mm == margin.least_mm()
+                        || (margin.least_mm()..default_mm).contains(&margin.in_use_mm);
+                    (!is_done).then(|| Step::SetMargin(margin).to_string())
+                }
+            },
+            Task::Fit(..) | Task::Set(..) => None,
+        })
+    }
+
+    /// The next step with these settings. `None` before the first `calibrate`.
+    pub fn next(&self, settings: &Settings) -> Option<Step> {
+        if self.timings.is_empty() && self.ticks_per_m.is_empty() {
+            return None;
+        }
+        Some(match self.margin(settings) {
+            Err(missing) => missing.into_iter().next()?,
+            Ok(margin) if margin.in_use_mm == margin.least_mm() => Step::Ready(margin),
+            Ok(margin) => Step::SetMargin(margin),
+        })
+    }
+
+    /// A warning if this session has set a margin that does not cover the measured values.
+    pub fn warning(&self, settings: &Settings) -> Option<String> {
+        if !self.sets_margin {
+            return None;
+        }
+        let in_use_mm = settings.get(Setting::MarginMm);
+        let safe_mm = Setting::MarginMm.description().default;
+        match self.margin(settings) {
+            Ok(margin) => (in_use_mm < margin.least_mm())
+                .then(|| format!("margin_mm {in_use_mm} is too small: the measurements need {}", margin.least_mm())),
+            Err(missing) => (in_use_mm < safe_mm).then(|| {
+                let missing: Vec<&str> = missing.iter().map(Step::name).collect();
+                format!("margin_mm {in_use_mm} is not measured: {} first; {safe_mm} is safe", missing.join(" and "))
+            }),
+        }
+    }
+}
+
+/// Whether the firmware keeps stem zones, not whole canopies.
+fn keeps_stems(settings: &Settings) -> bool {
+    settings.get(Setting::StemZoneMm) > 0
+}
+
+/// The leads that follow from the times. None if the operator sets them by eye.
+fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u16)> {
+    let (outs, ins) = extremes(timings);
+    let (Some(longest_ms), Some(shortest_ms)) = (outs.max(), ins.min()) else { return Vec::new() };
+    let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
+        let (in_us, out_us) = pulses(settings);
+        saved_ms(
+            settings.get(Setting::TopSpeedMmS).into(),
+            travel_ms(timings),
+            settings.get(Setting::StemZoneMm).into(),
+            circle::aside_mm(in_us.abs_diff(out_us)),
+        )
+    } else {
+        [0, 0]
+    };
+    vec![
+        (Setting::LeadOutMs, longest_ms.saturating_sub(saved_out_ms)),
+        (Setting::LeadInMs, shortest_ms.saturating_add(saved_in_ms)),
+    ]
+}
+
+/// The time of the stroke, from the times that were measured; 0 if it was timed by eye.
+fn travel_ms(timings: &[Timing]) -> f64 {
+    let (outs, ins) = extremes(timings);
+    let differ_ms =
+        outs.max().zip(ins.min()).map_or(0, |(longest_ms, shortest_ms)| longest_ms.saturating_sub(shortest_ms));
+    (f64::from(differ_ms) - BESIDE_STROKE_MS).max(0.0)
+}
+
+/// By how much the leads out and in beside a stem zone are shorter than the worst times: what the circle allows at the
+/// highest speed, and the servo's scatter, which is smaller for a quick servo. The margin pays for the scatter.
+pub fn saved_ms(top_speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -> [u16; 2] {
+    let overlap_ms = circle::overlap_ms(top_speed_mm_s, travel_ms, zone_mm, aside_mm);
+    let of_60_ms = (travel_ms / 60.0).min(1.0);
+    [SCATTER_OUT_MS, SCATTER_IN_MS].map(|scatter_ms| (overlap_ms + scatter_ms * of_60_ms) as u16)
+}
+
+/// The leads out and in that were timed.
+fn extremes(timings: &[Timing]) -> (impl Iterator<Item = u16> + Clone, impl Iterator<Item = u16> + Clone) {
+    let leads = || timings.iter().filter_map(|timing| timing.leads);
+    (leads().map(|(out_ms, _)| out_ms), leads().map(|(_, in_ms)| in_ms))
+}
+
+/// The greatest of some values less the least.
+fn range<T: Ord + Copy + std::ops::Sub<Output = T> + Default>(values: impl Iterator<Item = T> + Clone) -> T {
+    let ends = values.clone().max().zip(values.min());
+    ends.map_or_else(T::default, |(greatest, least)| greatest - least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The factory settings with some other values.
+    fn settings(values: &[(Setting, u16)]) -> Settings {
+        let mut settings = Settings::new();
+        for &(setting, value) in values {
+            settings.set(setting, value).unwrap();
+        }
+        settings
+    }
+
+    fn heard(lines: &[&[&str]]) -> SetUp {
+        SetUp::of_lines(lines.concat())
+    }
+
+    const TIMED: &[&str] =
+        &["calibrated lead_out_ms=150 lead_in_ms=52 set=yes", "calibrated lead_out_ms=158 lead_in_ms=56 set=yes"];
+
+    const BY_EYE: &str = "calibrated by=eye, set lead_out_ms and lead_in_ms to what you saw";
+
+    /// Two measurements of the wheel.
+    const MEASURED: &[&str] = &[
+        "> calibrate 10000",
+        "ticks_per_m=1910 from 0 to 20000, default 0, not saved",
+        "> get ticks_per_m",
+        "ticks_per_m=1700 from 0 to 20000, default 0, not saved",
+        "> calibrate 10000 force",
+        "ticks_per_m=1930 from 0 to 20000, default 0, not saved",
+        "ok",
+    ];
+
+    /// A third one.
+    const THIRD: &[&str] = &["> calibrate 10000", "ticks_per_m=1920 from 0 to 20000, default 0, not saved"];
+
+    /// The worst leads of those that were timed, with a value for another setting.
+    fn worst_leads(other: Setting, value: u16) -> Vec<(Setting, u16)> {
+        vec![(Setting::LeadOutMs, 158), (Setting::LeadInMs, 52), (other, value)]
+    }
+
+    #[test]
+    fn a_machine_without_measurements_is_left_alone() {
+        assert_eq!(heard(&[&["> get", MEASURED[1], "slip permille=12"]]).next(&Settings::new()), None);
+    }
+
+    #[test]
+    fn servo_wheel_and_margin_come_one_after_the_other() {
+        let next = |lines: &[&[&str]], changes: &[_]| heard(lines).next(&settings(changes)).expect("there is a step");
+        let leads = [(Setting::LeadOutMs, 150), (Setting::LeadInMs, 56)];
+        assert_eq!(next(&[&TIMED[..1]], &leads), Step::TimeServo(1));
+        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadOutMs, 158));
+        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 56)];
+        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadInMs, 52));
+        let mut changes = worst_leads(Setting::TicksPerM, 0);
+        assert_eq!(next(&[TIMED], &changes), Step::MeasureWheel(0));
+        changes[2].1 = 1920;
+        assert_eq!(next(&[TIMED, MEASURED], &changes), Step::MeasureWheel(2));
+        // 10 of 1920 ticks and 3 % over 400 mm, 15 ms at 0.694 m/s, and the firmware's 5 mm.
+        let step = next(&[TIMED, MEASURED, THIRD], &changes);
+        let Step::SetMargin(margin) = step else { panic!("{step:?}") };
+        assert!((margin.slip_mm - 400.0 * (10.0 / 1920.0 + 0.03)).abs() < 1e-9);
+        assert!((margin.servo_mm - 15.0 * SPEED_M_S).abs() < 1e-9);
+        for (in_use_mm, told) in [
+            (50, "lower the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"),
+            (30, "the margin pays for slip 14 + servo 10 + 5 mm at 2.5 km/h: `save`"),
+            (29, "raise the margin: `set margin_mm 30`: slip 14 + servo 10 + 5 mm at 2.5 km/h"),
+        ] {
+            let changes = [&changes[..], &[(Setting::MarginMm, in_use_mm)]].concat();
+            assert_eq!(next(&[TIMED, MEASURED, THIRD], &changes).to_string(), told);
+        }
+    }
+
+    #[test]
+    fn with_a_second_beam_plants_show_the_remaining_slip() {
+        let mut changes = worst_leads(Setting::SecondBeamMm, 200);
+        assert_eq!(
+            heard(&[TIMED, MEASURED, MEASURED]).missing(&settings(&changes)),
+            [Step::MeasureWheel(0), Step::PassPlants(0)],
+            "the wheel as it is set was not measured"
+        );
+        changes.push((Setting::TicksPerM, 1930));
+        let few = heard(&[TIMED, MEASURED, MEASURED, &["slip permille=40"; 5]]);
+        assert_eq!(few.next(&settings(&changes)), Some(Step::PassPlants(5)));
+        // Old values do not count.
+        let plants = ["slip permille=50", "slip permille=90"].repeat(PLANTS / 2);
+        let enough = heard(&[TIMED, MEASURED, MEASURED, &["slip permille=40"; 5], &plants]);
+        let margin = enough.margin(&settings(&changes)).expect("all was measured");
+        assert!((margin.slip_mm - 8.0).abs() < 1e-9, "a twenty-fifth of 200 mm: {margin:?}");
+    }
+
+    #[test]
+    fn beside_a_stem_s_zone_leads_and_margin_go_up_to_its_circle() {
+        let set_up = heard(&[TIMED, MEASURED, THIRD, &["slip permille=12"; PLANTS]]);
+        // 3 % of 200 mm, 15 ms at 2.5 km/h and the firmware's 5 mm: 21.4.
+        // Beside a zone of 100 mm, 6, 4.2, 11.5 and 2 mm. A trailing arm with a tool of 130 mm needs some millimetres more,
+        // and around canopies the 102.5 mm by which 45 degrees carry it.
+        let trailing = SetUp { trailing_tool_mm: Some(130), ..set_up.clone() };
+        for (set_up, zone_mm, least_mm, leads) in [
+            (&set_up, 0, 22, (158, 52)),
+            (&set_up, 100, 24, (127, 72)),
+            (&trailing, 100, 35, (127, 72)),
+            (&trailing, 0, 124, (158, 52)),
+        ] {
+            let mut changes = worst_leads(Setting::TicksPerM, 1930);
+            (changes[0].1, changes[1].1) = leads;
+            changes.extend([(Setting::SecondBeamMm, 200), (Setting::StemZoneMm, zone_mm)]);
+            let margin = set_up.margin(&settings(&changes)).expect("all was measured");
+            assert_eq!(margin.least_mm(), least_mm, "{margin:?}");
+        }
+    }
+
+    #[test]
+    fn a_servo_that_was_timed_by_eye_scatters_by_the_error_of_the_eye() {
+        let failed = "calibrated by=none, the end switch did not follow";
+        let set_up = heard(&[&[BY_EYE, failed, BY_EYE], MEASURED, MEASURED]);
+        let margin = set_up.margin(&settings(&[(Setting::TicksPerM, 1930)])).expect("all was measured");
+        assert!((margin.servo_mm - f64::from(SERVO_MS) * SPEED_M_S).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_servo_that_was_timed_over_another_stroke_is_to_be_timed_again() {
+        let set_up = heard(&[&["servo_out_us=1795"], TIMED, MEASURED, MEASURED]);
+        for (out_us, missing) in [(1795, vec![]), (1800, vec![Step::TimeServo(0)]), (1700, vec![Step::TimeServo(0)])] {
+            let changes = [worst_leads(Setting::TicksPerM, 1930), vec![(Setting::ServoOutUs, out_us)]].concat();
+            assert_eq!(set_up.missing(&settings(&changes)), missing, "{out_us}");
+        }
+    }
+
+    #[test]
+    fn a_margin_below_the_measured_one_gives_a_warning() {
+        let typed = &["> set margin_mm 13"][..];
+        let all = heard(&[TIMED, MEASURED, THIRD, typed]);
+        let (in_part, nothing) = (heard(&[TIMED, typed]), heard(&[typed]));
+        // A machine that was set up earlier gets no warning.
+        let earlier = heard(&[&["> get"]]);
+        let (servo, wheel) = ("time the servo and ", "measure the wheel first; 50 is safe");
+        for (set_up, margin_mm, warning) in [
+            (&all, 30, None),
+            (&all, 29, Some("margin_mm 29 is too small: the measurements need 30".to_owned())),
+            (&in_part, 50, None),
+            (&in_part, 49, Some(format!("margin_mm 49 is not measured: {wheel}"))),
+            (&nothing, 13, Some(format!("margin_mm 13 is not measured: {servo}{wheel}"))),
+            (&earlier, 13, None),
+        ] {
+            let changes = [worst_leads(Setting::TicksPerM, 1920), vec![(Setting::MarginMm, margin_mm)]].concat();
+            assert_eq!(set_up.warning(&settings(&changes)), warning);
+        }
+    }
+
+    #[test]
+    fn measurements_are_the_same_after_writing_and_reading() {
+        let set_up = heard(&[&["servo_out_us=1795"], TIMED, MEASURED, &[BY_EYE, "slip permille=-4"]]);
+        let settings = settings(&[(Setting::ServoOutUs, 1795)]);
+        let lines = set_up.lines();
+        let again = SetUp::of_lines(lines.iter().map(String::as_str));
+        assert_eq!((again.lines(), again.missing(&settings)), (lines, set_up.missing(&settings)));
+        assert_eq!(again.missing(&settings), [Step::MeasureWheel(0)]);
+    }
+
+    #[test]
+    fn every_step_fits_on_a_line_of_80_characters() {
+        let margin = Margin {
+            slip_mm: 123.0,
+            servo_mm: 123.0,
+            firmware_mm: 123.0,
+            stems_mm: Some(123.0),
+            arm_mm: 0.0,
+            in_use_mm: 50,
+        };
+        let steps = [
+            Step::TimeServo(1),
+            Step::SetLead(Setting::LeadOutMs, 158),
+            Step::MeasureWheel(2),
+            Step::PassPlants(11),
+            Step::SetMargin(margin),
+            Step::Ready(margin),
+        ];
+        for step in steps {
+            assert!(step.to_string().len() <= 80, "{} in {step}", step.to_string().len());
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Joins a table of plots with the log of the machine: speed, time, plants and area of each plot come from the log.
+//!
+//! The stretches of work in the log are the plots in the order of their numbers, because a plan's plots are weeded in
+//! that order. With false starts, or a plot in two parts, the user says which plot each stretch was.
+
+use super::PlotRecord;
+use crate::table::{Table, fixed, optional, short};
+use anyhow::{Result, anyhow, ensure};
+use logbook::worked::Worked;
+use serde::Serialize;
+
+/// A measured speed that differs by this share from the planned one may belong to another plot.
+const OFF_SPEED: f64 = 0.3;
+
+/// What the log has of a plot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfLog {
+    /// The plot's number.
+    pub plot: u32,
+    /// The first line of its first stretch, and the last line of its last one.
+    pub lines: (u64, u64),
+    /// From its first stretch's start to its last one's end, in s.
+    pub time_s: f64,
+    /// Net distance by the wheel, m. `None` if a part of it is unknown.
+    pub distance_m: Option<f64>,
+    /// Mean speed while the machine rolled, km/h.
+    pub speed_km_h: Option<f64>,
+    /// The speed in the table, km/h.
+    pub planned_km_h: f64,
+    /// Plants that the tool passed.
+    pub plants: Option<u32>,
+    /// Swings out of the row.
+    pub swings: u32,
+}
+
+impl OfLog {
+    fn of(record: &PlotRecord, stretches: &[&Worked]) -> Self {
+        let (first, last) = (&stretches[0], &stretches[stretches.len() - 1]);
+        let distance_m = stretches.iter().map(|worked| worked.distance_mm).sum::<Option<f64>>().map(|mm| mm / 1000.0);
+        let rolled_h = stretches.iter().map(|worked| worked.rolled_ms).sum::<u64>() as f64 / 3.6e6;
+        Self {
+            plot: record.plot,
+            lines: (first.lines.start, last.lines.end - 1),
+            time_s: last.time_ms.end.saturating_sub(first.time_ms.start) as f64 / 1000.0,
+            distance_m,
+            speed_km_h: distance_m.filter(|m| rolled_h > 0.0 && *m > 0.0).map(|m| m / 1000.0 / rolled_h),
+            planned_km_h: record.speed_km_h,
+            plants: stretches.iter().map(|worked| worked.plants).sum(),
+            swings: stretches.iter().map(|worked| worked.swings).sum(),
+        }
+    }
+
+    /// Says that its speed is far from the planned one.
+    pub fn warning(&self) -> Option<String> {
+        let speed_km_h = self.speed_km_h?;
+        let is_far = (speed_km_h - self.planned_km_h).abs() > OFF_SPEED * self.planned_km_h;
+        is_far.then(|| {
+            format!(
+                "plot {}: the log has {speed_km_h:.2} km/h, and the table {}: is this stretch another plot? --plots says which",
+                self.plot, self.planned_km_h
+            )
+        })
+    }
+}
+
+/// Joins the plots with the stretches of work in a log. `plots` has the plot of each stretch, and 0 for none. It may be
+/// empty if there are as many stretches as plots. Cells of the table that are filled in stay, but speeds are those of the
+/// log.
+///
+/// # Errors
+/// If the numbers do not match, with the stretches; or a plot is not in the table.
+pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> Result<Vec<OfLog>> {
+    let mut numbers: Vec<u32> = records.iter().map(|record| record.plot).collect();
+    numbers.sort_unstable();
+    let plots = if plots.is_empty() { &numbers } else { plots };
+    ensure!(
+        plots.len() == stretches.len(),
+        "the log has {} stretches of work, but there are {} plots. Say which plot each stretch is, such as `--plots 1,0,2`, \
+         with 0 for none and a plot twice if it was weeded in two parts: {}",
+        stretches.len(),
+        plots.len(),
+        list(stretches)
+    );
+    if let Some(unknown) = plots.iter().find(|&&plot| plot > 0 && !numbers.contains(&plot)) {
+        return Err(anyhow!("plot {unknown} is not in the table, which has {} plots", records.len()));
+    }
+    let mut joined = Vec::new();
+    for record in records {
+        let of_plot = plots.iter().zip(stretches).filter(|&(plot, _)| *plot == record.plot);
+        let of_plot: Vec<&Worked> = of_plot.map(|(_, worked)| worked).collect();
+        if of_plot.is_empty() {
+            continue;
+        }
+        let of_log = OfLog::of(record, &of_plot);
+        let m2 = |width_m: f64| of_log.distance_m.map(|m| m * width_m).filter(|m2| *m2 > 0.0);
+        // More digits would only seem to be measured.
+        record.speed_km_h = of_log.speed_km_h.map_or(record.speed_km_h, |km_h| (km_h * 1000.0).round() / 1000.0);
+        record.time_s = record.time_s.or(Some(of_log.time_s).filter(|time_s| *time_s > 0.0));
+        record.plants = record.plants.or(of_log.plants);
+        record.area_m2 = record.area_m2.or_else(|| m2(record.width_m?));
+        joined.push(of_log);
+    }
+    Ok(joined)
+}
+
+/// The stretches, in a line.
+fn list(stretches: &[Worked]) -> String {
+    let line = |(number, worked): (usize, &Worked)| {
+        let Worked { lines, time_ms, distance_mm, .. } = worked;
+        let seconds = time_ms.end.saturating_sub(time_ms.start) as f64 / 1000.0;
+        let metres = optional(distance_mm.map(|mm| mm / 1000.0), |m| fixed(m, 1));
+        format!("stretch {number} from line {} of the log, {seconds:.0} s, {metres} m", lines.start)
+    };
+    (1..).zip(stretches).map(line).collect::<Vec<_>>().join("; ")
+}
+
+/// A table of what the log has.
+pub fn of_log_table(joined: &[OfLog]) -> Table {
+    let header = ["plot", "lines of the log", "time, s", "distance, m", "speed, km/h", "plants", "swings"];
+    let rows = joined.iter().map(|of_log| {
+        let OfLog { plot, lines: (first, last), time_s, distance_m, speed_km_h, plants, swings, .. } = of_log;
+        vec![
+            plot.to_string(),
+            format!("{first} to {last}"),
+            fixed(*time_s, 1),
+            optional(*distance_m, |m| fixed(m, 2)),
+            optional(*speed_km_h, |km_h| fixed(km_h, 2)),
+            optional(plants.map(f64::from), short),
+            swings.to_string(),
+        ]
+    });
+    Table { rows: rows.collect(), ..Table::new("What the log has of each plot", header) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stretch(start_s: u64, seconds: u64, metres: f64) -> Worked {
+        Worked {
+            lines: start_s..start_s + seconds,
+            time_ms: 1000 * start_s..1000 * (start_s + seconds),
+            rolled_ms: 1000 * seconds,
+            distance_mm: Some(1000.0 * metres),
+            plants: Some(metres as u32 * 2),
+            swings: metres as u32,
+        }
+    }
+
+    fn plot(plot: u32, speed_km_h: f64) -> PlotRecord {
+        PlotRecord { plot, replication: 1, speed_km_h, spacing_cm: 50.0, width_m: Some(0.4), ..PlotRecord::default() }
+    }
+
+    #[test]
+    fn stretches_are_the_plots_in_the_order_of_their_numbers_and_filled_cells_stay() {
+        // The table was sorted by speed.
+        let mut records = [PlotRecord { plants: Some(61), ..plot(2, 1.0) }, plot(1, 1.8)];
+        let joined = join(&mut records, &[stretch(0, 60, 30.0), stretch(100, 108, 30.0)], &[]).expect("they match");
+        assert_eq!(joined.iter().map(|of| (of.plot, of.swings)).collect::<Vec<_>>(), [(2, 30), (1, 30)]);
+        // 30 m in 60 s are 1.8 km/h, and in 108 s are 1.
+        let [second, first] = records;
+        assert!((first.speed_km_h - 1.8).abs() < 1e-9 && (second.speed_km_h - 1.0).abs() < 1e-9, "{records:?}");
+        assert_eq!((first.plants, second.plants), (Some(60), Some(61)));
+        assert_eq!((first.time_s, first.area_m2.map(|m2| m2.round())), (Some(60.0), Some(12.0)));
+        assert!(joined.iter().all(|of| of.warning().is_none()), "{joined:?}");
+    }
+
+    #[test]
+    fn a_plot_in_two_parts_and_a_false_start_are_joined_as_the_user_says() {
+        let stretches = [stretch(0, 2, 0.5), stretch(10, 30, 15.0), stretch(50, 30, 15.0), stretch(200, 60, 30.0)];
+        let mut records = [plot(1, 1.8), plot(2, 1.8)];
+        let error = join(&mut records, &stretches, &[]).expect_err("there are four").to_string();
+        assert!(error.starts_with("the log has 4 stretches of work, but there are 2 plots."), "{error}");
+        assert!(error.ends_with("; stretch 4 from line 200 of the log, 60 s, 30.0 m"), "{error}");
+        let joined = join(&mut records, &stretches, &[0, 1, 1, 2]).expect("they match");
+        // With the pause between the two parts.
+        assert_eq!((joined[0].time_s, joined[0].distance_m), (70.0, Some(30.0)));
+        assert!((records[0].speed_km_h - 1.8).abs() < 1e-9);
+        let error = join(&mut records, &stretches, &[0, 1, 3, 2]).expect_err("there is no plot 3").to_string();
+        assert_eq!(error, "plot 3 is not in the table, which has 2 plots");
+    }
+
+    #[test]
+    fn a_speed_far_from_the_plan_is_told_and_an_unknown_distance_leaves_the_table_as_it_is() {
+        let mut records = [plot(1, 3.0)];
+        let joined = join(&mut records, &[stretch(0, 60, 30.0)], &[]).expect("they match");
+        assert!(joined[0].warning().is_some_and(|said| said.contains("the log has 1.80 km/h, and the table 3:")));
+        let mut records = [plot(1, 3.0)];
+        let unknown = Worked { distance_mm: None, plants: None, ..stretch(0, 60, 30.0) };
+        let joined = join(&mut records, &[unknown], &[]).expect("they match");
+        assert_eq!((joined[0].speed_km_h, joined[0].warning()), (None, None));
+        assert_eq!((records[0].speed_km_h, records[0].plants, records[0].area_m2), (3.0, None, None));
+    }
+}

@@ -1,0 +1,89 @@
+//! The confusion matrix.
+//!
+//! Unknown detections are treated as plants. So there are two kinds of error: a plant classified as a weed is cut, and
+//! a weed classified as a plant or unknown is left.
+
+use control::ground::class::Class;
+use field::row::Kind;
+use std::fmt;
+use uno_run::report::number_table;
+
+/// How many detections of each kind were classified as each class.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Confusion([[usize; CLASSES.len()]; 2]);
+
+/// All classes.
+const CLASSES: [Class; 3] = [Class::Plant, Class::Unknown, Class::Weed];
+
+impl FromIterator<(Kind, Class)> for Confusion {
+    fn from_iter<I: IntoIterator<Item = (Kind, Class)>>(classified: I) -> Self {
+        let mut confusion = Self::default();
+        for (kind, class) in classified {
+            confusion.0[kind as usize][class as usize] += 1;
+        }
+        confusion
+    }
+}
+
+impl Confusion {
+    /// The detections of a kind that were classified as a class.
+    fn of(&self, kind: Kind, class: Class) -> usize {
+        self.0[kind as usize][class as usize]
+    }
+
+    /// The objects of a kind.
+    pub fn count(&self, kind: Kind) -> usize {
+        self.0[kind as usize].iter().sum()
+    }
+
+    /// All objects.
+    pub fn total(&self) -> usize {
+        self.count(Kind::Plant) + self.count(Kind::Weed)
+    }
+
+    /// Plants that the machine would cut.
+    pub fn plants_taken_for_weeds(&self) -> usize {
+        self.of(Kind::Plant, Class::Weed)
+    }
+
+    /// Weeds that the machine would spare, including unknown ones.
+    pub fn weeds_taken_for_plants(&self) -> usize {
+        self.of(Kind::Weed, Class::Plant) + self.of(Kind::Weed, Class::Unknown)
+    }
+
+    /// Plants that are spared because they are unknown.
+    pub fn plants_unknown(&self) -> usize {
+        self.of(Kind::Plant, Class::Unknown)
+    }
+
+    /// Share of detections that the machine treats correctly, from 0 to 1.
+    pub fn accuracy(&self) -> f64 {
+        1.0 - share(self.plants_taken_for_weeds() + self.weeds_taken_for_plants(), self.total())
+    }
+
+    /// The errors, worst first: plants cut, weeds spared, plants unknown.
+    pub(super) fn harm(&self) -> (usize, usize, usize) {
+        (self.plants_taken_for_weeds(), self.weeds_taken_for_plants(), self.plants_unknown())
+    }
+}
+
+impl fmt::Display for Confusion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut table = number_table(["", "classified as\nplant", "\nunknown", "classified as\nweed"], 1);
+        for (name, kind) in [("plants", Kind::Plant), ("weeds", Kind::Weed)] {
+            let counts = CLASSES.map(|class| self.of(kind, class).to_string());
+            table.add_row([name.to_owned()].into_iter().chain(counts));
+        }
+        writeln!(f, "{table}")?;
+        let percent = |part: usize, total: usize| format!("{part} of {total}, {:.2} %", 100.0 * share(part, total));
+        let (plants, weeds) = (self.count(Kind::Plant), self.count(Kind::Weed));
+        writeln!(f, "Plants classified as weeds   {}", percent(self.plants_taken_for_weeds(), plants))?;
+        writeln!(f, "Weeds classified as plants   {}", percent(self.weeds_taken_for_plants(), weeds))?;
+        writeln!(f, "Plants spared unknown    {}", percent(self.plants_unknown(), plants))?;
+        write!(f, "Treated as they should   {:.2} % of all", 100.0 * self.accuracy())
+    }
+}
+
+fn share(part: usize, total: usize) -> f64 {
+    if total == 0 { 0.0 } else { part as f64 / total as f64 }
+}
