@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (false, None) => output::print(format_args!("{analysis}")),
     };
     if let Some(folder) = &folder {
-        write_report(&analysis, &arguments.file, folder)?;
+        write_report(&analysis, joined.as_deref(), arguments, folder)?;
         if !arguments.json {
             say!("\nReport      {}", folder.path().join(REPORT).display())?;
         }
@@ -81,18 +81,25 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     printed
 }
 
-fn write_report(analysis: &Analysis, file: &Path, folder: &OutFolder) -> Result<()> {
-    let name = file.file_name().unwrap_or(file.as_os_str()).display();
+fn write_report(
+    analysis: &Analysis,
+    joined: Option<&[OfLog]>,
+    arguments: &Arguments,
+    folder: &OutFolder,
+) -> Result<()> {
+    let name_of = |file: &Path| file.file_name().unwrap_or(file.as_os_str()).display().to_string();
+    let name = name_of(&arguments.file);
+    let mut parameters = vec![("plots from".to_owned(), name.clone())];
+    parameters.extend(arguments.log.as_deref().map(|log| ("log from".to_owned(), name_of(log))));
+    parameters.push(("weeder's version".to_owned(), env!("WEEDER_VERSION").to_owned()));
     let page = Page {
         title: &format!("Field trial: {name}"),
         summary: analysis.findings(),
         paper: analysis.against_the_paper(),
         command: &output::command_line()?,
-        parameters: &[
-            ("plots from".to_owned(), name.to_string()),
-            ("weeder's version".to_owned(), env!("WEEDER_VERSION").to_owned()),
-        ],
+        parameters: &parameters,
         analysis,
+        log: joined.map(field_log::of_log_table),
         totals: &[],
         row: None,
     };

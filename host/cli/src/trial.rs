@@ -536,6 +536,7 @@ fn write_report(
         command: &shlex::try_join(words.iter().map(String::as_str))?,
         parameters: &parameters,
         analysis,
+        log: None,
         totals,
         row: picture.as_deref(),
     };

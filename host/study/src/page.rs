@@ -33,6 +33,8 @@ pub struct Page<'a> {
     pub parameters: &'a [(String, String)],
     /// The plots and their analysis.
     pub analysis: &'a Analysis,
+    /// What the machine's log has of each plot; `None` without a log.
+    pub log: Option<Table>,
     /// The totals of each controller, with growing speed; empty for a real trial.
     pub totals: &'a [Total],
     /// The first metres of a row, as SVG by [`uno_run::picture::draw`]; `None` for a real trial.

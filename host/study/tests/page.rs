@@ -95,6 +95,7 @@ fn full_page() -> String {
         command: "weeder trial --seed 7",
         parameters: &parameters,
         analysis: &analysis,
+        log: None,
         totals: &totals,
         row: Some(&row),
     };
@@ -110,6 +111,7 @@ fn plain_page(title: &str, parameters: &[(String, String)], analysis: &Analysis)
         command: "weeder evaluate",
         parameters,
         analysis,
+        log: None,
         totals: &[],
         row: None,
     };
@@ -409,6 +411,7 @@ fn words_from_outside_stay_words() {
         command: hostile,
         parameters: &parameters,
         analysis: &analysis,
+        log: None,
         totals: &[],
         row: None,
     };

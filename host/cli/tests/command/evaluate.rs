@@ -88,6 +88,42 @@ fn the_report_is_one_page_in_a_folder_of_its_own() {
 }
 
 #[test]
+fn a_log_gives_each_plot_its_speed_and_what_the_table_leaves_empty() {
+    // Plots 1 and 2: 30 m in 60 s and in 30 s, by a wheel with a tick a millimetre.
+    let folder = folder_with("1,1.8,50,100,12,,0,,,0.4,2.5\n1,3.6,50,100,18,,1,,,0.4,2.5\n");
+    let mut log = "time_ms,kind,line\n0,connected,0.2.0\n0,setting,ticks_per_m=1000\n0,setting,beam_to_tool_mm=400\n".to_owned();
+    let mut now_ms = 0;
+    for (plot, speed_mm_s) in [(0, 500), (1, 1000)] {
+        let from = 100_000 * plot;
+        log.push_str(&format!("{now_ms},event,state is=work\n"));
+        for rolled in (0..=30_000).step_by(500) {
+            let mut line = |kind: &str, line: String| log.push_str(&format!("{now_ms},{kind},{line}\n"));
+            let position = from + rolled;
+            let status = format!("state=work tool=in pos={position} speed_mm_s={speed_mm_s} windows=0 unseen_mm=0");
+            line("status", status);
+            if rolled < 30_000 {
+                let plant = position + 250;
+                line("event", format!("plant pos={plant} votes=3 spacing=500 delay=0 hold=100 actuation=0"));
+                now_ms += 500 * 1000 / speed_mm_s;
+            }
+        }
+        log.push_str(&format!("{now_ms},event,state is=hold\n"));
+        now_ms += 60_000;
+    }
+    fs::write(folder.path().join("row.csv"), &log).unwrap();
+    let said = said(folder.path(), &["evaluate", "trial.csv", "--log", "row.csv", "--out", "report"]);
+    let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    for row in [["1", "60.0", "30.00", "1.80"], ["2", "30.0", "30.00", "3.60"]] {
+        let line = said.lines().find(|line| line.split('│').nth(1).is_some_and(|plot| plot.trim() == row[0]));
+        let cells: Vec<&str> = line.expect("the plot has a line").split('│').map(str::trim).collect();
+        assert!(row.iter().all(|cell| cells.contains(cell)), "{row:?} is not in {cells:?}");
+    }
+    assert!(page.contains("lines of the log") && page.contains("row.csv"), "the report has the log's table");
+    let one = ["evaluate", "trial.csv", "--log", "row.csv", "--plots", "1"];
+    assert_refused(folder.path(), &one, "stretches of work in the log: 2, plots: 1. Say which plot each stretch is");
+}
+
+#[test]
 fn a_trial_without_damage_or_replications_is_evaluated_partly() {
     let folder = folder_with(
         "1,1,50,100,12,60,0,12,127,0.4,2.5\n1,1,60,100,10,50,0,12,126,0.4,2.5\n\

@@ -75,7 +75,7 @@ pub fn join(records: &mut [PlotRecord], stretches: &[Worked], plots: &[u32]) -> 
     let plots = if plots.is_empty() { &numbers } else { plots };
     ensure!(
         plots.len() == stretches.len(),
-        "the log has {} stretches of work, but there are {} plots. Say which plot each stretch is, such as `--plots 1,0,2`, \
+        "stretches of work in the log: {}, plots: {}. Say which plot each stretch is, such as `--plots 1,0,2`, \
          with 0 for none and a plot twice if it was weeded in two parts: {}",
         stretches.len(),
         plots.len(),
@@ -170,7 +170,7 @@ mod tests {
         let stretches = [stretch(0, 2, 0.5), stretch(10, 30, 15.0), stretch(50, 30, 15.0), stretch(200, 60, 30.0)];
         let mut records = [plot(1, 1.8), plot(2, 1.8)];
         let error = join(&mut records, &stretches, &[]).expect_err("there are four").to_string();
-        assert!(error.starts_with("the log has 4 stretches of work, but there are 2 plots."), "{error}");
+        assert!(error.starts_with("stretches of work in the log: 4, plots: 2."), "{error}");
         assert!(error.ends_with("; stretch 4 from line 200 of the log, 60 s, 30.0 m"), "{error}");
         let joined = join(&mut records, &stretches, &[0, 1, 1, 2]).expect("they match");
         // With the pause between the two parts.
