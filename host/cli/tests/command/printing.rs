@@ -172,6 +172,8 @@ fn a_row_of_few_plants_has_the_weeds_that_there_is_room_for() {
     };
     let one = plants(&["sim", "--plants", "1", "--speed", "4"]);
     assert!(one.starts_with("1 plant and 0 tall weeds"), "{one}");
+    // A result without its field and its seed cannot be repeated.
+    assert!(one.contains(" at 4 km/h\nField walked, seed 1\n"), "{one}");
     let two = plants(&["sim", "--plants", "2", "--speed", "4"]);
     assert!(two.starts_with("2 plants and 2 tall weeds"), "{two}");
 }
