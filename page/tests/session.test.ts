@@ -50,8 +50,8 @@ class Connected {
         return (this.#operator.uno.cycle / CYCLES_PER_SECOND) * 1000 + this.sleptMs;
     }
 
-    async turn(): Promise<void> {
-        this.#operator.run(TURN_MS);
+    async turn(ms = TURN_MS): Promise<void> {
+        this.#operator.run(ms);
         this.session.turn(this.nowMs);
         if (this.nowMs >= this.stalledUntil) for (const text of this.#onItsWay.splice(0)) this.#operator.uno.send(text);
         // Lets the code that waits for an answer continue.
@@ -137,6 +137,21 @@ test("a question that noise takes, whichever it is, loses no machine for good", 
             `question ${taken} ends the session`,
         );
     }
+});
+
+test("many commands at a slow page leave no second without a status", async () => {
+    const machine = new Connected();
+    while (!machine.has("help")) await machine.turn();
+    let told = machine.nowMs;
+    machine.session.onHappening = ({ is }) => {
+        if (is === "status") told = machine.nowMs;
+    };
+    const typed = Array.from({ length: 6 }, () => machine.session.ask("get k"));
+    for (let turn = 0; turn < 15; turn++) {
+        await machine.turn(200);
+        assert(machine.nowMs - told < 1000, `${machine.nowMs - told} ms without a status`);
+    }
+    await Promise.all(typed);
 });
 
 test("what was typed and waits is not sent behind a HOLD, and says so", async () => {

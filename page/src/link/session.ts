@@ -20,6 +20,8 @@ export interface Wire {
 
 /** Time between two polls of the status. */
 const POLL_MS = 100;
+/** Longest further wait of a poll for commands: between many of them the state must not become unknown. */
+const BEHIND_MS = 300;
 /** Longest wait for an answer: the longest answer, all examples, takes less than a second. */
 const PATIENCE_MS = 2000;
 /** Longest time that counts as waiting between two turns. A busy or suspended page may have an unread answer. */
@@ -167,9 +169,10 @@ export class Session implements Link {
         const [oldest] = this.#asked;
         if (oldest && this.#now - oldest.since > PATIENCE_MS) this.#giveUp(oldest);
         if (this.#asked.length > 0) return;
-        if (this.#waiting.length === 0 && this.#now >= this.#pollAt) {
+        const pollAt = this.#pollAt + (this.#waiting.length > 0 ? BEHIND_MS : 0);
+        if (this.#now >= pollAt) {
             this.#pollAt = this.#now + POLL_MS;
-            void this.#ask("status", false).catch(() => {});
+            void this.#ask("status", false, (question) => this.#waiting.unshift(question)).catch(() => {});
         }
         const next = this.#waiting.shift();
         if (next) this.#send({ ...next, since: this.#now });
