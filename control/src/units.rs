@@ -307,8 +307,6 @@ impl Speed {
 pub struct Wheel {
     /// A tick in 2^-20 mm: 52,429 with 20,000 ticks a metre, 26 million with 40.
     tick: u32,
-    /// From this many ticks on, millimetres exceed 16 bits. Calculated once, because a division takes long.
-    too_far: u32,
 }
 
 impl Wheel {
@@ -317,7 +315,7 @@ impl Wheel {
     const PI_DENOMINATOR: u32 = 113;
 
     /// A wheel before the settings are loaded.
-    pub const NONE: Self = Self { tick: 0, too_far: 0 };
+    pub const NONE: Self = Self { tick: 0 };
 
     /// A tick in 2^-20 mm, from the encoder's counts a turn, 100 to 10,000, and the wheel's diameter, 200 to 800 mm.
     pub(crate) const fn tick_of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> u32 {
@@ -332,7 +330,7 @@ impl Wheel {
 
     /// A wheel from its tick in 2^-20 mm.
     pub(crate) const fn of_tick(tick: u32) -> Self {
-        Self { tick, too_far: ((i16::MAX as u32) << 16) / (tick >> 4) }
+        Self { tick }
     }
 
     /// Millimetres in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or the
@@ -347,14 +345,22 @@ impl Wheel {
         Ticks((((millimetres as u32) << 20) + tick / 2).wrapping_div(tick) as i32)
     }
 
-    /// Ticks in millimetres, rounded toward zero, limited to 16 bits; right to 1 mm and 0.02 %.
-    #[cfg_attr(target_arch = "avr", inline(never))]
+    /// A unit of a scale in 2^-16 mm.
+    pub(crate) const fn unit(self, scale: LengthScale) -> u32 {
+        (self.tick >> 4) << scale.shift
+    }
+
+    /// Ticks in millimetres, rounded toward zero, limited to 16 bits; right to 1 mm and 0.02 %. For the host: the chip converts a
+    /// [`Length`] with [`Geometry::millimetres`](crate::ground::reach::Geometry::millimetres).
     pub const fn millimetres(self, distance: Ticks) -> i16 {
-        let magnitude = distance.0.unsigned_abs();
-        // Below `too_far` the product fits 32 bits.
-        let millimetres =
-            if magnitude >= self.too_far { i16::MAX } else { ((magnitude * (self.tick >> 4)) >> 16) as i16 };
-        if distance.0 < 0 { -millimetres } else { millimetres }
+        let exact = (distance.0 as i64 * (self.tick >> 4) as i64) / (1 << 16);
+        if exact > i16::MAX as i64 {
+            i16::MAX
+        } else if exact < -i16::MAX as i64 {
+            -i16::MAX
+        } else {
+            exact as i16
+        }
     }
 }
 

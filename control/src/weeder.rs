@@ -302,7 +302,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Starts to classify a complete detection. Classification takes several turns. Dust is only counted.
     fn classify(&mut self, detection: Detection, is_of_second: bool) {
-        let width_mm = self.ground.millimetres(self.ground.ticks(detection.width()));
+        let width_mm = self.ground.millimetres(detection.width());
         if !detection.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
             count(&mut self.dust);
             return;
@@ -360,7 +360,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         classified.vote = vote;
         let width_mm = if *of_second { 0 } else { classified.width_mm };
         let leading = self.ground.position_of(detection.leading, self.sensors.position);
-        let (spacing, plan) = (self.ground.spacing(detection), self.ground.plan(detection));
+        let (spacing, plan) = (self.ground.ticks(self.ground.spacing(detection)), self.ground.plan(detection));
         self.events.add(Event::Detection { vote, leading, spacing, plan });
         if self.ground.classified(vote.class).is_err() {
             self.forget_and_raise(Alarm::ScheduleFull);
