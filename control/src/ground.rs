@@ -317,8 +317,7 @@ impl Ground {
             canopy.trim = 0;
         }
         self.guard.see(detection, &self.geometry);
-        let canopy = *canopy;
-        self.keep_out.push(canopy, self.tool(), self.geometry.margin())
+        self.keep_out.push(&self.unclassified.canopy, self.tool(), self.geometry.margin())
     }
 
     /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
@@ -340,7 +339,7 @@ impl Ground {
         // A detection in the beam, or one that is being classified, may be the expected plant.
         let seen_to = self.open().unwrap_or(self.detector.frontier());
         let guarded = self.guard.pass(seen_to, &self.geometry)?;
-        let pushed = self.keep_out.push(guarded, self.tool(), self.geometry.margin());
+        let pushed = self.keep_out.push(&guarded, self.tool(), self.geometry.margin());
         Some(pushed.map(|()| guarded.leading + self.geometry.guarded))
     }
 
