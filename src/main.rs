@@ -146,7 +146,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
                 && let Ok(byte) = serial.read()
             {
                 if typed.collect(byte) {
-                    console.take(typed);
+                    console.take(typed, controller);
                     break;
                 }
             } else {

@@ -262,7 +262,11 @@ mod tests {
             let geometry = Geometry::of(&Settings::with(&[(Setting::TicksPerM, ticks_per_m)]), 0);
             for length in (i16::MIN..=i16::MAX).map(Length) {
                 let ticks = geometry.scale.ticks(length);
-                assert_eq!(geometry.millimetres(length), geometry.wheel.millimetres(ticks), "{length:?}, {ticks_per_m}");
+                assert_eq!(
+                    geometry.millimetres(length),
+                    geometry.wheel.millimetres(ticks),
+                    "{length:?}, {ticks_per_m}"
+                );
             }
         }
     }
