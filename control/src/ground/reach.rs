@@ -134,7 +134,7 @@ impl Geometry {
     /// too coarse for work, it is wrong from 65 m on.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn millimetres(&self, length: Length) -> i16 {
-        let magnitude = u32::from(length.0.unsigned_abs()) * self.unit;
+        let magnitude = u32::from(length.0.unsigned_abs()).wrapping_mul(self.unit);
         let millimetres = ((magnitude >> 16) as u16).min(i16::MAX as u16) as i16;
         if length < Length::ZERO { -millimetres } else { millimetres }
     }
@@ -207,6 +207,7 @@ impl Leads {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::TICKS_PER_M_LEAST;
 
     #[test]
     fn the_stretch_to_stay_in_lies_within_the_stretch_to_come_in() {
@@ -258,7 +259,7 @@ mod tests {
 
     #[test]
     fn every_length_has_the_millimetres_of_its_ticks() {
-        for ticks_per_m in (500..=20_000).step_by(37) {
+        for ticks_per_m in (TICKS_PER_M_LEAST..=20_000).step_by(37) {
             let geometry = Geometry::of(&Settings::with(&[(Setting::TicksPerM, ticks_per_m)]), 0);
             for length in (i16::MIN..=i16::MAX).map(Length) {
                 let ticks = geometry.scale.ticks(length);

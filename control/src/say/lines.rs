@@ -92,8 +92,13 @@ mod kind {
     }
 
     pub(super) fn optional(line: &mut Line, value: Option<i16>) {
-        line.word(if value.is_some() { texts::NUMBER } else { texts::NONE }.text());
-        line.number(value.unwrap_or(0).into());
+        match value {
+            Some(value) => {
+                line.word(texts::NUMBER.text());
+                line.number(value.into());
+            }
+            None => line.word(texts::NONE.text()),
+        }
     }
 
     #[inline(never)]
