@@ -142,7 +142,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
         }
         controller.sensors.init(beam_broken, controller.ground.scale());
         controller.tool.init(now);
-        controller.plant_timeout = PlantTimeout::since(position);
+        controller.restart_plant_timeout();
         controller.telemetry.init(now);
         controller
     }
@@ -309,10 +309,9 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         }
         // The previous detection, a few millimetres back, is still being classified. Unclassified detections count as plants.
         self.decide(Some(Vote::UNKNOWN));
-        let position = self.sensors.position;
         let spacing_mm = self.ground.millimetres(self.ground.spacing(&detection));
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
-        self.plant_timeout = PlantTimeout::since(position);
+        self.restart_plant_timeout();
         let classified = Classified { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
         self.detections.remember(classified);
         self.ground.await_class(detection, is_of_second);
@@ -382,6 +381,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         self.enter(State::Alarm(alarm));
     }
 
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn restart_plant_timeout(&mut self) {
+        self.plant_timeout = PlantTimeout::since(self.sensors.position);
+    }
+
     fn is_working(&self) -> bool {
         matches!(self.state, State::Work)
     }
@@ -391,7 +395,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.forget_and_raise(Alarm::SettingsContradict);
             return;
         }
-        self.plant_timeout = PlantTimeout::since(self.sensors.position);
+        self.restart_plant_timeout();
         self.unknown_run = UnknownRun::NONE;
         self.enter(State::Work);
     }
