@@ -211,6 +211,12 @@ impl Coarse {
     /// Power-up.
     pub const ZERO: Self = Self(0);
 
+    /// The moment this many milliseconds after power-up.
+    #[cfg(test)]
+    pub(crate) const fn at_ms(milliseconds: u32) -> Self {
+        Instant::at_ms(milliseconds).coarse()
+    }
+
     /// Steps in a second.
     pub const STEPS_PER_SECOND: u32 = Interval::STEPS_PER_SECOND >> 4;
 

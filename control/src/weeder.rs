@@ -141,9 +141,9 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             controller.events.announce(Event::Warning(Warning::SettingsOlder));
         }
         controller.sensors.init(beam_broken, controller.ground.scale());
-        controller.tool.init(now);
+        controller.tool.init(now.slow());
         controller.restart_plant_timeout();
-        controller.telemetry.init(now);
+        controller.telemetry.init(controller.sensors.now);
         controller
     }
 }
@@ -187,7 +187,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn see_levels(&mut self, position: Position, broken: bool, second_broken: bool) {
         let second_broken = second_broken && self.ground.has_second_beam();
-        if self.sensors.beam.edge(self.sensors.readings.now, broken || second_broken) {
+        self.sensors.follow_clock();
+        if self.sensors.beam.edge(self.sensors.now, broken || second_broken) {
             self.forget_and_raise(Alarm::BeamFlickers);
         }
         let is_of_second = second_broken != self.ground.second_is_broken();
@@ -247,12 +248,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The last part of a turn, after the edges.
     pub fn step(&mut self) -> Orders {
-        let readings = self.sensors.readings;
-        let doubted = self.sensors.odometer.read(readings.position, readings.jumps, self.believes_jumps());
-        let position = self.sensors.odometer.place(readings.position);
+        self.sensors.follow_clock();
+        let Readings { position, jumps, switch_on, .. } = self.sensors.readings;
+        let doubted = self.sensors.odometer.read(position, jumps, self.believes_jumps());
+        let position = self.sensors.odometer.place(position);
         self.sensors.position = position;
-        self.leads_are_old |= self.sensors.meter.read(readings.now, self.ground.wrap(position));
-        match self.sensors.switch.read(readings.now, readings.switch_on) {
+        self.leads_are_old |= self.sensors.meter.read(self.sensors.now, self.ground.wrap(position));
+        match self.sensors.switch.read(self.sensors.now, switch_on) {
             // The operator clears an alarm first: with `clear`, or by turning the switch off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
             Some(false) => self.enter(State::Hold),
@@ -278,20 +280,25 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.events.add(Event::Swing { out, position });
         }
         let orders = self.orders();
-        self.tool.order(orders.pulse, readings.now);
+        self.tool.order(orders.pulse, self.sensors.readings.now.slow());
         self.report_warnings();
         orders
     }
 
     /// The orders after the last turn.
     pub fn orders(&self) -> Orders {
-        let pulse = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
-        let pulse_of = |setting| servo::from_us(self.configuration.get(setting));
         Orders {
-            pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
-            pulse_out: pulse_of(Setting::ServoOutUs),
+            pulse: self.pulse(),
+            pulse_out: servo::from_us(self.configuration.get(Setting::ServoOutUs)),
             gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
         }
+    }
+
+    /// The servo's pulse width after the last turn.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn pulse(&self) -> HalfMicros {
+        let setting = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
+        self.bench.pulse().unwrap_or_else(|| servo::from_us(self.configuration.get(setting)))
     }
 
     /// Whether the ground or a silent encoder keeps the tool out of the row.
@@ -376,7 +383,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
-        let alarm = self.sensors.beam.explain(alarm, self.sensors.readings.now);
+        let alarm = self.sensors.beam.explain(alarm, self.sensors.now);
         self.events.add(Event::Alarm { alarm, position: self.sensors.position });
         self.enter(State::Alarm(alarm));
     }

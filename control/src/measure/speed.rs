@@ -9,7 +9,7 @@
 //! [`SpeedMeter::expected`] adds what the machine gains in 100 ms. The gain shows in the distance of the averaging time, compared with
 //! its mean over another 80 ms.
 
-use crate::units::{Coarse, Instant, Speed, WrappedPosition};
+use crate::units::{Coarse, Speed, WrappedPosition};
 
 /// The shortest time between two samples. With their number it sets the averaging time. It is long enough that ticks and turns
 /// cause less than half a percent of error at 1 km/h. It is short enough to follow a walking person.
@@ -70,15 +70,15 @@ impl SpeedMeter {
     };
 
     /// A meter of a machine that stands at `position`.
-    pub const fn new(position: WrappedPosition, now: Instant) -> Self {
+    pub const fn new(position: WrappedPosition, now: Coarse) -> Self {
         let mut meter = Self::NONE;
         meter.init(position, now);
         meter
     }
 
     /// Starts with the machine standing at `position`.
-    pub const fn init(&mut self, position: WrappedPosition, now: Instant) {
-        self.last = Sample { ticks: position.count() as u16, time: now.coarse() };
+    pub const fn init(&mut self, position: WrappedPosition, now: Coarse) {
+        self.last = Sample { ticks: position.count() as u16, time: now };
         self.patience = STANDSTILL;
     }
 
@@ -98,8 +98,8 @@ impl SpeedMeter {
 
     /// Takes a reading. Returns whether it may have changed the speeds. The caller calls it at least every few milliseconds.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn read(&mut self, now: Instant, position: WrappedPosition) -> bool {
-        let reading = Sample { ticks: position.count() as u16, time: now.coarse() };
+    pub fn read(&mut self, now: Coarse, position: WrappedPosition) -> bool {
+        let reading = Sample { ticks: position.count() as u16, time: now };
         if reading.ticks != self.last.ticks {
             self.moved(reading)
         } else {

@@ -186,6 +186,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The curves whose next points are due, 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
-        self.telemetry.due(self.sensors.readings.now)
+        self.telemetry.due(self.sensors.now)
     }
 }
