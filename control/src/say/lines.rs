@@ -44,7 +44,8 @@ macro_rules! write_lines {
         /// Builds the line of an event.
         #[inline(never)]
         pub fn write_event(event: &Event, line: &mut Line) {
-            match *event {
+            // By reference: a copy of the whole event would take most registers.
+            match event {
                 $($pattern => {
                     line.say(const { NamedText::of(concat!($beginning, $($part,)* $($tail)?)) });
                     $(kind::$kind(line, $value);)*
