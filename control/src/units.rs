@@ -7,7 +7,10 @@
 //! Remembered ground ([`WrappedPosition`], [`Length`]) has 16 bits, which the chip compares in half the time and code.
 //! [`LengthScale`] converts.
 
-use core::ops::{Add, Neg, Sub};
+use core::{
+    num::NonZero,
+    ops::{Add, Neg, Sub},
+};
 
 /// A position on the ground: ticks forward since power-up, wrapping.
 ///
@@ -302,8 +305,9 @@ impl Speed {
     /// The distance rolled at this speed in this many milliseconds, at most one second.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn distance_in_ms(self, milliseconds: u16) -> Length {
+        const SECOND_MS: NonZero<u16> = NonZero::new(1000).unwrap();
         // Divided without its sign, so that the chip needs one division routine only, the shorter.
-        let magnitude = (u32::from(self.0.unsigned_abs()) * u32::from(milliseconds) / 1000) as i16;
+        let magnitude = share(self.0.unsigned_abs(), milliseconds, SECOND_MS) as i16;
         Length(if self.0 < 0 { -magnitude } else { magnitude })
     }
 }
@@ -368,6 +372,12 @@ impl Wheel {
             exact as i16
         }
     }
+}
+
+/// `whole * part / of`, rounded down. A separate function, because the chip's routines need most of its registers.
+#[cfg_attr(target_arch = "avr", inline(never))]
+pub fn share(whole: u16, part: u16, of: NonZero<u16>) -> u32 {
+    u32::from(whole) * u32::from(part) / NonZero::<u32>::from(of)
 }
 
 /// Adds one, and stops at 65,535.

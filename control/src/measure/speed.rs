@@ -9,7 +9,8 @@
 //! [`SpeedMeter::expected`] adds what the machine gains in 100 ms. The gain shows in the distance of the averaging time, compared with
 //! its mean over another 80 ms.
 
-use crate::units::{Coarse, Speed, WrappedPosition};
+use crate::units::{Coarse, Speed, WrappedPosition, share};
+use core::num::NonZero;
 
 /// The shortest time between two samples. With their number it sets the averaging time. It is long enough that ticks and turns
 /// cause less than half a percent of error at 1 km/h. It is short enough to follow a walking person.
@@ -121,9 +122,9 @@ impl SpeedMeter {
         }
         let oldest = self.samples[usize::from((self.next + SAMPLES - self.count) % SAMPLES)];
         self.remember(reading);
+        let Some(time) = NonZero::new(reading.time.since(oldest.time)) else { return false };
         let distance = reading.ticks.wrapping_sub(oldest.ticks).cast_signed();
-        let time = reading.time.since(oldest.time);
-        let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
+        let speed = share(distance.unsigned_abs(), Coarse::STEPS_PER_SECOND as u16, time);
         let speed = speed.min(FASTEST.into()) as u16;
         self.speed = Speed(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
         let gain = distance.wrapping_sub(self.trend >> 3);
