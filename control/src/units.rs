@@ -140,11 +140,11 @@ impl LengthScale {
     pub const TICK: Self = Self { shift: 0 };
 
     /// Most units in a metre, 0.42 mm each: 13 m fit half of 16 bits.
-    pub const FINEST: i32 = 2400;
+    pub const FINEST: u16 = 2400;
 
-    /// The scale for a wheel with these ticks a metre.
+    /// The scale for a wheel with these ticks a metre, at most 65,535.
     pub const fn of(ticks_per_m: Ticks) -> Self {
-        let (mut shift, mut units) = (0, ticks_per_m.0);
+        let (mut shift, mut units) = (0, ticks_per_m.0 as u16);
         while units > Self::FINEST {
             (shift, units) = (shift + 1, units >> 1);
         }

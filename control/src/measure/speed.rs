@@ -139,7 +139,7 @@ impl SpeedMeter {
     }
 
     fn remember(&mut self, reading: Sample) {
-        self.samples[usize::from(self.next)] = reading;
+        self.samples[usize::from(self.next % SAMPLES)] = reading;
         self.next = (self.next + 1) % SAMPLES;
         self.count = (self.count + 1).min(SAMPLES);
     }
