@@ -4,12 +4,11 @@
 //! [`Swings`] times the servo with the end switch: from the command until the tool is out, and until it begins to come back.
 //! Without an end switch, the operator can film and time the same swings: the LED shows the commands.
 
-use core::num::NonZero;
-
 use crate::{
     operate::command_error::CommandError,
     units::{Coarse, Instant, Position, share},
 };
+use core::num::NonZero;
 
 /// The shortest stretch that gives the ticks a metre to better than 0.1 %.
 pub const SHORTEST_MM: u16 = 1000;

@@ -55,7 +55,11 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             && !self.bench.needs_no_end_switch()
             && self.sensors.end_switch.is_on() != self.tool.is_out()
             // After a manual test has ended, the tool has not had its command yet.
-            && self.tool.has_held(self.pulse(), self.sensors.readings.now.slow(), self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS)
+            && self.tool.has_held(
+                self.pulse(),
+                self.sensors.readings.now.slow(),
+                self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS,
+            )
         {
             return Some(Alarm::ToolStuck);
         }
