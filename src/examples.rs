@@ -73,9 +73,10 @@ impl Examples<{ features::COUNT }> for InFlash {
 
     fn example(&self, index: usize) -> Option<Example<{ features::COUNT }>> {
         (index < self.len()).then(|| {
+            let row = self.rows.wrapping_add(index).cast::<u8>();
             // SAFETY: the row belongs to the table, so it is in flash.
-            let byte = |place| unsafe { read_byte(self.rows.cast::<u8>().wrapping_add(6 * index + place)) };
-            Example::new([byte(0), byte(1), byte(2), byte(3), byte(4)], byte(5))
+            let byte = |place| unsafe { read_byte(row.wrapping_add(place)) };
+            Example::new(core::array::from_fn(byte), byte(features::COUNT))
         })
     }
 

@@ -99,7 +99,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
     read(uninit.readings());
     let controller = init(uninit, beam.are_broken().0, cause);
     // The pulse for "tool out" is a setting, so the servo starts after the settings are loaded.
-    let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.orders().pulse);
+    let mut servo = servo::Servo::new(peripherals.TC1, &peripherals.PORTB, controller.pulse());
 
     'turn: loop {
         watchdog::feed();
@@ -146,7 +146,7 @@ fn run(typed: &mut LineBuffer, console: &mut Console, uninit: &mut UninitWeeder)
                 && let Ok(byte) = serial.read()
             {
                 if typed.collect(byte) {
-                    console.take(typed);
+                    console.take(typed, controller);
                     break;
                 }
             } else {

@@ -51,8 +51,9 @@ impl Servo {
         if action == Action::Wait {
             return;
         }
-        let left = TOO_LATE.saturating_sub(since_rise);
-        if change(&self.timer, since_rise, left, compare(width), action == Action::Restart) {
+        if since_rise < TOO_LATE
+            && change(&self.timer, since_rise, TOO_LATE - since_rise, compare(width), action == Action::Restart)
+        {
             self.width = width;
         }
     }
@@ -98,7 +99,7 @@ pub unsafe fn end_with(width: HalfMicros) {
     timer.tccr1b.write(|w| unsafe { w.bits(0) });
 }
 
-/// OCR1A for a pulse of `width`: the pin is high from 0 through the match.
+/// OCR1A for a pulse of `width`: the pin is high from 0 through the match. No width is 0: the settings begin at 500 us.
 const fn compare(width: HalfMicros) -> u16 {
-    width.saturating_sub(1)
+    width - 1
 }

@@ -317,8 +317,7 @@ impl Ground {
             canopy.trim = 0;
         }
         self.guard.see(detection, &self.geometry);
-        let canopy = *canopy;
-        self.keep_out.push(canopy, self.tool(), self.geometry.margin())
+        self.keep_out.push(&self.unclassified.canopy, self.tool(), self.geometry.margin())
     }
 
     /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
@@ -340,13 +339,13 @@ impl Ground {
         // A detection in the beam, or one that is being classified, may be the expected plant.
         let seen_to = self.open().unwrap_or(self.detector.frontier());
         let guarded = self.guard.pass(seen_to, &self.geometry)?;
-        let pushed = self.keep_out.push(guarded, self.tool(), self.geometry.margin());
+        let pushed = self.keep_out.push(&guarded, self.tool(), self.geometry.margin());
         Some(pushed.map(|()| guarded.leading + self.geometry.guarded))
     }
 
     /// From the last plant's leading edge, or from where detection began, to the detection's. At most the memory length.
-    pub fn spacing(&self, detection: &Detection) -> Ticks {
-        self.ticks(detection.leading - self.last_plant)
+    pub fn spacing(&self, detection: &Detection) -> Length {
+        detection.leading - self.last_plant
     }
 
     /// The paper's schedule for a detection.
@@ -359,9 +358,9 @@ impl Ground {
         self.geometry.wheel
     }
 
-    /// A distance in millimetres.
-    pub fn millimetres(&self, distance: Ticks) -> i16 {
-        self.geometry.wheel.millimetres(distance)
+    /// A length in millimetres.
+    pub fn millimetres(&self, length: Length) -> i16 {
+        self.geometry.millimetres(length)
     }
 
     /// Ticks in a unit of remembered ground.
@@ -426,8 +425,8 @@ impl Ground {
     }
 
     /// The distance until the tool has left unseen ground and its margin; 0 if it has.
-    pub fn unseen(&self) -> Ticks {
-        self.ticks(self.unseen_beyond(Length::ZERO).max(Length::ZERO))
+    pub fn unseen(&self) -> Length {
+        self.unseen_beyond(Length::ZERO).max(Length::ZERO)
     }
 
     /// How far unseen ground and its margin reach ahead of a place at this distance from the tool.
@@ -531,7 +530,7 @@ mod tests {
         ground.begin(Position::new(0), false);
         ground.lead(&settings, SPEED, SPEED);
         let canopy = pass(&mut ground, 1000, 1300);
-        assert_eq!((ground.spacing(&canopy), canopy.width()), (Ticks(1000), Length(300)));
+        assert_eq!((ground.spacing(&canopy), canopy.width()), (Length(1000), Length(300)));
         keep(&mut ground, canopy);
         (ground, settings)
     }
@@ -570,11 +569,11 @@ mod tests {
             ground.forget();
             ground.roll_to(Position::new(1400 + margin + ahead + beam_to_tool));
             ground.lead(&Settings::new(), Speed(-1000), Speed(-1000));
-            assert_eq!((ground.is_unseen(), ground.unseen()), (true, Ticks::ZERO), "it lies behind the tool");
+            assert_eq!((ground.is_unseen(), ground.unseen()), (true, Length::ZERO), "it lies behind the tool");
             ground.assume_bare();
             ground.roll_to(Position::new(1400 + margin - 1 + beam_to_tool));
             assert!(ground.is_closed_at_tool());
-            assert_eq!(ground.unseen(), Ticks(1));
+            assert_eq!(ground.unseen(), Length(1));
             ground.assume_bare();
             assert!(!ground.is_closed_at_tool(), "the operator vouches for what status shows");
         }

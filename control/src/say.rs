@@ -24,7 +24,7 @@ mod words;
 
 pub use self::{
     answer::Answer,
-    execute::execute,
+    execute::{answer_to, execute},
     lines::{write_event, write_plot},
     packed::Text,
 };
@@ -66,13 +66,17 @@ impl Console {
 
     /// Takes a line that is complete; a later turn runs it. Returns false for an empty line.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    pub fn take(&mut self, typed: &mut LineBuffer) -> bool {
-        let line = typed.read(&mut self.command);
-        let is_one = line.is_some();
-        if let Some(line) = line {
-            self.answer = Answer::Typed(line);
-        }
-        is_one
+    pub fn take<C: Classifier, M: Memory>(
+        &mut self,
+        typed: &mut LineBuffer,
+        controller: &mut Controller<C, M>,
+    ) -> bool {
+        let Some(line) = typed.read(&mut self.command) else { return false };
+        self.answer = match line {
+            Ok(()) => Answer::Typed,
+            Err(error) => execute::refuse(error, controller),
+        };
+        true
     }
 
     /// The next byte to send.
@@ -90,8 +94,8 @@ impl Console {
         if !controller.carry_on() {
             return true;
         }
-        if let Answer::Typed(line) = self.answer {
-            self.answer = execute(line.map(|()| &self.command), controller);
+        if self.answer == Answer::Typed {
+            self.answer = execute(&self.command, controller);
         } else if !self.answer.is_done() {
             self.answer.write_line(controller, &mut self.line);
         } else if let Some(event) = controller.next_event() {

@@ -7,7 +7,10 @@
 //! Remembered ground ([`WrappedPosition`], [`Length`]) has 16 bits, which the chip compares in half the time and code.
 //! [`LengthScale`] converts.
 
-use core::ops::{Add, Neg, Sub};
+use core::{
+    num::NonZero,
+    ops::{Add, Neg, Sub},
+};
 
 /// A position on the ground: ticks forward since power-up, wrapping.
 ///
@@ -137,11 +140,11 @@ impl LengthScale {
     pub const TICK: Self = Self { shift: 0 };
 
     /// Most units in a metre, 0.42 mm each: 13 m fit half of 16 bits.
-    pub const FINEST: i32 = 2400;
+    pub const FINEST: u16 = 2400;
 
-    /// The scale for a wheel with these ticks a metre.
+    /// The scale for a wheel with these ticks a metre, at most 65,535.
     pub const fn of(ticks_per_m: Ticks) -> Self {
-        let (mut shift, mut units) = (0, ticks_per_m.0);
+        let (mut shift, mut units) = (0, ticks_per_m.0 as u16);
         while units > Self::FINEST {
             (shift, units) = (shift + 1, units >> 1);
         }
@@ -210,6 +213,12 @@ pub struct Coarse(u16);
 impl Coarse {
     /// Power-up.
     pub const ZERO: Self = Self(0);
+
+    /// The moment this many milliseconds after power-up.
+    #[cfg(test)]
+    pub(crate) const fn at_ms(milliseconds: u32) -> Self {
+        Instant::at_ms(milliseconds).coarse()
+    }
 
     /// Steps in a second.
     pub const STEPS_PER_SECOND: u32 = Interval::STEPS_PER_SECOND >> 4;
@@ -296,8 +305,9 @@ impl Speed {
     /// The distance rolled at this speed in this many milliseconds, at most one second.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub fn distance_in_ms(self, milliseconds: u16) -> Length {
+        const SECOND_MS: NonZero<u16> = NonZero::new(1000).unwrap();
         // Divided without its sign, so that the chip needs one division routine only, the shorter.
-        let magnitude = (u32::from(self.0.unsigned_abs()) * u32::from(milliseconds) / 1000) as i16;
+        let magnitude = share(self.0.unsigned_abs(), milliseconds, SECOND_MS) as i16;
         Length(if self.0 < 0 { -magnitude } else { magnitude })
     }
 }
@@ -307,8 +317,6 @@ impl Speed {
 pub struct Wheel {
     /// A tick in 2^-20 mm: 52,429 with 20,000 ticks a metre, 26 million with 40.
     tick: u32,
-    /// From this many ticks on, millimetres exceed 16 bits. Calculated once, because a division takes long.
-    too_far: u32,
 }
 
 impl Wheel {
@@ -317,7 +325,7 @@ impl Wheel {
     const PI_DENOMINATOR: u32 = 113;
 
     /// A wheel before the settings are loaded.
-    pub const NONE: Self = Self { tick: 0, too_far: 0 };
+    pub const NONE: Self = Self { tick: 0 };
 
     /// A tick in 2^-20 mm, from the encoder's counts a turn, 100 to 10,000, and the wheel's diameter, 200 to 800 mm.
     pub(crate) const fn tick_of_diameter(ticks_per_rev: u16, diameter_mm: u16) -> u32 {
@@ -332,7 +340,7 @@ impl Wheel {
 
     /// A wheel from its tick in 2^-20 mm.
     pub(crate) const fn of_tick(tick: u32) -> Self {
-        Self { tick, too_far: ((i16::MAX as u32) << 16) / (tick >> 4) }
+        Self { tick }
     }
 
     /// Millimetres in ticks, rounded to the nearest: `mm * ticks_per_rev / (pi * diameter)`, the paper's Eq. 1 and 2, or the
@@ -347,15 +355,29 @@ impl Wheel {
         Ticks((((millimetres as u32) << 20) + tick / 2).wrapping_div(tick) as i32)
     }
 
-    /// Ticks in millimetres, rounded toward zero, limited to 16 bits; right to 1 mm and 0.02 %.
-    #[cfg_attr(target_arch = "avr", inline(never))]
-    pub const fn millimetres(self, distance: Ticks) -> i16 {
-        let magnitude = distance.0.unsigned_abs();
-        // Below `too_far` the product fits 32 bits.
-        let millimetres =
-            if magnitude >= self.too_far { i16::MAX } else { ((magnitude * (self.tick >> 4)) >> 16) as i16 };
-        if distance.0 < 0 { -millimetres } else { millimetres }
+    /// A unit of a scale in 2^-16 mm.
+    pub(crate) const fn unit(self, scale: LengthScale) -> u32 {
+        (self.tick >> 4) << scale.shift
     }
+
+    /// Ticks in millimetres, rounded toward zero, limited to 16 bits; right to 1 mm and 0.02 %. For the host: the chip converts a
+    /// [`Length`] with [`Geometry::millimetres`](crate::ground::reach::Geometry::millimetres).
+    pub const fn millimetres(self, distance: Ticks) -> i16 {
+        let exact = (distance.0 as i64 * (self.tick >> 4) as i64) / (1 << 16);
+        if exact > i16::MAX as i64 {
+            i16::MAX
+        } else if exact < -i16::MAX as i64 {
+            -i16::MAX
+        } else {
+            exact as i16
+        }
+    }
+}
+
+/// `whole * part / of`, rounded down. A separate function, because the chip's routines need most of its registers.
+#[cfg_attr(target_arch = "avr", inline(never))]
+pub fn share(whole: u16, part: u16, of: NonZero<u16>) -> u32 {
+    u32::from(whole) * u32::from(part) / NonZero::<u32>::from(of)
 }
 
 /// Adds one, and stops at 65,535.

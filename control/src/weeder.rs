@@ -141,9 +141,9 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
             controller.events.announce(Event::Warning(Warning::SettingsOlder));
         }
         controller.sensors.init(beam_broken, controller.ground.scale());
-        controller.tool.init(now);
-        controller.plant_timeout = PlantTimeout::since(position);
-        controller.telemetry.init(now);
+        controller.tool.init(now.slow());
+        controller.restart_plant_timeout();
+        controller.telemetry.init(controller.sensors.now);
         controller
     }
 }
@@ -187,7 +187,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     #[cfg_attr(not(target_arch = "avr"), inline)]
     fn see_levels(&mut self, position: Position, broken: bool, second_broken: bool) {
         let second_broken = second_broken && self.ground.has_second_beam();
-        if self.sensors.beam.edge(self.sensors.readings.now, broken || second_broken) {
+        self.sensors.follow_clock();
+        if self.sensors.beam.edge(self.sensors.now, broken || second_broken) {
             self.forget_and_raise(Alarm::BeamFlickers);
         }
         let is_of_second = second_broken != self.ground.second_is_broken();
@@ -247,12 +248,13 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The last part of a turn, after the edges.
     pub fn step(&mut self) -> Orders {
-        let readings = self.sensors.readings;
-        let doubted = self.sensors.odometer.read(readings.position, readings.jumps, self.believes_jumps());
-        let position = self.sensors.odometer.place(readings.position);
+        self.sensors.follow_clock();
+        let Readings { position, jumps, switch_on, .. } = self.sensors.readings;
+        let doubted = self.sensors.odometer.read(position, jumps, self.believes_jumps());
+        let position = self.sensors.odometer.place(position);
         self.sensors.position = position;
-        self.leads_are_old |= self.sensors.meter.read(readings.now, self.ground.wrap(position));
-        match self.sensors.switch.read(readings.now, readings.switch_on) {
+        self.leads_are_old |= self.sensors.meter.read(self.sensors.now, self.ground.wrap(position));
+        match self.sensors.switch.read(self.sensors.now, switch_on) {
             // The operator clears an alarm first: with `clear`, or by turning the switch off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
             Some(false) => self.enter(State::Hold),
@@ -278,20 +280,25 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.events.add(Event::Swing { out, position });
         }
         let orders = self.orders();
-        self.tool.order(orders.pulse, readings.now);
+        self.tool.order(orders.pulse, self.sensors.readings.now.slow());
         self.report_warnings();
         orders
     }
 
     /// The orders after the last turn.
     pub fn orders(&self) -> Orders {
-        let pulse = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
-        let pulse_of = |setting| servo::from_us(self.configuration.get(setting));
         Orders {
-            pulse: self.bench.pulse().unwrap_or_else(|| pulse_of(pulse)),
-            pulse_out: pulse_of(Setting::ServoOutUs),
+            pulse: self.pulse(),
+            pulse_out: servo::from_us(self.configuration.get(Setting::ServoOutUs)),
             gap_ms: self.configuration.get(Setting::ServoGapMs) as u8,
         }
+    }
+
+    /// The servo's pulse width after the last turn.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn pulse(&self) -> HalfMicros {
+        let setting = if self.tool.is_out() { Setting::ServoOutUs } else { Setting::ServoInUs };
+        self.bench.pulse().unwrap_or_else(|| servo::from_us(self.configuration.get(setting)))
     }
 
     /// Whether the ground or a silent encoder keeps the tool out of the row.
@@ -302,17 +309,16 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Starts to classify a complete detection. Classification takes several turns. Dust is only counted.
     fn classify(&mut self, detection: Detection, is_of_second: bool) {
-        let width_mm = self.ground.millimetres(self.ground.ticks(detection.width()));
+        let width_mm = self.ground.millimetres(detection.width());
         if !detection.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
             count(&mut self.dust);
             return;
         }
         // The previous detection, a few millimetres back, is still being classified. Unclassified detections count as plants.
         self.decide(Some(Vote::UNKNOWN));
-        let position = self.sensors.position;
         let spacing_mm = self.ground.millimetres(self.ground.spacing(&detection));
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
-        self.plant_timeout = PlantTimeout::since(position);
+        self.restart_plant_timeout();
         let classified = Classified { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
         self.detections.remember(classified);
         self.ground.await_class(detection, is_of_second);
@@ -360,7 +366,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         classified.vote = vote;
         let width_mm = if *of_second { 0 } else { classified.width_mm };
         let leading = self.ground.position_of(detection.leading, self.sensors.position);
-        let (spacing, plan) = (self.ground.spacing(detection), self.ground.plan(detection));
+        let (spacing, plan) = (self.ground.ticks(self.ground.spacing(detection)), self.ground.plan(detection));
         self.events.add(Event::Detection { vote, leading, spacing, plan });
         if self.ground.classified(vote.class).is_err() {
             self.forget_and_raise(Alarm::ScheduleFull);
@@ -377,9 +383,14 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if is_ignored || matches!(self.state, State::Alarm(_)) {
             return;
         }
-        let alarm = self.sensors.beam.explain(alarm, self.sensors.readings.now);
+        let alarm = self.sensors.beam.explain(alarm, self.sensors.now);
         self.events.add(Event::Alarm { alarm, position: self.sensors.position });
         self.enter(State::Alarm(alarm));
+    }
+
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    fn restart_plant_timeout(&mut self) {
+        self.plant_timeout = PlantTimeout::since(self.sensors.position);
     }
 
     fn is_working(&self) -> bool {
@@ -391,7 +402,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
             self.forget_and_raise(Alarm::SettingsContradict);
             return;
         }
-        self.plant_timeout = PlantTimeout::since(self.sensors.position);
+        self.restart_plant_timeout();
         self.unknown_run = UnknownRun::NONE;
         self.enter(State::Work);
     }

@@ -465,7 +465,7 @@ fn events_and_curves_wait_until_an_answer_is_complete() {
             && let Some(&byte) = to_type.next()
         {
             if typed.collect(byte) {
-                console.take(&mut typed);
+                console.take(&mut typed, &mut machine);
             }
         } else {
             console.carry_on(&mut machine);

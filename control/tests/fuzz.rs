@@ -70,7 +70,7 @@ fn every_line_is_answered_by_lines_that_fit_and_one_verdict() {
         for (turn, byte) in (0..).zip(bytes) {
             machine.at(turn / 4).turn_after(500);
             let Some(command) = line.take(byte) else { continue };
-            let mut answer = say::execute(command.as_ref().map_err(|&error| error), &mut machine);
+            let mut answer = say::answer_to(command.as_ref().map_err(|&error| error), &mut machine);
             while !machine.carry_on() {}
             let mut verdicts = 0;
             while !answer.is_done() {

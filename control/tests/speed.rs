@@ -2,7 +2,7 @@
 
 use control::{
     measure::speed::SpeedMeter,
-    units::{Instant, Interval, Speed, WrappedPosition},
+    units::{Coarse, Instant, Interval, Speed, WrappedPosition},
 };
 use proptest::prelude::*;
 
@@ -19,7 +19,11 @@ impl Run {
     }
 
     fn from(start: Instant, count: i32) -> Self {
-        Self { meter: SpeedMeter::new(WrappedPosition::new(count as i16), start), time_us: 0, start: (start, count) }
+        Self {
+            meter: SpeedMeter::new(WrappedPosition::new(count as i16), start.coarse()),
+            time_us: 0,
+            start: (start, count),
+        }
     }
 
     /// Rolls for `duration_ms`; `ticks` gives the distance since the start at a time in seconds.
@@ -29,7 +33,7 @@ impl Run {
             self.time_us += turn_us;
             let count = self.start.1.wrapping_add(ticks(self.time_us as f64 / 1e6).floor() as i32);
             self.meter.read(
-                self.start.0 + Interval::from_steps((self.time_us / 4) as u32),
+                (self.start.0 + Interval::from_steps((self.time_us / 4) as u32)).coarse(),
                 WrappedPosition::new(count as i16),
             );
         }
@@ -181,14 +185,14 @@ fn one_tick_backwards_changes_the_speed_by_its_share() {
 
 #[test]
 fn a_reading_that_changes_a_speed_is_reported() {
-    let mut meter = SpeedMeter::new(WrappedPosition::new(0), Instant::default());
+    let mut meter = SpeedMeter::new(WrappedPosition::new(0), Coarse::ZERO);
     let mut reported = 0;
     for milliseconds in 0..2000_u32 {
         // It accelerates, rolls at constant speed and stands.
         let count = (milliseconds * milliseconds / 500).min(milliseconds).min(1000);
         let now = Instant::default() + Interval::from_ms(milliseconds);
         let before = (meter.speed(), meter.expected());
-        let is_reported = meter.read(now, WrappedPosition::new(count as i16));
+        let is_reported = meter.read(now.coarse(), WrappedPosition::new(count as i16));
         assert!(is_reported || (meter.speed(), meter.expected()) == before, "at {milliseconds} ms");
         reported += u32::from(is_reported);
     }

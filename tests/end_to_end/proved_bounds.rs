@@ -185,7 +185,7 @@ fn loops_are_said_to_turn_as_often_as_the_constants_behind_them_have_it() {
     for function in ["Ground::is_closed", "Ground::zones"] {
         assert_eq!(passes(&format!("control::ground::{function}")), keep_out::CAPACITY + 1, "{function}");
     }
-    for function in ["say::command::split_word", "say::command::number"] {
+    for function in ["say::command::next_word", "say::command::number"] {
         assert_eq!(passes(&format!("control::{function}")), LINE_LENGTH + 1, "{function}");
     }
     // A typed word may continue after the longest word of a group.

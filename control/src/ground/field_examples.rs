@@ -87,14 +87,19 @@ impl<M: Memory> FieldExamples<M> {
     pub fn forget(&mut self, number: u8) -> bool {
         let is_held = self.slot(number).is_some();
         if is_held {
-            self.write(number, number + 1, [ERASED; SLOT]);
+            self.erase(number, number + 1);
         }
         is_held
     }
 
     /// Forgets all examples. [`carry_on`](Self::carry_on) erases them.
     pub fn forget_all(&mut self) {
-        self.write(0, CAPACITY, [ERASED; SLOT]);
+        self.erase(0, CAPACITY);
+    }
+
+    #[inline(never)]
+    fn erase(&mut self, from: u8, end: u8) {
+        self.write(from, end, [ERASED; SLOT]);
     }
 
     fn write(&mut self, from: u8, end: u8, bytes: [u8; SLOT]) {

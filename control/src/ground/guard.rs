@@ -35,7 +35,7 @@ impl Guard {
         }
         let is_due = self.due - plant.leading >= -scatter && plant.trailing - self.due >= -scatter;
         if self.left == 0 || is_due {
-            self.due = plant.leading + Length(plant.width().0 / 2) + spacing;
+            self.due = plant.leading + Length(plant.width().0 >> 1) + spacing;
             self.left = IN_A_ROW;
         }
     }

@@ -137,7 +137,7 @@ impl KeepOut {
     ///
     /// # Errors
     /// [`ScheduleFull`] if even the oldest zone lies at the tool or ahead of it. The canopy is then not added.
-    pub fn push(&mut self, canopy: Canopy, tool: WrappedPosition, margin: Length) -> Result<(), ScheduleFull> {
+    pub fn push(&mut self, canopy: &Canopy, tool: WrappedPosition, margin: Length) -> Result<(), ScheduleFull> {
         if self.canopies.is_full() {
             let oldest = self.canopies.first().ok_or(ScheduleFull)?;
             if !tool.is_ahead_of(oldest.trailing + margin) {
@@ -146,7 +146,7 @@ impl KeepOut {
             let position = oldest.trailing;
             self.leave(position);
         }
-        self.canopies.push(canopy).map_err(|_| ScheduleFull)
+        self.canopies.push(*canopy).map_err(|_| ScheduleFull)
     }
 
     /// Widens the canopy that the second beam sees between `from` and `to`, see `Canopy::widen`. Returns whether a canopy is within
@@ -247,7 +247,7 @@ mod tests {
         for base in [0, i16::MAX - 1100] {
             let at = |offset: i16| WrappedPosition::new(base.wrapping_add(offset));
             let mut keep_out = KeepOut::new(at(-1000));
-            keep_out.push(Canopy { leading: at(1000), trailing: at(1300), trim: 0 }, at(0), MARGIN).unwrap();
+            keep_out.push(&Canopy { leading: at(1000), trailing: at(1300), trim: 0 }, at(0), MARGIN).unwrap();
             for (from, to, closed) in [
                 (904, 904, false),
                 (905, 905, true),
@@ -272,7 +272,7 @@ mod tests {
         let plant = Detection::whole(1000, 1300);
         assert_eq!(Canopy::of(&plant, Length::ZERO).trim, 0);
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        keep_out.push(Canopy::of(&plant, zone), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.push(&Canopy::of(&plant, zone), WrappedPosition::new(0), MARGIN).unwrap();
         assert!(!closed(&keep_out, 936, 936) && closed(&keep_out, 937, 937));
         assert!(closed(&keep_out, 1363, 1363) && !closed(&keep_out, 1364, 1364));
     }
@@ -284,7 +284,7 @@ mod tests {
         assert!(closed(&keep_out, 94, 94));
         assert!(closed(&keep_out, 94, 100));
         assert!(!closed(&keep_out, 95, 100));
-        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.push(&canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
         keep_out.invalidate(WrappedPosition::new(1310));
         assert!(closed(&keep_out, 0, 0) && closed(&keep_out, 1310, 1310));
         assert!(closed(&keep_out, 1404, 1404));
@@ -296,10 +296,10 @@ mod tests {
     fn a_full_schedule_forgets_only_ground_behind_the_tool() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         for plant in 0..CAPACITY as i16 {
-            keep_out.push(canopy(plant * 1000, plant * 1000 + 200), WrappedPosition::new(0), MARGIN).unwrap();
+            keep_out.push(&canopy(plant * 1000, plant * 1000 + 200), WrappedPosition::new(0), MARGIN).unwrap();
         }
-        assert_eq!(keep_out.push(canopy(20_000, 20_200), WrappedPosition::new(295), MARGIN), Err(ScheduleFull));
-        assert_eq!(keep_out.push(canopy(20_000, 20_200), WrappedPosition::new(296), MARGIN), Ok(()));
+        assert_eq!(keep_out.push(&canopy(20_000, 20_200), WrappedPosition::new(295), MARGIN), Err(ScheduleFull));
+        assert_eq!(keep_out.push(&canopy(20_000, 20_200), WrappedPosition::new(296), MARGIN), Ok(()));
         assert!(keep_out.has_left(WrappedPosition::new(199)) && !keep_out.has_left(WrappedPosition::new(200)));
         assert!(closed(&keep_out, 294, 294), "forgotten ground is unknown");
         assert!(!closed(&keep_out, 295, 295));
@@ -311,8 +311,8 @@ mod tests {
     #[test]
     fn zones_ahead_are_counted_until_the_tool_has_passed_them() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
-        keep_out.push(canopy(2000, 2300), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.push(&canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.push(&canopy(2000, 2300), WrappedPosition::new(0), MARGIN).unwrap();
         assert_eq!(keep_out.ahead(WrappedPosition::new(0), MARGIN), 2);
         assert_eq!(keep_out.ahead(WrappedPosition::new(1395), MARGIN), 2);
         assert_eq!(keep_out.ahead(WrappedPosition::new(1396), MARGIN), 1);
@@ -324,19 +324,19 @@ mod tests {
         let at = WrappedPosition::new;
         let mut keep_out = KeepOut::new(at(0));
         let mut plants = (0..).map(|plant| canopy(500 * plant, 500 * plant + 50));
-        plants.by_ref().take(CAPACITY).for_each(|plant| keep_out.push(plant, at(0), MARGIN).expect("there is room"));
+        plants.by_ref().take(CAPACITY).for_each(|plant| keep_out.push(&plant, at(0), MARGIN).expect("there is room"));
         keep_out.leave(at(1200));
         for plant in plants.by_ref().take(3) {
-            keep_out.push(plant, at(1350), MARGIN).expect("three are behind");
+            keep_out.push(&plant, at(1350), MARGIN).expect("three are behind");
             assert!(closed(&keep_out, 0, 1294) && !closed(&keep_out, 1295, 1404) && closed(&keep_out, 1405, 1405));
         }
-        assert_eq!(keep_out.push(plants.next().expect("more"), at(1350), MARGIN), Err(ScheduleFull));
+        assert_eq!(keep_out.push(&plants.next().expect("more"), at(1350), MARGIN), Err(ScheduleFull));
     }
 
     #[test]
     fn far_ground_is_dropped_before_the_counter_wraps() {
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
-        keep_out.push(canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
+        keep_out.push(&canopy(1000, 1300), WrappedPosition::new(0), MARGIN).unwrap();
         for step in 1..5000 {
             let tool = WrappedPosition::new(i16::wrapping_mul(step, 1 << 8));
             keep_out.leave(tool - Length(8000));

@@ -37,6 +37,8 @@ pub struct Geometry {
     pub wheel: Wheel,
     /// Ticks in a unit of [`Length`].
     pub scale: LengthScale,
+    /// A unit of [`Length`] in 2^-16 mm.
+    unit: u32,
     /// The settings that are lengths, [`LENGTHS`].
     lengths: [Length; LENGTHS.len()],
     /// Ground guarded on either side of an expected plant: the scatter and half a stem zone.
@@ -50,6 +52,7 @@ impl Geometry {
     pub const NONE: Self = Self {
         wheel: Wheel::NONE,
         scale: LengthScale::TICK,
+        unit: 0,
         lengths: [Length::ZERO; LENGTHS.len()],
         guarded: Length::ZERO,
         memory: Length::ZERO,
@@ -118,12 +121,22 @@ impl Geometry {
         self.wheel = settings.wheel();
         let metre = self.wheel.ticks(1000);
         self.scale = LengthScale::of(metre);
+        self.unit = self.wheel.unit(self.scale);
         for index in 0..LENGTHS.len() {
             let Some(setting) = Setting::from_index(LENGTHS[0] as u8 + index as u8) else { break };
             self.lengths[index] = self.length(settings, setting, excess);
         }
         self.guarded = self.guard_scatter() + Length(self.stem_zone().0 >> 1);
         self.memory = Length(self.scale.length(metre).0 * MEMORY_M);
+    }
+
+    /// A length in millimetres, rounded toward zero, limited to 16 bits: [`Wheel::millimetres`] of its ticks. With a wheel that is
+    /// too coarse for work, it is wrong from 65 m on.
+    #[cfg_attr(target_arch = "avr", inline(never))]
+    pub fn millimetres(&self, length: Length) -> i16 {
+        let magnitude = u32::from(length.0.unsigned_abs()).wrapping_mul(self.unit);
+        let millimetres = ((magnitude >> 16) as u16).min(i16::MAX as u16) as i16;
+        if length < Length::ZERO { -millimetres } else { millimetres }
     }
 
     /// A setting in millimetres as a length, with slip.
@@ -194,6 +207,7 @@ impl Leads {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::TICKS_PER_M_LEAST;
 
     #[test]
     fn the_stretch_to_stay_in_lies_within_the_stretch_to_come_in() {
@@ -240,6 +254,21 @@ mod tests {
             ]);
             let Leads { out, back, response } = Leads::at(speed, expected, &settings);
             assert_eq!([out.0, back.0, response.0], expected_leads);
+        }
+    }
+
+    #[test]
+    fn every_length_has_the_millimetres_of_its_ticks() {
+        for ticks_per_m in (TICKS_PER_M_LEAST..=20_000).step_by(37) {
+            let geometry = Geometry::of(&Settings::with(&[(Setting::TicksPerM, ticks_per_m)]), 0);
+            for length in (i16::MIN..=i16::MAX).map(Length) {
+                let ticks = geometry.scale.ticks(length);
+                assert_eq!(
+                    geometry.millimetres(length),
+                    geometry.wheel.millimetres(ticks),
+                    "{length:?}, {ticks_per_m}"
+                );
+            }
         }
     }
 

@@ -147,16 +147,16 @@ impl SecondBeam {
         }
         // Greatest difference between the widths of a pair.
         let same = least + Length(4);
-        let near = apart.0 as u16 / 8;
+        let near = apart.0 >> 3;
         let (mut bit, mut fitting, mut travel, mut is_near) = (1_u8, 0_u8, Length::ZERO, false);
         for first in self.passed.iter().take(self.awaited.into()) {
             let (off, wider) = (detection.leading - first.leading, detection.width() - first.width);
             // At the expected position, with a tolerance for a change of slip.
-            if !is_over && self.slip.is_known() && off.0.unsigned_abs() <= near {
+            if !is_over && self.slip.is_known() && (-near..=near).contains(&off.0) {
                 self.expected_to = position + first.width + same;
             }
             // From 25 % less to 50 % more: slip of 30 % in either direction.
-            if (off.0 as u16).wrapping_add(2 * near) <= 6 * near {
+            if (-2 * near..=4 * near).contains(&off.0) {
                 is_near = true;
                 if wider <= same && wider >= -same {
                     fitting |= bit;

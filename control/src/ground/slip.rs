@@ -3,7 +3,8 @@
 //! Consecutive detections have to agree before a slip is trusted: two, or three if the slip jumps. After `WITHOUT_SLIP` detections
 //! without agreement the slip is unknown.
 
-use crate::units::Length;
+use crate::units::{Length, share};
+use core::num::NonZero;
 
 /// Consecutive detections without a slip until it is unknown: as few as a plant with its weeds, as many as the leaves of a canopy.
 const WITHOUT_SLIP: u8 = 6;
@@ -98,7 +99,7 @@ impl Slip {
     pub(super) fn measure(&mut self, apart: Length, travel: Length) {
         let trusted = self.excess();
         let turned = (Self::WHOLE + i16::from(trusted)) as u16;
-        let turned = u32::from(turned) * u32::from(travel.0 as u16) / u32::from((apart.0 as u16).max(1));
+        let turned = share(turned, travel.0 as u16, NonZero::new(apart.0 as u16).unwrap_or(NonZero::<u16>::MIN));
         let excess = turned as i16 - Self::WHOLE;
         let (last, now) = (self.last, excess as i8);
         self.last = now;

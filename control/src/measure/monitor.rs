@@ -10,7 +10,7 @@
 
 use crate::{
     alarm::Alarm,
-    units::{Coarse, Instant, Position},
+    units::{Coarse, Position},
 };
 
 /// The time over which reversals are counted.
@@ -148,8 +148,8 @@ impl EncoderMonitor {
     };
 
     /// Starts with the machine standing at `position`.
-    pub const fn init(&mut self, now: Instant, position: Position) {
-        let (now, count) = (now.coarse(), position.count() as u16);
+    pub const fn init(&mut self, now: Coarse, position: Position) {
+        let count = position.count() as u16;
         (self.anchor, self.last) = (count, count);
         (self.progress_at, self.read_at, self.period_since) = (now, now, now);
         (self.took, self.took_before, self.stands) = (Short::MAX, Short::MAX, true);
@@ -162,8 +162,7 @@ impl EncoderMonitor {
     /// fewer.
     #[cfg_attr(target_arch = "avr", inline(never))]
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn read(&mut self, now: Instant, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
-        let now = now.coarse();
+    pub fn read(&mut self, now: Coarse, position: Position, doubted: u8, progress: u8) -> Option<Alarm> {
         let count = position.count() as u16;
         if now.since(self.period_since) >= PERIOD {
             self.period_since = now;
@@ -305,13 +304,12 @@ impl BeamMonitor {
     pub const NONE: Self = Self { edges: 0, since: Coarse::ZERO, short: 0, broke_at: Coarse::ZERO, broken: false };
 
     /// Starts counting.
-    pub const fn init(&mut self, now: Instant) {
-        self.since = now.coarse();
+    pub const fn init(&mut self, now: Coarse) {
+        self.since = now;
     }
 
     /// Takes a change of the beam's level. Returns whether it has changed too often.
-    pub fn edge(&mut self, now: Instant, broken: bool) -> bool {
-        let now = now.coarse();
+    pub fn edge(&mut self, now: Coarse, broken: bool) -> bool {
         if now.since(self.since) >= FLICKER_PERIOD {
             (self.edges, self.since) = (0, now);
         }
@@ -336,10 +334,10 @@ impl BeamMonitor {
     }
 
     /// The alarm for detections that fit no crop. They are a fault of the beam if its breaks were short.
-    pub fn explain(&self, alarm: Alarm, now: Instant) -> Alarm {
+    pub fn explain(&self, alarm: Alarm, now: Coarse) -> Alarm {
         let is_of_breaks = match alarm {
             // An object that stays in the beam is no short break.
-            Alarm::BeamBlocked => now.coarse().since(self.broke_at) <= SHORT_BREAK,
+            Alarm::BeamBlocked => now.since(self.broke_at) <= SHORT_BREAK,
             Alarm::BeamBlind | Alarm::SecondBeamBlind | Alarm::ScheduleFull | Alarm::CropUnknown => true,
             _ => false,
         };
@@ -372,14 +370,14 @@ mod tests {
     /// A monitor of a standing machine.
     fn standing() -> EncoderMonitor {
         let mut monitor = EncoderMonitor::NONE;
-        monitor.init(Instant::at_ms(0), Position::new(0));
+        monitor.init(Coarse::at_ms(0), Position::new(0));
         monitor
     }
 
     /// The first alarm within seven seconds, and its time in ms. `position` gives the encoder's position at each millisecond.
     fn first_alarm(position: impl Fn(u32) -> u32) -> Option<(u32, Alarm)> {
         let mut monitor = standing();
-        (1..7000).find_map(|ms| Some((ms, monitor.read(Instant::at_ms(ms), Position::new(position(ms) as i32), 0, 4)?)))
+        (1..7000).find_map(|ms| Some((ms, monitor.read(Coarse::at_ms(ms), Position::new(position(ms) as i32), 0, 4)?)))
     }
 
     #[test]
@@ -393,7 +391,7 @@ mod tests {
         let mut monitor = standing();
         for ms in 0..100 {
             let position = if ms < 60 { ms.min(40) } else { ms - 20 };
-            monitor.read(Instant::at_ms(ms), Position::new(position as i32), 0, 4);
+            monitor.read(Coarse::at_ms(ms), Position::new(position as i32), 0, 4);
             assert_eq!(monitor.is_quiet(), (50..64).contains(&ms), "{ms} ms");
         }
     }
@@ -418,7 +416,7 @@ mod tests {
     fn more_than_40_edges_in_a_tenth_of_a_second_are_flicker() {
         let first_alarm = |every_ms: u32| {
             let mut monitor = BeamMonitor::NONE;
-            (1..200).find(|edge| monitor.edge(Instant::at_ms(every_ms * (edge - 1)), edge % 2 == 1))
+            (1..200).find(|edge| monitor.edge(Coarse::at_ms(every_ms * (edge - 1)), edge % 2 == 1))
         };
         assert_eq!(first_alarm(2), Some(41));
         assert_eq!(first_alarm(3), None, "34 in a tenth of a second");

@@ -72,9 +72,9 @@ impl Quadrature {
 /// the ticks are then 12 us apart. The interrupt samples again within 8 us.
 const CAN_BE_MISSED: u16 = 16;
 
-/// Speed in ticks a second above which an edge may be missed, so jumps count: edges are less than 50 us apart. No weeder with an
-/// encoder of 0.2 mm or more is as fast.
-pub const FAST: u16 = 20_000;
+/// At a speed of more than this distance a second an edge may be missed, so jumps count: edges are less than 50 us apart. No weeder
+/// with an encoder of 0.2 mm or more is as fast.
+pub const FAST: Ticks = Ticks(20_000);
 
 /// Most ticks reported as doubted: more change nothing.
 const MOST_DOUBTED: u16 = 32;

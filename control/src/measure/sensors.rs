@@ -10,13 +10,15 @@ use super::{
     speed::SpeedMeter,
     switch::Switch,
 };
-use crate::units::{Instant, LengthScale, Position};
+use crate::units::{Coarse, Instant, LengthScale, Position};
 
 /// The machine's sensors.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     /// The last readings.
     pub readings: Readings,
+    /// The time of the last readings, see [`follow_clock`](Self::follow_clock).
+    pub now: Coarse,
     /// The odometer's position: the count without the ticks that noise added.
     pub position: Position,
     /// The work switch.
@@ -41,6 +43,7 @@ impl Sensors {
         let (start, position) = (Instant::ZERO, Position::new(0));
         Self {
             readings: Readings { stack_free: 0, ..Readings::new(start, position) },
+            now: Coarse::ZERO,
             position,
             switch: Switch::NONE,
             end_switch: Switch::NONE,
@@ -55,7 +58,9 @@ impl Sensors {
     /// Starts with the first `readings`. The beam's level is `broken`.
     #[inline(always)]
     pub const fn init(&mut self, broken: bool, scale: LengthScale) {
-        let Readings { now, position, jumps, switch_on, end_switch_on, .. } = self.readings;
+        let Readings { position, jumps, switch_on, end_switch_on, .. } = self.readings;
+        self.follow_clock();
+        let now = self.now;
         (self.position, self.beam_broken) = (position, broken);
         self.switch.init(now, switch_on);
         self.end_switch.init(now, end_switch_on);
@@ -63,5 +68,10 @@ impl Sensors {
         self.encoder.init(now, position);
         self.beam.init(now);
         self.meter.init(scale.wrap(position), now);
+    }
+
+    /// Takes the time of new readings in coarse steps: once, because each conversion takes more code than its result.
+    pub const fn follow_clock(&mut self) {
+        self.now = self.readings.now.coarse();
     }
 }

@@ -9,7 +9,8 @@
 //! [`SpeedMeter::expected`] adds what the machine gains in 100 ms. The gain shows in the distance of the averaging time, compared with
 //! its mean over another 80 ms.
 
-use crate::units::{Coarse, Instant, Speed, WrappedPosition};
+use crate::units::{Coarse, Speed, WrappedPosition, share};
+use core::num::NonZero;
 
 /// The shortest time between two samples. With their number it sets the averaging time. It is long enough that ticks and turns
 /// cause less than half a percent of error at 1 km/h. It is short enough to follow a walking person.
@@ -70,15 +71,15 @@ impl SpeedMeter {
     };
 
     /// A meter of a machine that stands at `position`.
-    pub const fn new(position: WrappedPosition, now: Instant) -> Self {
+    pub const fn new(position: WrappedPosition, now: Coarse) -> Self {
         let mut meter = Self::NONE;
         meter.init(position, now);
         meter
     }
 
     /// Starts with the machine standing at `position`.
-    pub const fn init(&mut self, position: WrappedPosition, now: Instant) {
-        self.last = Sample { ticks: position.count() as u16, time: now.coarse() };
+    pub const fn init(&mut self, position: WrappedPosition, now: Coarse) {
+        self.last = Sample { ticks: position.count() as u16, time: now };
         self.patience = STANDSTILL;
     }
 
@@ -98,8 +99,8 @@ impl SpeedMeter {
 
     /// Takes a reading. Returns whether it may have changed the speeds. The caller calls it at least every few milliseconds.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn read(&mut self, now: Instant, position: WrappedPosition) -> bool {
-        let reading = Sample { ticks: position.count() as u16, time: now.coarse() };
+    pub fn read(&mut self, now: Coarse, position: WrappedPosition) -> bool {
+        let reading = Sample { ticks: position.count() as u16, time: now };
         if reading.ticks != self.last.ticks {
             self.moved(reading)
         } else {
@@ -121,9 +122,9 @@ impl SpeedMeter {
         }
         let oldest = self.samples[usize::from((self.next + SAMPLES - self.count) % SAMPLES)];
         self.remember(reading);
+        let Some(time) = NonZero::new(reading.time.since(oldest.time)) else { return false };
         let distance = reading.ticks.wrapping_sub(oldest.ticks).cast_signed();
-        let time = reading.time.since(oldest.time);
-        let speed = u32::from(distance.unsigned_abs()) * Coarse::STEPS_PER_SECOND / u32::from(time);
+        let speed = share(distance.unsigned_abs(), Coarse::STEPS_PER_SECOND as u16, time);
         let speed = speed.min(FASTEST.into()) as u16;
         self.speed = Speed(if distance < 0 { -speed.cast_signed() } else { speed.cast_signed() });
         let gain = distance.wrapping_sub(self.trend >> 3);
@@ -138,7 +139,7 @@ impl SpeedMeter {
     }
 
     fn remember(&mut self, reading: Sample) {
-        self.samples[usize::from(self.next)] = reading;
+        self.samples[usize::from(self.next % SAMPLES)] = reading;
         self.next = (self.next + 1) % SAMPLES;
         self.count = (self.count + 1).min(SAMPLES);
     }

@@ -2,7 +2,7 @@
 //!
 //! Only a change counts: a switch that is on at start-up has no effect until it has been off.
 
-use crate::units::{Coarse, Instant};
+use crate::units::Coarse;
 
 /// Contacts bounce for a few milliseconds. A level counts once it has lasted this long.
 const SETTLE: u16 = Coarse::steps_in_ms(20);
@@ -20,8 +20,8 @@ impl Switch {
     pub const NONE: Self = Self { on: false, steady_at: Coarse::ZERO };
 
     /// Takes the level at start-up.
-    pub const fn init(&mut self, now: Instant, on: bool) {
-        (self.on, self.steady_at) = (on, now.coarse());
+    pub const fn init(&mut self, now: Coarse, on: bool) {
+        (self.on, self.steady_at) = (on, now);
     }
 
     /// Whether it is on.
@@ -31,8 +31,7 @@ impl Switch {
 
     /// Takes the switch's level. Returns the new state when it changes.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn read(&mut self, now: Instant, on: bool) -> Option<bool> {
-        let now = now.coarse();
+    pub fn read(&mut self, now: Coarse, on: bool) -> Option<bool> {
         if on == self.on {
             self.steady_at = now;
         }
@@ -52,12 +51,12 @@ mod tests {
     #[test]
     fn a_switch_that_is_on_from_the_start_counts_only_after_it_has_been_off() {
         let mut switch = Switch { on: true, ..Switch::NONE };
-        assert_eq!(switch.read(Instant::at_ms(0), true), None);
-        assert_eq!(switch.read(Instant::at_ms(1000), true), None);
-        assert_eq!(switch.read(Instant::at_ms(1001), false), None);
-        assert_eq!(switch.read(Instant::at_ms(1021), false), Some(false));
-        assert_eq!(switch.read(Instant::at_ms(1022), true), None);
-        assert_eq!(switch.read(Instant::at_ms(1042), true), Some(true));
+        assert_eq!(switch.read(Coarse::at_ms(0), true), None);
+        assert_eq!(switch.read(Coarse::at_ms(1000), true), None);
+        assert_eq!(switch.read(Coarse::at_ms(1001), false), None);
+        assert_eq!(switch.read(Coarse::at_ms(1021), false), Some(false));
+        assert_eq!(switch.read(Coarse::at_ms(1022), true), None);
+        assert_eq!(switch.read(Coarse::at_ms(1042), true), Some(true));
     }
 
     #[test]
@@ -66,7 +65,7 @@ mod tests {
         let mut thrown = 0;
         for millisecond in 0..100 {
             let on = millisecond >= 15 || millisecond % 3 == 0;
-            thrown += u8::from(switch.read(Instant::at_ms(millisecond), on).is_some());
+            thrown += u8::from(switch.read(Coarse::at_ms(millisecond), on).is_some());
         }
         assert_eq!(thrown, 1);
     }

@@ -6,8 +6,9 @@
 
 use crate::{
     operate::command_error::CommandError,
-    units::{Coarse, Instant, Position},
+    units::{Coarse, Instant, Position, share},
 };
+use core::num::NonZero;
 
 /// The shortest stretch that gives the ticks a metre to better than 0.1 %.
 pub const SHORTEST_MM: u16 = 1000;
@@ -80,6 +81,9 @@ const SPARE_MS: u8 = 7;
 /// Longest wait of a command in fixed frames.
 const FRAME_MS: u8 = 20;
 
+/// Coarse steps in 8 ms.
+const STEPS_IN_8_MS: NonZero<u16> = NonZero::new(Coarse::steps_in_ms(8)).unwrap();
+
 /// How late the end switch may be read: the loop sleeps until the clock's interrupt, every 1.024 ms.
 const LATE_MS: u16 = 1;
 
@@ -143,7 +147,7 @@ impl Swings {
         if self.watched && !self.followed && switch_on == self.tool_out() {
             self.followed = true;
             // A step more, because both moments are rounded down.
-            let lasted_ms = ((u32::from(lasted) + 1) * 8 / 125) as u16;
+            let lasted_ms = share(lasted + 1, 8, STEPS_IN_8_MS) as u16;
             // No servo is that fast: the switch is stuck or in the wrong position.
             if lasted_ms < 5 {
                 return Some(Outcome::Failed);

@@ -1,9 +1,10 @@
 //! The last classified detections, for the console and for labels.
 
-use crate::ground::{class::Vote, features::Features};
-use heapless::Vec;
-
-/// Detections remembered.
+use crate::ground::{
+    class::{Class, Vote},
+    features::Features,
+};
+/// Detections remembered; a power of two, for short arithmetic.
 const CAPACITY: usize = 16;
 
 /// A classified detection: the values from which its features are calculated, which take less room.
@@ -19,6 +20,15 @@ pub struct Classified {
 }
 
 impl Classified {
+    /// A place without a detection: zeros, which need no copy in flash.
+    const NONE: Self = Self {
+        speed_class_mm_s: 0,
+        spacing_mm: 0,
+        width_mm: 0,
+        vote: Vote { class: Class::Plant, votes: 0 },
+        label: None,
+    };
+
     /// Its features.
     pub fn features(&self) -> Features {
         Features::describe(self.speed_class_mm_s, self.spacing_mm, self.width_mm)
@@ -28,54 +38,55 @@ impl Classified {
 /// The last detections.
 #[derive(Clone, Debug)]
 pub struct Detections {
-    detections: Vec<Classified, CAPACITY, u8>,
+    detections: [Classified; CAPACITY],
+    len: u8,
     /// The index of the oldest, which the next one replaces if there is no room.
     oldest: u8,
 }
 
 impl Detections {
     /// No detections.
-    pub const NONE: Self = Self { detections: Vec::new(), oldest: 0 };
+    pub const NONE: Self = Self { detections: [Classified::NONE; CAPACITY], len: 0, oldest: 0 };
 
     /// Adds a detection, and drops the oldest if there is no room.
     pub fn remember(&mut self, detection: Classified) {
-        if let Err(detection) = self.detections.push(detection)
-            && let Some(oldest) = self.detections.get_mut(usize::from(self.oldest))
-        {
-            *oldest = detection;
+        self.detections[self.place(self.len)] = detection;
+        if usize::from(self.len) < CAPACITY {
+            self.len += 1;
+        } else {
             self.oldest = (self.oldest + 1) % CAPACITY as u8;
         }
     }
 
     /// Whether there are no detections.
     pub fn is_empty(&self) -> bool {
-        self.detections.is_empty()
+        self.len == 0
     }
 
     /// The number of detections.
     pub fn len(&self) -> u8 {
-        self.detections.len() as u8
+        self.len
     }
 
     /// A detection, counted from the oldest.
     pub fn get(&self, number: u8) -> Option<&Classified> {
-        if number < self.len() { self.detections.get(self.place(number)) } else { None }
+        (number < self.len).then(|| &self.detections[self.place(number)])
     }
 
     /// The last detection.
     pub fn last(&self) -> Option<&Classified> {
-        self.get(self.len().checked_sub(1)?)
+        self.get(self.len.checked_sub(1)?)
     }
 
     /// The last detection, to change.
     pub fn newest(&mut self) -> Option<&mut Classified> {
-        let last = self.place(self.len().checked_sub(1)?);
-        self.detections.get_mut(last)
+        let last = self.place(self.len.checked_sub(1)?);
+        Some(&mut self.detections[last])
     }
 
     /// The index of a detection.
     fn place(&self, number: u8) -> usize {
-        usize::from((self.oldest + number) % CAPACITY as u8)
+        usize::from(self.oldest + number) % CAPACITY
     }
 }
 

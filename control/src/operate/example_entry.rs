@@ -19,7 +19,9 @@ impl ExampleEntry {
         if let Some(next) = self.features.get_mut(usize::from(self.count)) {
             *next = feature;
         }
-        self.count = self.count.saturating_add(1);
+        if usize::from(self.count) <= features::COUNT {
+            self.count += 1;
+        }
     }
 
     /// Returns the features if exactly five were entered, and clears the buffer.

@@ -1,6 +1,6 @@
 //! Curves for a plotter: the format, and when the next points are due.
 
-use crate::units::{Coarse, Instant};
+use crate::units::Coarse;
 
 /// Time between two points of a plotter's curves.
 const PERIOD: u16 = Coarse::steps_in_ms(50);
@@ -29,8 +29,8 @@ impl Telemetry {
     pub const NONE: Self = Self { plot: Plot::Off, drawn_at: Coarse::ZERO };
 
     /// Starts: the next points are due a period from now.
-    pub const fn init(&mut self, now: Instant) {
-        self.drawn_at = now.coarse();
+    pub const fn init(&mut self, now: Coarse) {
+        self.drawn_at = now;
     }
 
     /// Selects the curves, or none.
@@ -39,11 +39,11 @@ impl Telemetry {
     }
 
     /// The format whose next points are due, 20 times a second.
-    pub fn due(&mut self, now: Instant) -> Option<Plot> {
-        if self.plot == Plot::Off || now.coarse().since(self.drawn_at) < PERIOD {
+    pub fn due(&mut self, now: Coarse) -> Option<Plot> {
+        if self.plot == Plot::Off || now.since(self.drawn_at) < PERIOD {
             return None;
         }
-        self.drawn_at = now.coarse();
+        self.drawn_at = now;
         Some(self.plot)
     }
 }

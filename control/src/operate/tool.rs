@@ -3,7 +3,7 @@
 use crate::{
     named::named,
     operate::servo::HalfMicros,
-    units::{Instant, Slow, count},
+    units::{Slow, count},
 };
 
 named! {
@@ -40,8 +40,8 @@ impl Tool {
     pub const NONE: Self = Self { out: false, pulse: 0, since: Slow::ZERO, awaits_ground: false, late: 0 };
 
     /// Starts with the tool out of the row.
-    pub const fn init(&mut self, now: Instant) {
-        (self.out, self.since) = (true, now.slow());
+    pub const fn init(&mut self, now: Slow) {
+        (self.out, self.since) = (true, now);
     }
 
     /// Whether it is commanded out.
@@ -56,8 +56,7 @@ impl Tool {
 
     /// Records the servo's pulse.
     #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub const fn order(&mut self, pulse: HalfMicros, now: Instant) {
-        let now = now.slow();
+    pub const fn order(&mut self, pulse: HalfMicros, now: Slow) {
         if pulse != self.pulse {
             (self.pulse, self.since) = (pulse, now);
         } else if now.since(self.since) > SETTLED {
@@ -66,12 +65,12 @@ impl Tool {
     }
 
     /// Whether the servo has had this pulse for this many milliseconds.
-    pub fn has_held(&self, pulse: HalfMicros, now: Instant, milliseconds: u16) -> bool {
+    pub fn has_held(&self, pulse: HalfMicros, now: Slow, milliseconds: u16) -> bool {
         pulse == self.pulse && self.is_settled(now, milliseconds)
     }
 
     /// Closed ground has reached the tool. Returns whether the command came less than `milliseconds` before, and counts that.
-    pub fn count_if_late(&mut self, now: Instant, milliseconds: u16) -> bool {
+    pub fn count_if_late(&mut self, now: Slow, milliseconds: u16) -> bool {
         self.awaits_ground = false;
         let is_late = !self.is_settled(now, milliseconds);
         if is_late {
@@ -92,20 +91,21 @@ impl Tool {
 
     /// Whether the servo has had its pulse for this many milliseconds.
     #[cfg_attr(target_arch = "avr", inline(never))]
-    fn is_settled(&self, now: Instant, milliseconds: u16) -> bool {
-        now.slow().since(self.since) >= milliseconds
+    fn is_settled(&self, now: Slow, milliseconds: u16) -> bool {
+        now.since(self.since) >= milliseconds
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Instant;
 
     #[test]
     fn a_pulse_that_is_older_than_the_clock_counts_is_still_held() {
         let mut tool = Tool::NONE;
-        tool.init(Instant::ZERO);
-        let at = |seconds: f64| Instant::at_ms((seconds * 1000.0) as u32);
+        tool.init(Slow::ZERO);
+        let at = |seconds: f64| Instant::at_ms((seconds * 1000.0) as u32).slow();
         for quarter in 0..1200 {
             let seconds = 0.25 * f64::from(quarter);
             tool.order(3000, at(seconds));

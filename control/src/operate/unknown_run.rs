@@ -38,7 +38,7 @@ impl UnknownRun {
         } else if (1..NARROW_MM).contains(&width_mm) {
             // A leaf that moves in the beam of a standing machine has width 0.
             self.any_weed |= class == Class::Weed;
-            self.count = self.count.saturating_add(1);
+            self.count += i8::from(self.count < i8::MAX);
         }
         self.any_weed && enough > 0 && self.count >= enough as i8
     }

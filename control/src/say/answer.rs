@@ -1,10 +1,10 @@
 //! Answers, a line at a time.
 
 use super::{
-    command::ParseError,
-    errors::{write_command_error, write_parse_error},
+    command::{ParseError, Wrong},
+    errors::write_command_error,
     line::Line,
-    lines::{Counts, Status, write_alarm, write_detection, write_example, write_setting},
+    lines::{Counts, Status, write_alarm, write_allowed, write_detection, write_example, write_setting},
     names,
     packed::Text,
     texts,
@@ -18,7 +18,7 @@ use crate::{
     weeder::Controller,
 };
 
-/// The part of an answer that is not yet written.
+/// The part of an answer that is not yet written. Two bytes, which the chip returns in registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 // `Greeting` is 0, like memory before start-up.
 #[repr(u8)]
@@ -28,8 +28,8 @@ pub enum Answer {
     /// Nothing.
     #[default]
     Done,
-    /// The answer to the console's command, which has not been run yet, or to an error.
-    Typed(Result<(), ParseError>),
+    /// The answer to the console's command, which has not been run yet.
+    Typed,
     /// The commands from this index on.
     Help(u8),
     /// What a setting means.
@@ -54,10 +54,16 @@ pub enum Answer {
     Version,
     /// `ok`.
     Ok,
-    /// A parse error.
-    Wrong(ParseError),
-    /// A command error, and the command's setting.
-    Refused(CommandError, Option<Setting>),
+    /// The line says nothing that is known.
+    Wrong(Wrong),
+    /// The command takes other arguments.
+    Usage(Word),
+    /// The setting takes a value within its range.
+    OutOfRange(Setting),
+    /// The setting can be changed in HOLD only.
+    HoldToSet(Setting),
+    /// A command error.
+    Refused(CommandError),
 }
 
 impl Answer {
@@ -70,7 +76,7 @@ impl Answer {
     #[inline(never)]
     pub fn write_line<C: Classifier, M: Memory>(&mut self, controller: &Controller<C, M>, line: &mut Line) {
         *self = match *self {
-            Self::Done | Self::Typed(_) => return,
+            Self::Done | Self::Typed => return,
             Self::Greeting => {
                 line.add(texts::WEEDER);
                 line.say(texts::RESET_BY);
@@ -149,16 +155,42 @@ impl Answer {
                 line.say(texts::OK);
                 Self::Done
             }
-            Self::Wrong(error) => {
-                write_parse_error(error, line);
-                Self::Done
-            }
-            Self::Refused(error, setting) => {
-                write_command_error(error, setting, controller, line);
+            Self::Wrong(_) | Self::Usage(_) | Self::OutOfRange(_) | Self::HoldToSet(_) | Self::Refused(_) => {
+                self.write_error(controller, line);
                 Self::Done
             }
         };
         line.say(texts::END);
+    }
+
+    /// Builds the line of an answer that is an error.
+    fn write_error<C: Classifier, M: Memory>(self, controller: &Controller<C, M>, line: &mut Line) {
+        line.say(texts::ERROR);
+        match self {
+            Self::Wrong(wrong) => line.add(wrong.text()),
+            Self::Usage(word) => {
+                line.say(texts::USAGE);
+                line.add(word.text());
+                line.add(word.takes());
+            }
+            Self::OutOfRange(setting) => write_allowed(setting.text(), setting, line),
+            Self::HoldToSet(setting) => {
+                line.add(setting.text());
+                line.say(texts::HOLD_TO_SET);
+            }
+            Self::Refused(error) => write_command_error(error, controller, line),
+            _ => {}
+        }
+    }
+}
+
+impl From<ParseError> for Answer {
+    fn from(error: ParseError) -> Self {
+        match error {
+            ParseError::Line(wrong) => Self::Wrong(wrong),
+            ParseError::Usage(word) => Self::Usage(word),
+            ParseError::Value(setting) => Self::OutOfRange(setting),
+        }
     }
 }
 

@@ -83,11 +83,10 @@ pub fn parse(line: &[u8]) -> Result<Command, ParseError> {
 /// Parses a line into a command that stays where it is. After an error the command has no meaning.
 #[inline(never)]
 fn parse_to(line: &[u8], command: &mut Command) -> Result<(), ParseError> {
-    let (word, rest) = split_word(line);
-    let word = Word::find(word).ok_or(ParseError::Line(Wrong::UnknownCommand))?;
+    let mut rest = line;
+    let Some(word) = Word::find(next_word(&mut rest)) else { return Err(ParseError::Line(Wrong::UnknownCommand)) };
     let usage = Err(ParseError::Usage(word));
-    let (first, rest) = split_word(rest);
-    let (second, rest) = split_word(rest);
+    let (first, second) = (next_word(&mut rest), next_word(&mut rest));
     let (mut value, mut force) = (TEST_SPEED_MM_S, false);
     let kind = if first.is_empty() {
         NOTHING
@@ -113,14 +112,15 @@ fn parse_to(line: &[u8], command: &mut Command) -> Result<(), ParseError> {
         row += 1;
     };
     let is_complete = if second.is_empty() { takes & VALUE == 0 } else { takes != 0 };
-    if !is_complete || !split_word(rest).0.is_empty() {
+    if !is_complete || !next_word(&mut rest).is_empty() {
         return usage;
     }
     // Another row names no setting, and none that is a switch stands for it.
-    let setting = match kind {
-        SETTING => Setting::find(first).ok_or(ParseError::Line(Wrong::UnknownSetting))?,
-        _ => Setting::TicksPerRev,
-    };
+    let mut setting = Setting::TicksPerRev;
+    if kind == SETTING {
+        let Some(named) = Setting::find(first) else { return Err(ParseError::Line(Wrong::UnknownSetting)) };
+        setting = named;
+    }
     if !second.is_empty() {
         match Argument::find(second) {
             Some(Argument::Force) if takes & FORCE != 0 => force = true,
@@ -137,12 +137,14 @@ fn parse_to(line: &[u8], command: &mut Command) -> Result<(), ParseError> {
     Ok(())
 }
 
-/// The next word of a line, empty at its end, and what follows it.
+/// Takes the next word of a line, empty at its end.
 #[inline(never)]
-fn split_word(line: &[u8]) -> (&[u8], &[u8]) {
+fn next_word<'a>(line: &mut &'a [u8]) -> &'a [u8] {
     let start = line.iter().position(|byte| !is_blank(byte)).unwrap_or(line.len());
-    let line = &line[start..];
-    line.split_at(line.iter().position(is_blank).unwrap_or(line.len()))
+    let begun = &line[start..];
+    let (word, rest) = begun.split_at(begun.iter().position(is_blank).unwrap_or(begun.len()));
+    *line = rest;
+    word
 }
 
 fn is_blank(byte: &u8) -> bool {
@@ -214,7 +216,7 @@ impl LineBuffer {
     #[inline(never)]
     pub fn read(&mut self, command: &mut Command) -> Option<Result<(), ParseError>> {
         let line = match mem::replace(&mut self.error, Wrong::Nothing) {
-            Wrong::Nothing if split_word(&self.characters).0.is_empty() => None,
+            Wrong::Nothing if next_word(&mut &self.characters[..]).is_empty() => None,
             Wrong::Nothing => Some(parse_to(&self.characters, command)),
             wrong => Some(Err(ParseError::Line(wrong))),
         };

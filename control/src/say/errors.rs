@@ -1,51 +1,30 @@
-//! Error lines: what is wrong, and what is allowed.
+//! Command errors: what is wrong, and what is allowed.
 
 use super::lines::write_allowed;
 use crate::{
     ground::class::Classifier,
     memory::Memory,
     operate::command_error::CommandError,
-    say::{command::ParseError, line::Line, texts, words::Word},
+    say::{line::Line, texts, words::Word},
     settings::Setting,
     weeder::Controller,
 };
 
-pub(super) fn write_parse_error(error: ParseError, line: &mut Line) {
-    line.say(texts::ERROR);
-    let what = match error {
-        ParseError::Usage(word) => {
-            line.say(texts::USAGE);
-            line.add(word.text());
-            word.takes()
-        }
-        ParseError::Value(setting) => return write_allowed(setting.text(), setting, line),
-        ParseError::Line(wrong) => wrong.text(),
-    };
-    line.add(what);
-}
-
 pub(super) fn write_command_error<C: Classifier, M: Memory>(
     error: CommandError,
-    setting: Option<Setting>,
     controller: &Controller<C, M>,
     line: &mut Line,
 ) {
-    line.say(texts::ERROR);
-    match (error, setting) {
-        (CommandError::OutOfRange, Some(setting)) => return write_allowed(setting.text(), setting, line),
-        // `servo US` is the only other command with a range.
-        (CommandError::OutOfRange, None) => return write_allowed(Word::Servo.text(), Setting::ServoOutUs, line),
-        (CommandError::NotInHold, Some(setting)) => {
-            line.add(setting.text());
-            return line.say(texts::HOLD_TO_SET);
-        }
-        (CommandError::TakenForPlant | CommandError::TakenForWeed, _) => line.say(texts::TAKEN_FOR),
-        (CommandError::WheelDiffers, _) => {
+    match error {
+        // `servo US` is the only command with a range that names no setting.
+        CommandError::OutOfRange => return write_allowed(Word::Servo.text(), Setting::ServoOutUs, line),
+        CommandError::TakenForPlant | CommandError::TakenForWeed => line.say(texts::TAKEN_FOR),
+        CommandError::WheelDiffers => {
             line.counted(controller.distance().counted());
             line.counted(controller.settings().nominal_ticks_per_m());
         }
-        (CommandError::BeamTooNear, _) => line.counted(controller.needed_mm()),
-        (CommandError::TestSpeed, _) => line.counted(controller.settings().get(Setting::TopSpeedMmS)),
+        CommandError::BeamTooNear => line.counted(controller.needed_mm()),
+        CommandError::TestSpeed => line.counted(controller.settings().get(Setting::TopSpeedMmS)),
         _ => {}
     }
     line.add(error.text());

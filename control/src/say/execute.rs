@@ -4,24 +4,35 @@ use super::{
     answer::Answer,
     command::{Action, Command, ParseError},
 };
-use crate::{ground::class::Classifier, memory::Memory, operate::plot::Plot, settings::Setting, weeder::Controller};
+use crate::{
+    ground::class::Classifier,
+    memory::Memory,
+    operate::{command_error::CommandError, plot::Plot},
+    settings::Setting,
+    weeder::Controller,
+};
 
-/// Runs a line and begins its answer.
+/// Runs a line and begins its answer, for a caller that can do both at once.
+pub fn answer_to<C: Classifier, M: Memory>(
+    line: Result<&Command, ParseError>,
+    controller: &mut Controller<C, M>,
+) -> Answer {
+    match line {
+        Ok(command) => execute(command, controller),
+        Err(error) => refuse(error, controller),
+    }
+}
+
+/// Begins the answer to a line that is no command.
+pub(super) fn refuse<C: Classifier, M: Memory>(error: ParseError, controller: &mut Controller<C, M>) -> Answer {
+    controller.count_command_error();
+    error.into()
+}
+
+/// Runs a command and begins its answer.
 #[inline(never)]
-pub fn execute<C, M>(line: Result<&Command, ParseError>, controller: &mut Controller<C, M>) -> Answer
-where
-    C: Classifier,
-    M: Memory,
-{
-    let command = match line {
-        Ok(command) => command,
-        Err(error) => {
-            controller.count_command_error();
-            return Answer::Wrong(error);
-        }
-    };
+pub fn execute<C: Classifier, M: Memory>(command: &Command, controller: &mut Controller<C, M>) -> Answer {
     let Command { action, setting, number, force } = *command;
-    let mut refused = None;
     let result = match action {
         Action::Help => return Answer::Help(0),
         Action::Explain => return Answer::Explain(setting),
@@ -31,21 +42,21 @@ where
         Action::Version => return Answer::Version,
         Action::Examples => return Answer::Examples(0),
         Action::Dump => return Answer::DumpHeading,
-        Action::Set => {
-            refused = Some(setting);
-            controller.set(setting, number)
-        }
+        Action::Set => match controller.set(setting, number) {
+            Err(CommandError::OutOfRange) => return Answer::OutOfRange(setting),
+            Err(CommandError::NotInHold) => return Answer::HoldToSet(setting),
+            result => result,
+        },
         Action::Save => controller.save(),
         Action::Revert => controller.take_saved(),
         Action::Defaults => controller.take_defaults(),
         Action::CalibrateStart => controller.calibrate_start(),
-        Action::Calibrate => {
-            refused = Some(Setting::TicksPerM);
-            match controller.calibrate(number, force) {
-                Ok(()) => return Answer::Calibrated,
-                refused => refused,
-            }
-        }
+        Action::Calibrate => match controller.calibrate(number, force) {
+            Ok(()) => return Answer::Calibrated,
+            Err(CommandError::OutOfRange) => return Answer::OutOfRange(Setting::TicksPerM),
+            Err(CommandError::NotInHold) => return Answer::HoldToSet(Setting::TicksPerM),
+            result => result,
+        },
         Action::CalibrateServo => controller.calibrate_servo(),
         Action::ServoIn => controller.servo_in(),
         Action::ServoOut => controller.servo_out(),
@@ -89,6 +100,6 @@ where
     };
     match result {
         Ok(()) => Answer::Ok,
-        Err(error) => Answer::Refused(error, refused),
+        Err(error) => Answer::Refused(error),
     }
 }

@@ -46,34 +46,34 @@ macro_rules! line_tables {
                 }
                 Swing "the tool was commanded in or out",
                 Event::Swing { out, position } => "swing" {
-                    " tool=@" place(out) => out: bool, "where it is to be";
+                    " tool=@" place(*out) => out: bool, "where it is to be";
                     " pos=#" number(position.count()) => position: i32,
                         "the machine's position at the command, in encoder ticks";
                 }
                 Slip "a plant passed both beams and told the wheel's slip",
                 Event::Slip { permille } => "slip" {
-                    " permille=#" number(permille) => permille: i32,
+                    " permille=#" number(*permille) => permille: i32,
                         "in thousandths, above 0 where the wheel turns farther than the machine rolls";
                 }
                 State "the state changed",
                 Event::State(state) => "state" {
-                    " is=@" state(state) => mode: Mode, "the new one";
+                    " is=@" state(*state) => mode: Mode, "the new one";
                 }
                 Warning "something that the operator should know of",
                 Event::Warning(warning) => "warning" {
-                    " name=@" warning(warning) => warning: Warning, "which warning";
+                    " name=@" warning(*warning) => warning: Warning, "which warning";
                 }
                 Alarm "an alarm was latched, and the tool is out",
                 Event::Alarm { alarm, position } => "alarm" {
-                    " code=#-#" led(alarm), "how the lamp shows it";
-                    " name=@" alarm(alarm) => alarm: Alarm, "which alarm";
+                    " code=#-#" led(*alarm), "how the lamp shows it";
+                    " name=@" alarm(*alarm) => alarm: Alarm, "which alarm";
                     " pos=#" number(position.count()) => position: i32, "the machine's position, in encoder ticks";
                 }
                 CalibratedBySwitch "the end switch timed the servo",
                 Event::Calibrated { outcome: Outcome::Measured(SwingTimes { out_ms, in_ms }), fits } => "calibrated" {
-                    " lead_out_ms=#" count(out_ms) => out_ms: u16, "the longest time until the tool was out, in ms";
-                    " lead_in_ms=#" count(in_ms) => in_ms: u16, "the shortest time until it began to come back, in ms";
-                    " set=@" answer(fits) => is_set: bool, "whether the leads are set to these times";
+                    " lead_out_ms=#" count(*out_ms) => out_ms: u16, "the longest time until the tool was out, in ms";
+                    " lead_in_ms=#" count(*in_ms) => in_ms: u16, "the shortest time until it began to come back, in ms";
+                    " set=@" answer(*fits) => is_set: bool, "whether the leads are set to these times";
                 }
                 CalibratedByEye "the servo was shown without an end switch: set the leads that you saw",
                 Event::Calibrated { outcome: Outcome::Shown, .. } => "calibrated by=eye" {}

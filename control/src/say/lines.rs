@@ -44,7 +44,8 @@ macro_rules! write_lines {
         /// Builds the line of an event.
         #[inline(never)]
         pub fn write_event(event: &Event, line: &mut Line) {
-            match *event {
+            // By reference: a copy of the whole event would take most registers.
+            match event {
                 $($pattern => {
                     line.say(const { NamedText::of(concat!($beginning, $($part,)* $($tail)?)) });
                     $(kind::$kind(line, $value);)*
@@ -92,8 +93,13 @@ mod kind {
     }
 
     pub(super) fn optional(line: &mut Line, value: Option<i16>) {
-        line.word(if value.is_some() { texts::NUMBER } else { texts::NONE }.text());
-        line.number(value.unwrap_or(0).into());
+        match value {
+            Some(value) => {
+                line.word(texts::NUMBER.text());
+                line.number(value.into());
+            }
+            None => line.word(texts::NONE.text()),
+        }
     }
 
     #[inline(never)]

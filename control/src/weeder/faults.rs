@@ -4,7 +4,7 @@ use super::Controller;
 use crate::{
     alarm::{Alarm, Warning},
     ground::class::{Class, Classifier},
-    measure::readings::Readings,
+    measure::sensors::Sensors,
     memory::Memory,
     operate::{bench::Bench, event::Event},
     settings::Setting,
@@ -24,9 +24,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// The fault in the readings, if any. `doubted` is the number of ticks that may be noise.
     #[cfg_attr(target_arch = "avr", inline(never))]
     pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
-        let Readings { now, end_switch_on, stack_free, .. } = self.sensors.readings;
-        let position = self.sensors.position;
         let working = self.is_working();
+        let Sensors { now, position, .. } = self.sensors;
         let fault = self.sensors.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
         if !self.sensors.encoder.stands() {
             // Movement ends a manual test, with the tool out.
@@ -51,16 +50,20 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if working && self.ground.rolled_back_too_far() {
             return Some(Alarm::RolledBackTooFar);
         }
-        self.sensors.end_switch.read(now, end_switch_on);
+        self.sensors.end_switch.read(self.sensors.now, self.sensors.readings.end_switch_on);
         if self.configuration.get(Setting::EndSwitch) != 0
             && !self.bench.needs_no_end_switch()
             && self.sensors.end_switch.is_on() != self.tool.is_out()
             // After a manual test has ended, the tool has not had its command yet.
-            && self.tool.has_held(self.orders().pulse, now, self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS)
+            && self.tool.has_held(
+                self.pulse(),
+                self.sensors.readings.now.slow(),
+                self.configuration.get(Setting::LeadOutMs) + END_SWITCH_GRACE_MS,
+            )
         {
             return Some(Alarm::ToolStuck);
         }
-        (stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
+        (self.sensors.readings.stack_free < STACK_RESERVE).then_some(Alarm::StackLow)
     }
 
     /// Counts unknown detections and detections of unusual width while the machine works.
@@ -79,7 +82,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if self.tool.awaits_ground() && self.ground.is_closed_at_tool() {
             // The speed may vary by an eighth of the lead.
             let lead_ms = self.configuration.get(Setting::LeadOutMs);
-            if self.tool.count_if_late(self.sensors.readings.now, lead_ms - lead_ms / 8) {
+            if self.tool.count_if_late(self.sensors.readings.now.slow(), lead_ms - lead_ms / 8) {
                 self.events.add(Event::Warning(Warning::LateCommand));
             }
         }

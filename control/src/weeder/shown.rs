@@ -10,7 +10,7 @@ use crate::{
         calibration::Distance, detections::Detections, event::Event, lamp, plot::Plot, state::State, tool::Reason,
     },
     settings::{Setting, Settings},
-    units::{Length, Position, Ticks},
+    units::{Length, Position},
 };
 
 impl<C: Classifier, M: Memory> Controller<C, M> {
@@ -41,7 +41,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The machine's speed in millimetres a second, negative backwards.
     pub fn speed_mm_s(&self) -> i16 {
-        self.ground.millimetres(self.ticks_per_s())
+        self.ground.millimetres(Length(self.sensors.meter.speed().0))
     }
 
     /// Keep-out zones at the tool or ahead of it, with an open detection.
@@ -52,7 +52,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// The distance in mm until the tool has left unseen ground and its margin, rounded up: 0 only once it has.
     pub fn unseen_mm(&self) -> i16 {
         let unseen = self.ground.unseen();
-        self.ground.millimetres(unseen) + i16::from(unseen > Ticks::ZERO)
+        self.ground.millimetres(unseen) + i16::from(unseen > Length::ZERO)
     }
 
     /// Whether there is a second beam.
@@ -72,12 +72,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the wheel turns so fast that an edge can be missed: both channels may then change at once.
     pub fn believes_jumps(&self) -> bool {
-        self.ticks_per_s().0.unsigned_abs() > quadrature::FAST.into()
-    }
-
-    /// The ticks that the machine rolls in a second.
-    fn ticks_per_s(&self) -> Ticks {
-        self.ground.ticks(Length(self.sensors.meter.speed().0))
+        self.sensors.meter.speed().is_beyond(self.ground.scale().length(quadrature::FAST).0 as u16)
     }
 
     /// Whether the beam is broken.
@@ -191,6 +186,6 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The curves whose next points are due, 20 times a second.
     pub fn next_plot(&mut self) -> Option<Plot> {
-        self.telemetry.due(self.sensors.readings.now)
+        self.telemetry.due(self.sensors.now)
     }
 }

@@ -117,7 +117,7 @@ macro_rules! read_lines {
 
         impl From<&Event> for EventLine {
             fn from(event: &Event) -> Self {
-                match *event {
+                match event {
                     $($pattern => Self::$Event { $($($field: $value.into(),)?)* },)*
                 }
             }

@@ -283,7 +283,7 @@ impl Machine for Decisions {
             while self.console.listens()
                 && let Some(byte) = self.typed.pop_front()
             {
-                if self.line.collect(byte) && self.console.take(&mut self.line) {
+                if self.line.collect(byte) && self.console.take(&mut self.line, &mut self.weeder) {
                     begun = self.lines.pop_front();
                 }
             }

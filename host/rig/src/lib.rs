@@ -162,7 +162,7 @@ impl<C: Classifier, M: Memory> Rig<C, M> {
         let mut said = Vec::new();
         for byte in bytes {
             let Some(typed) = self.line.take(byte) else { continue };
-            let mut answer = say::execute(typed.as_ref().map_err(|&error| error), &mut self.controller);
+            let mut answer = say::answer_to(typed.as_ref().map_err(|&error| error), &mut self.controller);
             self.write_all();
             while !answer.is_done() {
                 let mut line = Line::new();
