@@ -82,7 +82,7 @@ fn against_paper(own: Option<&Machine>, json: bool) -> Result<()> {
     if json {
         return say!("{:#}", json!({ "comparisons": comparisons }));
     }
-    say!("{}\n", report::comparison_table(&comparisons))?;
+    say!("{}\n\n{}\n", report::comparison_table(&comparisons), report::remark_table(&comparisons))?;
     let count = |verdict| comparisons.iter().filter(|comparison| comparison.verdict == verdict).count();
     say!(
         "Of {} printed figures {} are right, {} follow from an error before them, and {} are wrong.",
