@@ -167,7 +167,10 @@ fn no_cause_is_printed_twice() {
 fn no_message_in_the_source_repeats_its_cause() {
     let host = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut folders = vec![host.join("../control/src")];
-    folders.extend(std::fs::read_dir(&host).unwrap().map(|entry| entry.unwrap().path().join("src")));
+    for rooms in [host.clone(), host.join("../yard")] {
+        let crates = std::fs::read_dir(rooms).unwrap().map(|entry| entry.unwrap().path().join("src"));
+        folders.extend(crates.filter(|sources| sources.is_dir()));
+    }
     let mut messages = 0;
     while let Some(folder) = folders.pop() {
         for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {

@@ -97,7 +97,7 @@ pub(super) fn basis(columns: &[Column]) -> Result<Basis, NoModel> {
 #[serde(rename_all = "snake_case")]
 pub enum NoModel {
     /// The response does not vary.
-    #[error("it is {value} in every plot: speed and spacing explain nothing")]
+    #[error("it is {} in every plot: speed and spacing explain nothing", crate::table::short(*.value))]
     Constant {
         /// Its value everywhere.
         value: f64,
