@@ -35,7 +35,7 @@ const ADDED: [(&str, &str, &str); 6] = [
         "say/line_tables.rs",
         "            events {\n",
         "Leaning \"the machine leans\", Event::Leaning(degrees) => \"leaning\" {
-            \" degrees=#\" number(degrees) => degrees: i32, \"how far\";
+            \" degrees=#\" number(*degrees) => degrees: i32, \"how far\";
         }\n",
     ),
 ];
