@@ -256,10 +256,26 @@ impl Model {
     /// If no whole detection of this width ended here, within `tolerance`.
     pub fn weed(&mut self, place: i64, width: i64, tolerance: i64) -> Result<(), String> {
         let last = self.stretches.partition_point(|stretch| stretch.trailing <= place);
-        let nearest = |last: usize| &self.stretches[last.saturating_sub(4)..last];
         // The stretch at the frontier has not ended yet.
         let last = if self.is_growing && last == self.stretches.len() { last.saturating_sub(1) } else { last };
-        let shown = nearest(last).to_vec();
+        // While the machine classified it, the beam may have been broken again, and be clear by now.
+        let broken_again = last.checked_sub(1).map(|next| (next, self.stretches[next].leading));
+        for (last, seen_to) in [Some((last, place)), broken_again].into_iter().flatten() {
+            if let Some(whole) = self.whole_detection(last, seen_to, width, tolerance) {
+                self.stretches[whole].iter_mut().for_each(|stretch| stretch.is_free = true);
+                return Ok(());
+            }
+        }
+        if self.stretches[..last].is_empty() && place - width < self.begin {
+            return Ok(());
+        }
+        let shown = &self.stretches[last.saturating_sub(4)..last];
+        Err(format!("the machine reports a weed of {width} ticks at {place}, but the beam saw {shown:?}"))
+    }
+
+    /// The stretches up to `last`, without it, that are one detection of this width, if the beam has seen the gap behind it up
+    /// to `seen_to`.
+    fn whole_detection(&self, last: usize, seen_to: i64, width: i64, tolerance: i64) -> Option<Range<usize>> {
         for first in (0..last).rev() {
             let (leading, trailing) = (self.stretches[first].leading, self.stretches[last - 1].trailing);
             let tolerance = tolerance + self.slack + 2 * blur(&self.stretches[first..last]);
@@ -267,20 +283,16 @@ impl Model {
             let before = first.checked_sub(1).map(|before| self.stretches[before].trailing);
             // The stretch before it may have ended under another setting.
             let begins = before.is_none_or(|end| leading - end >= shortest_since(end) - tolerance);
-            let is_whole = begins && place - trailing >= shortest_since(leading) - tolerance;
+            let is_whole = begins && seen_to - trailing >= shortest_since(leading) - tolerance;
             if is_whole && (trailing - leading).abs_diff(width) <= tolerance as u64 {
-                self.stretches[first..last].iter_mut().for_each(|stretch| stretch.is_free = true);
-                return Ok(());
+                return Some(first..last);
             }
             let longest = self.merge_gaps_since(leading).max().unwrap_or(0);
             if before.is_none_or(|end| leading - end > longest + tolerance) {
                 break;
             }
         }
-        if self.stretches[..last].is_empty() && place - width < self.begin {
-            return Ok(());
-        }
-        Err(format!("the machine reports a weed of {width} ticks at {place}, but the beam saw {shown:?}"))
+        None
     }
 
     /// The gaps that were set while the beam came from a place on.
@@ -423,5 +435,18 @@ mod tests {
         assert!(model.has_canopy_near(950, 0) && model.canopy_between(955, 960, 0).is_none(), "it has no width yet");
         model.roll_to(1000, 0);
         assert!(model.canopy_between(960, 960, 0).is_some());
+    }
+
+    #[test]
+    fn a_weed_that_is_classified_when_the_beam_was_broken_again_behind_it_is_right() {
+        let mut model = Model::new(0, false);
+        model.follow(0, &Settings::new(), 0);
+        // The gap that ends a detection is 41 ticks.
+        for (place, broken) in [(896, true), (925, false), (968, true), (968, false)] {
+            model.edge(place, broken, 2);
+        }
+        model.roll_to(984, 0);
+        assert!(model.weed(984, 60, 3).is_err(), "the beam saw no such detection");
+        assert_eq!(model.weed(984, 29, 3), Ok(()));
     }
 }
