@@ -15,6 +15,7 @@
 //! the beam has seen at each count: the machine cannot know more.
 
 use control::settings::{Setting, Settings};
+use std::ops::Range;
 
 /// Ground over which the beam was broken continuously.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
