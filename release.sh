@@ -175,7 +175,7 @@ sbom() {
     find . -name target -prune -o -name node_modules -prune -o -name sbom.json -exec rm {} +
 }
 sbom firmware . "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
-sbom tester tester "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
+sbom tester yard/tester "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
 sbom weeder host/cli "$c_simavr" "$c_libelf" -- --target "$(rustc --print host-tuple)"
 sbom page host/page -- --target wasm32-unknown-unknown
 (cd page && npx --yes npm@10.9.4 sbom --sbom-format cyclonedx --omit dev) >"$target/npm-sbom.json"
