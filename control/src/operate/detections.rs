@@ -4,6 +4,7 @@ use crate::ground::{
     class::{Class, Vote},
     features::Features,
 };
+
 /// Detections remembered; a power of two, for short arithmetic.
 const CAPACITY: usize = 16;
 
@@ -20,7 +21,7 @@ pub struct Classified {
 }
 
 impl Classified {
-    /// A place without a detection: zeros, which need no copy in flash.
+    /// A free slot: zeros, which need no copy in flash.
     const NONE: Self = Self {
         speed_class_mm_s: 0,
         spacing_mm: 0,

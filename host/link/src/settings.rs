@@ -358,16 +358,7 @@ mod tests {
     use control::memory::Volatile;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-    use rig::Rig;
-
-    /// The factory settings with some other values.
-    fn settings(values: &[(Setting, u16)]) -> Settings {
-        let mut settings = Settings::new();
-        for &(setting, value) in values {
-            settings.set(setting, value).unwrap();
-        }
-        settings
-    }
+    use rig::{Rig, settings};
 
     /// Takes the steps as the firmware does. It refuses a step that causes a contradiction.
     #[track_caller]

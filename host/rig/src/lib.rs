@@ -16,12 +16,25 @@ use control::measure::reset::Cause;
 use control::memory::{Memory, SIZE, Volatile};
 use control::operate::event::Event;
 use control::say::{self, LINE, command::LineBuffer, line::Line};
+use control::settings::{Setting, Settings};
 use control::units::{Instant, Interval, Position};
 use control::weeder::{Controller, Orders};
 use std::ops::{Deref, DerefMut};
 
 /// The firmware's classifier, with built-in examples and a memory for field examples.
 pub type ByExamples<M = Volatile> = Nearest<&'static [knn::Example<{ features::COUNT }>], M>;
+
+/// The factory settings with these changes.
+///
+/// # Panics
+/// If a value is out of its range.
+pub fn settings(changes: &[(Setting, u16)]) -> Settings {
+    let mut settings = Settings::new();
+    for &(setting, value) in changes {
+        settings.set(setting, value).expect("it is within its range");
+    }
+    settings
+}
 
 /// Which of the beams are broken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

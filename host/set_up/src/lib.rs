@@ -464,15 +464,7 @@ fn range<T: Ord + Copy + std::ops::Sub<Output = T> + Default>(values: impl Itera
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The factory settings with some other values.
-    fn settings(values: &[(Setting, u16)]) -> Settings {
-        let mut settings = Settings::new();
-        for &(setting, value) in values {
-            settings.set(setting, value).unwrap();
-        }
-        settings
-    }
+    use rig::settings;
 
     fn heard(lines: &[&[&str]]) -> SetUp {
         SetUp::of_lines(lines.concat())

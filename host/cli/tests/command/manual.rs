@@ -245,21 +245,21 @@ fn every_file_that_contributing_and_the_page_of_the_sources_name_is_there() {
 }
 
 #[test]
-fn rooms_import_only_from_the_rooms_above_them_in_the_table_of_the_sources() {
-    let page = fs::read_to_string(Path::new(ROOT).join("docs/sources.md")).unwrap();
-    let (_, table) = page.split_once("| floor | room | what it does |").expect("it has the table");
+fn crates_import_only_crates_above_them_in_the_table_of_the_tools() {
+    let page = fs::read_to_string(Path::new(ROOT).join("host/README.md")).unwrap();
+    let (_, table) = page.split_once("| floor | crate | what it does |").expect("it has the table");
     let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
-    let rooms: Vec<&str> = rows
+    let crates: Vec<&str> = rows
         .flat_map(|row| row.split('|').nth(2).expect("a row has three cells").split('`').skip(1).step_by(2))
         .collect();
-    for (place, room) in rooms.iter().enumerate() {
-        let manifest = fs::read_to_string(Path::new(ROOT).join("host").join(room).join("Cargo.toml")).unwrap();
+    for (place, name) in crates.iter().enumerate() {
+        let manifest = fs::read_to_string(Path::new(ROOT).join("host").join(name).join("Cargo.toml")).unwrap();
         let (imports, _) = manifest.split_once("[dev-dependencies]").unwrap_or((&manifest, ""));
         for import in imports.lines().filter_map(|line| line.split(['.', ' ', '=']).next()) {
-            assert!(!rooms[place..].contains(&import), "{room} imports {import}, which is not above it");
+            assert!(!crates[place..].contains(&import), "{name} imports {import}, which is not above it");
         }
     }
-    let mut listed: Vec<String> = rooms.iter().map(|room| (*room).to_owned()).collect();
+    let mut listed: Vec<String> = crates.iter().map(|name| (*name).to_owned()).collect();
     listed.sort();
     let folders = fs::read_dir(Path::new(ROOT).join("host")).unwrap().map(|entry| entry.unwrap());
     let folders = folders.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name().into_string().unwrap());
