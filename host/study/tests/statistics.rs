@@ -231,12 +231,12 @@ fn a_spacing_for_each_speed_is_refused_as_inseparable() {
 
 #[test]
 fn too_few_plots_for_the_parameters_are_refused() {
-    let refused = |plots, parameters, spare| Some(NoModel::TooFewPlots { plots, parameters, spare });
-    assert_eq!(refusals(&[(1.0, 50.0), (2.0, 50.0)], &[1.0, 2.0]), (refused(2, 2, 1), refused(2, 2, 3)));
+    let refused = |plots, parameters, needed| Some(NoModel::TooFewPlots { plots, parameters, needed });
+    assert_eq!(refusals(&[(1.0, 50.0), (2.0, 50.0)], &[1.0, 2.0]), (refused(2, 2, 3), refused(2, 2, 5)));
     let three = [(1.0, 50.0), (1.0, 60.0), (2.0, 50.0)];
-    assert_eq!(refusals(&three, &[1.0, 2.0, 4.0]), (refused(3, 3, 1), refused(3, 3, 3)));
+    assert_eq!(refusals(&three, &[1.0, 2.0, 4.0]), (refused(3, 3, 4), refused(3, 3, 6)));
     let four = [(1.0, 50.0), (1.0, 50.0), (2.0, 50.0), (2.0, 50.0)];
-    assert_eq!(refusals(&four, &[1.0, 2.0, 4.0, 5.0]), (None, refused(4, 2, 3)), "2 degrees of freedom are too few");
+    assert_eq!(refusals(&four, &[1.0, 2.0, 4.0, 5.0]), (None, refused(4, 2, 5)), "2 degrees of freedom are too few");
 }
 
 #[test]

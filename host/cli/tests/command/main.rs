@@ -12,6 +12,7 @@ mod destinations;
 mod evaluate;
 mod field_trials;
 mod flashing;
+mod full_screen;
 mod host_tools;
 mod language;
 mod manual;

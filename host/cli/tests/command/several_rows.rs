@@ -160,7 +160,8 @@ fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
     }
     let mut recording = Running(record(&format!("middle={sentences}")));
     let text = |name: &str| fs::read_to_string(logs.join(format!("{name}.csv"))).unwrap_or_default();
-    let is_written = || text("middle").contains(",gps,") && text("left").contains(",status,");
+    let ends = || text("middle").matches("the file ends here").count();
+    let is_written = || text("middle").contains(",gps,") && ends() > 0 && text("left").contains(",status,");
     while !is_written() {
         assert_eq!(recording.0.try_wait().expect("it is a child"), None, "it goes on");
         sleep(Duration::from_millis(50));
@@ -168,6 +169,7 @@ fn of_several_rows_the_one_that_is_named_has_the_receiver_in_its_record() {
     Command::new("kill").args(["-INT", &recording.0.id().to_string()]).status().expect("there is a kill");
     assert!(recording.0.wait().expect("it ends").success());
     assert!(text("middle").contains(",antenna,") && !text("left").contains("gps"), "{}", text("left"));
+    assert_eq!(ends(), 1, "{}", text("middle"));
 }
 
 #[test]

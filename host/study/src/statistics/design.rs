@@ -76,7 +76,7 @@ impl Design {
             [_] => Err(NoModel::OneTreatment),
             [_, (_, speeds), (_, spacings)] if is_collinear(speeds, spacings) => Err(NoModel::Inseparable),
             _ if self.plots() <= columns.len() => {
-                Err(NoModel::TooFewPlots { plots: self.plots(), parameters: columns.len(), spare: 1 })
+                Err(NoModel::TooFewPlots { plots: self.plots(), parameters: columns.len(), needed: columns.len() + 1 })
             }
             _ => Ok((columns, remarks)),
         }
@@ -106,14 +106,14 @@ pub enum NoModel {
     #[error("all plots have the same speed and spacing: a model needs two levels of one of them")]
     OneTreatment,
     /// There are too few degrees of freedom left for the scatter.
-    #[error("plots: {plots}, parameters: {parameters}: it takes at least {spare} more plots than parameters")]
+    #[error("plots: {plots}, parameters: {parameters}: this model takes at least {needed} plots")]
     TooFewPlots {
         /// The plots that there are.
         plots: usize,
         /// The number of parameters.
         parameters: usize,
-        /// By how much plots have to exceed parameters.
-        spare: usize,
+        /// The plots that it takes.
+        needed: usize,
     },
     /// Speed and spacing go together.
     #[error("speed and spacing change together, so their effects cannot be separated")]

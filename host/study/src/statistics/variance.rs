@@ -110,7 +110,8 @@ impl AnalysisOfVariance {
         }
         let (_, last) = fits[fits.len() - 1];
         if last.parameters + SPARE > values.len() {
-            return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters, spare: SPARE });
+            let needed = last.parameters + SPARE;
+            return Err(NoModel::TooFewPlots { plots: values.len(), parameters: last.parameters, needed });
         }
 
         let residual_freedom = values.len() - last.parameters;
