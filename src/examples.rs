@@ -82,7 +82,7 @@ impl Examples<{ features::COUNT }> for InFlash {
 
     fn join<const CLASSES: usize>(&self, range: Range<usize>, query: &Query, nearest: &mut Nearest<CLASSES>) {
         let (mut row, mut reach) = (self.rows.wrapping_add(range.start), nearest.reach());
-        for _ in range {
+        for _ in 0..range.len() as u8 {
             if let Some(neighbour) = neighbour(row, query, reach) {
                 nearest.join(neighbour);
                 reach = nearest.reach();
@@ -94,46 +94,48 @@ impl Examples<{ features::COUNT }> for InFlash {
 
 /// The neighbour in a row of flash; `None` if it is beyond `reach`, which two features of five mostly show.
 ///
-/// In assembly, because the compiler takes twice the cycles.
+/// It subtracts the squares from the reach, until one leaves a borrow. In assembly, because the compiler takes twice the cycles.
 #[inline(always)]
 fn neighbour(row: *const Row, query: &Query, reach: Neighbour) -> Option<Neighbour> {
-    let (reach_far, reach_near) = reach.parts();
-    let (mut far, mut near, mut left) = (0, 0, features::COUNT as u8);
-    // SAFETY: it reads the row, which is in flash, and the features of the query. R0 is free for use, and R1 is 0 again.
+    let (mut far, mut near) = reach.parts();
+    let [a, b, c, d, e] = *query;
+    let beyond: u8;
+    // SAFETY: it reads the row, which is in flash. R0 is free for use, and R1 is 0 again.
     unsafe {
         asm!(
-            "2:",
+            ".irp feature, {a}, {b}, {c}, {d}, {e}",
             "lpm {byte}, Z+",
-            "ld {other}, X+",
-            "sub {byte}, {other}",
+            "sub {byte}, \\feature",
             "brcc 3f",
             "neg {byte}",
             "3:",
             "mul {byte}, {byte}",
-            "add {near:h}, r0",
-            "adc {far:l}, r1",
-            "clr r1", // keeps the carry
-            "adc {far:h}, r1",
-            "cp {reach_near:h}, {near:h}",
-            "cpc {reach_far:l}, {far:l}",
-            "cpc {reach_far:h}, {far:h}",
+            "sub {near_rest}, r0",
+            "sbc {far_rest:l}, r1",
+            "sbci {far_rest:h}, 0",
             "brcs 4f",
-            "dec {left}",
-            "brne 2b",
+            ".endr",
             "lpm {near:l}, Z",
             "com {near:l}",
+            "sub {near:h}, {near_rest}",
+            "sbc {far:l}, {far_rest:l}",
+            "sbc {far:h}, {far_rest:h}",
             "4:",
-            byte = out(reg) _,
-            other = out(reg) _,
+            "clr r1", // keeps the borrow
+            "sbc {byte}, {byte}",
+            a = in(reg) a,
+            b = in(reg) b,
+            c = in(reg) c,
+            d = in(reg) d,
+            e = in(reg) e,
+            byte = out(reg) beyond,
+            near_rest = inout(reg) (near >> 8) as u8 => _,
+            far_rest = inout(reg_iw) far => _,
             far = inout(reg_pair) far,
             near = inout(reg_pair) near,
-            reach_far = in(reg_pair) reach_far,
-            reach_near = in(reg_pair) reach_near,
-            left = inout(reg) left,
-            inout("X") query.as_ptr() => _,
             inout("Z") row => _,
             options(nostack, readonly),
         );
     }
-    (left == 0).then(|| Neighbour::of_parts(far, near))
+    (beyond == 0).then(|| Neighbour::of_parts(far, near))
 }

@@ -87,7 +87,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     fn vote(&self) -> Vote {
         let found: &Found<[Neighbour]> = &self.found;
         let voters = found.places();
-        let (Some(nearest), Some(farthest)) = (voters.first(), voters.last()) else { return Vote::UNKNOWN };
+        let ([farthest, ..], [.., nearest]) = (voters, voters) else { return Vote::UNKNOWN };
         if *farthest == Neighbour::NONE {
             return Vote::UNKNOWN;
         }
