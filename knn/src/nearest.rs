@@ -104,7 +104,7 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
             let is_empty = *nearest == Neighbour::NONE;
             return Err(if is_empty { ClassifyError::NoExamples } else { ClassifyError::TooFewExamples });
         }
-        let mut votes = [0_usize; CLASSES];
+        let mut votes = [0_u8; CLASSES];
         let (mut label, mut most, mut is_tie) = (0, 0, false);
         // The nearest comes last, so among equals its class is named.
         for place in places {

@@ -119,7 +119,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
             (Kind::Known, _) => Class::Weed,
             _ => Class::Unknown,
         };
-        Vote { class, votes: votes[usize::from(label)] as u8 }
+        Vote { class, votes: votes[usize::from(label)] }
     }
 
     fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
