@@ -75,7 +75,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
         self.built_in.join(self.asked.into()..end.min(built_in).into(), &self.query, found);
         self.asked = self.asked.max(end.min(built_in));
         while self.asked < end {
-            if let Some(example) = self.field.slot(self.asked - built_in) {
+            if let Some(example) = &self.field.slot(self.asked - built_in) {
                 found.join(example.neighbour_of(&self.query));
             }
             self.asked += 1;
