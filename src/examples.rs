@@ -97,7 +97,8 @@ impl Examples<{ features::COUNT }> for InFlash {
 /// It subtracts the squares from the reach, until one leaves a borrow. In assembly, because the compiler takes twice the cycles.
 #[inline(always)]
 fn neighbour(row: *const Row, query: &Query, reach: Neighbour) -> Option<Neighbour> {
-    let (mut far, mut near) = reach.parts();
+    let (far, near): (u16, u16);
+    let (reach_far, reach_near) = reach.parts();
     let [a, b, c, d, e] = *query;
     let beyond: u8;
     // SAFETY: it reads the row, which is in flash. R0 is free for use, and R1 is 0 again.
@@ -117,6 +118,8 @@ fn neighbour(row: *const Row, query: &Query, reach: Neighbour) -> Option<Neighbo
             ".endr",
             "lpm {near:l}, Z",
             "com {near:l}",
+            "mov {near:h}, {reach_near:h}",
+            "movw {far}, {reach_far}",
             "sub {near:h}, {near_rest}",
             "sbc {far:l}, {far_rest:l}",
             "sbc {far:h}, {far_rest:h}",
@@ -129,10 +132,12 @@ fn neighbour(row: *const Row, query: &Query, reach: Neighbour) -> Option<Neighbo
             d = in(reg) d,
             e = in(reg) e,
             byte = out(reg) beyond,
-            near_rest = inout(reg) (near >> 8) as u8 => _,
-            far_rest = inout(reg_iw) far => _,
-            far = inout(reg_pair) far,
-            near = inout(reg_pair) near,
+            reach_far = in(reg_pair) reach_far,
+            reach_near = in(reg_pair) reach_near,
+            near_rest = inout(reg) (reach_near >> 8) as u8 => _,
+            far_rest = inout(reg_iw) reach_far => _,
+            far = out(reg_pair) far,
+            near = out(reg_pair) near,
             inout("Z") row => _,
             options(nostack, readonly),
         );
