@@ -82,6 +82,7 @@ impl Examples<{ features::COUNT }> for InFlash {
 
     fn join<const CLASSES: usize>(&self, range: Range<usize>, query: &Query, nearest: &mut Nearest<CLASSES>) {
         let (mut row, mut reach) = (self.rows.wrapping_add(range.start), nearest.reach());
+        // A byte counts them, in fewer cycles than the range's 16 bits.
         for _ in 0..range.len() as u8 {
             if let Some(neighbour) = neighbour(row, query, reach) {
                 nearest.join(neighbour);
@@ -94,17 +95,18 @@ impl Examples<{ features::COUNT }> for InFlash {
 
 /// The neighbour in a row of flash; `None` if it is beyond `reach`, which two features of five mostly show.
 ///
-/// It subtracts the squares from the reach, until one leaves a borrow. In assembly, because the compiler takes twice the cycles.
+/// It subtracts the squares from the reach. A borrow shows that the row is beyond. If none comes, the distance is the reach less the
+/// rest. In assembly, because the compiler takes twice the cycles.
 #[inline(always)]
 fn neighbour(row: *const Row, query: &Query, reach: Neighbour) -> Option<Neighbour> {
-    let (far, near): (u16, u16);
     let (reach_far, reach_near) = reach.parts();
     let [a, b, c, d, e] = *query;
+    let (far, near): (u16, u16);
     let beyond: u8;
     // SAFETY: it reads the row, which is in flash. R0 is free for use, and R1 is 0 again.
     unsafe {
         asm!(
-            ".irp feature, {a}, {b}, {c}, {d}, {e}",
+            ".irp feature, {a}, {b}, {c}, {d}, {e}", // for each feature of the query, up to .endr
             "lpm {byte}, Z+",
             "sub {byte}, \\feature",
             "brcc 3f",

@@ -62,7 +62,8 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
     /// Out of line, because it takes more code than a call.
     #[inline(never)]
     pub fn join(&mut self, example: Neighbour) {
-        let Some((mut free, nearer)) = self.places.split_first_mut().filter(|(farthest, _)| example < **farthest) else {
+        let Some((mut free, nearer)) = self.places.split_first_mut().filter(|(farthest, _)| example < **farthest)
+        else {
             return;
         };
         for (place, _) in nearer.iter_mut().zip(1..self.k) {

@@ -11,7 +11,7 @@ fn a_classification_among_32_examples_in_flash_takes_at_most_3900_cycles() {
     let costs = bench::classifier(&elf, |_| ()).expect("the bench runs, and every answer is the plain search's");
     let (_, cycles) = costs.tasks.iter().find(|(task, _)| *task == Task::Classify(32)).expect("it is measured");
     assert!(cycles.mean <= 3900.0, "{cycles:?}");
-    assert!(cycles.most <= 4900, "{cycles:?}");
+    assert!(cycles.most <= 4800, "{cycles:?}");
     assert!(costs.stack < 200, "{} bytes of stack", costs.stack);
 }
 
