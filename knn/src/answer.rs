@@ -21,7 +21,7 @@ pub struct Answer<const CLASSES: usize> {
     /// is only the best guess.
     pub label: u8,
     /// The votes of each class: k in all.
-    pub votes: [usize; CLASSES],
+    pub votes: [u8; CLASSES],
     /// The squared distance to the nearest example (see [`squared_distance`](crate::squared_distance)).
     pub nearest: u32,
     /// How reliable the answer is.

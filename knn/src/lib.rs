@@ -37,9 +37,9 @@
 //! | [`Table<F, N>`](Table) | N (F + 1) + 2 | `add_example` O(1), `remove` O(n) |
 //! | [`Scale<F>`](Scale) | 5 F | `quantise`: F subtractions, shifts and multiplications |
 //! | [`Nearest`] for k, which may be kept | 4 k + 1 | |
-//! | [`classify`] | about 100 + 2 C of stack | n F multiplications of 8 x 8 bits; k comparisons an example; k + C to vote |
+//! | [`classify`] | about 100 + 2 C of stack | n F multiplications of 8 x 8 bits; up to k comparisons an example; k to vote |
 //!
-//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. An example that joins the nearest takes about four
+//! The README has a table of cycles on an ATmega328P, for F = 5, C = 2 and k = 3. An example that joins the nearest takes about five
 //! times the cycles of one that is left early (see [`Examples::join`]). In random order, k (1 + ln(n / k)) of n join. If each one is
 //! a little nearer than the one before, all join. [`Scale::quantise`] takes 1,400 cycles. `cargo bench-uno` in the weeder's workspace
 //! measures all of this in the simulator simavr.

@@ -1,7 +1,7 @@
 //! The nearest examples of a search, the insertion of another, and their vote.
 //!
-//! There are k places, sorted, nearest first. A new example bubbles in from the front: at each place the nearer of two stays, and the
-//! other goes on. So the work depends on k alone, not on the order of the examples.
+//! There are k places, sorted, farthest first. A new example takes the farthest's place. Then it changes places with its neighbours,
+//! up to the first that is nearer. Most examples that join stop early.
 
 use crate::{Answer, ClassifyError, Kind, MAX_K, Neighbour};
 
@@ -62,25 +62,28 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
     /// Out of line, because it takes more code than a call.
     #[inline(never)]
     pub fn join(&mut self, example: Neighbour) {
-        let Some(places) = self.places.get_mut(..self.k.into()) else { return };
-        let mut example = example;
-        for place in places {
-            if example < *place {
-                core::mem::swap(place, &mut example);
+        let Some((mut free, nearer)) = self.places.split_first_mut().filter(|(farthest, _)| example < **farthest)
+        else {
+            return;
+        };
+        for (place, _) in nearer.iter_mut().zip(1..self.k) {
+            if example >= *place {
+                break;
             }
+            *free = *place;
+            free = place;
         }
+        *free = example;
     }
 
     /// The farthest of the k places: no example beyond it can join. While a place is free, none is beyond.
-    ///
-    /// Out of line, because it takes more code than a call.
-    #[inline(never)]
+    #[inline]
     #[must_use]
     pub fn reach(&self) -> Neighbour {
-        self.places.get(usize::from(self.k).wrapping_sub(1)).copied().unwrap_or(Neighbour::VACANT)
+        self.places.first().copied().unwrap_or(Neighbour::VACANT)
     }
 
-    /// The k places, nearest first. Places without an example come last, and hold [`Neighbour::NONE`].
+    /// The k places, farthest first. Places without an example come first, and hold [`Neighbour::NONE`].
     #[inline]
     #[must_use]
     pub fn places(&self) -> &[Neighbour] {
@@ -95,27 +98,27 @@ impl<const CLASSES: usize> Nearest<CLASSES> {
     /// [`ClassifyError`] if fewer than k have joined, or a voter's label is not a class.
     pub fn answer(&self, radius: u32) -> Result<Answer<CLASSES>, ClassifyError> {
         let places = self.places();
-        let (Some(first), Some(last)) = (places.first(), places.last()) else {
+        let ([farthest, ..], [.., nearest]) = (places, places) else {
             return Err(ClassifyError::KOutOfRange);
         };
-        if *first == Neighbour::NONE {
-            return Err(ClassifyError::NoExamples);
+        if *farthest == Neighbour::NONE {
+            let is_empty = *nearest == Neighbour::NONE;
+            return Err(if is_empty { ClassifyError::NoExamples } else { ClassifyError::TooFewExamples });
         }
-        if *last == Neighbour::NONE {
-            return Err(ClassifyError::TooFewExamples);
-        }
-        let mut votes = [0_usize; CLASSES];
+        let mut votes = [0_u8; CLASSES];
+        let (mut label, mut most, mut is_tie) = (0, 0, false);
+        // The nearest comes last, so among equals its class is named.
         for place in places {
             let Some(votes) = votes.get_mut(usize::from(place.label())) else {
                 return Err(ClassifyError::UnknownLabel);
             };
             *votes += 1;
+            if *votes >= most {
+                is_tie = *votes == most;
+                (label, most) = (place.label(), *votes);
+            }
         }
-        let most = votes.iter().copied().max().unwrap_or(0);
-        let leads = |label: u8| votes.get(usize::from(label)) == Some(&most);
-        let label = places.iter().map(|place| place.label()).find(|&label| leads(label)).unwrap_or(0);
-        let is_tie = votes.iter().filter(|&&votes| votes == most).count() > 1;
-        let nearest = first.distance();
+        let nearest = nearest.distance();
         let kind = match (nearest > radius, is_tie) {
             (true, _) => Kind::Stranger,
             (false, true) => Kind::Tie,

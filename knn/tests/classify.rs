@@ -36,8 +36,8 @@ fn reference<const FEATURES: usize, const CLASSES: usize>(
     if voters.iter().any(|&(_, label)| usize::from(label) >= CLASSES) {
         return Err(ClassifyError::UnknownLabel);
     }
-    let votes: [usize; CLASSES] =
-        std::array::from_fn(|class| voters.iter().filter(|&&(_, label)| usize::from(label) == class).count());
+    let votes: [u8; CLASSES] =
+        std::array::from_fn(|class| voters.iter().filter(|&&(_, label)| usize::from(label) == class).count() as u8);
     let most = votes.into_iter().max().expect("there are classes");
     let leads = |label: u8| votes[usize::from(label)] == most;
     let label = voters.iter().map(|&(_, label)| label).find(|&label| leads(label)).expect("a class leads");

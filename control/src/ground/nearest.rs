@@ -75,7 +75,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
         self.built_in.join(self.asked.into()..end.min(built_in).into(), &self.query, found);
         self.asked = self.asked.max(end.min(built_in));
         while self.asked < end {
-            if let Some(example) = self.field.slot(self.asked - built_in) {
+            if let Some(example) = &self.field.slot(self.asked - built_in) {
                 found.join(example.neighbour_of(&self.query));
             }
             self.asked += 1;
@@ -87,7 +87,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Nearest<B, M> {
     fn vote(&self) -> Vote {
         let found: &Found<[Neighbour]> = &self.found;
         let voters = found.places();
-        let (Some(nearest), Some(farthest)) = (voters.first(), voters.last()) else { return Vote::UNKNOWN };
+        let ([farthest, ..], [.., nearest]) = (voters, voters) else { return Vote::UNKNOWN };
         if *farthest == Neighbour::NONE {
             return Vote::UNKNOWN;
         }
@@ -119,7 +119,7 @@ impl<B: Examples<{ features::COUNT }>, M: Memory> Classifier for Nearest<B, M> {
             (Kind::Known, _) => Class::Weed,
             _ => Class::Unknown,
         };
-        Vote { class, votes: votes[usize::from(label)] as u8 }
+        Vote { class, votes: votes[usize::from(label)] }
     }
 
     fn begin(&mut self, features: &Features, k: u8) -> Option<Vote> {
