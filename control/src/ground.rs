@@ -37,7 +37,7 @@ use self::{
 };
 use crate::{
     settings::Settings,
-    units::{Length, Position, Speed, Ticks, Wheel, WrappedPosition},
+    units::{Length, Position, Speed, WrappedPosition},
 };
 
 /// The known ground around the machine.
@@ -255,34 +255,14 @@ impl Ground {
         Some(pushed.map(|()| guarded.leading + self.geometry.guarded))
     }
 
-    /// The ground wheel from the settings.
-    pub fn wheel(&self) -> Wheel {
-        self.geometry.wheel
-    }
-
-    /// A length in millimetres.
-    pub fn millimetres(&self, length: Length) -> i16 {
-        self.geometry.millimetres(length)
-    }
-
-    /// Ticks in a unit of remembered ground.
-    pub fn scale(&self) -> crate::units::LengthScale {
-        self.geometry.scale
-    }
-
-    /// A position of the machine on remembered ground.
-    pub fn wrap(&self, position: Position) -> WrappedPosition {
-        self.geometry.scale.wrap(position)
-    }
-
-    /// A length in ticks.
-    pub fn ticks(&self, length: Length) -> Ticks {
-        self.geometry.scale.ticks(length)
+    /// The distances from the settings, for the present wheel and slip.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
     }
 
     /// The odometer's position at a wrapped position, if `position` is the beam's.
     pub fn position_of(&self, wrapped: WrappedPosition, position: Position) -> Position {
-        position + self.ticks(wrapped - self.beam)
+        position + self.geometry.scale.ticks(wrapped - self.beam)
     }
 
     /// Whether there is a second beam.
@@ -385,7 +365,7 @@ mod tests {
         ground.follow(&settings, Position::new(1400));
         assert_eq!((ground.zones(), ground.is_unseen()), (0, true));
         let (beam_to_tool, margin) = (6000, 750);
-        let scale = ground.ticks(Length(1)).0;
+        let scale = ground.geometry.scale.ticks(Length(1)).0;
         assert_eq!(scale, 8);
         let open_from = (1400 + beam_to_tool + margin..20_000).find(|&position| {
             ground.roll_to(Position::new(position));
