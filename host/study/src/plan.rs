@@ -90,7 +90,7 @@ impl Plan {
                 to,
                 "<p>Count weeds on the same marked ground before and after. Leave a box empty if you did not count.</p>\n<table>"
             )?;
-            for ((_, heading, _), (column, value)) in COLUMNS.iter().zip(plot.columns()).skip(PLANNED) {
+            for ((_, heading, ..), (column, value)) in COLUMNS.iter().zip(plot.columns()).skip(PLANNED) {
                 writeln!(to, "<tr><th>{heading} <small>({column})</small></th><td>{value}</td></tr>")?;
             }
             writeln!(to, "<tr><th>remarks, who counted, when</th><td></td></tr>\n</table>\n</section>")?;

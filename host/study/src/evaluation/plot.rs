@@ -2,7 +2,7 @@
 //! speed and spacing.
 
 use crate::table::{fixed, optional, short};
-use anyhow::{Result, anyhow};
+use anyhow::{Result, bail, ensure};
 use files::FileError;
 use files::csv_table::Line;
 use serde::{Deserialize, Serialize};
@@ -41,23 +41,26 @@ pub struct PlotRecord {
     pub power_hp: Option<f64>,
 }
 
-/// A column of a table of plots: its name there, its heading in a report, and its decimals there. `None` prints all
-/// that the number has.
-type Column = (&'static str, &'static str, Option<usize>);
+/// A column of a table of plots: its name there, its heading in a report, its decimals there, and its range. `None`
+/// prints all decimals.
+type Column = (&'static str, &'static str, Option<usize>, (f64, f64));
+
+/// The range of a count.
+const COUNT: (f64, f64) = (0.0, f64::INFINITY);
 
 /// The columns of a table of plots, which carry their units.
 pub(crate) const COLUMNS: [Column; 11] = [
-    ("replication", "replication", None),
-    ("speed_km_h", "speed, km/h", None),
-    ("spacing_cm", "spacing, cm", None),
-    ("weeds_before", "weeds before", None),
-    ("weeds_after", "weeds after", None),
-    ("plants", "plants", None),
-    ("damaged", "damaged", None),
-    ("area_m2", "area, m²", Some(2)),
-    ("time_s", "time, s", Some(1)),
-    ("width_m", "width, m", Some(2)),
-    ("power_hp", "power, hp", Some(2)),
+    ("replication", "replication", None, COUNT),
+    ("speed_km_h", "speed, km/h", None, (0.1, 15.0)),
+    ("spacing_cm", "spacing, cm", None, (5.0, 500.0)),
+    ("weeds_before", "weeds before", None, COUNT),
+    ("weeds_after", "weeds after", None, COUNT),
+    ("plants", "plants", None, COUNT),
+    ("damaged", "damaged", None, COUNT),
+    ("area_m2", "area, m²", Some(2), (0.01, 1e6)),
+    ("time_s", "time, s", Some(1), (0.1, 1e6)),
+    ("width_m", "width, m", Some(2), (0.01, 50.0)),
+    ("power_hp", "power, hp", Some(2), (0.001, 1000.0)),
 ];
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
@@ -114,8 +117,8 @@ impl PlotRecord {
     /// The cells of a report.
     pub(super) fn cells(&self) -> Vec<String> {
         let shown = |decimals: Option<usize>, value| decimals.map_or_else(|| short(value), |some| fixed(value, some));
-        let cells = COLUMNS.iter().zip(self.values());
-        cells.map(|((.., decimals), value)| optional(value, |value| shown(*decimals, value))).collect()
+        let cells = COLUMNS.into_iter().zip(self.values());
+        cells.map(|((_, _, decimals, _), value)| optional(value, |value| shown(decimals, value))).collect()
     }
 
     /// Each column with its value, which is empty if it is not known.
@@ -129,29 +132,16 @@ impl PlotRecord {
     /// # Errors
     /// Names the first quantity that is out of its range or contradicts another.
     pub fn check(&self) -> Result<()> {
-        let within = |value: f64, lowest: f64, highest: f64| (lowest..=highest).contains(&value);
-        let measured = |value: Option<f64>, lowest, highest| value.is_none_or(|value| within(value, lowest, highest));
-        let shown = |value: Option<f64>| value.unwrap_or_default();
-        let is_damage_possible = match (self.damaged, self.plants) {
-            (Some(damaged), Some(plants)) => damaged <= plants,
-            _ => true,
-        };
-        let checks = [
-            ("speed_km_h", self.speed_km_h, within(self.speed_km_h, 0.1, 15.0), "it has to be from 0.1 to 15 km/h"),
-            ("spacing_cm", self.spacing_cm, within(self.spacing_cm, 5.0, 500.0), "it has to be from 5 to 500 cm"),
-            ("damaged", shown(self.damaged.map(f64::from)), is_damage_possible, "it cannot exceed plants"),
-            ("area_m2", shown(self.area_m2), measured(self.area_m2, 0.01, 1e6), "it has to be from 0.01 to 1000000 m2"),
-            ("time_s", shown(self.time_s), measured(self.time_s, 0.1, 1e6), "it has to be from 0.1 to 1000000 s"),
-            ("width_m", shown(self.width_m), measured(self.width_m, 0.01, 50.0), "it has to be from 0.01 to 50 m"),
-            (
-                "power_hp",
-                shown(self.power_hp),
-                measured(self.power_hp, 0.001, 1000.0),
-                "it has to be from 0.001 to 1000 hp",
-            ),
-        ];
-        let wrong = checks.into_iter().find(|(_, _, fits, _)| !fits);
-        wrong.map_or(Ok(()), |(column, value, _, right)| Err(anyhow!("{column} is {value}: {right}")))
+        for ((column, heading, _, (least, greatest)), value) in COLUMNS.into_iter().zip(self.values()) {
+            if let Some(value) = value.filter(|value| !(least..=greatest).contains(value)) {
+                let unit = heading.split(", ").nth(1).unwrap_or_default().replace('²', "2");
+                bail!("{column} is {value}: it has to be from {least} to {greatest} {unit}");
+            }
+        }
+        if let (Some(damaged), Some(plants)) = (self.damaged, self.plants) {
+            ensure!(damaged <= plants, "damaged is {damaged}: it cannot exceed plants");
+        }
+        Ok(())
     }
 
     /// The plot's measures by Eq. 22 to 27. They are finite if [`PlotRecord::check`] succeeds.

@@ -101,7 +101,7 @@ impl Analysis {
 
     /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
-        let columns = ["plot"].into_iter().chain(COLUMNS.map(|(_, heading, _)| heading)).chain(MEASURES);
+        let columns = ["plot"].into_iter().chain(COLUMNS.map(|(_, heading, ..)| heading)).chain(MEASURES);
         let mut table = Table::new("Each plot: counts, measurements and results", columns);
         for (record, performance) in self.records.iter().zip(&self.performances) {
             table.rows.push([vec![record.plot.to_string()], record.cells(), measures(performance).into()].concat());
