@@ -10,6 +10,7 @@
 //! Positions on the ground have 16 bits. [`Ground::roll_to`] drops old ground before that counter wraps.
 
 pub mod class;
+mod closed;
 pub mod detection;
 pub mod detector;
 pub mod examples;
@@ -21,20 +22,22 @@ pub mod nearest;
 pub mod reach;
 pub mod second_beam;
 pub mod slip;
+mod unclassified;
 
+pub use self::{closed::AtTool, unclassified::Unclassified};
 use self::{
-    class::Class,
     detection::Detection,
     detector::Detector,
     guard::Guard,
-    keep_out::{Canopy, KeepOut, Plan, ScheduleFull},
+    keep_out::{Canopy, KeepOut, ScheduleFull},
     reach::{Geometry, Leads},
     second_beam::{Blind, SecondBeam},
     slip::SlipChange,
+    unclassified::Known,
 };
 use crate::{
     settings::Settings,
-    units::{Length, Position, Speed, Ticks, Wheel, WrappedPosition},
+    units::{Length, Position, Speed, WrappedPosition},
 };
 
 /// The known ground around the machine.
@@ -55,47 +58,6 @@ pub struct Ground {
     unclassified: Unclassified,
     /// Whether the tool has just reached ground that was dropped for its distance or for lack of room.
     rolled_back_too_far: bool,
-}
-
-/// Why the tool may or may not work at its position. Only experiments read the reason; the machine needs yes or no.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AtTool {
-    /// No keep-out zone is here.
-    Open,
-    /// The ground is unknown.
-    Unknown,
-    /// The tool is in a keep-out zone or its margin.
-    Kept {
-        /// The odometer's position when the beam was where the tool is now.
-        tool: Position,
-        /// Where the zone begins, without its margin.
-        begin: Position,
-        /// Where the zone ends, without its margin.
-        end: Position,
-    },
-}
-
-/// The complete detection that is being classified, if any.
-#[derive(Clone, Copy, Debug)]
-pub struct Unclassified {
-    /// The detection.
-    pub detection: Detection,
-    /// What both beams have seen of it so far.
-    canopy: Canopy,
-    /// Whether the second beam reports it. The first beam may have reported it already.
-    pub of_second: bool,
-    known: Known,
-}
-
-/// What is known of a detection without a class. `Nothing` is 0, so [`Ground::NONE`] is all zeros and needs no copy in flash.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Known {
-    /// There is no detection.
-    Nothing,
-    /// Its ground is forgotten.
-    Detection,
-    /// Its ground is known.
-    Canopy,
 }
 
 impl Ground {
@@ -270,56 +232,6 @@ impl Ground {
         self.unclassified.known = Known::Nothing;
     }
 
-    /// The operator confirms that no plant stands on the unknown ground at the tool and ahead of it. Does nothing on known ground,
-    /// as [`unseen`](Self::unseen) tells it.
-    pub fn assume_bare(&mut self) {
-        if self.unseen_beyond(Length::ZERO) > Length::ZERO {
-            // Unknown ground has a margin ahead of it. The second margin keeps the tool off its border.
-            self.keep_out.set_known_from(self.tool() - self.geometry.margin() - self.geometry.margin());
-        }
-    }
-
-    /// Closes the ground from the start of a detection until it is classified.
-    pub fn await_class(&mut self, detection: Detection, of_second: bool) {
-        let zone = if self.detector.take_parted() { Length::ZERO } else { self.geometry.stem_zone() };
-        self.unclassified =
-            Unclassified { detection, canopy: Canopy::of(&detection, zone), of_second, known: Known::Canopy };
-        // A wide detection reaches the second beam before the first has seen its end.
-        if let Some(begin) = self.second_beam.open() {
-            self.widen(begin, begin);
-        }
-    }
-
-    /// The detection that is being classified.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn unclassified(&self) -> Option<&Unclassified> {
-        Some(&self.unclassified).filter(|unclassified| unclassified.known != Known::Nothing)
-    }
-
-    /// Takes the class of that detection, and remembers a plant or an unknown.
-    ///
-    /// # Errors
-    /// [`ScheduleFull`] if more canopies stand between beam and tool than can be remembered.
-    pub fn classified(&mut self, class: Class) -> Result<(), ScheduleFull> {
-        let Unclassified { detection, canopy, known, .. } = &mut self.unclassified;
-        let was_known = core::mem::replace(known, Known::Nothing);
-        if class == Class::Weed || was_known == Known::Nothing {
-            return Ok(());
-        }
-        if detection.leading.is_ahead_of(self.last_plant) {
-            self.last_plant = detection.leading;
-        }
-        if was_known != Known::Canopy {
-            return Ok(());
-        }
-        // An unknown detection may be several plants: it keeps its full width.
-        if class != Class::Plant {
-            canopy.trim = 0;
-        }
-        self.guard.see(detection, &self.geometry);
-        self.keep_out.push(&self.unclassified.canopy, self.tool(), self.geometry.margin())
-    }
-
     /// Widens a canopy to the stretch that the second beam sees. Returns whether a canopy is there.
     fn widen(&mut self, from: WrappedPosition, to: WrappedPosition) -> bool {
         let within = Length(self.geometry.second_beam().0 >> 2);
@@ -343,44 +255,14 @@ impl Ground {
         Some(pushed.map(|()| guarded.leading + self.geometry.guarded))
     }
 
-    /// From the last plant's leading edge, or from where detection began, to the detection's. At most the memory length.
-    pub fn spacing(&self, detection: &Detection) -> Length {
-        detection.leading - self.last_plant
-    }
-
-    /// The paper's schedule for a detection.
-    pub fn plan(&self, detection: &Detection) -> Plan {
-        Plan::new(&self.geometry, detection.width())
-    }
-
-    /// The ground wheel from the settings.
-    pub fn wheel(&self) -> Wheel {
-        self.geometry.wheel
-    }
-
-    /// A length in millimetres.
-    pub fn millimetres(&self, length: Length) -> i16 {
-        self.geometry.millimetres(length)
-    }
-
-    /// Ticks in a unit of remembered ground.
-    pub fn scale(&self) -> crate::units::LengthScale {
-        self.geometry.scale
-    }
-
-    /// A position of the machine on remembered ground.
-    pub fn wrap(&self, position: Position) -> WrappedPosition {
-        self.geometry.scale.wrap(position)
-    }
-
-    /// A length in ticks.
-    pub fn ticks(&self, length: Length) -> Ticks {
-        self.geometry.scale.ticks(length)
+    /// The distances from the settings, for the present wheel and slip.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
     }
 
     /// The odometer's position at a wrapped position, if `position` is the beam's.
     pub fn position_of(&self, wrapped: WrappedPosition, position: Position) -> Position {
-        position + self.ticks(wrapped - self.beam)
+        position + self.geometry.scale.ticks(wrapped - self.beam)
     }
 
     /// Whether there is a second beam.
@@ -418,83 +300,6 @@ impl Ground {
         self.rolled_back_too_far
     }
 
-    /// Whether unseen ground, or the margin ahead of it, keeps the tool out. It may lie behind a tool that rolls back.
-    pub fn is_unseen(&self) -> bool {
-        let (from, to) = self.leads.stretch(true);
-        self.unseen_beyond(from.min(to)) > Length::ZERO
-    }
-
-    /// The distance until the tool has left unseen ground and its margin; 0 if it has.
-    pub fn unseen(&self) -> Length {
-        self.unseen_beyond(Length::ZERO).max(Length::ZERO)
-    }
-
-    /// How far unseen ground and its margin reach ahead of a place at this distance from the tool.
-    fn unseen_beyond(&self, distance: Length) -> Length {
-        self.keep_out.open_from(self.geometry.margin()) - (self.tool() + distance)
-    }
-
-    /// The number of keep-out zones at the tool or ahead of it, with an open detection and an unclassified one.
-    pub fn zones(&self) -> u8 {
-        let unclassified = self.unclassified.known == Known::Canopy;
-        self.keep_out.ahead(self.tool(), self.geometry.margin())
-            + u8::from(unclassified)
-            + u8::from(self.detector.open().is_some())
-    }
-
-    /// Whether the tool must be out: closed ground comes within the leads, or the machine is too fast.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn must_be_out(&self, tool_out: bool) -> bool {
-        let (from, to) = self.leads.stretch(tool_out);
-        self.is_closed(from, to) || self.outruns_the_beam(tool_out)
-    }
-
-    /// Whether the tool is at closed ground.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn is_closed_at_tool(&self) -> bool {
-        self.is_closed(Length::ZERO, Length::ZERO)
-    }
-
-    /// Why the tool is in or out at its position, if the odometer shows `position`.
-    pub fn at_tool(&self, position: Position) -> AtTool {
-        let of = |wrapped| self.position_of(wrapped, position);
-        match self.keep_out.zone_at(self.tool(), self.geometry.margin()) {
-            Some((begin, end)) => AtTool::Kept { tool: of(self.tool()), begin: of(begin), end: of(end) },
-            None if self.is_closed_at_tool() => AtTool::Unknown,
-            None => AtTool::Open,
-        }
-    }
-
-    /// Whether the machine is so fast that a plant just behind the beam reaches the tool before the tool is out. With a second
-    /// beam, a plant that only that beam sees must not reach it either, but may reach its margin.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    pub fn outruns_the_beam(&self, tool_out: bool) -> bool {
-        let out = self.leads.out;
-        // Hysteresis: the machine has to slow down by an eighth.
-        let lead = if tool_out { out + Length(out.0 / 8) } else { out };
-        (self.tool() + lead) - self.detector.frontier() >= -self.geometry.margin().max(self.geometry.second_beam())
-    }
-
-    /// Whether any ground between two distances from the tool is closed: unknown, or within the margin of a canopy. An open
-    /// detection, an unclassified one and an expected plant count as canopies.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    fn is_closed(&self, one: Length, other: Length) -> bool {
-        let margin = self.geometry.margin();
-        let (near, far) = (self.tool() + one.min(other), self.tool() + one.max(other));
-        let reaches = |leading| far - leading >= -margin;
-        self.keep_out.is_closed(near, far, margin)
-            || self.open().is_some_and(reaches)
-            || self.guard.awaited(self.detector.frontier(), &self.geometry).is_some_and(reaches)
-            || self.second_beam.open_alone().is_some_and(reaches)
-    }
-
-    /// Where the first detection begins that has no end yet, or no class.
-    #[cfg_attr(not(target_arch = "avr"), inline)]
-    fn open(&self) -> Option<WrappedPosition> {
-        let Unclassified { canopy, known, .. } = &self.unclassified;
-        if *known == Known::Canopy { Some(canopy.leading) } else { self.detector.open() }
-    }
-
     /// The tool's position.
     fn tool(&self) -> WrappedPosition {
         self.beam - self.geometry.beam_to_tool()
@@ -503,26 +308,27 @@ impl Ground {
 
 #[cfg(test)]
 mod tests {
+    use super::class::Class;
     use super::*;
     use crate::settings::Setting;
 
     const SPEED: Speed = Speed(1000);
 
     /// Classifies a detection as a plant.
-    fn keep(ground: &mut Ground, canopy: Detection) {
+    pub(super) fn keep(ground: &mut Ground, canopy: Detection) {
         ground.await_class(canopy, false);
         ground.classified(Class::Plant).expect("there is room");
     }
 
     /// Rolls past a canopy and the gap behind it.
-    fn pass(ground: &mut Ground, leading: i32, trailing: i32) -> Detection {
+    pub(super) fn pass(ground: &mut Ground, leading: i32, trailing: i32) -> Detection {
         ground.edge(Position::new(leading), true);
         ground.edge(Position::new(trailing), false);
         ground.roll_to(Position::new(trailing + 100)).expect("the gap has been seen")
     }
 
     /// Ground seen from 0 to 1400, with a canopy from 1000 to 1300, without leads.
-    fn ground() -> (Ground, Settings) {
+    pub(super) fn ground() -> (Ground, Settings) {
         let leads = [Setting::LeadOutMs, Setting::LeadInMs, Setting::BeamResponseMs];
         let settings = Settings::with(&leads.map(|lead| (lead, 0)));
         let mut ground = Ground::NONE;
@@ -533,50 +339,6 @@ mod tests {
         assert_eq!((ground.spacing(&canopy), canopy.width()), (Length(1000), Length(300)));
         keep(&mut ground, canopy);
         (ground, settings)
-    }
-
-    /// The first tool position from `from` on where the ground is open.
-    fn opens(ground: &mut Ground, from: i32) -> i32 {
-        let beam_to_tool = i32::from(ground.geometry.beam_to_tool().0);
-        (from..from + 5000)
-            .find(|&tool| {
-                ground.roll_to(Position::new(tool + beam_to_tool));
-                !ground.is_closed_at_tool()
-            })
-            .expect("somewhere the ground is open")
-    }
-
-    #[test]
-    fn forgotten_ground_is_closed_up_to_a_margin_ahead_of_the_frontier() {
-        let margin = 95;
-        let (mut known, _) = ground();
-        assert_eq!(opens(&mut known, 1000), 1300 + margin + 1);
-        for frontier in 1400..1420 {
-            let (mut forgetful, _) = ground();
-            forgetful.roll_to(Position::new(frontier));
-            forgetful.forget();
-            assert_eq!(forgetful.zones(), 0, "no plant is known any more");
-            assert_eq!(opens(&mut forgetful, 1000), frontier + margin);
-        }
-    }
-
-    #[test]
-    fn a_tool_that_rolls_back_to_forgotten_ground_keeps_its_margin_whatever_the_operator_vouches_for() {
-        let (margin, beam_to_tool) = (95, 764);
-        for ahead in [0, 1, 40, 100] {
-            let (mut ground, _) = ground();
-            ground.roll_to(Position::new(1400));
-            ground.forget();
-            ground.roll_to(Position::new(1400 + margin + ahead + beam_to_tool));
-            ground.lead(&Settings::new(), Speed(-1000), Speed(-1000));
-            assert_eq!((ground.is_unseen(), ground.unseen()), (true, Length::ZERO), "it lies behind the tool");
-            ground.assume_bare();
-            ground.roll_to(Position::new(1400 + margin - 1 + beam_to_tool));
-            assert!(ground.is_closed_at_tool());
-            assert_eq!(ground.unseen(), Length(1));
-            ground.assume_bare();
-            assert!(!ground.is_closed_at_tool(), "the operator vouches for what status shows");
-        }
     }
 
     #[test]
@@ -603,7 +365,7 @@ mod tests {
         ground.follow(&settings, Position::new(1400));
         assert_eq!((ground.zones(), ground.is_unseen()), (0, true));
         let (beam_to_tool, margin) = (6000, 750);
-        let scale = ground.ticks(Length(1)).0;
+        let scale = ground.geometry.scale.ticks(Length(1)).0;
         assert_eq!(scale, 8);
         let open_from = (1400 + beam_to_tool + margin..20_000).find(|&position| {
             ground.roll_to(Position::new(position));
@@ -694,29 +456,5 @@ mod tests {
             assert_eq!(ground.roll_to(Position::new(3300)), None);
             assert_eq!(ground.guard_missed_plant().is_some(), is_due, "{setting:?}");
         }
-    }
-
-    #[test]
-    fn the_beam_is_outrun_if_the_lead_reaches_the_margin_of_unseen_ground() {
-        let (mut ground, _) = ground();
-        let reach = ground.geometry.beam_to_tool() - ground.geometry.margin();
-        let outruns = |ground: &mut Ground, out, tool_out| {
-            ground.leads = Leads { out, ..Leads::NONE };
-            ground.outruns_the_beam(tool_out)
-        };
-        assert!(!outruns(&mut ground, reach - Length(1), false));
-        assert!(outruns(&mut ground, reach, false));
-        let trusted = (0..reach.0).rfind(|&out| !outruns(&mut ground, Length(out), true));
-        assert_eq!(trusted.map(|out| out + out / 8), Some(reach.0 - 1), "an eighth slower");
-    }
-
-    #[test]
-    fn the_spacing_is_at_most_the_remembered_length() {
-        let (mut ground, _) = ground();
-        for position in (1400..200_000).step_by(50) {
-            ground.roll_to(Position::new(position));
-        }
-        let canopy = pass(&mut ground, 200_000, 200_300);
-        assert!((14_800..15_280).contains(&ground.spacing(&canopy).0), "{:?}", ground.spacing(&canopy));
     }
 }

@@ -140,7 +140,7 @@ impl<C: Classifier, M: Memory> Uninit<C, M> {
         if controller.configuration.has_spoiled_copy() {
             controller.events.announce(Event::Warning(Warning::SettingsOlder));
         }
-        controller.sensors.init(beam_broken, controller.ground.scale());
+        controller.sensors.init(beam_broken, controller.ground.geometry().scale);
         controller.tool.init(now.slow());
         controller.restart_plant_timeout();
         controller.telemetry.init(controller.sensors.now);
@@ -253,7 +253,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         let doubted = self.sensors.odometer.read(position, jumps, self.believes_jumps());
         let position = self.sensors.odometer.place(position);
         self.sensors.position = position;
-        self.leads_are_old |= self.sensors.meter.read(self.sensors.now, self.ground.wrap(position));
+        self.leads_are_old |= self.sensors.meter.read(self.sensors.now, self.ground.geometry().scale.wrap(position));
         match self.sensors.switch.read(self.sensors.now, switch_on) {
             // The operator clears an alarm first: with `clear`, or by turning the switch off.
             Some(true) if matches!(self.state, State::Hold) => self.go_to_work(),
@@ -309,14 +309,14 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Starts to classify a complete detection. Classification takes several turns. Dust is only counted.
     fn classify(&mut self, detection: Detection, is_of_second: bool) {
-        let width_mm = self.ground.millimetres(detection.width());
+        let width_mm = self.ground.geometry().millimetres(detection.width());
         if !detection.cut && (width_mm as u16) < self.configuration.get(Setting::MinWidthMm) {
             count(&mut self.dust);
             return;
         }
         // The previous detection, a few millimetres back, is still being classified. Unclassified detections count as plants.
         self.decide(Some(Vote::UNKNOWN));
-        let spacing_mm = self.ground.millimetres(self.ground.spacing(&detection));
+        let spacing_mm = self.ground.geometry().millimetres(self.ground.spacing(&detection));
         let speed_class_mm_s = features::speed_class(self.speed_mm_s());
         self.restart_plant_timeout();
         let classified = Classified { speed_class_mm_s, spacing_mm, width_mm, vote: Vote::UNKNOWN, label: None };
@@ -366,7 +366,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         classified.vote = vote;
         let width_mm = if *of_second { 0 } else { classified.width_mm };
         let leading = self.ground.position_of(detection.leading, self.sensors.position);
-        let (spacing, plan) = (self.ground.ticks(self.ground.spacing(detection)), self.ground.plan(detection));
+        let (spacing, plan) =
+            (self.ground.geometry().scale.ticks(self.ground.spacing(detection)), self.ground.plan(detection));
         self.events.add(Event::Detection { vote, leading, spacing, plan });
         if self.ground.classified(vote.class).is_err() {
             self.forget_and_raise(Alarm::ScheduleFull);

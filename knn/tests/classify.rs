@@ -84,13 +84,6 @@ fn first_of_all<const FEATURES: usize>(examples: &[Example<MOST>]) -> Vec<Exampl
     examples.iter().map(|example| Example::new(first(&example.features), example.label)).collect()
 }
 
-/// A check, for each number of features.
-macro_rules! for_each_number_of_features {
-    ($holds:ident) => {
-        [$holds::<1>, $holds::<2>, $holds::<3>, $holds::<4>, $holds::<5>, $holds::<6>, $holds::<7>, $holds::<8>]
-    };
-}
-
 fn is_that_of_a_plain_classifier<const FEATURES: usize>(
     examples: &[Example<MOST>],
     query: &[u8; MOST],
@@ -139,7 +132,8 @@ proptest! {
     fn the_answer_is_that_of_a_plain_float_classifier(
         examples in examples(), query in features(), k in 0_u8..18, radius in radius(),
     ) {
-        for holds in for_each_number_of_features!(is_that_of_a_plain_classifier) {
+        use self::is_that_of_a_plain_classifier as holds;
+        for holds in [holds::<1>, holds::<2>, holds::<3>, holds::<4>, holds::<5>, holds::<6>, holds::<7>, holds::<8>] {
             holds(&examples, &query, k, radius)?;
         }
     }
@@ -150,7 +144,8 @@ proptest! {
             examples().prop_flat_map(|examples| (Just(examples.clone()), Just(examples).prop_shuffle())),
         split in any::<prop::sample::Index>(), query in features(), k in 1_u8..=MAX_K, radius in radius(),
     ) {
-        for holds in for_each_number_of_features!(is_the_same_by_every_store) {
+        use self::is_the_same_by_every_store as holds;
+        for holds in [holds::<1>, holds::<2>, holds::<3>, holds::<4>, holds::<5>, holds::<6>, holds::<7>, holds::<8>] {
             holds(&examples, &shuffled, split, &query, k, radius)?;
         }
     }

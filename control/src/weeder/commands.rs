@@ -81,7 +81,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
         if !matches!(self.state, State::Work) {
             self.ground.distrust_slip();
         }
-        self.limits = Limits::of(settings, self.ground.wheel(), self.ground.scale());
+        self.limits = Limits::of(settings, self.ground.geometry().wheel, self.ground.geometry().scale);
         self.leads_are_old = true;
     }
 

@@ -26,7 +26,8 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     pub(super) fn fault(&mut self, doubted: u8) -> Option<Alarm> {
         let working = self.is_working();
         let Sensors { now, position, .. } = self.sensors;
-        let fault = self.sensors.encoder.read(now, position, doubted, self.ground.ticks(PROGRESS).0 as u8);
+        let fault =
+            self.sensors.encoder.read(now, position, doubted, self.ground.geometry().scale.ticks(PROGRESS).0 as u8);
         if !self.sensors.encoder.stands() {
             // Movement ends a manual test, with the tool out.
             self.bench = Bench::Idle;

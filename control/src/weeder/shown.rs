@@ -41,7 +41,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// The machine's speed in millimetres a second, negative backwards.
     pub fn speed_mm_s(&self) -> i16 {
-        self.ground.millimetres(Length(self.sensors.meter.speed().0))
+        self.ground.geometry().millimetres(Length(self.sensors.meter.speed().0))
     }
 
     /// Keep-out zones at the tool or ahead of it, with an open detection.
@@ -52,7 +52,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
     /// The distance in mm until the tool has left unseen ground and its margin, rounded up: 0 only once it has.
     pub fn unseen_mm(&self) -> i16 {
         let unseen = self.ground.unseen();
-        self.ground.millimetres(unseen) + i16::from(unseen > Length::ZERO)
+        self.ground.geometry().millimetres(unseen) + i16::from(unseen > Length::ZERO)
     }
 
     /// Whether there is a second beam.
@@ -72,7 +72,7 @@ impl<C: Classifier, M: Memory> Controller<C, M> {
 
     /// Whether the wheel turns so fast that an edge can be missed: both channels may then change at once.
     pub fn believes_jumps(&self) -> bool {
-        self.sensors.meter.speed().is_beyond(self.ground.scale().length(quadrature::FAST).0 as u16)
+        self.sensors.meter.speed().is_beyond(self.ground.geometry().scale.length(quadrature::FAST).0 as u16)
     }
 
     /// Whether the beam is broken.

@@ -66,81 +66,100 @@ struct Arguments {
     command: Command,
 }
 
-/// The grammar of the commands, and the function that runs one. The module of each has its `Arguments`, and `run`. That
-/// fails if an argument, a file, the firmware or a machine cannot be used. The error says what would be right.
-macro_rules! commands {
-    ($($(#[$about:meta])+ $command:ident: $module:ident,)+) => {
-        #[derive(Subcommand)]
-        enum Command {
-            $($(#[$about])+ $command(Box<$module::Arguments>),)+
-        }
-
-        /// Runs a command and returns its finding.
-        fn run(command: Command) -> Result<Finding> {
-            match command {
-                $(Command::$command(arguments) => $module::run(&arguments).map(Into::into),)+
-            }
-        }
-    };
+/// The grammar of the commands. The module of each has its `Arguments`, and `run`. That fails if an argument, a file, the
+/// firmware or a machine cannot be used. The error says what would be right.
+#[derive(Subcommand)]
+enum Command {
+    /// Weed a simulated row with the real firmware on a virtual Uno.
+    Sim(Box<row::Arguments>),
+    /// Build the firmware and flash the Uno at a USB port.
+    Flash(Box<flash::Arguments>),
+    /// Write the firmware as an Intel HEX file, for the Arduino tools.
+    Hex(Box<hex::Arguments>),
+    /// Run the firmware or a bootloader on a virtual Uno, in real time, at a serial port.
+    VirtualUno(Box<virtual_uno::Arguments>),
+    /// Measure the cycles and bytes of the firmware on a virtual Uno.
+    BenchUno(Box<bench::Arguments>),
+    /// Prove bounds from the ELF: stack, interrupts, and the encoder's rate.
+    Bounds(Box<bounds::Arguments>),
+    /// Check a real board with a second Uno, the tester.
+    CheckBoard(Box<check_board::Arguments>),
+    /// Work for a day with random faults.
+    Soak(Box<soak::Arguments>),
+    /// Run the paper's experiment in a simulated field, with several controllers.
+    Trial(Box<trial::Arguments>),
+    /// Map a result of the simulated trial against one or two parameters.
+    Sweep(Box<sweep::Arguments>),
+    /// Show what each assumption of the simulated field costs.
+    Sensitivity(Box<sensitivity::Arguments>),
+    /// Merge the parts of a trial, sweep or soak from several machines.
+    Merge(Box<merge::Arguments>),
+    /// Learn a table of examples from labelled detections, and print its error rates.
+    Train(Box<train::Arguments>),
+    /// Classify recorded detections with the firmware's classifier.
+    Classify(Box<classify::Arguments>),
+    /// List the Unos and the rows that they control, and name rows.
+    Rows(Box<rows::Arguments>),
+    /// Watch the machine, and type commands.
+    Monitor(Box<monitor::Arguments>),
+    /// Serve the page to a phone, with the state of the machines and HOLD.
+    Serve(Box<serve::Arguments>),
+    /// Record what the machine does.
+    Record(Box<record::Arguments>),
+    /// Replay a log with the same decisions on this computer, and compare.
+    Replay(Box<replay::Arguments>),
+    /// Make a map of a record with a satellite receiver, and count plants.
+    Map(Box<map::Arguments>),
+    /// Save taught examples in a table, teach them, or compare.
+    Examples(Box<examples::Arguments>),
+    /// Set up the machine step by step: ask, measure, set and save.
+    SetUp(Box<set_up::Arguments>),
+    /// Save the machine's settings in a file, set them from it, or compare.
+    Settings(Box<settings::Arguments>),
+    /// Calculate engine, servo, shanks, chain, wheels and handle of a machine.
+    Design(Box<design::Arguments>),
+    /// Create a randomised plan of a field trial, as a table to fill in.
+    Plan(Box<plan::Arguments>),
+    /// Evaluate a field trial from the counts of its plots.
+    Evaluate(Box<evaluate::Arguments>),
+    /// Update or check the manual's figures.
+    Figures(Box<figures::Arguments>),
+    /// Print the completion script for a shell.
+    Completions(Box<completions::Arguments>),
 }
 
-commands! {
-    /// Weed a simulated row with the real firmware on a virtual Uno.
-    Sim: row,
-    /// Build the firmware and flash the Uno at a USB port.
-    Flash: flash,
-    /// Write the firmware as an Intel HEX file, for the Arduino tools.
-    Hex: hex,
-    /// Run the firmware or a bootloader on a virtual Uno, in real time, at a serial port.
-    VirtualUno: virtual_uno,
-    /// Measure the cycles and bytes of the firmware on a virtual Uno.
-    BenchUno: bench,
-    /// Prove bounds from the ELF: stack, interrupts, and the encoder's rate.
-    Bounds: bounds,
-    /// Check a real board with a second Uno, the tester.
-    CheckBoard: check_board,
-    /// Work for a day with random faults.
-    Soak: soak,
-    /// Run the paper's experiment in a simulated field, with several controllers.
-    Trial: trial,
-    /// Map a result of the simulated trial against one or two parameters.
-    Sweep: sweep,
-    /// Show what each assumption of the simulated field costs.
-    Sensitivity: sensitivity,
-    /// Merge the parts of a trial, sweep or soak from several machines.
-    Merge: merge,
-    /// Learn a table of examples from labelled detections, and print its error rates.
-    Train: train,
-    /// Classify recorded detections with the firmware's classifier.
-    Classify: classify,
-    /// List the Unos and the rows that they control, and name rows.
-    Rows: rows,
-    /// Watch the machine, and type commands.
-    Monitor: monitor,
-    /// Serve the page to a phone, with the state of the machines and HOLD.
-    Serve: serve,
-    /// Record what the machine does.
-    Record: record,
-    /// Replay a log with the same decisions on this computer, and compare.
-    Replay: replay,
-    /// Make a map of a record with a satellite receiver, and count plants.
-    Map: map,
-    /// Save taught examples in a table, teach them, or compare.
-    Examples: examples,
-    /// Set up the machine step by step: ask, measure, set and save.
-    SetUp: set_up,
-    /// Save the machine's settings in a file, set them from it, or compare.
-    Settings: settings,
-    /// Calculate engine, servo, shanks, chain, wheels and handle of a machine.
-    Design: design,
-    /// Create a randomised plan of a field trial, as a table to fill in.
-    Plan: plan,
-    /// Evaluate a field trial from the counts of its plots.
-    Evaluate: evaluate,
-    /// Update or check the manual's figures.
-    Figures: figures,
-    /// Print the completion script for a shell.
-    Completions: completions,
+/// Runs a command and returns its finding.
+fn run(command: Command) -> Result<Finding> {
+    match command {
+        Command::Sim(arguments) => row::run(&arguments),
+        Command::Flash(arguments) => flash::run(&arguments).map(Into::into),
+        Command::Hex(arguments) => hex::run(&arguments).map(Into::into),
+        Command::VirtualUno(arguments) => virtual_uno::run(&arguments).map(Into::into),
+        Command::BenchUno(arguments) => bench::run(&arguments).map(Into::into),
+        Command::Bounds(arguments) => bounds::run(&arguments),
+        Command::CheckBoard(arguments) => check_board::run(&arguments),
+        Command::Soak(arguments) => soak::run(&arguments),
+        Command::Trial(arguments) => trial::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments).map(Into::into),
+        Command::Sensitivity(arguments) => sensitivity::run(&arguments).map(Into::into),
+        Command::Merge(arguments) => merge::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments).map(Into::into),
+        Command::Classify(arguments) => classify::run(&arguments),
+        Command::Rows(arguments) => rows::run(&arguments).map(Into::into),
+        Command::Monitor(arguments) => monitor::run(&arguments),
+        Command::Serve(arguments) => serve::run(&arguments).map(Into::into),
+        Command::Record(arguments) => record::run(&arguments).map(Into::into),
+        Command::Replay(arguments) => replay::run(&arguments),
+        Command::Map(arguments) => map::run(&arguments).map(Into::into),
+        Command::Examples(arguments) => examples::run(&arguments),
+        Command::SetUp(arguments) => set_up::run(&arguments).map(Into::into),
+        Command::Settings(arguments) => settings::run(&arguments),
+        Command::Design(arguments) => design::run(&arguments).map(Into::into),
+        Command::Plan(arguments) => plan::run(&arguments).map(Into::into),
+        Command::Evaluate(arguments) => evaluate::run(&arguments).map(Into::into),
+        Command::Figures(arguments) => figures::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments).map(Into::into),
+    }
 }
 
 fn main() -> ExitCode {

@@ -4,6 +4,7 @@
 //! a set-up can be continued. The steps come from the manual's page, and the margin from [`set_up`], as in the
 //! monitor and on the page.
 
+mod measuring;
 mod simulated;
 mod state;
 
@@ -12,23 +13,22 @@ use crate::input;
 use crate::output::{say, tell};
 use crate::ports::Port;
 use crate::source;
-use anyhow::{Context, Error, Result, bail};
+use anyhow::{Context, Error, Result};
 use clap::Args;
 use files::{bounded_file, whole_file};
 use link::row_names::Board;
 use link::settings::{self, Setting, name, range, unit};
-use link::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
+use link::{ConsoleLine, EventLine, Link, LinkError, Mode};
 use mechanics::design::Design;
 use mechanics::machine::Machine;
 use mechanics::swing::Swing;
 use mechanics::unit::MM;
-use set_up::{ManualStep, SetUp, Step, Task, steps};
+use set_up::{ManualStep, Task, steps};
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::thread;
-use std::time::{Duration, Instant};
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -56,17 +56,6 @@ pub struct Arguments {
     #[arg(long, conflicts_with_all = ["port", "state", "machine", "again"])]
     simulated: bool,
 }
-
-/// Time limit for the servo's six swings out and in, and for waiting for plants.
-const SWINGS: Duration = Duration::from_secs(30);
-const PLANTS: Duration = Duration::from_secs(600);
-
-/// Time between two checks whether the machine stands, and the ticks after which it has left a mark.
-const POLL: Duration = Duration::from_millis(200);
-const ROLLED_TICKS: u32 = 500;
-
-/// From this speed on, the machine ends timed swings: 0.05 km/h, rounded up.
-const ROLLS_MM_S: u32 = 15;
 
 /// The measures from which `weeder design` calculates the stroke: section and key of a machine file, and the question.
 const TOOL_WIDTH: (&str, &str) = ("intra_row", "width");
@@ -422,191 +411,6 @@ impl Guide {
             }
             Err(error) => Err(error.into()),
         }
-    }
-
-    /// Times the servo until there are enough measurements over the present stroke.
-    fn time_servo(&mut self) -> Result<()> {
-        self.push(&[])?;
-        let has_switch = settings::read(&mut self.link)?.get(Setting::EndSwitch) > 0;
-        let shown = if has_switch { "on" } else { "off" };
-        let wanted = loop {
-            match self.ask_for("An end switch on D5 times the servo by itself: on, off", Some(shown))?.as_str() {
-                "on" => break 1,
-                "off" => break 0,
-                _ => tell!("  error: type on or off"),
-            }
-        };
-        self.push(&[(Setting::EndSwitch, wanted)])?;
-        loop {
-            let settings = settings::read(&mut self.link)?;
-            let missing = self.state.measured.missing(&settings);
-            let Some(step) = missing.iter().find(|step| matches!(step, Step::TimeServo(_))) else {
-                let leads = missing.iter().filter_map(|step| match *step {
-                    Step::SetLead(lead, worst_ms) => Some((lead, worst_ms)),
-                    _ => None,
-                });
-                let leads: Vec<(Setting, u16)> = leads.collect();
-                return self.push(&leads);
-            };
-            say!("  Next, {step}")?;
-            self.go("Keep clear of the tool")?;
-            let from = self.stands_at(None)?;
-            if self.ask("calibrate servo")?.is_none() {
-                continue;
-            }
-            let Some((event, line)) = self.swings(from)? else { continue };
-            match event {
-                EventLine::NotCalibrated {} => {
-                    tell!(
-                        "  error: the end switch did not follow: see to it, or leave out this step and begin it with off"
-                    );
-                }
-                EventLine::CalibratedBySwitch { out_ms, in_ms, is_set } => {
-                    say!("  The tool was out after {out_ms} ms, and began to come back after {in_ms} ms.")?;
-                    if !is_set {
-                        bail!(
-                            "a lead of {out_ms} ms needs the beam farther ahead, or a lower top_speed_mm_s: change one of them"
-                        );
-                    }
-                    self.state.measured.take_line(&line);
-                }
-                _ => {
-                    self.state.measured.take_line(&line);
-                    let mut leads = Vec::new();
-                    for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
-                        leads.push((lead, self.value(lead, None)?));
-                    }
-                    self.push(&leads)?;
-                }
-            }
-            self.keep()?;
-        }
-    }
-
-    /// Waits for the result of the timed swings. `None` if the machine has dropped them; the reason was printed.
-    fn swings(&mut self, from: i32) -> Result<Option<(EventLine, String)>> {
-        let calibrated = |event: &EventLine| {
-            use EventLine::{CalibratedByEye, CalibratedBySwitch, NotCalibrated};
-            matches!(event, CalibratedBySwitch { .. } | CalibratedByEye {} | NotCalibrated {})
-        };
-        let deadline = Instant::now() + SWINGS;
-        let mut has_moved = false;
-        while Instant::now() < deadline && !has_moved {
-            let until = Instant::now() + POLL;
-            while Instant::now() < until {
-                let Some(line) = self.link.next_line()? else { continue };
-                if let ConsoleLine::Event(event) = ConsoleLine::parse(&line)
-                    && calibrated(&event)
-                {
-                    return Ok(Some((event, line)));
-                }
-            }
-            has_moved = settings::status(&mut self.link)?.speed_mm_s.unsigned_abs() >= ROLLS_MM_S;
-        }
-        let has_moved = has_moved || settings::status(&mut self.link)?.position != from;
-        if has_moved {
-            tell!("  The wheel moved, so the machine has dropped the measurement. Hold the machine still.");
-        } else {
-            tell!("  The machine has not reported the swings within {} seconds.", SWINGS.as_secs());
-        }
-        Ok(None)
-    }
-
-    /// Waits until the machine stands, and returns its position. With `from`, it must first have left that position.
-    fn stands_at(&mut self, from: Option<i32>) -> Result<i32> {
-        let mut before = None;
-        loop {
-            let Status { position, speed_mm_s, .. } = settings::status(&mut self.link)?;
-            let has_rolled = from.is_none_or(|from| position.abs_diff(from) > ROLLED_TICKS);
-            if has_rolled && speed_mm_s == 0 && before == Some(position) {
-                return Ok(position);
-            }
-            before = Some(position);
-            thread::sleep(POLL);
-        }
-    }
-
-    /// Measures the wheel until there are enough measurements.
-    fn measure_wheel(&mut self, length_mm: u16) -> Result<()> {
-        if settings::read(&mut self.link)?.get(Setting::TicksPerM) == 0 {
-            // They were of another wheel.
-            self.state.measured.forget_stretches();
-        }
-        loop {
-            let stretches = self.state.measured.stretches();
-            if stretches >= SetUp::STRETCHES {
-                return self.push(&[]);
-            }
-            say!("  Stretch {} of {}", stretches + 1, SetUp::STRETCHES)?;
-            self.go("Stand at the first mark, and stand still")?;
-            let from = self.stands_at(None)?;
-            if self.ask("calibrate start")?.is_none() {
-                continue;
-            }
-            let question = "Roll to the other mark and stand still; the distance in mm";
-            let length = self.ask_for(question, Some(&length_mm.to_string()))?;
-            self.stands_at(Some(from))?;
-            let command = format!("calibrate {length}");
-            let Some(answer) = self.ask(&command)? else { continue };
-            self.state.measured.take_line(&format!("> {command}"));
-            answer.iter().for_each(|line| self.state.measured.take_line(line));
-            answer.iter().try_for_each(|line| say!("  {line}"))?;
-            self.push(&[])?;
-            self.keep()?;
-        }
-    }
-
-    /// Sets the margin that follows from the measurements, or prints what is missing.
-    fn set_margin(&mut self) -> Result<()> {
-        self.push(&[])?;
-        let settings = settings::read(&mut self.link)?;
-        if matches!(self.state.measured.missing(&settings)[..], [Step::PassPlants(_)]) {
-            say!("  Roll past plants: both beams measure the slip.")?;
-        }
-        loop {
-            match self.state.measured.margin(&settings) {
-                Ok(margin) => {
-                    let least_mm = margin.least_mm();
-                    say!("  The measurements ask for {least_mm} mm: {margin}")?;
-                    let value = self.value(Setting::MarginMm, Some(least_mm))?;
-                    self.state.measured.take_line(&format!("> set {} {value}", name(Setting::MarginMm)));
-                    self.push(&[(Setting::MarginMm, value)])?;
-                    if let Some(warning) = self.state.measured.warning(&settings::read(&mut self.link)?) {
-                        tell!("  Warning: {warning}");
-                    }
-                    return Ok(());
-                }
-                Err(missing) => {
-                    let [Step::PassPlants(_)] = missing[..] else {
-                        for step in missing {
-                            say!("  Missing: {step}")?;
-                        }
-                        return say!("  The margin stays at {} mm.", settings.get(Setting::MarginMm));
-                    };
-                    self.pass_plant()?;
-                }
-            }
-        }
-    }
-
-    /// Listens to the next plant that passes both beams.
-    fn pass_plant(&mut self) -> Result<()> {
-        let deadline = Instant::now() + PLANTS;
-        while Instant::now() < deadline {
-            match self.typed.try_recv().as_deref() {
-                Ok("s") => return Err(Error::msg(End::LeaveOut)),
-                Ok("q") | Err(TryRecvError::Disconnected) => return Err(Error::msg(End::Stop)),
-                _ => {}
-            }
-            let Some(line) = self.link.next_line()? else { continue };
-            if let ConsoleLine::Event(EventLine::Slip { permille }) = ConsoleLine::parse(&line) {
-                say!("  slip {permille} permille")?;
-                self.state.measured.take_line(&line);
-                return self.keep();
-            }
-        }
-        tell!("  No plant has passed both beams for {} minutes.", PLANTS.as_secs() / 60);
-        Err(Error::msg(End::LeaveOut))
     }
 }
 

@@ -1,5 +1,11 @@
 //! `weeder trial`: the paper's experiment in a simulated field, with its report.
 
+mod summary;
+mod tables;
+
+use self::summary::{about, against_the_paper, summary};
+use self::tables::Contents::{Brief, Ground, Plants};
+use self::tables::{LOSS_BUDGET, by_speed, loss_budget};
 use crate::destination::{OutFolder, OutName, Replace};
 use crate::examples;
 use crate::numbers::{number_within, whole_within};
@@ -10,23 +16,18 @@ use crate::progress::with_bar;
 use crate::source;
 use anyhow::{Result, ensure};
 use clap::{Args, Command, FromArgMatches, ValueEnum};
-use comfy_table::{CellAlignment, Table};
-use field::budget;
 use field::conditions::{self, presets};
-use field::tool_path::{Effect, WeedCount, unweeded_strip_mm};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
-use study::evaluation::{Analysis, published};
+use study::evaluation::Analysis;
 use study::experiment::{self, Engine, Experiment, PlotOutcome, Total, Treatment};
 use study::page::Page;
 use study::shard::{Numbered, Shard};
-use study::statistics::Share;
 use study::sweep::{SPACINGS_CM, SPEEDS_KM_H};
-use study::table::{distinct, in_two_lines};
-use uno_run::report::number_table;
+use study::table::distinct;
 use uno_run::{firmware, picture};
 
 /// The name of the command in its parts.
@@ -301,206 +302,9 @@ fn show(
     Ok(Finding::of(damaged == 0 && alarms == 0))
 }
 
-/// The differences between the paper's controller here and in the paper, at the paper's speeds, and their reason.
-fn against_the_paper(outcomes: &[PlotOutcome]) -> Vec<String> {
-    let (slowest, fastest) = published::SPEEDS_KM_H;
-    let mut records = experiment::records(outcomes, Treatment::Paper);
-    records.retain(|record| (slowest..=fastest).contains(&record.speed_km_h));
-    let said = Analysis::of(records).map(|analysis| analysis.against_the_paper()).unwrap_or_default();
-    if said.is_empty() {
-        return said;
-    }
-    let reason = format!(
-        "This is the paper's program at {slowest} to {fastest} km/h, on this report's machine and field. The paper prints no servo \
-         times, canopies or straying, so these are assumed. Its own slopes contradict each other too."
-    );
-    [said, vec![reason]].concat()
-}
-
 /// The totals of one controller, by speed.
 fn of(totals: &[Total], controller: Treatment) -> impl Iterator<Item = &Total> {
     totals.iter().filter(move |total| total.plots.controller == controller)
-}
-
-/// A column: its heading, its value for a total, and the tables that have it.
-type Column = (&'static str, fn(&Total) -> String, &'static [Contents]);
-
-/// The tables of a trial, each with a line for each speed and controller.
-#[derive(Clone, Copy, PartialEq)]
-enum Contents {
-    /// The most important columns, for `--brief`.
-    Brief,
-    /// The results for plants.
-    Plants,
-    /// The weeded ground.
-    Ground,
-}
-
-use Contents::{Brief, Ground, Plants};
-
-const COLUMNS: [Column; 13] = [
-    ("km/h", |total| total.speed_km_h().to_string(), &[Brief, Plants, Ground]),
-    ("controller", |total| name(total.plots.controller).to_owned(), &[Brief, Plants, Ground]),
-    ("seen plants\ndamaged, %", |total| interval(total.damage_of_seen()), &[Brief, Plants]),
-    ("unseen\nplants, %", |total| without_interval(&interval(total.damage_of_unseen())), &[Plants]),
-    ("zones\nreached, %", |total| format!("{:.1}", total.zones_reached_percent()), &[Brief, Plants]),
-    ("margins\ncut, %", |total| format!("{:.1}", total.margins_cut_percent()), &[Plants]),
-    ("rows with\nan alarm", |total| total.plots.alarms.to_string(), &[Plants]),
-    ("row ground\nweeded, %", weeded, &[Brief, Ground]),
-    ("most\nlost to, %", most_lost, &[Brief, Ground]),
-    ("with all\nmargins\nkept at\nmost, %", |total| format!("{:.1}", 100.0 * total.plots.weedable_share), &[Ground]),
-    ("undamaged\nat most, %", |total| format!("{:.1}", 100.0 * total.plots.undamaged_share), &[Ground]),
-    ("weeds\ngone in\nrow, %", |total| gone(total.plots.effect.in_row), &[Brief, Ground]),
-    ("weeds\ngone in\nplot, %", |total| gone(total.plots.effect.in_plot), &[Ground]),
-];
-
-/// A share alone: the table has no room for a second interval, and `--json` has it.
-fn without_interval(share: &str) -> String {
-    share.split(" (").next().unwrap_or_default().to_owned()
-}
-
-/// A controller's title without its article, for a table.
-fn name(controller: Treatment) -> &'static str {
-    let title = controller.title();
-    ["a ", "the "].iter().find_map(|article| title.strip_prefix(article)).unwrap_or(title)
-}
-
-/// A table of a trial, at most 110 characters wide.
-fn by_speed(totals: &[Total], contents: Contents) -> Table {
-    let columns = || COLUMNS.iter().filter(|(_, _, tables)| tables.contains(&contents));
-    let mut table = number_table(columns().map(|(heading, _, _)| heading), 0);
-    for total in totals {
-        table.add_row(columns().map(|(_, cell, _)| cell(total)));
-    }
-    table.column_iter_mut().skip(1).take(1).for_each(|column| column.set_cell_alignment(CellAlignment::Left));
-    table
-}
-
-/// The heading of the loss budget.
-const LOSS_BUDGET: &str = "Loss budget of the row's ground with this firmware, %";
-
-/// The firmware's loss budget, a line a speed: each adds up to 100 %.
-fn loss_budget(totals: &[Total]) -> Table {
-    let headings = budget::Part::ALL.map(|part| in_two_lines(part.title()));
-    let mut table = number_table(std::iter::once("km/h".to_owned()).chain(headings), 0);
-    for total in of(totals, Treatment::Firmware) {
-        let shares = total.plots.budget.tenths().map(|(_, tenths)| format!("{:.1}", f64::from(tenths) / 10.0));
-        table.add_row(std::iter::once(total.speed_km_h().to_string()).chain(shares));
-    }
-    table
-}
-
-/// The largest loss of the row's ground.
-fn most_lost(total: &Total) -> String {
-    let (part, share) = total.plots.budget.largest_loss();
-    format!("{} {:.1}", part.key(), 100.0 * share)
-}
-
-/// The weeded share of the row's ground, and the confidence range of its mean.
-fn weeded(total: &Total) -> String {
-    let mean = total.weeded_percent.mean;
-    total.weeded_percent.within.map_or(format!("{mean:.1}"), |within| format!("{mean:.1} ± {within:.1}"))
-}
-
-/// The removed share of the weeds.
-fn gone(weeds: WeedCount) -> String {
-    weeds.efficiency_percent().map_or("-".to_owned(), |percent| format!("{percent:.1}"))
-}
-
-/// The result in words.
-fn summary(experiment: &Experiment, totals: &[Total]) -> Vec<String> {
-    let mut sentences: Vec<String> =
-        experiment.controllers.iter().map(|&controller| damage(totals, controller)).collect();
-    if experiment.controllers.contains(&Treatment::Paper) {
-        let (lowest, highest) = published::DAMAGED_PERCENT;
-        sentences.push(format!(
-            "The paper's controller is the paper's program on this machine. On its own machine the paper measured {lowest} to {highest} %. \
-             `weeder trial --field paper` simulates that machine."
-        ));
-    }
-    let alarms: u32 = of(totals, Treatment::Firmware).map(|total| total.plots.alarms).sum();
-    if alarms > 0 {
-        sentences.push(format!(
-            "In {alarms} of {} rows an alarm took the firmware's tool out for the rest of the row. Exclude those rows.",
-            experiment.rows()
-        ));
-    }
-    let short_of_bound =
-        of(totals, Treatment::Firmware).map(|total| total.plots.weedable_share - total.plots.weeded_share);
-    let zone = match experiment.conditions.timing().stem_zone_mm {
-        0 => "canopy".to_owned(),
-        zone_mm => format!("zone of {zone_mm} mm round the stem"),
-    };
-    sentences.push(format!(
-        "With each plant's {zone} and its margin kept, this servo could weed at most {:.1} points more of the row's ground than the \
-         firmware did.",
-        100.0 * short_of_bound.fold(0.0, f64::max)
-    ));
-    let mut weeds = Effect::default();
-    of(totals, Treatment::Firmware).for_each(|total| weeds += total.plots.effect);
-    let Effect { damaged, unseen, swept, neighbours, .. } = weeds;
-    if damaged + swept + neighbours > 0 {
-        sentences.push(format!(
-            "Of the plants that the firmware's machine damaged, the tool hit {damaged}: the beam cannot see {unseen} of them. Sweeps cut \
-             {swept}, where the machine strays. The tool cut {neighbours} in the next row, where it swung aside."
-        ));
-    }
-    let strip_mm = unweeded_strip_mm(&experiment.conditions.machine(0), &experiment.conditions.machine);
-    if strip_mm > 0.0 {
-        sentences.push(format!(
-            "Between tool and sweeps a strip of {strip_mm:.1} mm on either side of the row is not weeded: a tool of {:.0} mm would fill it.",
-            2.0 * experiment.conditions.machine.sweep_from_mm
-        ));
-    }
-    if let (Some(in_row), Some(in_plot)) = (weeds.in_row.efficiency_percent(), weeds.in_plot.efficiency_percent()) {
-        sentences.push(format!(
-            "Of the weeds in the row the firmware removed {in_row:.0} %; of all weeds of the plot, as the paper counts them, \
-             {in_plot:.0} % were gone."
-        ));
-    }
-    sentences
-}
-
-/// The field, its seeds and its rows, for the tables. Their lines have the speeds.
-fn about(study: &Study) -> String {
-    let Study { experiment: Experiment { seed, seeds, conditions, spacings_cm, .. }, field, .. } = study;
-    let seeds = if *seeds > 1 {
-        format!("seeds {seed} to {}", seed.wrapping_add((seeds - 1).into()))
-    } else {
-        format!("seed {seed}")
-    };
-    let spacings: Vec<String> = spacings_cm.iter().map(f64::to_string).collect();
-    let rows = study.experiment.rows();
-    format!(
-        "Field {field}, {seeds}: {rows} rows of {} m for each controller, plants {} cm apart.",
-        conditions.plot.row_m,
-        spacings.join(" and ")
-    )
-}
-
-/// A share and its interval.
-fn interval(share: Share) -> String {
-    if share.of == 0 { "-".to_owned() } else { format!("{} ({share})", share.shown()) }
-}
-
-/// How many plants a controller damaged, and where it damaged most.
-fn damage(totals: &[Total], controller: Treatment) -> String {
-    let name = controller.title();
-    let (damaged, plants) = of(totals, controller).fold((0, 0), |(damaged, plants), total| {
-        (damaged + total.plots.effect.injured(), plants + total.plots.effect.plants)
-    });
-    let share = Share::of(damaged, plants);
-    let worst = of(totals, controller).max_by(|a, b| a.plant_damage_percent().total_cmp(&b.plant_damage_percent()));
-    match worst {
-        Some(worst) if damaged > 0 => format!(
-            "Plants damaged by {name}: {damaged} of {plants} ({} %, {}), most of them at {} km/h, {} %.",
-            share,
-            share.kind(),
-            worst.speed_km_h(),
-            worst.damage().shown()
-        ),
-        _ => format!("Plants damaged by {name}: none of {plants} ({share} %, {}).", share.kind()),
-    }
 }
 
 fn write_report(

@@ -14,103 +14,27 @@
 //! the leads of the [`Timing`] and the true speed at that moment. Plants that share one swing share its two commands:
 //! the first plant has the command out, the last one has the command back.
 
+mod swing;
+mod timing;
+
+pub use self::timing::Timing;
+
+use self::swing::Swing;
+use self::timing::Level;
 use crate::driving::Steering;
 use crate::ground::{share_of, union};
-use crate::machine::{Machine, time_at_s};
+use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::row::{Canopy, Row};
-use crate::servo::{Command, OUT_DEGREES, Stroke};
+use crate::servo::{OUT_DEGREES, Stroke};
 use crate::tool_path::Swinging;
-use control::{ground::keep_out::trim, units::Length};
 use serde::Serialize;
-use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use strum::Display;
 use uno::Pulse;
 
 /// A margin that is short by less than this still counts as kept.
 pub const MARGIN_TOLERANCE_MM: f64 = 10.0;
-
-/// Margin and leads, as the firmware's settings have them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timing {
-    /// Margin on both sides of a canopy.
-    pub margin_mm: u32,
-    /// Lead of the command to leave the row.
-    pub lead_out_ms: u32,
-    /// Lead of the command to come back.
-    pub lead_in_ms: u32,
-    /// The zone that is kept for a single plant, if the tool may work under its leaves. 0 keeps its whole canopy.
-    pub stem_zone_mm: u32,
-}
-
-impl Default for Timing {
-    /// For the unloaded servo of [`Machine::default`]. The firmware's own default is for a servo in the soil.
-    fn default() -> Self {
-        Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40, stem_zone_mm: 0 }
-    }
-}
-
-impl Timing {
-    /// The paper's schedule, without leads (Eq. 1 to 3).
-    pub fn as_in_the_paper() -> Self {
-        Self { lead_out_ms: 0, lead_in_ms: 0, ..Self::default() }
-    }
-
-    /// The ground that the tool must not enter for a plant, without the margin: its canopy. With a stem zone it is the
-    /// part that the firmware keeps of a plant seen whole.
-    fn kept_mm(&self, plant: &Canopy) -> Range<f64> {
-        let (span, zone_mm) = (plant.span_mm(), f64::from(self.stem_zone_mm));
-        // In steps of 0.1 mm, which is finer than the wheel's.
-        let steps = |mm: f64| Length((10.0 * mm) as i16);
-        let trim_mm = f64::from(trim(steps(span.end - span.start), steps(zone_mm)).0) / 10.0;
-        span.start + trim_mm..span.end - trim_mm
-    }
-
-    /// A plant's keep-out zone: that ground with its margins.
-    fn window_mm(&self, plant: &Canopy) -> Range<f64> {
-        let (kept, margin_mm) = (self.kept_mm(plant), f64::from(self.margin_mm));
-        kept.start - margin_mm..kept.end + margin_mm
-    }
-
-    /// How wide the kept ground is across the row.
-    fn kept_across_mm(&self, plant: &Canopy) -> f64 {
-        if self.stem_zone_mm == 0 { plant.across_mm } else { plant.across_mm.min(self.stem_zone_mm.into()) }
-    }
-
-    /// The outline of a keep-out zone, from its ends on the row's line to its widest: how far the tool's edge has to be
-    /// from the line, and how far inside the zone's end, as a share of half its length. A canopy is a rectangle.
-    fn outline(&self) -> Vec<Level> {
-        let half_mm = f64::from(self.stem_zone_mm) / 2.0;
-        let level = |step: u32| {
-            let (sin, cos) = (FRAC_PI_2 * f64::from(step) / f64::from(LEVELS)).sin_cos();
-            Level { aside_mm: half_mm * sin, inside_mm: half_mm * (1.0 - cos) }
-        };
-        if self.stem_zone_mm == 0 {
-            return vec![Level { aside_mm: f64::INFINITY, inside_mm: 0.0 }];
-        }
-        (0..=LEVELS).map(level).collect()
-    }
-}
-
-/// Points of a quarter of a circle. Between two of them the circle is within 0.1 mm of a straight line.
-const LEVELS: u32 = 16;
-
-/// A point of a zone's outline.
-#[derive(Clone, Copy)]
-struct Level {
-    /// From the row's line.
-    aside_mm: f64,
-    /// From the zone's end, along the row.
-    inside_mm: f64,
-}
-
-impl Level {
-    /// The same in a plant's kept ground, which may be shorter than the circle.
-    fn inside_mm(self, kept: &Range<f64>, zone_mm: u32) -> f64 {
-        self.inside_mm * ((kept.end - kept.start) / f64::from(zone_mm.max(1))).min(1.0)
-    }
-}
 
 /// The result for a plant, from good to bad.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Display, Serialize)]
@@ -319,36 +243,6 @@ pub fn judge(
         weeded_share: share_of(&row.span_mm(), &weeded),
         weeded_mm: weeded,
         weedable_share: weedable_share(row, machine, motion, timing),
-    }
-}
-
-/// The time from a command out of the row to the next one into it.
-struct Swing {
-    /// `None` if the tool was out at power-up.
-    out_s: Option<f64>,
-    /// `None` if the tool is still out at the end.
-    in_s: Option<f64>,
-    during_s: Range<f64>,
-}
-
-impl Swing {
-    fn all(commands: &[Command], motion: &Motion, start_cycle: u64) -> Vec<Self> {
-        let mut swings: Vec<Self> = Vec::new();
-        for (index, command) in commands.iter().enumerate() {
-            let time_s = time_at_s(start_cycle, command.rise_cycle);
-            match swings.last_mut().filter(|swing| swing.in_s.is_none()) {
-                Some(swing) if !command.is_out => {
-                    swing.in_s = Some(time_s);
-                    swing.during_s.end = time_s;
-                }
-                None if command.is_out => {
-                    let out_s = (index > 0).then_some(time_s);
-                    swings.push(Self { out_s, in_s: None, during_s: out_s.unwrap_or(0.0)..motion.duration_s() });
-                }
-                _ => {}
-            }
-        }
-        swings
     }
 }
 

@@ -15,10 +15,15 @@
 //!   If dropped fixes agree with each other for [`AGREEING_MS`], the earlier fixes may have been wrong. The track then
 //!   starts again with the first of them.
 
+mod delay;
+mod heard;
+
+pub use self::heard::{Counts, Fix, Heard, Jump, Mark};
+
+use self::delay::{LONGEST_DELAY_MS, LeastAhead};
 use crate::plane::Place;
 use crate::sentence::{DAY_MS, Finder, Line, Quality, Report};
 use std::collections::BTreeMap;
-use std::fmt;
 
 /// After a jump, fixes are accepted again once they have agreed for this time, in ms.
 pub const AGREEING_MS: f64 = 10_000.0;
@@ -36,13 +41,6 @@ const SWAY_M: f64 = 0.25;
 /// Greatest ratio of the machine's distance to the wheel's: the machine may skid.
 const SKIDDING: f64 = 1.1;
 
-/// The least delay is searched among the lines of this time and the one before, in ms of the log.
-const DELAYS_MS: f64 = 10_000.0;
-
-/// The greatest difference of a delay from the least. If a receiver's time jumps by more, it has only now found the
-/// right time.
-const LONGEST_DELAY_MS: f64 = 30_000.0;
-
 /// A longer time without a status of the wheel is a gap, in ms.
 pub(crate) const WHEEL_GAP_MS: f64 = 2000.0;
 
@@ -52,89 +50,6 @@ const STEP_STAYS_MS: f64 = 2000.0;
 
 /// The greatest difference of such a rise from whole seconds, and between its lines, in ms.
 const STEP_JITTER_MS: f64 = 300.0;
-
-/// A fix.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fix {
-    /// By the record's clock, in milliseconds, less the receiver's own delay.
-    pub time_ms: f64,
-    /// Milliseconds UTC since a midnight, see [`Receiver::midnight_ms`].
-    pub utc_ms: i64,
-    /// Where the antenna was.
-    pub place: Place,
-    /// How good it is.
-    pub quality: Quality,
-    /// Its standard deviation to the east and to the north, in metres: of the receiver, and of its digits.
-    pub error_m: f64,
-    /// The number of its track. Fixes that have jumped for good begin a new one.
-    pub track: u32,
-}
-
-/// A fix that has jumped.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jump {
-    /// The antenna's position by the receiver.
-    pub place: Place,
-    /// By the record's clock.
-    pub time_ms: f64,
-    /// Metres from the last fix that is used.
-    pub far_m: f64,
-    /// Metres that the wheel has rolled since.
-    pub rolled_m: f64,
-}
-
-/// A fault in the receiver's output, or the end of a fault.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mark {
-    /// There is a fix again.
-    Found(Quality),
-    /// There is no fix any more.
-    Lost,
-    /// A fix that has jumped, and is not used.
-    Jumped(Jump),
-    /// The fixes stay at their new position, and are used from there on.
-    Stayed,
-    /// The receiver's clock has stepped back by these seconds.
-    Stepped(f64),
-}
-
-impl fmt::Display for Mark {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Found(quality) => write!(formatter, "fix by {quality}"),
-            Self::Lost => formatter.write_str("no fix"),
-            Self::Jumped(Jump { far_m, rolled_m, .. }) => {
-                write!(formatter, "jumped {far_m:.2} m while the wheel rolled {rolled_m:.2} m: not used")
-            }
-            Self::Stayed => formatter.write_str("stays where it has jumped to: used from here on"),
-            Self::Stepped(seconds) => {
-                write!(formatter, "the receiver's clock went back by {seconds:.0} s: used as it is now")
-            }
-        }
-    }
-}
-
-/// The results of a line.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Heard {
-    /// Complete fixes. Several come if earlier fixes had jumped and are accepted after all.
-    pub fixes: Vec<Fix>,
-    /// The marks.
-    pub marks: Vec<Mark>,
-}
-
-/// The counts of a receiver.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Fixes that are used.
-    pub fixes: u64,
-    /// How often the fix was lost.
-    pub losses: u64,
-    /// Fixes that have jumped.
-    pub jumps: u64,
-    /// Lines that came damaged.
-    pub damaged: u64,
-}
 
 /// A moment, and the values received for it.
 #[derive(Clone, Copy, Debug)]
@@ -187,10 +102,7 @@ pub struct Receiver {
     days: i64,
     /// How many lines have which day as that of the first line, from 1970.
     first_days: BTreeMap<i64, u64>,
-    /// The least difference of the log's clock ahead of UTC, in this period and the one before, and the start of this
-    /// one.
-    ahead_ms: [Option<f64>; 2],
-    delays_since_ms: f64,
+    least_ahead: LeastAhead,
     /// The last moment that has its time, in UTC.
     timed_utc_ms: i64,
     /// Moments whose delay has risen. It is not clear yet whether they came late or the receiver's clock has stepped.
@@ -333,7 +245,7 @@ impl Receiver {
 
     /// Gives a moment its time, or keeps it until it is clear whether the receiver's clock has stepped back.
     fn time(&mut self, moment: Moment) {
-        let least_ms = self.least_ahead_ms().unwrap_or(moment.ahead_ms());
+        let least_ms = self.least_ahead.ms().unwrap_or(moment.ahead_ms());
         let rise_ms = |moment: &Moment| moment.ahead_ms() - least_ms;
         let has_risen = (LEAST_STEP_MS..LONGEST_DELAY_MS).contains(&rise_ms(&moment));
         let stays = |first: &Moment| (moment.ahead_ms() - first.ahead_ms()).abs() < STEP_JITTER_MS;
@@ -351,10 +263,10 @@ impl Receiver {
         let has_stayed = moment.arrived_ms - first.arrived_ms >= STEP_STAYS_MS;
         // A time that goes back is a step in any case.
         if first.utc_ms < self.timed_utc_ms || (has_stayed && is_whole) {
-            self.ahead_ms = [None; 2];
+            self.least_ahead.forget();
             self.heard.marks.push(Mark::Stepped(rise_s));
         }
-        if has_stayed || self.ahead_ms == [None; 2] {
+        if has_stayed || self.least_ahead.ms().is_none() {
             self.release();
         }
     }
@@ -364,29 +276,10 @@ impl Receiver {
         std::mem::take(&mut self.risen).into_iter().for_each(|moment| self.judge(moment));
     }
 
-    fn least_ahead_ms(&self) -> Option<f64> {
-        self.ahead_ms.into_iter().flatten().reduce(f64::min)
-    }
-
-    /// By how much the record's clock is ahead of UTC, and of the receiver's least delay.
-    fn ahead_ms(&mut self, moment: &Moment) -> f64 {
-        let ahead_ms = moment.ahead_ms();
-        let is_another = |least: f64| (ahead_ms - least).abs() > LONGEST_DELAY_MS;
-        if self.ahead_ms.into_iter().flatten().any(is_another) {
-            self.ahead_ms = [None; 2];
-        }
-        if !(0.0..DELAYS_MS).contains(&(moment.arrived_ms - self.delays_since_ms)) {
-            self.ahead_ms = [None, self.ahead_ms[0]];
-            self.delays_since_ms = moment.arrived_ms;
-        }
-        self.ahead_ms[0] = Some(self.ahead_ms[0].map_or(ahead_ms, |least| least.min(ahead_ms)));
-        self.least_ahead_ms().unwrap_or(ahead_ms)
-    }
-
     /// Compares a moment's fix with the last one, and with the wheel.
     fn judge(&mut self, moment: Moment) {
         let Some(place) = moment.place else { return };
-        let time_ms = moment.utc_ms as f64 + self.ahead_ms(&moment);
+        let time_ms = moment.utc_ms as f64 + self.least_ahead.take(moment.arrived_ms, moment.ahead_ms());
         self.timed_utc_ms = moment.utc_ms;
         let quality = moment.quality.unwrap_or(Quality::Satellites);
         // A receiver may cut its digits instead of rounding them.

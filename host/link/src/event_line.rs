@@ -3,12 +3,18 @@
 //! Lines are `name key=value key=value`. Unknown keys are ignored, so that a newer firmware may add more. An event
 //! that lacks a key, or has a value that is not known here, is [`EventLine::Newer`].
 
+mod field;
+pub(crate) mod kind;
+mod values;
+
+pub use self::field::{Field, Fields};
+pub use self::values::Values;
+use self::values::behind;
 use control::alarm::{Alarm, Warning};
-use control::ground::{class::Class, features};
+use control::ground::class::Class;
 use control::operate::calibration::{Outcome, SwingTimes};
 use control::operate::event::Event;
 use control::operate::state::State;
-use control::say::names;
 use strum::{EnumString, IntoStaticStr};
 
 /// A line, as the [tables](control::line_tables) describe it.
@@ -206,55 +212,6 @@ impl<T> Take<T> for Option<T> {
     }
 }
 
-/// A line's name, and its fields by their names.
-pub type Fields = (&'static str, Vec<(&'static str, Field)>);
-
-/// A field of a line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Field {
-    /// The line does not have it.
-    Missing,
-    /// A number.
-    Number(i64),
-    /// Several numbers.
-    Numbers(Vec<u8>),
-    /// Yes or no.
-    Flag(bool),
-    /// A word, or a text.
-    Word(String),
-}
-
-impl<T: Into<Field>> From<Option<T>> for Field {
-    fn from(field: Option<T>) -> Self {
-        field.map_or(Self::Missing, T::into)
-    }
-}
-
-/// Which kind of field a type is.
-macro_rules! fields {
-    ($($Type:ty: $value:ident => $field:expr;)*) => {$(
-        impl From<$Type> for Field {
-            fn from($value: $Type) -> Self {
-                $field
-            }
-        }
-    )*};
-}
-
-fields! {
-    i32: number => Self::Number(number.into());
-    u32: number => Self::Number(number.into());
-    u16: number => Self::Number(number.into());
-    u8: number => Self::Number(number.into());
-    [u8; features::COUNT]: numbers => Self::Numbers(numbers.to_vec());
-    bool: flag => Self::Flag(flag);
-    String: word => Self::Word(word);
-    Class: class => Self::Word(names::class(class).to_string());
-    Mode: mode => Self::Word(mode.name().to_owned());
-    Alarm: alarm => Self::Word(alarm.text().to_string());
-    Warning: warning => Self::Word(warning.text().to_string());
-}
-
 /// The machine's state, without the reason for an alarm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumString, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
@@ -282,83 +239,6 @@ impl Mode {
     /// Its name on the console.
     pub fn name(self) -> &'static str {
         self.into()
-    }
-}
-
-/// The words `key=value` of a line, by their keys.
-pub struct Values<'a>(pub &'a str);
-
-impl<'a> Values<'a> {
-    /// The text of a key. `None` if the line lacks it. An empty key is the first word.
-    pub fn text(&self, key: &str) -> Option<&'a str> {
-        if key.is_empty() {
-            return self.0.split(' ').next();
-        }
-        self.0.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
-    }
-
-    /// As [`text`](Self::text), parsed as a number. `None` if it is no number.
-    pub fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
-        self.text(key)?.parse().ok()
-    }
-}
-
-/// The rest of an event's line after its beginning. `None` if the line begins otherwise.
-fn behind<'a>(line: &'a str, beginning: &str) -> Option<Values<'a>> {
-    let rest = line.strip_prefix(beginning)?;
-    let is_whole = beginning.is_empty() || rest.is_empty() || rest.starts_with([' ', ',']);
-    is_whole.then_some(Values(rest))
-}
-
-/// How each kind of value of the tables is read.
-pub(super) mod kind {
-    use super::{Alarm, Class, Mode, Warning, names};
-    use control::say::Text;
-    use std::str::FromStr;
-
-    pub(super) use self::{number as count, word as cause, word as reason};
-
-    pub(super) fn number<T: FromStr>(word: &str) -> Option<T> {
-        word.parse().ok()
-    }
-
-    /// A number, or another word if there is none.
-    pub(super) fn optional(word: &str) -> Option<i32> {
-        number(word)
-    }
-
-    pub(super) fn state(word: &str) -> Option<Mode> {
-        number(word)
-    }
-
-    /// A newer firmware may have more of these words.
-    pub(super) fn word(word: &str) -> Option<String> {
-        Some(word.to_owned())
-    }
-
-    pub(crate) fn class(word: &str) -> Option<Class> {
-        named(word, [Class::Plant, Class::Weed, Class::Unknown], names::class)
-    }
-
-    pub(super) fn place(word: &str) -> Option<bool> {
-        named(word, [false, true], names::place)
-    }
-
-    pub(super) fn answer(word: &str) -> Option<bool> {
-        named(word, [false, true], names::answer)
-    }
-
-    pub(super) fn alarm(word: &str) -> Option<Alarm> {
-        Alarm::find(word.as_bytes())
-    }
-
-    pub(super) fn warning(word: &str) -> Option<Warning> {
-        Warning::find(word.as_bytes())
-    }
-
-    /// The value with this name.
-    fn named<T: Copy, const N: usize>(word: &str, all: [T; N], name: fn(T) -> Text) -> Option<T> {
-        all.into_iter().find(|&one| name(one).to_string() == word)
     }
 }
 
@@ -469,10 +349,16 @@ mod tests {
         }
     }
 
-    fields! {
-        i16: number => Self::Number(number.into());
-        Reason: reason => Self::Word(reason.text().to_string());
-        Cause: cause => Self::Word(cause.text().to_string());
+    impl From<Reason> for Field {
+        fn from(reason: Reason) -> Self {
+            reason.text().to_string().into()
+        }
+    }
+
+    impl From<Cause> for Field {
+        fn from(cause: Cause) -> Self {
+            cause.text().to_string().into()
+        }
     }
 
     /// Rolls over plants, with noise, and with commands between.

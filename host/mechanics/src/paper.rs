@@ -9,7 +9,8 @@ use crate::equations as eq;
 use crate::figure::{digits, written};
 use crate::machine::{Machine, MachineError};
 use crate::unit::{
-    CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM, WATT,
+    CM, COUNT, DEGREE, FACTOR, HECTARE_PER_HOUR, HP, KG_CM, KM_H, KPA, M, MM, MPA, NEWTON, NEWTON_METRE, RPM, Unit,
+    WATT,
 };
 use serde::Serialize;
 
@@ -69,45 +70,62 @@ impl Verdict {
     }
 }
 
-/// Makes the comparisons, each with the field of a design that holds the result:
-/// `name, equation, printed value, unit, field: result for the printed inputs, remark`.
-macro_rules! comparisons {
-    ($paper:ident, $own:ident;
-     $($name:literal, $equation:literal, $printed:literal, $unit:ident, $field:ident: $from_printed:expr, $remark:expr;)+) => {
-        vec![$(Comparison::new(
-            ($name, $equation),
-            ($printed, $unit.name),
-            $unit.value($from_printed),
-            $unit.value($paper.$field),
-            $own.map(|own| $unit.value(own.$field)),
-            $remark.into(),
-        )),+]
-    };
+/// The paper's machine, and the user's own.
+struct Designs {
+    paper: Design,
+    own: Option<Design>,
 }
 
-impl Comparison {
-    fn new(
-        (name, equation): (&'static str, &'static str),
-        (printed, unit): (&str, &'static str),
-        from_printed_inputs: f64,
-        calculated: f64,
-        own: Option<f64>,
-        remark: String,
-    ) -> Self {
-        let decimals = printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-        let printed = printed.parse().unwrap_or(f64::NAN);
-        let verdict = Verdict::of(printed, decimals, calculated, from_printed_inputs);
-        Self { name, equation, unit, printed, decimals, from_printed_inputs, calculated, own, verdict, remark }
+/// A printed figure, with the results of both designs.
+struct Figure<Q> {
+    name: &'static str,
+    equation: &'static str,
+    printed: &'static str,
+    unit: Unit<Q>,
+    calculated: Q,
+    own: Option<Q>,
+}
+
+impl Designs {
+    fn figure<Q>(
+        &self,
+        (name, equation, printed): (&'static str, &'static str, &'static str),
+        unit: Unit<Q>,
+        result: fn(&Design) -> Q,
+    ) -> Figure<Q> {
+        Figure { name, equation, printed, unit, calculated: result(&self.paper), own: self.own.as_ref().map(result) }
     }
 }
 
-/// Compares the paper's figures with ours, and with those of a machine of one's own.
+impl<Q> Figure<Q> {
+    /// The comparison with the result of the equation for the printed inputs.
+    fn from(self, printed_inputs: Q, remark: impl Into<String>) -> Comparison {
+        let decimals = self.printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        let printed = self.printed.parse().unwrap_or(f64::NAN);
+        let [from_printed_inputs, calculated] = [printed_inputs, self.calculated].map(|value| self.unit.value(value));
+        Comparison {
+            name: self.name,
+            equation: self.equation,
+            unit: self.unit.name,
+            printed,
+            decimals,
+            from_printed_inputs,
+            calculated,
+            own: self.own.map(|own| self.unit.value(own)),
+            verdict: Verdict::of(printed, decimals, calculated, from_printed_inputs),
+            remark: remark.into(),
+        }
+    }
+}
+
+/// Compares the paper's figures with ours, and with those of the user's own machine.
 ///
 /// # Errors
-/// If the machine of one's own cannot be calculated.
+/// If that machine cannot be calculated.
 pub fn compare(own_machine: Option<&Machine>) -> Result<Vec<Comparison>, MachineError> {
     let Machine { weeder, soil, crop, shank, engine, chain, .. } = Machine::default();
-    let (paper, own) = (Design::of(&Machine::default())?, own_machine.map(Design::of).transpose()?);
+    let both = Designs { paper: Design::of(&Machine::default())?, own: own_machine.map(Design::of).transpose()? };
+    let paper = &both.paper;
 
     // The printed tractive force. Many other figures depend on it.
     let tractive_force = NEWTON.of(1082.4);
@@ -134,15 +152,13 @@ pub fn compare(own_machine: Option<&Machine>) -> Result<Vec<Comparison>, Machine
     let shear = |thickness_mm| eq::shear_stress(torque, outer, MM.of(thickness_mm));
     let thin = written(shear(1.5), KPA);
     // The default machine has the sheet of Table 1, so both columns start from the diameters of the text.
-    let thickness_mm = MM.value((outer - inner) / 2.0);
-    let thickness = Comparison::new(
-        ("wheel thickness", "below Eq. 20"),
-        ("3", MM.name),
-        thickness_mm,
-        thickness_mm,
-        own_machine.map(|own| MM.value(own.wheel.rim_thickness)),
-        "0.400 and 0.397 m were subtracted, not halved; the sheet of Table 1 has 3 mm".into(),
-    );
+    let thickness = (outer - inner) / 2.0;
+    let thickness = Figure {
+        calculated: thickness,
+        own: own_machine.map(|own| own.wheel.rim_thickness),
+        ..both.figure(("wheel thickness", "below Eq. 20", "3"), MM, |_| MM.of(3.0))
+    }
+    .from(thickness, "0.400 and 0.397 m were subtracted, not halved; the sheet of Table 1 has 3 mm");
 
     let (speed, width) = (KM_H.of(2.5), M.of(0.4));
     let capacity = format!(
@@ -151,53 +167,68 @@ pub fn compare(own_machine: Option<&Machine>) -> Result<Vec<Comparison>, Machine
         written(HECTARE_PER_HOUR.of(0.041) / weeder.field_efficiency / weeder.speed, M)
     );
 
-    let mut comparisons = comparisons! { paper, own;
-        "rolling resistance coefficient", "Eq. 5", "0.95", FACTOR, rolling_resistance_coefficient:
-            eq::rolling_resistance_coefficient(21.95), "a slip of the decimal point";
-        "rolling resistance", "Eq. 4", "605.77", NEWTON, rolling_resistance:
-            0.95 * paper.weight, "from the coefficient 0.95";
-        "draft", "Eq. 7", "453.7", NEWTON, draft: paper.draft, "";
-        "acceleration force", "Eq. 8", "23", NEWTON, acceleration_force: paper.acceleration_force, "";
-        "tractive force", "below Eq. 8", "1082.4", NEWTON, tractive_force:
-            NEWTON.of(605.77) + NEWTON.of(453.7) + NEWTON.of(23.0), "from the rolling resistance";
-        "power", "Eq. 9", "1503.3", WATT, power: power, "from 1082.4 N";
-        "engine", "below Eq. 9", "2.24", HP, engine_power:
+    Ok(vec![
+        both.figure(("rolling resistance coefficient", "Eq. 5", "0.95"), FACTOR, |of| {
+            of.rolling_resistance_coefficient
+        })
+        .from(eq::rolling_resistance_coefficient(21.95), "a slip of the decimal point"),
+        both.figure(("rolling resistance", "Eq. 4", "605.77"), NEWTON, |of| of.rolling_resistance)
+            .from(0.95 * paper.weight, "from the coefficient 0.95"),
+        both.figure(("draft", "Eq. 7", "453.7"), NEWTON, |of| of.draft).from(paper.draft, ""),
+        both.figure(("acceleration force", "Eq. 8", "23"), NEWTON, |of| of.acceleration_force)
+            .from(paper.acceleration_force, ""),
+        both.figure(("tractive force", "below Eq. 8", "1082.4"), NEWTON, |of| of.tractive_force)
+            .from(NEWTON.of(605.77) + NEWTON.of(453.7) + NEWTON.of(23.0), "from the rolling resistance"),
+        both.figure(("power", "Eq. 9", "1503.3"), WATT, |of| of.power).from(power, "from 1082.4 N"),
+        both.figure(("engine", "below Eq. 9", "2.24"), HP, |of| of.engine_power).from(
             power / engine.transmission_efficiency,
-            format!("from 1082.4 N: the engine is {excess:.1} times too large");
-        "soil force on the tool", "Eq. 10", "11.04", NEWTON, soil_force: paper.soil_force, "";
-        "servo torque", "above Eq. 10", "3.86", NEWTON_METRE, servo_torque: paper.servo_torque, "";
-        "servo torque", "above Eq. 10", "39.4", KG_CM, servo_torque: paper.servo_torque, "";
-        "soil failure zone", "Eq. 11", "10", CM, failure_zone:
-            paper.failure_zone, "30 cm less twice 5 cm; 10 cm would need rows 20 cm apart";
-        "sweep width", "Eq. 12", "8", CM, sweep_width:
-            eq::sweep_width(CM.of(10.0), soil.depth, soil.internal_friction), "neither of the two zones gives it";
-        "apex angle", "Eq. 13", "120", DEGREE, apex_angle: paper.apex_angle, friction;
-        "number of tools", "above Eq. 13", "5", COUNT, tools: eq::tools_that_fit(CM.of(40.0), CM.of(8.0)), "";
-        "draft of one tool", "Eq. 14", "216.48", NEWTON, tool_draft: tractive_force / 5.0, "from 1082.4 N";
-        "bending moment, between rows", "above Eq. 15", "345.6", NEWTON_METRE, inter_row_bending_moment:
-            moment(40.0), "from the draft of one tool";
-        "bending moment, in the row", "above Eq. 15", "302.4", NEWTON_METRE, intra_row_bending_moment:
-            moment(35.0), "from the draft of one tool";
-        "shank diameter, between rows", "Eq. 15, 16", "1.6", CM, inter_row_shank_diameter:
-            diameter(inter_row_moment), stress(inter_row_moment, 1.6);
-        "shank diameter, in the row", "Eq. 15, 16", "1.4", CM, intra_row_shank_diameter:
-            diameter(intra_row_moment), stress(intra_row_moment, 1.4);
-        "wheel speed", "Eq. 17", "33.17", RPM, wheel_speed: paper.wheel_speed, "with 3.14 for pi";
-        "reduction by the chain", "below Eq. 17", "2.72", FACTOR, chain_reduction: reduction, "from 33 rpm";
-        "driven sprocket", "below Eq. 17", "38", FACTOR, driven_teeth:
-            eq::driven_teeth(chain.drive_teeth, reduction), "from 33 rpm";
-        "chain links", "Eq. 18", "88", COUNT, chain_links:
-            eq::even_links(links), format!("{}, rounded up to the next even number", digits(links));
-        "chain length", "Eq. 19", "1118", MM, chain_length: 88.0 * chain.pitch, "";
-    };
-    comparisons.push(thickness);
-    comparisons.extend(comparisons! { paper, own;
-        "shear stress in the wheel", "Eq. 20", "293.5", KPA, shear_stress:
-            shear(3.0), format!("from 1082 N with 3 mm; {thin} with 1.5 mm");
-        "slope of the handle", "Eq. 21", "63.43", DEGREE, handle_angle: CM.of(80.0).atan2(CM.of(40.0)), "";
-        "length of the handle", "below Eq. 21", "89.44", CM, handle_length: CM.of(80.0).hypot(CM.of(40.0)), "";
-        "field capacity at 86.25 %", "Eq. 24, 25", "0.041", HECTARE_PER_HOUR, effective_capacity:
-            eq::effective_capacity(speed, width, weeder.field_efficiency), capacity;
-    });
-    Ok(comparisons)
+            format!("from 1082.4 N: the engine is {excess:.1} times too large"),
+        ),
+        both.figure(("soil force on the tool", "Eq. 10", "11.04"), NEWTON, |of| of.soil_force)
+            .from(paper.soil_force, ""),
+        both.figure(("servo torque", "above Eq. 10", "3.86"), NEWTON_METRE, |of| of.servo_torque)
+            .from(paper.servo_torque, ""),
+        both.figure(("servo torque", "above Eq. 10", "39.4"), KG_CM, |of| of.servo_torque).from(paper.servo_torque, ""),
+        both.figure(("soil failure zone", "Eq. 11", "10"), CM, |of| of.failure_zone)
+            .from(paper.failure_zone, "30 cm less twice 5 cm; 10 cm would need rows 20 cm apart"),
+        both.figure(("sweep width", "Eq. 12", "8"), CM, |of| of.sweep_width).from(
+            eq::sweep_width(CM.of(10.0), soil.depth, soil.internal_friction),
+            "neither of the two zones gives it",
+        ),
+        both.figure(("apex angle", "Eq. 13", "120"), DEGREE, |of| of.apex_angle).from(paper.apex_angle, friction),
+        both.figure(("number of tools", "above Eq. 13", "5"), COUNT, |of| of.tools)
+            .from(eq::tools_that_fit(CM.of(40.0), CM.of(8.0)), ""),
+        both.figure(("draft of one tool", "Eq. 14", "216.48"), NEWTON, |of| of.tool_draft)
+            .from(tractive_force / 5.0, "from 1082.4 N"),
+        both.figure(("bending moment, between rows", "above Eq. 15", "345.6"), NEWTON_METRE, |of| {
+            of.inter_row_bending_moment
+        })
+        .from(moment(40.0), "from the draft of one tool"),
+        both.figure(("bending moment, in the row", "above Eq. 15", "302.4"), NEWTON_METRE, |of| {
+            of.intra_row_bending_moment
+        })
+        .from(moment(35.0), "from the draft of one tool"),
+        both.figure(("shank diameter, between rows", "Eq. 15, 16", "1.6"), CM, |of| of.inter_row_shank_diameter)
+            .from(diameter(inter_row_moment), stress(inter_row_moment, 1.6)),
+        both.figure(("shank diameter, in the row", "Eq. 15, 16", "1.4"), CM, |of| of.intra_row_shank_diameter)
+            .from(diameter(intra_row_moment), stress(intra_row_moment, 1.4)),
+        both.figure(("wheel speed", "Eq. 17", "33.17"), RPM, |of| of.wheel_speed)
+            .from(paper.wheel_speed, "with 3.14 for pi"),
+        both.figure(("reduction by the chain", "below Eq. 17", "2.72"), FACTOR, |of| of.chain_reduction)
+            .from(reduction, "from 33 rpm"),
+        both.figure(("driven sprocket", "below Eq. 17", "38"), FACTOR, |of| of.driven_teeth)
+            .from(eq::driven_teeth(chain.drive_teeth, reduction), "from 33 rpm"),
+        both.figure(("chain links", "Eq. 18", "88"), COUNT, |of| of.chain_links)
+            .from(eq::even_links(links), format!("{}, rounded up to the next even number", digits(links))),
+        both.figure(("chain length", "Eq. 19", "1118"), MM, |of| of.chain_length).from(88.0 * chain.pitch, ""),
+        thickness,
+        both.figure(("shear stress in the wheel", "Eq. 20", "293.5"), KPA, |of| of.shear_stress)
+            .from(shear(3.0), format!("from 1082 N with 3 mm; {thin} with 1.5 mm")),
+        both.figure(("slope of the handle", "Eq. 21", "63.43"), DEGREE, |of| of.handle_angle)
+            .from(CM.of(80.0).atan2(CM.of(40.0)), ""),
+        both.figure(("length of the handle", "below Eq. 21", "89.44"), CM, |of| of.handle_length)
+            .from(CM.of(80.0).hypot(CM.of(40.0)), ""),
+        both.figure(("field capacity at 86.25 %", "Eq. 24, 25", "0.041"), HECTARE_PER_HOUR, |of| of.effective_capacity)
+            .from(eq::effective_capacity(speed, width, weeder.field_efficiency), capacity),
+    ])
 }

@@ -15,7 +15,19 @@ use uom::si::diffusion_coefficient::square_meter_per_second;
 use uom::si::f64::{
     Angle, AngularVelocity, DiffusionCoefficient, Force, Length, Mass, Power, Pressure, Ratio, Time, Torque, Velocity,
 };
-use uom::si::{angle, angular_velocity, force, length, mass, power, pressure, ratio, time, torque, velocity};
+use uom::si::{
+    angle::{degree, radian},
+    angular_velocity::revolution_per_minute,
+    force::newton,
+    length::{centimeter, meter, millimeter},
+    mass::{gram, kilogram},
+    power::{horsepower, kilowatt, watt},
+    pressure::{kilopascal, megapascal, pascal},
+    ratio::percent,
+    time::{millisecond, second},
+    torque::{kilogram_force_meter, newton_meter},
+    velocity::{kilometer_per_hour, meter_per_second},
+};
 
 /// Area in a time, which `uom` knows by the name of another quantity of the same dimension.
 pub type AreaRate = DiffusionCoefficient;
@@ -26,7 +38,7 @@ pub struct Unit<Q> {
     /// Its text behind the number; empty for plain numbers.
     pub name: &'static str,
     of: fn(f64) -> Q,
-    value: fn(Q) -> f64,
+    value: fn(&Q) -> f64,
 }
 
 impl<Q> Unit<Q> {
@@ -37,8 +49,12 @@ impl<Q> Unit<Q> {
 
     /// How many of this unit a quantity is.
     pub fn value(&self, quantity: Q) -> f64 {
-        (self.value)(quantity)
+        (self.value)(&quantity)
     }
+}
+
+const fn unit<Q>(name: &'static str, of: fn(f64) -> Q, value: fn(&Q) -> f64) -> Unit<Q> {
+    Unit { name, of, value }
 }
 
 /// A kind of quantity that can be read from text.
@@ -49,93 +65,109 @@ pub trait Written: Copy + 'static {
     const UNITS: &'static [Unit<Self>];
 }
 
-/// Declares units by the names of `uom`'s, and the quantities that use them. A number behind a unit divides it.
-macro_rules! units {
-    ($($quantity:ident, $kind:literal {
-        $($(#[$doc:meta])* $constant:ident = $name:literal, $unit:path $(, $parts:literal)?;)+
-    })+) => {$(
-        $($(#[$doc])* pub const $constant: Unit<$quantity> = Unit {
-            name: $name,
-            of: |value| $quantity::new::<$unit>(value $(/ $parts)?),
-            value: |quantity| quantity.get::<$unit>() $(* $parts)?,
-        };)+
+/// Millimetre.
+pub const MM: Unit<Length> = unit("mm", Length::new::<millimeter>, Length::get::<millimeter>);
+/// Centimetre.
+pub const CM: Unit<Length> = unit("cm", Length::new::<centimeter>, Length::get::<centimeter>);
+/// Metre.
+pub const M: Unit<Length> = unit("m", Length::new::<meter>, Length::get::<meter>);
 
-        impl Written for $quantity {
-            const KIND: &'static str = $kind;
-            const UNITS: &'static [Unit<Self>] = &[$($constant),+];
-        }
-    )+};
+impl Written for Length {
+    const KIND: &'static str = "a length";
+    const UNITS: &'static [Unit<Self>] = &[MM, CM, M];
 }
 
-units! {
-    Length, "a length" {
-        /// Millimetre.
-        MM = "mm", length::millimeter;
-        /// Centimetre.
-        CM = "cm", length::centimeter;
-        /// Metre.
-        M = "m", length::meter;
-    }
-    Mass, "a mass" {
-        /// Kilogram.
-        KG = "kg", mass::kilogram;
-        /// Gram.
-        GRAM = "g", mass::gram;
-    }
-    Time, "a time" {
-        /// Second.
-        SECOND = "s", time::second;
-        /// Millisecond.
-        MS = "ms", time::millisecond;
-    }
-    Velocity, "a speed" {
-        /// Kilometre per hour.
-        KM_H = "km/h", velocity::kilometer_per_hour;
-        /// Metre per second.
-        M_S = "m/s", velocity::meter_per_second;
-    }
-    AngularVelocity, "a speed of rotation" {
-        /// Turn per minute.
-        RPM = "rpm", angular_velocity::revolution_per_minute;
-    }
-    Angle, "an angle" {
-        /// Degree.
-        DEGREE = "degrees", angle::degree;
-        /// Degree, as a sign.
-        DEGREE_SIGN = "°", angle::degree;
-        /// Radian.
-        RADIAN = "rad", angle::radian;
-    }
-    Pressure, "a pressure or stress" {
-        /// Kilopascal.
-        KPA = "kPa", pressure::kilopascal;
-        /// Megapascal.
-        MPA = "MPa", pressure::megapascal;
-        /// Pascal.
-        PA = "Pa", pressure::pascal;
-    }
-    Power, "a power" {
-        /// Watt.
-        WATT = "W", power::watt;
-        /// Kilowatt.
-        KW = "kW", power::kilowatt;
-        /// Mechanical horsepower, 745.7 W.
-        HP = "hp", power::horsepower;
-    }
-    Force, "a force" {
-        /// Newton.
-        NEWTON = "N", force::newton;
-    }
-    Torque, "a torque" {
-        /// The weight of a kilogram on an arm of a centimetre: the usual unit in data sheets of servos.
-        KG_CM = "kg cm", torque::kilogram_force_meter, 100.0;
-        /// Newton metre.
-        NEWTON_METRE = "N m", torque::newton_meter;
-    }
-    Ratio, "a share" {
-        /// Hundredth.
-        PERCENT = "%", ratio::percent;
-    }
+/// Kilogram.
+pub const KG: Unit<Mass> = unit("kg", Mass::new::<kilogram>, Mass::get::<kilogram>);
+
+impl Written for Mass {
+    const KIND: &'static str = "a mass";
+    const UNITS: &'static [Unit<Self>] = &[KG, unit("g", Mass::new::<gram>, Mass::get::<gram>)];
+}
+
+/// Second.
+pub const SECOND: Unit<Time> = unit("s", Time::new::<second>, Time::get::<second>);
+/// Millisecond.
+pub const MS: Unit<Time> = unit("ms", Time::new::<millisecond>, Time::get::<millisecond>);
+
+impl Written for Time {
+    const KIND: &'static str = "a time";
+    const UNITS: &'static [Unit<Self>] = &[SECOND, MS];
+}
+
+/// Kilometre per hour.
+pub const KM_H: Unit<Velocity> = unit("km/h", Velocity::new::<kilometer_per_hour>, Velocity::get::<kilometer_per_hour>);
+
+impl Written for Velocity {
+    const KIND: &'static str = "a speed";
+    const UNITS: &'static [Unit<Self>] =
+        &[KM_H, unit("m/s", Velocity::new::<meter_per_second>, Velocity::get::<meter_per_second>)];
+}
+
+/// Turn per minute.
+pub const RPM: Unit<AngularVelocity> =
+    unit("rpm", AngularVelocity::new::<revolution_per_minute>, AngularVelocity::get::<revolution_per_minute>);
+
+impl Written for AngularVelocity {
+    const KIND: &'static str = "a speed of rotation";
+    const UNITS: &'static [Unit<Self>] = &[RPM];
+}
+
+/// Degree.
+pub const DEGREE: Unit<Angle> = unit("degrees", Angle::new::<degree>, Angle::get::<degree>);
+
+impl Written for Angle {
+    const KIND: &'static str = "an angle";
+    const UNITS: &'static [Unit<Self>] = &[
+        DEGREE,
+        unit("°", Angle::new::<degree>, Angle::get::<degree>),
+        unit("rad", Angle::new::<radian>, Angle::get::<radian>),
+    ];
+}
+
+/// Kilopascal.
+pub const KPA: Unit<Pressure> = unit("kPa", Pressure::new::<kilopascal>, Pressure::get::<kilopascal>);
+/// Megapascal.
+pub const MPA: Unit<Pressure> = unit("MPa", Pressure::new::<megapascal>, Pressure::get::<megapascal>);
+
+impl Written for Pressure {
+    const KIND: &'static str = "a pressure or stress";
+    const UNITS: &'static [Unit<Self>] = &[KPA, MPA, unit("Pa", Pressure::new::<pascal>, Pressure::get::<pascal>)];
+}
+
+/// Watt.
+pub const WATT: Unit<Power> = unit("W", Power::new::<watt>, Power::get::<watt>);
+/// Mechanical horsepower, 745.7 W.
+pub const HP: Unit<Power> = unit("hp", Power::new::<horsepower>, Power::get::<horsepower>);
+
+impl Written for Power {
+    const KIND: &'static str = "a power";
+    const UNITS: &'static [Unit<Self>] = &[WATT, unit("kW", Power::new::<kilowatt>, Power::get::<kilowatt>), HP];
+}
+
+/// Newton.
+pub const NEWTON: Unit<Force> = unit("N", Force::new::<newton>, Force::get::<newton>);
+
+/// The weight of a kilogram on an arm of a centimetre: the usual unit in data sheets of servos.
+pub const KG_CM: Unit<Torque> = Unit {
+    name: "kg cm",
+    of: |value| Torque::new::<kilogram_force_meter>(value / 100.0),
+    value: |quantity| quantity.get::<kilogram_force_meter>() * 100.0,
+};
+/// Newton metre.
+pub const NEWTON_METRE: Unit<Torque> = unit("N m", Torque::new::<newton_meter>, Torque::get::<newton_meter>);
+
+impl Written for Torque {
+    const KIND: &'static str = "a torque";
+    const UNITS: &'static [Unit<Self>] = &[KG_CM, NEWTON_METRE];
+}
+
+/// Hundredth.
+pub const PERCENT: Unit<Ratio> = unit("%", Ratio::new::<percent>, Ratio::get::<percent>);
+
+impl Written for Ratio {
+    const KIND: &'static str = "a share";
+    const UNITS: &'static [Unit<Self>] = &[PERCENT];
 }
 
 /// Hectare per hour.
@@ -146,7 +178,7 @@ pub const HECTARE_PER_HOUR: Unit<AreaRate> = Unit {
 };
 
 /// A ratio or factor, as a plain number.
-pub const FACTOR: Unit<f64> = Unit { name: "", of: |value| value, value: |factor| factor };
+pub const FACTOR: Unit<f64> = Unit { name: "", of: |value| value, value: |factor| *factor };
 
 impl Written for f64 {
     const KIND: &'static str = "a plain number";
@@ -154,7 +186,7 @@ impl Written for f64 {
 }
 
 /// A count.
-pub const COUNT: Unit<u32> = Unit { name: "", of: |value| value as u32, value: f64::from };
+pub const COUNT: Unit<u32> = Unit { name: "", of: |value| value as u32, value: |count| (*count).into() };
 
 impl Written for u32 {
     const KIND: &'static str = "a whole number from 0";

@@ -2,14 +2,16 @@
 //!
 //! The ground is counted in ticks of the encoder. The trait [`Machine`] hides whether the machine is the decisions
 //! alone or the firmware in an Uno. Facts that are visible only in the decisions are checked only there. This file
-//! executes steps and rolls the machine. `checks` compares the tool with the model, and `console` types lines and
-//! follows their effects.
+//! executes steps, `rolling` rolls the machine, and `restart` resets it. `checks` compares the tool with the model, and
+//! `console` types lines and follows their effects.
 //!
 //! [`Drive::go`] executes a run on a new machine. A soak keeps one drive for hours: it draws its steps one by one
 //! ([`Drive::execute`]), and takes the machine from row to row ([`Drive::enter_row`]).
 
 mod checks;
 mod console;
+mod restart;
+mod rolling;
 
 pub use console::is_end;
 
@@ -21,7 +23,6 @@ use crate::{
     stand::{Geometry, Score, Stand},
 };
 use control::{
-    alarm::Alarm,
     ground::class::Listed,
     measure::reset::Cause,
     operate::state::State,
@@ -33,9 +34,6 @@ use proptest::prelude::*;
 
 /// Resolution of the measured speed, in ticks a second: twice a tick in 10 ms.
 const SPEED_RESOLUTION: f64 = 200.0;
-
-/// The end switch reports the tool's arrival after this time.
-const SWITCH_DELAY_US: u64 = 60_000;
 
 /// Ticks behind the row after which the firmware's monitors no longer count its plants.
 const BEHIND_THE_ROW: i64 = 500;
@@ -312,27 +310,6 @@ impl<M: Machine> Drive<M> {
         }
     }
 
-    /// Asks the machine for the facts that are not visible from outside.
-    fn look(&mut self) -> Checked {
-        if M::IS_OPEN {
-            return Ok(());
-        }
-        if self.machine.settings_are_in_doubt() {
-            self.say("get")?;
-        }
-        self.say("status")?;
-        let state = self.machine.state();
-        // Tests on the bench run only in HOLD.
-        self.is_tried &= state == State::Hold;
-        self.check_tool_stuck(state)
-    }
-
-    fn check_tool_stuck(&self, state: State) -> Checked {
-        let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
-        prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
-        Ok(())
-    }
-
     /// Repairs every fault and ends the row. The operator clears the alarm, starts, and drives on until the tool is in. On the
     /// way back through the row there may be more alarms.
     pub fn come_back_to_work(&mut self) -> Checked {
@@ -437,129 +414,6 @@ impl<M: Machine> Drive<M> {
         (self.calm_since_us, self.left_for) = (self.world.time_us, None);
     }
 
-    fn roll(&mut self, ticks: f64, speed: f64) -> Checked {
-        let (from, begun_us) = (self.ground, self.world.time_us);
-        // The time of a turn in the other direction.
-        let most_us = ((ticks / speed).abs() * 1e6) as u64 + 5_000_000;
-        if self.target != speed {
-            self.disturb();
-        }
-        self.target = speed;
-        while (self.ground - from) * ticks.signum() < ticks.abs() && self.world.time_us < begun_us + most_us {
-            self.turn()?;
-        }
-        Ok(())
-    }
-
-    fn stop(&mut self) {
-        (self.speed, self.target) = (0.0, 0.0);
-        self.disturb();
-    }
-
-    fn turns(&mut self, turns: u32) -> Checked {
-        self.disturb();
-        let passed = (0..turns).try_for_each(|_| self.turn());
-        self.disturb();
-        passed
-    }
-
-    /// A turn of the machine's loop.
-    fn turn(&mut self) -> Checked {
-        self.turns += 1;
-        let before = self.world;
-        // A detection below the minimum width is dust, and causes no event.
-        let narrow_mm = M::NARROW_MM.max(self.machine.settings().get(Setting::MinWidthMm));
-        self.model.follow(self.here(), self.machine.settings(), narrow_mm);
-        self.response_ms = self.response_ms.max(self.machine.settings().get(Setting::BeamResponseMs));
-        let leads_ms = [Setting::LeadOutMs, Setting::LeadInMs].map(|lead| self.machine.settings().get(lead));
-        self.leads_turns = if leads_ms == self.leads_ms { self.leads_turns.saturating_add(1) } else { 0 };
-        self.leads_ms = leads_ms;
-        self.guard_scatter = self.guard_scatter.min(self.ticks(Setting::GuardScatterMm));
-        self.had_second_beam |= self.ticks(Setting::SecondBeamMm) > 0;
-        let spacing = self.ticks(Setting::GuardSpacingMm);
-        if spacing > 0 && !self.guard_spacings.contains(&spacing) {
-            self.guard_spacings.push(spacing);
-        }
-
-        self.world.time_us += self.beginning.turn_us;
-        let seconds = self.beginning.turn_us as f64 / 1e6;
-        let most = f64::from(self.beginning.mm_s2) * TICKS_A_MM * seconds;
-        self.speed += (self.target - self.speed).clamp(-most, most);
-        let turned = if self.encoder == Encoder::Works { self.speed * self.wheel.turns_a_tick } else { 0.0 };
-        self.speeds.take(self.world.time_us, turned);
-        self.roll_by(self.speed * seconds)?;
-        let rolled = (self.speed * seconds).abs();
-        self.rolled += rolled;
-        self.weeded += if self.machine.tool_out() { 0.0 } else { rolled };
-        let tool_is_out = self.out_since_us.is_some_and(|since_us| since_us + SWITCH_DELAY_US <= self.world.time_us);
-        self.world.end_switch_on = tool_is_out && !self.tool_is_stuck;
-        self.step(&before)?;
-        self.attend_to_the_console()
-    }
-
-    /// Rolls by this many ticks, past the plants and weeds there.
-    fn roll_by(&mut self, ticks: f64) -> Checked {
-        let from = self.ground.floor() as i64;
-        self.ground += ticks;
-        let to = self.ground.floor() as i64;
-        let (moves, direction) = ((to - from).abs(), (to - from).signum());
-        for place in 1..=moves {
-            let turned = self.wheel.roll(from + (place - 1) * direction, direction > 0);
-            let counted = match self.encoder {
-                Encoder::Works => turned,
-                Encoder::Silent => 0,
-                Encoder::OneChannel => turned.abs() * (1 - 2 * (self.wheel.ticks() & 1)),
-            };
-            for _ in 0..counted.abs() {
-                self.world.count += counted.signum();
-                self.machine.count(counted > 0);
-            }
-            if let Some(stand) = &mut self.stand {
-                stand.lose_ticks(turned - counted);
-            }
-            self.beam_at(from + place * direction)?;
-        }
-        self.beam_at(to)
-    }
-
-    fn beam_at(&mut self, ground: i64) -> Checked {
-        self.farthest = self.farthest.max(ground);
-        let stands_at =
-            |row: &[bool], place: i64| place <= self.bare_from && row[place.rem_euclid(row.len() as i64) as usize];
-        let apart = self.geometry.map_or_else(|| self.ticks(Setting::SecondBeamMm), |real| real.second_beam);
-        let [first, second] = &self.row;
-        let (broken, second_broken) = (stands_at(first, ground), apart > 0 && stands_at(second, ground - apart));
-        if second_broken != self.world.second_broken {
-            self.second_edge(second_broken);
-        }
-        if broken == self.world.broken { Ok(()) } else { self.edge(broken) }
-    }
-
-    /// The second beam changes its level.
-    fn second_edge(&mut self, broken: bool) {
-        self.world.second_broken = broken;
-        if !self.edges_get_lost {
-            self.machine.beam_edge(&self.world);
-        }
-    }
-
-    /// The first beam changes its level.
-    fn edge(&mut self, broken: bool) -> Checked {
-        self.world.broken = broken;
-        if !self.edges_get_lost {
-            self.machine.beam_edge(&self.world);
-            self.check_weed()?;
-        }
-        self.model.edge(self.here(), broken, self.blur());
-        Ok(())
-    }
-
-    /// Error of the machine's positions, in ticks, from the sensor response that it expects: this sensor answers at once.
-    fn blur(&self) -> i64 {
-        let (slowest, fastest) = self.speeds.extremes();
-        (fastest.max(-slowest) * f64::from(self.response_ms) / 1000.0) as i64 + 1
-    }
-
     /// The position by the machine's count.
     fn here(&self) -> i64 {
         self.machine.place(self.world.count)
@@ -610,17 +464,6 @@ impl<M: Machine> Drive<M> {
         Ok(())
     }
 
-    /// The saved settings, with the leads that were found, if those are in doubt.
-    fn with_leads_of(&self, kept: &Option<Settings>, found: &Option<Settings>) -> Option<Settings> {
-        let (true, Some(kept), Some(found)) = (self.leads_in_doubt, kept, found) else { return kept.clone() };
-        let mut kept = kept.clone();
-        for lead in [Setting::LeadOutMs, Setting::LeadInMs] {
-            // It was within its range.
-            let _ = kept.set(lead, found.get(lead));
-        }
-        Some(kept)
-    }
-
     /// The real machine. By default its settings are right.
     fn geometry(&self) -> Geometry {
         self.geometry.unwrap_or_else(|| {
@@ -632,46 +475,6 @@ impl<M: Machine> Drive<M> {
                 swing_us: us(Setting::LeadOutMs),
             }
         })
-    }
-
-    /// Resets the machine. It must start in HOLD or with an alarm, with the tool out, and with everything that it
-    /// acknowledged as saved.
-    fn init(&mut self, cause: Cause, torn: Option<u8>) -> Checked {
-        let is_spoiled = std::mem::take(&mut self.is_spoiled);
-        let is_answered = self.machine.is_done();
-        let maybe = self.machine.examples();
-        self.machine.reset(cause, torn, &self.world)?;
-        let is_lost = self.machine.state() == State::Alarm(Alarm::SettingsLost);
-        prop_assert!(is_lost || self.machine.state() == State::Hold, "it started in {:?}", self.machine.state());
-        let found = (!is_lost).then(|| self.machine.settings().clone());
-        // A save that was not acknowledged may be complete, or have no effect.
-        let expected = [&self.saving, &self.saved].map(|kept| self.with_leads_of(kept, &found));
-        if !is_spoiled && (self.saving.is_none() || expected[0] != found) {
-            prop_assert_eq!(&found, &expected[1], "other settings than were saved");
-        }
-        self.saved = found;
-        let examples = self.machine.examples();
-        if is_spoiled {
-        } else if is_answered {
-            prop_assert_eq!(&examples, &self.taught, "other examples than were taught");
-        } else {
-            let is_known = |example| maybe.contains(example) || self.taught.contains(example);
-            prop_assert!(examples.iter().all(is_known) || !M::IS_OPEN, "{examples:?}");
-        }
-        self.taught = examples;
-        self.scale = scale(self.machine.settings());
-        self.model = Model::new(self.here(), self.world.broken);
-        let geometry = self.geometry();
-        if let Some(stand) = &mut self.stand {
-            stand.forget(self.world.time_us, &geometry);
-        }
-        // The measured speed is 0 until the first measurement.
-        self.speeds = Speeds::default();
-        self.speeds.take(self.world.time_us, 0.0);
-        (self.saving, self.suspect, self.is_tried, self.had_second_beam) = (None, None, false, false);
-        (self.tool_was_stuck, self.out_since_us) = (self.tool_is_stuck, Some(self.world.time_us));
-        self.disturb();
-        Ok(())
     }
 }
 

@@ -17,15 +17,23 @@
 //! worst case, so each scatter has a least value. Times that were measured over another stroke do not count.
 
 pub mod circle;
+mod leads;
+mod margin;
+mod next_step;
 mod steps;
 
-pub use steps::{ManualStep, Task, steps};
+pub use self::leads::saved_ms;
+pub use self::margin::Margin;
+pub use self::next_step::Step;
+pub use self::steps::{ManualStep, Task, steps};
+
+use self::leads::{Timing, extremes, leads, travel_ms};
 
 use control::settings::{Setting, Settings};
 use link::EventLine;
 use link::session::Happening;
 use link::settings::shown;
-use std::{collections::VecDeque, fmt};
+use std::collections::VecDeque;
 
 /// Required timings of the servo, each with six swings out and six in.
 const TIMINGS: usize = 2;
@@ -54,115 +62,6 @@ const SLOW_M_S: f64 = 1.0 / 3.6;
 /// How far a stem's protected ground may reach beyond its zone, as a share of the zone. In the field `walked` it is 10 of
 /// 110 mm: a zone of 90 mm round a stem that stands 20 mm off the middle of its canopy.
 const STEM_SHARE: f64 = 0.095;
-
-/// The servo's scatter beside a stem zone, as a time on its way out and in. The way out has the dead time's scatter, the
-/// load's, and a command's wait for the pulse. The way in has the dead time's only. Leads that are shortened by the same
-/// time on both ways damage plants behind the tool, at 4 km/h twice as many as at 1 km/h.
-const SCATTER_OUT_MS: f64 = 20.0;
-const SCATTER_IN_MS: f64 = 9.0;
-
-/// What the two measured leads differ by beside the stroke: the longest wait of a command, and the scatter of a hobby
-/// servo's dead time.
-const BESIDE_STROKE_MS: f64 = 40.0;
-
-/// The next step.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Step {
-    /// Time the servo. It has been timed this many times.
-    TimeServo(usize),
-    /// Set a lead to the one that follows from the measured times.
-    SetLead(Setting, u16),
-    /// Measure the wheel. It has been measured this many times.
-    MeasureWheel(usize),
-    /// Drive on with the second beam. This many plants have measured the slip.
-    PassPlants(usize),
-    /// The margin can, or must, be changed to this one.
-    SetMargin(Margin),
-    /// The margin is right.
-    Ready(Margin),
-}
-
-/// The parts of a margin, each in millimetres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Margin {
-    /// The slip's scatter.
-    pub slip_mm: f64,
-    /// The servo's.
-    pub servo_mm: f64,
-    /// The firmware's.
-    pub firmware_mm: f64,
-    /// The stems', beside a stem zone. `None` around whole canopies.
-    pub stems_mm: Option<f64>,
-    /// A trailing arm's; 0 for a pendulum.
-    pub arm_mm: f64,
-    /// The margin in use.
-    pub in_use_mm: u16,
-}
-
-impl Margin {
-    /// The least sufficient margin, in whole millimetres: the sum.
-    pub fn least_mm(&self) -> u16 {
-        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, arm_mm, .. } = self;
-        (slip_mm + servo_mm + firmware_mm + stems_mm.unwrap_or(0.0) + arm_mm).ceil() as u16
-    }
-}
-
-impl Step {
-    /// Its name, in two or three words.
-    fn name(&self) -> &'static str {
-        match self {
-            Self::TimeServo(_) => "time the servo",
-            Self::SetLead(..) => "set the lead",
-            Self::MeasureWheel(_) => "measure the wheel",
-            Self::PassPlants(_) => "pass some plants",
-            Self::SetMargin(_) | Self::Ready(_) => "set the margin",
-        }
-    }
-}
-
-impl fmt::Display for Step {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::TimeServo(done) => write!(f, "time the servo: `calibrate servo` ({done} of {TIMINGS} done)"),
-            Self::SetLead(lead, lead_ms) => write!(f, "take the calculated lead: `set {} {lead_ms}`", lead.text()),
-            Self::MeasureWheel(done) => {
-                let all = SetUp::STRETCHES;
-                write!(f, "measure 10 m: `calibrate start`, roll, `calibrate 10000` ({done} of {all} done)")
-            }
-            Self::PassPlants(done) => {
-                write!(f, "measure the slip with both beams: roll past {PLANTS} plants ({done} done)")
-            }
-            Self::SetMargin(margin) => {
-                let word = if margin.least_mm() < margin.in_use_mm { "lower" } else { "raise" };
-                write!(f, "{word} the margin: `set margin_mm {}`: {margin}", margin.least_mm())
-            }
-            Self::Ready(margin) => write!(f, "the margin pays for {margin}: `save`"),
-        }
-    }
-}
-
-impl fmt::Display for Margin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, arm_mm, .. } = self;
-        let mut sum = format!("slip {slip_mm:.0} + servo {servo_mm:.0}");
-        if *arm_mm > 0.0 {
-            sum += &format!(" + arm {arm_mm:.0}");
-        }
-        match stems_mm {
-            Some(stems_mm) => write!(f, "{sum} + stem {stems_mm:.0} + {firmware_mm:.0} mm"),
-            None => write!(f, "{sum} + {firmware_mm:.0} mm at 2.5 km/h"),
-        }
-    }
-}
-
-/// The servo, timed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Timing {
-    /// The leads in milliseconds, out and in. `None` if the operator sets them by eye.
-    leads: Option<(u16, u16)>,
-    /// The pulse widths of the stroke.
-    pulses: (u16, u16),
-}
 
 /// The measurements of a machine in a session.
 #[derive(Clone, Debug, Default)]
@@ -410,49 +309,6 @@ impl SetUp {
 /// Whether the firmware keeps stem zones, not whole canopies.
 fn keeps_stems(settings: &Settings) -> bool {
     settings.get(Setting::StemZoneMm) > 0
-}
-
-/// The leads that follow from the times. None if the operator sets them by eye.
-fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u16)> {
-    let (outs, ins) = extremes(timings);
-    let (Some(longest_ms), Some(shortest_ms)) = (outs.max(), ins.min()) else { return Vec::new() };
-    let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
-        let (in_us, out_us) = pulses(settings);
-        saved_ms(
-            settings.get(Setting::TopSpeedMmS).into(),
-            travel_ms(timings),
-            settings.get(Setting::StemZoneMm).into(),
-            circle::aside_mm(in_us.abs_diff(out_us)),
-        )
-    } else {
-        [0, 0]
-    };
-    vec![
-        (Setting::LeadOutMs, longest_ms.saturating_sub(saved_out_ms)),
-        (Setting::LeadInMs, shortest_ms.saturating_add(saved_in_ms)),
-    ]
-}
-
-/// The time of the stroke, from the times that were measured; 0 if it was timed by eye.
-fn travel_ms(timings: &[Timing]) -> f64 {
-    let (outs, ins) = extremes(timings);
-    let differ_ms =
-        outs.max().zip(ins.min()).map_or(0, |(longest_ms, shortest_ms)| longest_ms.saturating_sub(shortest_ms));
-    (f64::from(differ_ms) - BESIDE_STROKE_MS).max(0.0)
-}
-
-/// By how much the leads out and in beside a stem zone are shorter than the worst times: what the circle allows at the
-/// highest speed, and the servo's scatter, which is smaller for a quick servo. The margin pays for the scatter.
-pub fn saved_ms(top_speed_mm_s: f64, travel_ms: f64, zone_mm: f64, aside_mm: f64) -> [u16; 2] {
-    let overlap_ms = circle::overlap_ms(top_speed_mm_s, travel_ms, zone_mm, aside_mm);
-    let of_60_ms = (travel_ms / 60.0).min(1.0);
-    [SCATTER_OUT_MS, SCATTER_IN_MS].map(|scatter_ms| (overlap_ms + scatter_ms * of_60_ms) as u16)
-}
-
-/// The leads out and in that were timed.
-fn extremes(timings: &[Timing]) -> (impl Iterator<Item = u16> + Clone, impl Iterator<Item = u16> + Clone) {
-    let leads = || timings.iter().filter_map(|timing| timing.leads);
-    (leads().map(|(out_ms, _)| out_ms), leads().map(|(_, in_ms)| in_ms))
 }
 
 /// The greatest of some values less the least.

@@ -14,7 +14,8 @@ pub mod published;
 pub(crate) mod report;
 mod table;
 
-pub use self::plot::{COLUMNS, Performance, PlotRecord, Response};
+pub(crate) use self::plot::COLUMNS;
+pub use self::plot::{Performance, PlotRecord, Response};
 pub use self::table::read_csv;
 
 use self::published::Published;

@@ -26,22 +26,9 @@ pub struct Plan {
     pub seed: u64,
 }
 
-/// A plot of the plan.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlannedPlot {
-    /// Its number in the field, from 1, in the order in which plots are weeded.
-    pub plot: u32,
-    /// Its block, from 1.
-    pub block: u32,
-    /// Its speed, km/h.
-    pub speed_km_h: f64,
-    /// Its spacing, cm.
-    pub spacing_cm: f64,
-}
-
 impl Plan {
-    /// The plots, in the order in which they are weeded.
-    pub fn plots(&self) -> Vec<PlannedPlot> {
+    /// The plots, numbered in the order in which they are weeded. A block is a replication. Counts and times are missing.
+    pub fn plots(&self) -> Vec<PlotRecord> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let of_block = |block: u32| {
             let mut treatments: Vec<(f64, f64)> = self
@@ -53,7 +40,10 @@ impl Plan {
             treatments.into_iter().map(move |treatment| (block, treatment)).collect::<Vec<_>>()
         };
         let drawn = (1..=self.blocks).flat_map(of_block).zip(1..);
-        let planned = |((block, (speed_km_h, spacing_cm)), plot)| PlannedPlot { plot, block, speed_km_h, spacing_cm };
+        let planned = |((replication, (speed_km_h, spacing_cm)), plot)| {
+            let Self { width_m, power_hp, .. } = *self;
+            PlotRecord { plot, replication, speed_km_h, spacing_cm, width_m, power_hp, ..PlotRecord::default() }
+        };
         drawn.map(planned).collect()
     }
 
@@ -65,11 +55,9 @@ impl Plan {
         for note in notes {
             writeln!(to, "# {note}")?;
         }
-        writeln!(to, "plot,{}", COLUMNS.join(","))?;
-        let known = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-        for PlannedPlot { plot, block, speed_km_h, spacing_cm } in self.plots() {
-            let (width, power) = (known(self.width_m), known(self.power_hp));
-            writeln!(to, "{plot},{block},{speed_km_h},{spacing_cm},,,,,,,{width},{power}")?;
+        writeln!(to, "plot,{}", COLUMNS.map(|(column, ..)| column).join(","))?;
+        for plot in self.plots() {
+            writeln!(to, "{},{}", plot.plot, plot.columns().map(|(_, value)| value).collect::<Vec<_>>().join(","))?;
         }
         Ok(())
     }
@@ -91,23 +79,18 @@ impl Plan {
              th {{ text-align: left; padding-right: 2em }} td {{ border: 1px solid; width: 12em; height: 1.8em; padding: 0 0.5em }}</style>"
         )?;
         let plots = self.plots();
-        let known =
-            [self.width_m, self.power_hp].map(|value| value.map_or_else(String::new, |value| value.to_string()));
-        for PlannedPlot { plot, block, speed_km_h, spacing_cm } in &plots {
-            writeln!(to, "<section>\n<h1>Plot {plot} of {}</h1>", plots.len())?;
+        for plot in &plots {
+            let PlotRecord { plot: number, replication, speed_km_h, spacing_cm, .. } = plot;
+            writeln!(to, "<section>\n<h1>Plot {number} of {}</h1>", plots.len())?;
             writeln!(
                 to,
-                "<p>Block {block}. Weed it at <b>{speed_km_h} km/h</b>. Plants stand {spacing_cm} cm apart.</p>"
+                "<p>Block {replication}. Weed it at <b>{speed_km_h} km/h</b>. Plants stand {spacing_cm} cm apart.</p>"
             )?;
             writeln!(
                 to,
                 "<p>Count weeds on the same marked ground before and after. Leave a box empty if you did not count.</p>\n<table>"
             )?;
-            let (headings, columns) = (&PlotRecord::HEADINGS[PLANNED..], &COLUMNS[PLANNED..]);
-            for (index, (heading, column)) in headings.iter().zip(columns).enumerate() {
-                // The last two are the machine's.
-                let value =
-                    (index + known.len()).checked_sub(columns.len()).map_or("", |known_index| &known[known_index]);
+            for ((_, heading, ..), (column, value)) in COLUMNS.iter().zip(plot.columns()).skip(PLANNED) {
                 writeln!(to, "<tr><th>{heading} <small>({column})</small></th><td>{value}</td></tr>")?;
             }
             writeln!(to, "<tr><th>remarks, who counted, when</th><td></td></tr>\n</table>\n</section>")?;
@@ -146,7 +129,7 @@ mod tests {
         };
         assert!(orders.iter().all(|order| sorted(order) == sorted(&orders[0])));
         assert!(orders[0] != orders[1] && orders[1] != orders[2]);
-        assert!(plots.chunks(8).zip(1..).all(|(plots, block)| plots.iter().all(|plot| plot.block == block)));
+        assert!(plots.chunks(8).zip(1..).all(|(plots, block)| plots.iter().all(|plot| plot.replication == block)));
     }
 
     #[test]
@@ -167,11 +150,11 @@ mod tests {
         for (sheet, plot) in sheets.iter().zip(plan(1).plots()) {
             let speed = format!(
                 "<h1>Plot {} of 24</h1>\n<p>Block {}. Weed it at <b>{} km/h</b>",
-                plot.plot, plot.block, plot.speed_km_h
+                plot.plot, plot.replication, plot.speed_km_h
             );
             assert!(sheet.contains(&speed), "{sheet}");
             assert_eq!(sheet.matches("<td></td>").count(), 8, "six counts and times, the power, and remarks: {sheet}");
-            assert!(COLUMNS[3..].iter().all(|column| sheet.contains(&format!("({column})"))), "{sheet}");
+            assert!(COLUMNS[3..].iter().all(|(column, ..)| sheet.contains(&format!("({column})"))), "{sheet}");
             assert!(sheet.contains("(width_m)</small></th><td>0.4</td>"), "{sheet}");
         }
     }

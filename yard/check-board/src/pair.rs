@@ -8,6 +8,10 @@
 use crate::plan::INPUTS;
 use crate::second::SecondUno;
 use anyhow::Result;
+use either::{
+    Either::{self, Left, Right},
+    for_both,
+};
 use field::wiring;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -73,26 +77,7 @@ impl Wiring {
 }
 
 /// The weeder's virtual Uno, of this project's simulator or of another one.
-enum WeederUno {
-    Own(Uno),
-    Second(SecondUno),
-}
-
-/// Does the same with either Uno.
-macro_rules! with {
-    ($weeder:expr, $uno:ident => $done:expr) => {
-        match $weeder {
-            WeederUno::Own($uno) => $done,
-            WeederUno::Second($uno) => $done,
-        }
-    };
-}
-
-impl WeederUno {
-    fn cycle(&self) -> u64 {
-        with!(self, uno => uno.cycle())
-    }
-}
+type WeederUno = Either<Uno, SecondUno>;
 
 /// The two boards. Its methods fail if one of them stops.
 pub struct Pair {
@@ -118,11 +103,11 @@ impl Pair {
     pub fn power_up(tester: &Path, weeder_elf: &Path, second: Option<&Path>, wiring: Wiring) -> Result<Self> {
         let tester = Uno::boot(tester)?;
         let weeder = match second {
-            Some(program) => WeederUno::Second(SecondUno::power_up(program, weeder_elf)?),
-            None => WeederUno::Own(Uno::boot(weeder_elf)?.wired(&wiring::WIRES)),
+            Some(program) => Right(SecondUno::power_up(program, weeder_elf)?),
+            None => Left(Uno::boot(weeder_elf)?.wired(&wiring::WIRES)),
         };
         Ok(Self {
-            shared: (tester.cycle(), weeder.cycle()),
+            shared: (tester.cycle(), for_both!(&weeder, uno => uno.cycle())),
             tester,
             weeder,
             weeder_elf: weeder_elf.to_owned(),
@@ -133,6 +118,10 @@ impl Pair {
             from_tester: VecDeque::new(),
             from_weeder: VecDeque::new(),
         })
+    }
+
+    fn cycles(&self) -> (u64, u64) {
+        (self.tester.cycle(), for_both!(&self.weeder, uno => uno.cycle()))
     }
 
     fn weeder_cycle(&self, tester_cycle: u64) -> u64 {
@@ -153,8 +142,8 @@ impl Pair {
         }
         self.from_tester.extend(self.tester.received_bytes().into_iter().map(|received| received.byte));
         self.from_weeder.extend(match &mut self.weeder {
-            WeederUno::Own(uno) => uno.received_bytes().into_iter().map(|received| received.byte).collect(),
-            WeederUno::Second(uno) => uno.received(),
+            Left(uno) => uno.received_bytes().into_iter().map(|received| received.byte).collect(),
+            Right(uno) => uno.received(),
         });
         Ok(())
     }
@@ -173,7 +162,7 @@ impl Pair {
             return Ok(());
         }
         let until = self.weeder_cycle(until);
-        with!(&mut self.weeder, uno => uno.run_until(until)?);
+        for_both!(&mut self.weeder, uno => uno.run_until(until)?);
         self.carry_to_tester();
         Ok(())
     }
@@ -181,17 +170,17 @@ impl Pair {
     /// While the reset is pulled, the weeder's clock stands still, and both are counted from there on.
     fn check_reset(&mut self) -> Result<()> {
         if self.is_reset_pulled {
-            self.shared = (self.tester.cycle(), self.weeder.cycle());
+            self.shared = self.cycles();
         }
         let pulled = self.wiring.has_reset && self.tester.output(TESTER_RESET) == Some(false);
         if pulled && !self.is_reset_pulled {
             self.resets += 1;
-            if let (Some(corrupt), WeederUno::Own(weeder)) = (&mut self.wiring.eeprom_at_reset, &mut self.weeder) {
+            if let (Some(corrupt), Left(weeder)) = (&mut self.wiring.eeprom_at_reset, &mut self.weeder) {
                 let mut eeprom = weeder.eeprom();
                 corrupt(&mut eeprom);
                 *weeder = Uno::boot_with_eeprom(&self.weeder_elf, &eeprom)?.wired(&wiring::WIRES);
             }
-            self.shared = (self.tester.cycle(), self.weeder.cycle());
+            self.shared = self.cycles();
             self.reset_weeder()?;
             self.carry_to_tester();
         }
@@ -211,8 +200,8 @@ impl Pair {
 
     fn reset_weeder(&mut self) -> Result<()> {
         match &mut self.weeder {
-            WeederUno::Own(uno) => uno.reset(),
-            WeederUno::Second(uno) => uno.reset()?,
+            Left(uno) => uno.reset(),
+            Right(uno) => uno.reset()?,
         }
         Ok(())
     }
@@ -232,7 +221,7 @@ impl Pair {
     pub fn bytes_pending(&self, side: Side) -> usize {
         match side {
             Side::Tester => self.tester.bytes_pending(),
-            Side::Weeder => with!(&self.weeder, uno => uno.bytes_pending()),
+            Side::Weeder => for_both!(&self.weeder, uno => uno.bytes_pending()),
         }
     }
 
@@ -240,7 +229,7 @@ impl Pair {
     pub fn send(&mut self, side: Side, bytes: &[u8]) {
         match side {
             Side::Tester => self.tester.send(bytes),
-            Side::Weeder => with!(&mut self.weeder, uno => uno.send(bytes)),
+            Side::Weeder => for_both!(&mut self.weeder, uno => uno.send(bytes)),
         }
     }
 
@@ -258,11 +247,11 @@ impl Pair {
         let cycle = self.weeder_cycle(change.cycle);
         let wires = self.wiring.inputs.iter().filter(|wire| wire.0 == Line::ALL[number]);
         let changes = wires.map(|&(_, pin, inverted)| PinChange { cycle, pin, high: change.high != inverted });
-        with!(&mut self.weeder, uno => uno.drive(changes));
+        for_both!(&mut self.weeder, uno => uno.drive(changes));
     }
 
     fn carry_to_tester(&mut self) {
-        for change in with!(&mut self.weeder, uno => uno.take_changes()) {
+        for change in for_both!(&mut self.weeder, uno => uno.take_changes()) {
             if !self.wiring.outputs.contains(&change.pin) {
                 continue;
             }

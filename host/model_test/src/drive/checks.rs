@@ -2,12 +2,16 @@
 //!
 //! For some turns after a change the machine may still use the earlier state. In these turns nothing is checked.
 
-use super::{Drive, Place};
+use super::{Drive, Place, rolling::SWITCH_DELAY_US};
 use crate::{
     machine::{Checked, Machine},
     run::Encoder,
 };
-use control::{operate::tool::Reason, settings::Setting};
+use control::{
+    alarm::Alarm,
+    operate::{state::State, tool::Reason},
+    settings::Setting,
+};
 use proptest::prelude::*;
 
 /// At a steady speed of at least [`STEADY_SPEED`] ticks a second, the measured speed is right after this time.
@@ -183,6 +187,12 @@ impl<M: Machine> Drive<M> {
             self.guard_spacings.iter().map(|&spacing| self.model.guard(due, spacing, self.guard_scatter)).collect();
         let is_right = guarded.iter().any(Result::is_ok) || self.model.is_in_doubt() || self.had_second_beam;
         prop_assert!(is_right, "{guarded:?}");
+        Ok(())
+    }
+
+    pub(super) fn check_tool_stuck(&self, state: State) -> Checked {
+        let is_false = state == State::Alarm(Alarm::ToolStuck) && !self.tool_was_stuck;
+        prop_assert!(!is_false, "an end switch that follows the tool within {SWITCH_DELAY_US} us is an alarm");
         Ok(())
     }
 }

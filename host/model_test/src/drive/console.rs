@@ -121,6 +121,21 @@ impl<M: Machine> Drive<M> {
             self.model.trust(tool - 2 * margin - late, tool + unseen as i64 - margin);
         }
     }
+
+    /// Asks the machine for the facts that are not visible from outside.
+    pub(super) fn look(&mut self) -> Checked {
+        if M::IS_OPEN {
+            return Ok(());
+        }
+        if self.machine.settings_are_in_doubt() {
+            self.say("get")?;
+        }
+        self.say("status")?;
+        let state = self.machine.state();
+        // Tests on the bench run only in HOLD.
+        self.is_tried &= state == State::Hold;
+        self.check_tool_stuck(state)
+    }
 }
 
 fn words(line: &str) -> Vec<&str> {

@@ -204,7 +204,7 @@ fn effect(term: &Term, response: Response, name: &str, unit: &str) -> String {
 /// What a plot lacks.
 fn lacking(record: &PlotRecord) -> Vec<String> {
     let is_missing = |(_, value): &(&str, String)| value.is_empty();
-    let missing = record.columns().into_iter().filter(is_missing).map(|(column, _)| format!("no {column}"));
+    let missing = record.columns().filter(is_missing).map(|(column, _)| format!("no {column}"));
     let none = [(record.weeds_before, "no weed before weeding"), (record.plants, "no plant")];
     let none = none.into_iter().filter(|(count, _)| *count == Some(0)).map(|(_, what)| what.to_owned());
     missing.chain(none).collect()

@@ -2,7 +2,7 @@
 //! speed and spacing.
 
 use crate::table::{fixed, optional, short};
-use anyhow::{Result, anyhow};
+use anyhow::{Result, bail, ensure};
 use files::FileError;
 use files::csv_table::Line;
 use serde::{Deserialize, Serialize};
@@ -11,85 +11,61 @@ use std::str::FromStr;
 const M2_PER_HA: f64 = 10_000.0;
 const S_PER_H: f64 = 3600.0;
 
-/// Declares a plot's record. Each column of a table of plots has its type, how it is read, its heading in a report, and
-/// its text there.
-macro_rules! plot_record {
-    ($(
-        $(#[doc = $about:literal])+
-        $column:ident: $type:ty = $read:ident($($least:literal)?), $heading:literal => $shown:expr, $csv:expr;
-    )+) => {
-        /// The counts and measurements of one plot. What was not counted or measured is `None`.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-        pub struct PlotRecord {
-            /// Its number in the field, from 1; 0 if it has none yet.
-            #[serde(default, skip_serializing_if = "is_zero")]
-            pub plot: u32,
-            $($(#[doc = $about])+ pub $column: $type,)+
-        }
-
-        /// The columns of a table of plots, which carry their units.
-        pub const COLUMNS: &[&str] = &[$(stringify!($column)),+];
-
-        impl PlotRecord {
-            /// The headings of a report's columns.
-            pub(crate) const HEADINGS: &[&str] = &[$($heading),+];
-
-            /// The cells of a report.
-            pub(super) fn cells(&self) -> Vec<String> {
-                let Self { $($column,)+ .. } = *self;
-                vec![$($shown),+]
-            }
-
-            /// Each column with its value, which is empty if it is not known.
-            pub(crate) fn columns(&self) -> Vec<(&'static str, String)> {
-                let Self { $($column,)+ .. } = *self;
-                vec![$((stringify!($column), $csv)),+]
-            }
-
-            /// Parses a line of a table. The values are not checked yet.
-            pub(super) fn read(line: Line) -> Result<Self, FileError> {
-                Ok(Self { plot: 0, $($column: $read(line, stringify!($column) $(, $least)?)?),+ })
-            }
-        }
-    };
-}
-
-plot_record! {
+/// The counts and measurements of one plot. What was not counted or measured is `None`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlotRecord {
+    /// Its number in the field, from 1; 0 if it has none yet.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub plot: u32,
     /// The number of its replication.
-    replication: u32 = whole(), "replication" => replication.to_string(), replication.to_string();
+    pub replication: u32,
     /// Forward speed that the machine was set to, or that was measured, km/h.
-    speed_km_h: f64 = number(), "speed, km/h" => short(speed_km_h), speed_km_h.to_string();
+    pub speed_km_h: f64,
     /// Plant spacing along the row, cm.
-    spacing_cm: f64 = number(), "spacing, cm" => short(spacing_cm), spacing_cm.to_string();
+    pub spacing_cm: f64,
     /// Weeds counted before weeding.
-    weeds_before: Option<u32> = count(), "weeds before" => counted(weeds_before), text(weeds_before);
+    pub weeds_before: Option<u32>,
     /// Weeds counted after weeding, on the same ground. More may be there than before: some emerge, and counts scatter.
-    weeds_after: Option<u32> = count(), "weeds after" => counted(weeds_after), text(weeds_after);
+    pub weeds_after: Option<u32>,
     /// Crop plants in the plot.
-    plants: Option<u32> = count(), "plants" => counted(plants), text(plants);
+    pub plants: Option<u32>,
     /// Crop plants that the machine injured.
-    damaged: Option<u32> = count(), "damaged" => counted(damaged), text(damaged);
+    pub damaged: Option<u32>,
     /// Area that was weeded, m2.
-    area_m2: Option<f64> = measured(), "area, m²" => optional(area_m2, |area| fixed(area, 2)), text(area_m2);
+    pub area_m2: Option<f64>,
     /// Time that this took, with turns and stops, s.
-    time_s: Option<f64> = measured(), "time, s" => optional(time_s, |time| fixed(time, 1)), text(time_s);
+    pub time_s: Option<f64>,
     /// Working width of the machine, m.
-    width_m: Option<f64> = measured(), "width, m" => optional(width_m, |width| fixed(width, 2)), text(width_m);
+    pub width_m: Option<f64>,
     /// Power that the machine needs, hp.
-    power_hp: Option<f64> = measured(), "power, hp" => optional(power_hp, |power| fixed(power, 2)), text(power_hp);
+    pub power_hp: Option<f64>,
 }
+
+/// A column of a table of plots: its name there, its heading in a report, its decimals there, and its range. `None`
+/// prints all decimals.
+type Column = (&'static str, &'static str, Option<usize>, (f64, f64));
+
+/// The range of a count.
+const COUNT: (f64, f64) = (0.0, f64::INFINITY);
+
+/// The columns of a table of plots, which carry their units.
+pub(crate) const COLUMNS: [Column; 11] = [
+    ("replication", "replication", None, COUNT),
+    ("speed_km_h", "speed, km/h", None, (0.1, 15.0)),
+    ("spacing_cm", "spacing, cm", None, (5.0, 500.0)),
+    ("weeds_before", "weeds before", None, COUNT),
+    ("weeds_after", "weeds after", None, COUNT),
+    ("plants", "plants", None, COUNT),
+    ("damaged", "damaged", None, COUNT),
+    ("area_m2", "area, m²", Some(2), (0.01, 1e6)),
+    ("time_s", "time, s", Some(1), (0.1, 1e6)),
+    ("width_m", "width, m", Some(2), (0.01, 50.0)),
+    ("power_hp", "power, hp", Some(2), (0.001, 1000.0)),
+];
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(number: &u32) -> bool {
     *number == 0
-}
-
-fn counted(count: Option<u32>) -> String {
-    optional(count.map(f64::from), short)
-}
-
-fn text<T: ToString>(value: Option<T>) -> String {
-    value.map(|value| value.to_string()).unwrap_or_default()
 }
 
 /// The measures of one plot. A measure is `None` if something that it needs was not counted or measured.
@@ -111,34 +87,61 @@ pub struct Performance {
 }
 
 impl PlotRecord {
+    /// Parses a line of a table. The values are not checked yet.
+    pub(super) fn read(line: Line) -> Result<Self, FileError> {
+        Ok(Self {
+            plot: 0,
+            replication: whole(line, "replication")?,
+            speed_km_h: number(line, "speed_km_h")?,
+            spacing_cm: number(line, "spacing_cm")?,
+            weeds_before: count(line, "weeds_before")?,
+            weeds_after: count(line, "weeds_after")?,
+            plants: count(line, "plants")?,
+            damaged: count(line, "damaged")?,
+            area_m2: measured(line, "area_m2")?,
+            time_s: measured(line, "time_s")?,
+            width_m: measured(line, "width_m")?,
+            power_hp: measured(line, "power_hp")?,
+        })
+    }
+
+    /// The value of each of the [`COLUMNS`].
+    fn values(&self) -> [Option<f64>; COLUMNS.len()] {
+        let [before, after, plants, damaged] =
+            [self.weeds_before, self.weeds_after, self.plants, self.damaged].map(|count| count.map(f64::from));
+        let [replication, speed, spacing] = [self.replication.into(), self.speed_km_h, self.spacing_cm].map(Some);
+        let Self { area_m2, time_s, width_m, power_hp, .. } = *self;
+        [replication, speed, spacing, before, after, plants, damaged, area_m2, time_s, width_m, power_hp]
+    }
+
+    /// The cells of a report.
+    pub(super) fn cells(&self) -> Vec<String> {
+        let shown = |decimals: Option<usize>, value| decimals.map_or_else(|| short(value), |some| fixed(value, some));
+        let cells = COLUMNS.into_iter().zip(self.values());
+        cells.map(|((_, _, decimals, _), value)| optional(value, |value| shown(decimals, value))).collect()
+    }
+
+    /// Each column with its value, which is empty if it is not known.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = (&'static str, String)> {
+        let text = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+        COLUMNS.into_iter().zip(self.values()).map(move |((column, ..), value)| (column, text(value)))
+    }
+
     /// Checks that a plot's values are possible.
     ///
     /// # Errors
     /// Names the first quantity that is out of its range or contradicts another.
     pub fn check(&self) -> Result<()> {
-        let within = |value: f64, lowest: f64, highest: f64| (lowest..=highest).contains(&value);
-        let measured = |value: Option<f64>, lowest, highest| value.is_none_or(|value| within(value, lowest, highest));
-        let shown = |value: Option<f64>| value.unwrap_or_default();
-        let is_damage_possible = match (self.damaged, self.plants) {
-            (Some(damaged), Some(plants)) => damaged <= plants,
-            _ => true,
-        };
-        let checks = [
-            ("speed_km_h", self.speed_km_h, within(self.speed_km_h, 0.1, 15.0), "it has to be from 0.1 to 15 km/h"),
-            ("spacing_cm", self.spacing_cm, within(self.spacing_cm, 5.0, 500.0), "it has to be from 5 to 500 cm"),
-            ("damaged", shown(self.damaged.map(f64::from)), is_damage_possible, "it cannot exceed plants"),
-            ("area_m2", shown(self.area_m2), measured(self.area_m2, 0.01, 1e6), "it has to be from 0.01 to 1000000 m2"),
-            ("time_s", shown(self.time_s), measured(self.time_s, 0.1, 1e6), "it has to be from 0.1 to 1000000 s"),
-            ("width_m", shown(self.width_m), measured(self.width_m, 0.01, 50.0), "it has to be from 0.01 to 50 m"),
-            (
-                "power_hp",
-                shown(self.power_hp),
-                measured(self.power_hp, 0.001, 1000.0),
-                "it has to be from 0.001 to 1000 hp",
-            ),
-        ];
-        let wrong = checks.into_iter().find(|(_, _, fits, _)| !fits);
-        wrong.map_or(Ok(()), |(column, value, _, right)| Err(anyhow!("{column} is {value}: {right}")))
+        for ((column, heading, _, (least, greatest)), value) in COLUMNS.into_iter().zip(self.values()) {
+            if let Some(value) = value.filter(|value| !(least..=greatest).contains(value)) {
+                let unit = heading.split(", ").nth(1).unwrap_or_default().replace('²', "2");
+                bail!("{column} is {value}: it has to be from {least} to {greatest} {unit}");
+            }
+        }
+        if let (Some(damaged), Some(plants)) = (self.damaged, self.plants) {
+            ensure!(damaged <= plants, "damaged is {damaged}: it cannot exceed plants");
+        }
+        Ok(())
     }
 
     /// The plot's measures by Eq. 22 to 27. They are finite if [`PlotRecord::check`] succeeds.

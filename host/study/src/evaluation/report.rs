@@ -1,8 +1,9 @@
 //! A trial's analysis as tables, which the page has too, and for people at a terminal: findings in plain words, then the tables that they
 //! rest on.
 
+use super::plot::COLUMNS;
 use super::published::Published;
-use super::{Analysis, Performance, PlotRecord, ResponseAnalysis};
+use super::{Analysis, Performance, ResponseAnalysis};
 use crate::statistics::{AnalysisOfVariance, BinomialModel, LinearModel};
 use crate::table::{NOTHING, Table, fixed, optional, probability, short, significant};
 use std::fmt::{self, Display, Formatter};
@@ -100,7 +101,7 @@ impl Analysis {
 
     /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
-        let columns = ["plot"].iter().chain(PlotRecord::HEADINGS).chain(&MEASURES).copied();
+        let columns = ["plot"].into_iter().chain(COLUMNS.map(|(_, heading, ..)| heading)).chain(MEASURES);
         let mut table = Table::new("Each plot: counts, measurements and results", columns);
         for (record, performance) in self.records.iter().zip(&self.performances) {
             table.rows.push([vec![record.plot.to_string()], record.cells(), measures(performance).into()].concat());

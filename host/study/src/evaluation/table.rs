@@ -19,7 +19,7 @@ pub(super) const LEAVE_OUT: &str = "to leave a plot out, put # in front of its l
 /// filled in, text in a number, a value out of range, more damaged plants than plants, and a replication of a speed and
 /// spacing that occurs twice.
 pub fn read_csv(path: &Path) -> Result<Vec<PlotRecord>, FileError> {
-    let table = CsvTable::read_with_gaps(path, COLUMNS)?;
+    let table = CsvTable::read_with_gaps(path, &COLUMNS.map(|(name, ..)| name))?;
     let numbers = numbers(&table);
     let mut plots: Vec<(u64, PlotRecord)> = Vec::new();
     for (line, number) in table.lines().zip(numbers) {

@@ -1,0 +1,170 @@
+//! A stretch while it is read: the wheel's statuses, the events and the ground so far.
+
+use super::{Did, Event, EventKind, Ground};
+use crate::receiver::{Fix, WHEEL_GAP_MS};
+use crate::track::STANDING_M;
+use link::settings::Setting;
+use link::{Class, EventLine, Mode, Status};
+use logbook::follower::Follower;
+use logbook::log::Entry;
+use std::ops::Range;
+
+/// Time before and after a stretch in which the machine is assumed to have stood, in ms. A fix in this time belongs to
+/// the stretch's beginning or end.
+const STANDING_MS: f64 = 1000.0;
+
+/// A status of the wheel.
+#[derive(Clone, Copy)]
+pub(super) struct Rolled {
+    pub(super) time_ms: f64,
+    /// Distance since the stretch began.
+    pub(super) m: f64,
+    pub(super) line: u64,
+}
+
+/// A stretch while it is read.
+#[derive(Default)]
+pub(super) struct Reading {
+    pub(super) wheel: Vec<Rolled>,
+    pub(super) last_status: Option<Status>,
+    pub(super) beam_to_tool_mm: f64,
+    pub(super) fixes: Vec<Fix>,
+    pub(super) events: Vec<Event>,
+    pub(super) ground: Vec<Ground>,
+    pub(super) time_ms: Option<Range<u64>>,
+}
+
+impl Reading {
+    pub(super) fn seen(&mut self, time_ms: u64) {
+        let range = self.time_ms.get_or_insert(time_ms..time_ms);
+        range.end = time_ms;
+    }
+
+    /// Whether the wheel has rolled between two statuses, and it is not known when.
+    fn is_gap(from: &Rolled, to: &Rolled) -> bool {
+        to.time_ms - from.time_ms > WHEEL_GAP_MS && (to.m - from.m).abs() > STANDING_M
+    }
+
+    /// The marks of all gaps.
+    pub(super) fn gaps(&self) -> impl Iterator<Item = Event> {
+        let gaps = self.wheel.windows(2).filter(|pair| Self::is_gap(&pair[0], &pair[1]));
+        gaps.map(|pair| {
+            let (from, to) = (&pair[0], &pair[1]);
+            let text = format!(
+                "no status for {:.1} s and {:.1} m: positions there are interpolated",
+                (to.time_ms - from.time_ms) / 1000.0,
+                (to.m - from.m).abs()
+            );
+            Event::mark(EventKind::WheelGap, text, to.line, to.time_ms, from.m)
+        })
+    }
+
+    /// The wheel's distance at a time, in metres. `None` outside of the stretch, and in a gap.
+    pub(super) fn m_at(&self, time_ms: f64) -> Option<f64> {
+        let next = self.wheel.partition_point(|rolled| rolled.time_ms < time_ms);
+        let before = next.checked_sub(1).map(|place| self.wheel[place]);
+        match (before, self.wheel.get(next)) {
+            (Some(from), Some(to)) if Self::is_gap(&from, to) => None,
+            (Some(from), Some(to)) => {
+                Some(from.m + (to.m - from.m) * (time_ms - from.time_ms) / (to.time_ms - from.time_ms))
+            }
+            (None, Some(&at)) | (Some(at), None) => ((time_ms - at.time_ms).abs() <= STANDING_MS).then_some(at.m),
+            (None, None) => None,
+        }
+    }
+
+    pub(super) fn status(&mut self, status: Status, at_m: f64, entry: &Entry) {
+        self.wheel.push(Rolled { time_ms: entry.time_ms as f64, m: at_m, line: entry.number });
+        let did = did(&status);
+        match self.ground.last_mut() {
+            None => self.ground.push(Ground::begin(did, at_m, entry.time_ms)),
+            Some(passed) => {
+                passed.distance_m.end = passed.distance_m.end.max(at_m);
+                passed.time_ms.end = entry.time_ms;
+                // A swing has its own position.
+                let is_at_work = |did: Did| did != Did::Rolled;
+                if is_at_work(passed.did) != is_at_work(did) {
+                    self.turn_to(did, at_m, entry.time_ms);
+                }
+            }
+        }
+        self.last_status = Some(status);
+    }
+
+    /// From this distance on the ground gets another kind of work.
+    fn turn_to(&mut self, did: Did, at_m: f64, time_ms: u64) {
+        let Some(passed) = self.ground.last_mut() else { return };
+        if passed.did == did {
+            return;
+        }
+        // A swing is reported somewhat later than it is commanded, and perhaps after a status with a farther position.
+        let at_m = at_m.max(passed.distance_m.start);
+        passed.distance_m.end = at_m;
+        passed.time_ms.end = time_ms;
+        self.ground.push(Ground::begin(did, at_m, time_ms));
+    }
+
+    /// The link ends or begins while the machine is at work.
+    pub(super) fn restart(&mut self, entry: &Entry) {
+        let Some(&Rolled { m, .. }) = self.wheel.last() else { return };
+        let mark = Event::mark(EventKind::Restart, String::new(), entry.number, entry.time_ms as f64, m);
+        self.events.push(mark);
+    }
+
+    pub(super) fn event(&mut self, entry: &Entry, event: &EventLine, follower: &Follower) {
+        let metres = |position| follower.mm(position).map(|mm| mm / 1000.0);
+        let (kind, position, width_mm) = match *event {
+            EventLine::Detection { class, position, votes, hold, .. } => {
+                let margin_mm = f64::from(follower.in_use().settings().get(Setting::MarginMm));
+                let width_mm = (f64::from(hold) * follower.tick_mm() - 2.0 * margin_mm).max(0.0);
+                (EventKind::Detection { class, votes }, position, width_mm)
+            }
+            EventLine::Guarded { position } => (EventKind::Guarded, position, 0.0),
+            EventLine::Swing { out, position } => {
+                let is_at_work = self.last_status.as_ref().is_some_and(|status| status.mode == Mode::Work)
+                    || self.ground.last().is_some_and(|passed| passed.did != Did::Rolled);
+                if let Some(at_m) = metres(position).filter(|_| is_at_work) {
+                    self.turn_to(if out { Did::Spared } else { Did::Weeded }, at_m, entry.time_ms);
+                }
+                (if out { EventKind::SwingOut } else { EventKind::SwingIn }, position, 0.0)
+            }
+            EventLine::Alarm { position, .. } => (EventKind::Alarm, position, 0.0),
+            EventLine::State { mode } => {
+                if let Some(status) = &mut self.last_status {
+                    status.mode = mode;
+                }
+                if mode != Mode::Work
+                    && let Some(&Rolled { m, .. }) = self.wheel.last()
+                {
+                    self.turn_to(Did::Rolled, m, entry.time_ms);
+                }
+                return;
+            }
+            _ => return,
+        };
+        let Some(at_m) = metres(position) else { return };
+        // A detection is its middle.
+        let mark = Event::mark(kind, entry.text.clone(), entry.number, entry.time_ms as f64, at_m + width_mm / 2000.0);
+        self.events.push(Event { width_mm, ..mark });
+    }
+
+    /// Takes a command that the machine has carried out.
+    pub(super) fn label(&mut self, command: &Entry) {
+        let mut words = command.text.split_whitespace();
+        let (Some("label"), Some(class)) = (words.next(), words.next()) else { return };
+        let class = if class == "plant" { Class::Plant } else { Class::Weed };
+        let is_detection = |event: &&Event| matches!(event.kind, EventKind::Detection { .. });
+        let Some(detection) = self.events.iter().rev().find(is_detection).cloned() else { return };
+        let (line, time_ms, text) = (command.number, command.time_ms, command.text.clone());
+        self.events.push(Event { kind: EventKind::Label(class), line, text, time_ms, ..detection });
+    }
+}
+
+/// The work of a machine with this status.
+fn did(status: &Status) -> Did {
+    match (status.mode, status.tool_out) {
+        (Mode::Work, false) => Did::Weeded,
+        (Mode::Work, true) => Did::Spared,
+        (Mode::Hold | Mode::Alarm, _) => Did::Rolled,
+    }
+}

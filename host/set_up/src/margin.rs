@@ -1,0 +1,42 @@
+//! A margin as the sum of its parts.
+
+use std::fmt;
+
+/// The parts of a margin, each in millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margin {
+    /// The slip's scatter.
+    pub slip_mm: f64,
+    /// The servo's.
+    pub servo_mm: f64,
+    /// The firmware's.
+    pub firmware_mm: f64,
+    /// The stems', beside a stem zone. `None` around whole canopies.
+    pub stems_mm: Option<f64>,
+    /// A trailing arm's; 0 for a pendulum.
+    pub arm_mm: f64,
+    /// The margin in use.
+    pub in_use_mm: u16,
+}
+
+impl Margin {
+    /// The least sufficient margin, in whole millimetres: the sum.
+    pub fn least_mm(&self) -> u16 {
+        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, arm_mm, .. } = self;
+        (slip_mm + servo_mm + firmware_mm + stems_mm.unwrap_or(0.0) + arm_mm).ceil() as u16
+    }
+}
+
+impl fmt::Display for Margin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { slip_mm, servo_mm, firmware_mm, stems_mm, arm_mm, .. } = self;
+        let mut sum = format!("slip {slip_mm:.0} + servo {servo_mm:.0}");
+        if *arm_mm > 0.0 {
+            sum += &format!(" + arm {arm_mm:.0}");
+        }
+        match stems_mm {
+            Some(stems_mm) => write!(f, "{sum} + stem {stems_mm:.0} + {firmware_mm:.0} mm"),
+            None => write!(f, "{sum} + {firmware_mm:.0} mm at 2.5 km/h"),
+        }
+    }
+}
