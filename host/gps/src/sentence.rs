@@ -292,6 +292,8 @@ mod tests {
             "GPRMC,225446.00,A,4916.45,N,12311.12,W,000.5,054.7,191194,020.3,E,E",
             "GPRMC,225446.00,A,4916.45,N,12311.12,W,000.5,054.7,191194,,E,E",
             "GPRMC,225446.00,A,0000.0000,N,00000.0000,E,000.5,054.7,191194,,,A",
+            "GNRMC,000000.25,A,0000.0,N,00000.0,E,1.35,90.0,140626,,,R",
+            "GNGGA,000000.25,0000.0,N,00000.0,E,4,18,0.6,42.0,M,46.0,M,1.0,0001",
         ] {
             assert_eq!(report(text).place, None, "{text}");
         }
@@ -385,9 +387,10 @@ mod tests {
             prop_assert_eq!(Finder::all(&bytes), Vec::<String>::new());
         }
 
+        // More minutes, rounded to one digit, would be 60.0, which is refused.
         #[test]
         fn values_are_those_that_another_parser_reads(
-            latitude in 0..90_u32, longitude in 0..180_u32, minutes in 0.0..59.99_f64, digits in 1..8_usize,
+            latitude in 0..90_u32, longitude in 0..180_u32, minutes in 0.0..59.94_f64, digits in 1..8_usize,
             ns in prop::sample::select(vec!['N', 'S']), ew in prop::sample::select(vec!['E', 'W']), second in 0..86_400_u32,
         ) {
             let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
@@ -399,6 +402,8 @@ mod tests {
                 format!("GNGGA,{clock},{place},4,18,0.6,42.0,M,46.0,M,1.0,0001"),
             ] {
                 let (north, east, time_ms) = by_another(&framed(&text));
+                // A receiver that does not know its position may send zeros: that is no fix.
+                prop_assume!((north, east) != (Some(0.0), Some(0.0)));
                 let report = report(&text);
                 prop_assert_eq!(report.time_ms, time_ms);
                 let place = report.place.expect("there is a fix");
