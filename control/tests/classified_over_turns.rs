@@ -142,8 +142,8 @@ proptest! {
                 prop_assert_eq!(over_it_mm, None, "in the row over the plant from {} to {} mm", from_mm, to_mm);
             }
         }
-        // Both stop, and get all the time that they need.
-        for _ in 0..turns {
+        // Both stop, and get all the time that they need. A detection that has just ended begins in the next turn.
+        for _ in 0..=turns {
             quick.turn(0.0);
             late.turn(0.0);
         }

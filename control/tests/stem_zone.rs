@@ -14,7 +14,7 @@ const ZONE_MM: f64 = 96.0;
 const MARGIN_MM: f64 = 10.0;
 
 /// Most that is cut off either side.
-const MOST_MM: f64 = ZONE_MM * 13.0 / 64.0;
+const MOST_MM: f64 = ZONE_MM * 11.0 / 64.0;
 
 /// Tolerance: two ticks at either end, a turn's distance, and the command of the next turn.
 const TOLERANCE_MM: f64 = 2.5;

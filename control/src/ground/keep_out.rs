@@ -19,9 +19,9 @@ pub const CAPACITY: usize = 16;
 /// `zone` around its middle, or in full if `zone` is 0 or wider.
 ///
 /// A stem stands near the middle of its canopy. But two plants that have grown together, or a plant with a weed beside it, look the
-/// same to the beam. So at most 13/64 of the zone are cut off either end: no stem stands so near to an end.
+/// same to the beam. So at most 11/64 of the zone are cut off either end: no stem stands so near to an end.
 pub const fn trim(width: Length, zone: Length) -> Length {
-    let (most, beside) = ((zone.0 as u16 * 13) >> 6, width.0 - zone.0);
+    let (most, beside) = ((zone.0 as u16 * 11) >> 6, width.0 - zone.0);
     let half = beside as u16 >> 1;
     Length(if beside <= 0 {
         0
@@ -266,15 +266,15 @@ mod tests {
     #[test]
     fn a_single_plant_is_closed_in_its_stem_zone_and_margins() {
         let zone = Length(160);
-        for (width, trim) in [(100, 0), (160, 0), (170, 5), (222, 31), (224, 32), (225, 32), (300, 32)] {
+        for (width, trim) in [(100, 0), (160, 0), (170, 5), (213, 26), (214, 27), (215, 27), (300, 27)] {
             assert_eq!(Canopy::of(&Detection::whole(1000, 1000 + width), zone).trim, trim, "{width}");
         }
         let plant = Detection::whole(1000, 1300);
         assert_eq!(Canopy::of(&plant, Length::ZERO).trim, 0);
         let mut keep_out = KeepOut::new(WrappedPosition::new(0));
         keep_out.push(&Canopy::of(&plant, zone), WrappedPosition::new(0), MARGIN).unwrap();
-        assert!(!closed(&keep_out, 936, 936) && closed(&keep_out, 937, 937));
-        assert!(closed(&keep_out, 1363, 1363) && !closed(&keep_out, 1364, 1364));
+        assert!(!closed(&keep_out, 931, 931) && closed(&keep_out, 932, 932));
+        assert!(closed(&keep_out, 1368, 1368) && !closed(&keep_out, 1369, 1369));
     }
 
     #[test]

@@ -391,7 +391,7 @@ impl Model {
     fn given_up(&self, stretch: &Stretch) -> i64 {
         let first = self.stem_zones.partition_point(|&(from, _)| from <= stretch.trailing).saturating_sub(1);
         let zones = self.stem_zones[first..].iter().filter(|&&(_, zone)| zone > 0);
-        let beside = |zone: i64| ((self.widest(stretch) - zone) / 2).clamp(0, zone * 13 / 64);
+        let beside = |zone: i64| ((self.widest(stretch) - zone) / 2).clamp(0, zone * 11 / 64);
         let most = zones.map(|&(_, zone)| beside(zone)).max();
         most.map_or(0, |most| if most > 0 { most + 1 } else { 0 })
     }

@@ -28,7 +28,7 @@ const BEFORE_MM: f64 = 500.0;
 /// pulse: avr8js does not time edges more exactly (docs/simulators.md).
 const CLEAR_WITHIN_DEGREES: f64 = 0.09;
 /// The margin from the measurements of the machine that is set up.
-const MARGIN_MM: u16 = 23;
+const MARGIN_MM: u16 = 22;
 
 /// A machine before a row.
 #[derive(Deserialize)]

@@ -217,7 +217,7 @@ mod tests {
         let steps = steps();
         let all = after(steps.clone());
         let margin_mm = all.settings().get(Setting::MarginMm);
-        assert_eq!(margin_mm, 23, "{margin_mm}: {:?}", all.conditions.settings);
+        assert_eq!(margin_mm, 22, "{margin_mm}: {:?}", all.conditions.settings);
         for left_out in [Task::TimeServo, Task::MeasureWheel(10_000)] {
             let novice = after(steps.iter().filter(|step| !step.tasks.contains(&left_out)).cloned());
             assert_eq!(novice.settings().get(Setting::MarginMm), 50, "{left_out:?}");
