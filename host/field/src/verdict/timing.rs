@@ -19,7 +19,7 @@ pub struct Timing {
 }
 
 impl Default for Timing {
-    /// For the unloaded servo of [`Machine::default`]. The firmware's own default is for a servo in the soil.
+    /// For the unloaded servo of [`Machine::default`](crate::machine::Machine). The firmware's own default is for a servo in the soil.
     fn default() -> Self {
         Self { margin_mm: 50, lead_out_ms: 180, lead_in_ms: 40, stem_zone_mm: 0 }
     }
