@@ -183,9 +183,13 @@ impl<'a> Stretch<'a> {
         };
         let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
         // A swing after the next change of state belongs to that change.
-        let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
-        match (until_next.find_map(swing_or_status), mode) {
-            (Some((position, true)), _) | (Some((position, false)), Mode::Work) => Some(position),
+        let until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
+        let mut places = until_next.filter_map(swing_or_status);
+        let (first, second) = (places.next(), places.next());
+        match (first, second, mode) {
+            (Some((position, true)), ..) | (Some((position, false)), _, Mode::Work) => Some(position),
+            // The tool goes out for a hold, and stays there. A status that was asked for before may come between.
+            (_, Some((position, true)), Mode::Hold) => Some(position),
             _ => self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position),
         }
     }
@@ -211,12 +215,19 @@ impl<'a> Stretch<'a> {
         told == Some(brings)
     }
 
-    /// Whether a swing belongs to a change of state directly before it.
+    /// Whether a swing belongs to a change of state directly before it, with a status between them at most if it is a hold.
     pub(super) fn follows_change(&self, place: usize) -> bool {
+        let mut statuses = 0;
         let before = self.happened[..place].iter().rev().map(|(_, happened)| happened);
-        before
-            .take_while(|happened| !matches!(happened, Happened::Status(_) | Happened::Event(EventLine::Swing { .. })))
-            .any(|happened| matches!(happened, Happened::Event(EventLine::State { .. })))
+        let mut near = before.take_while(|happened| {
+            statuses += u8::from(matches!(happened, Happened::Status(_)));
+            statuses < 2 && !matches!(happened, Happened::Event(EventLine::Swing { .. }))
+        });
+        let mode = near.find_map(|happened| match happened {
+            Happened::Event(EventLine::State { mode }) => Some(*mode),
+            _ => None,
+        });
+        mode.is_some_and(|mode| statuses == 0 || mode == Mode::Hold)
     }
 
     /// The next status after an index.
