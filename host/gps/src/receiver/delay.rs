@@ -1,4 +1,4 @@
-//! The least delay of a receiver's lines, by which the log's clock is ahead of UTC.
+//! How far the log's clock is ahead of UTC, by the receiver's quickest lines.
 
 /// The least delay is searched among the lines of this time and the one before, in ms of the log.
 const DELAYS_MS: f64 = 10_000.0;

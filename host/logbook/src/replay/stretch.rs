@@ -182,16 +182,35 @@ impl<'a> Stretch<'a> {
             _ => return None,
         };
         let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
-        // A swing after the next change of state belongs to that change.
-        let until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
-        let mut places = until_next.filter_map(swing_or_status);
-        let (first, second) = (places.next(), places.next());
-        match (first, second, mode) {
-            (Some((position, true)), ..) | (Some((position, false)), _, Mode::Work) => Some(position),
-            // The tool goes out for a hold, and stays there. A status that was asked for before may come between.
-            (_, Some((position, true)), Mode::Hold) => Some(position),
-            _ => self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position),
+        let next_status = || {
+            let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
+            until_next.find_map(|happened| Some(status(happened)?.position))
+        };
+        let before = || self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position);
+        match (self.swing_of_change(place), mode) {
+            (Some((_, position)), _) => Some(position),
+            (None, Mode::Work) => next_status().or_else(before),
+            (None, _) => before(),
         }
+    }
+
+    /// The index and the position of the swing that a change of state brings. A status that was asked for before may come
+    /// between them, and shows the tool where the swing puts it. `None` if the tool was there already.
+    fn swing_of_change(&self, place: usize) -> Option<(usize, i32)> {
+        let mut between = None;
+        for (index, (_, happened)) in self.happened.iter().enumerate().skip(place + 1) {
+            match happened {
+                Happened::Event(EventLine::Swing { out, position }) => {
+                    return between.is_none_or(|tool_out| tool_out == *out).then_some((index, *position));
+                }
+                // A swing after the next change of state belongs to that change.
+                Happened::Event(EventLine::State { .. }) => return None,
+                Happened::Status(status) if between.is_none() => between = Some(status.tool_out),
+                Happened::Status(_) => return None,
+                _ => {}
+            }
+        }
+        None
     }
 
     /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
@@ -215,19 +234,11 @@ impl<'a> Stretch<'a> {
         told == Some(brings)
     }
 
-    /// Whether a swing belongs to a change of state directly before it, with a status between them at most if it is a hold.
+    /// Whether a swing belongs to a change of state before it.
     pub(super) fn follows_change(&self, place: usize) -> bool {
-        let mut statuses = 0;
-        let before = self.happened[..place].iter().rev().map(|(_, happened)| happened);
-        let mut near = before.take_while(|happened| {
-            statuses += u8::from(matches!(happened, Happened::Status(_)));
-            statuses < 2 && !matches!(happened, Happened::Event(EventLine::Swing { .. }))
-        });
-        let mode = near.find_map(|happened| match happened {
-            Happened::Event(EventLine::State { mode }) => Some(*mode),
-            _ => None,
-        });
-        mode.is_some_and(|mode| statuses == 0 || mode == Mode::Hold)
+        let is_state = |(_, happened): &(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
+        let change = self.happened[..place].iter().rposition(is_state);
+        change.and_then(|change| self.swing_of_change(change)).is_some_and(|(index, _)| index == place)
     }
 
     /// The next status after an index.
