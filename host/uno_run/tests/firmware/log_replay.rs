@@ -270,6 +270,25 @@ fn random_rows_are_decided_the_same_on_the_host_for_all_commands_and_delays() {
 }
 
 #[test]
+fn a_status_between_a_change_of_state_and_its_swing_changes_nothing() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    let log = logged(&row(), &motion, &["start now"]);
+    let begins = |place: usize, text: &str| log.get(place).is_some_and(|entry| entry.text.starts_with(text));
+    let changes = (0..log.len()).filter(|&place| begins(place, "state is=") && begins(place + 1, "swing "));
+    let mut tried = 0;
+    for swing in changes.map(|change| change + 1) {
+        let mut late = log.clone();
+        let is_status = |entry: &Entry| entry.kind == Kind::Status;
+        let status = swing + late[swing..].iter().position(is_status).expect("the machine was asked on");
+        late[swing..=status].rotate_right(1);
+        let replayed = replay(&late).expect("the log can be replayed");
+        assert_eq!(replayed.difference, None, "line {}: {replayed:#?}", log[swing].number);
+        tried += 1;
+    }
+    assert!(tried > 0, "{log:#?}");
+}
+
+#[test]
 fn start_now_over_unseen_ground_is_known_from_start() {
     let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
     assert_same(&logged(&row(), &motion, &["start now"]), 9);
