@@ -1,16 +1,18 @@
 #!/usr/bin/env bash
 # Makes a release: a folder for users without Rust, independent of the build machine.
 #
-#     ./release.sh FOLDER
+#     ./release.sh FOLDER             for computers like this one
+#     ./release.sh FOLDER SYSTEM      for x86_64-pc-windows-gnu or aarch64-unknown-linux-gnu; `./setup.sh page cross` installs
+#                                     the compilers
 #
 # START.html          where to begin, in the page's languages
 # weeder.hex          the firmware, for the page or avrdude to write
 # weeder-tester.hex   the firmware of a second Uno, which checks the first
 # firmware.txt        its size, and its worst-case stack and time
 # page/               the page: open its index.html, or serve it to a phone with `weeder serve`
-# weeder              the host tools, for computers like this one, with the firmware and the page inside
+# weeder              the host tools, with the firmware and the page inside; on Windows weeder.exe
 # wokwi/              the wiring with this firmware, for the Wokwi editor
-# 60-weeder.rules     lets a Linux user open an Uno's port
+# 60-weeder.rules     lets a Linux user open an Uno's port; not for Windows
 # manual/             README.md and docs/, as Markdown, and the sources that docs/ links; book/ is docs/ for a browser
 # sbom/               the parts as CycloneDX, for programs: packages, versions, licences
 # licences/           the parts, their authors and licences, with the licences' texts
@@ -23,10 +25,22 @@
 # complete.
 set -euo pipefail
 
-if [ $# -ne 1 ]; then
-    echo "release.sh: name the new folder, as in \`./release.sh weeder-release\`." >&2
+if [ $# -ne 1 ] && [ $# -ne 2 ]; then
+    echo "release.sh: name the new folder, as in \`./release.sh weeder-release\`, and a system if it is another than this one." >&2
     exit 1
 fi
+here=$(rustc --print host-tuple)
+system=${2:-$here}
+# The system's name for a reader, the name of its GNU tools, and how its programs end.
+case "$system" in
+    "$here") title="$(uname -s) on $(uname -m)" gnu='' exe='' ;;
+    x86_64-pc-windows-gnu) title="Windows on x86_64" gnu=x86_64-w64-mingw32 exe=.exe ;;
+    aarch64-unknown-linux-gnu) title="Linux on aarch64" gnu=aarch64-linux-gnu exe='' ;;
+    *)
+        echo "release.sh: there is no release for $system. Use x86_64-pc-windows-gnu or aarch64-unknown-linux-gnu." >&2
+        exit 1
+        ;;
+esac
 if [ -e "$1" ]; then
     echo "release.sh: $1 exists. Remove it, or name another folder." >&2
     exit 1
@@ -39,24 +53,42 @@ trap 'rm -rf "$folder"' EXIT
 chmod 755 "$folder"
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
-# The host tools, first without the firmware and the page: they build them.
+# The host tools for another system. simavr's makefile and its Rust binding know only this computer, so their settings come from the
+# environment. simavr's reader of ELF files is left out, because the virtual Uno has its own: the libraries that it needs are empty.
+build_for_another() {
+    local empty=$target/empty-libraries name library
+    rm -rf "$empty"
+    mkdir -p "$empty"
+    for name in libelf zlib libzstd; do
+        printf 'Name: %s\nDescription: empty\nVersion: 0\nLibs: -L%s\n' "$name" "$empty" >"$empty/$name.pc"
+    done
+    for library in elf z; do "$gnu-ar" rcs "$empty/lib$library.a"; done
+    local linker=CARGO_TARGET_${system^^}_LINKER libraries=''
+    [ -z "$exe" ] || libraries=-lws2_32
+    env CC="$gnu-gcc" AR="$gnu-ar" RANLIB="$gnu-ranlib" LDFLAGS="$libraries" C_LIBELF='' LD_LIBELF='' C_LIBDWARF='' LD_LIBDWARF='' \
+        PKG_CONFIG_ALLOW_CROSS=1 PKG_CONFIG_LIBDIR="$empty" BINDGEN_EXTRA_CLANG_ARGS="-isystem /usr/$gnu/include" \
+        "${linker//-/_}=$gnu-gcc" cargo build --locked --release --package weeder-cli --target "$system"
+}
+
+# The host tools of this computer, which build the rest: first without the firmware and the page inside.
 cargo build --locked --release --package weeder-cli
-cp "$target/release/weeder" "$folder/"
-WEEDER_COMMIT=$("$folder/weeder" --version | sed -n 's/.*(\(.*\))$/\1/p')
+weeder=$target/release-weeder
+cp "$target/release/weeder" "$weeder"
+WEEDER_COMMIT=$("$weeder" --version | sed -n 's/.*(\(.*\))$/\1/p')
 export WEEDER_COMMIT
 
 # The firmware. `weeder hex` proves its bounds before it writes the file.
 cargo firmware --locked
 elf=$target/avr-none/firmware/weeder-firmware.elf
-"$folder/weeder" hex --elf "$elf" "$folder/weeder.hex"
+"$weeder" hex --elf "$elf" "$folder/weeder.hex"
 {
     (cd "$(dirname "$elf")" && avr-size -A "$(basename "$elf")" | grep -E '^(section|\.(text|data|bss|noinit|eeprom) )')
     echo
-    "$folder/weeder" bounds --elf "$elf"
+    "$weeder" bounds --elf "$elf"
 } >"$folder/firmware.txt"
 
 # The tester's firmware.
-"$folder/weeder" hex --tester "$folder/weeder-tester.hex"
+"$weeder" hex --tester "$folder/weeder-tester.hex"
 
 # What the host tools have inside: the firmware of each chip with its budgets, and the Uno's bootloader for the virtual Uno.
 cargo bench-firmware --locked
@@ -74,21 +106,35 @@ avr-gcc -mmcu=atmega328p -DF_CPU=16000000L -DBAUD_RATE=115200 -w -Os -mrelax -no
     -fno-inline-small-functions -nostartfiles -Wl,--section-start=.text=0x7e00 -o "$inside/optiboot.elf" \
     /usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot.c
 avr-objcopy -O ihex -j .text "$inside/optiboot.elf" "$inside/optiboot.hex"
-"$folder/weeder" hex --elf "$inside/weeder-firmware.elf" "$inside/weeder.hex"
+"$weeder" hex --elf "$inside/weeder-firmware.elf" "$inside/weeder.hex"
 cmp "$inside/weeder.hex" "$folder/weeder.hex"
 
 # The page.
 [ -d page/node_modules ] || npm --prefix page ci --no-audit --no-fund
-WEEDER="$folder/weeder" npm --prefix page run build
+WEEDER="$weeder" npm --prefix page run build
 cp -r page/dist "$folder/page"
-WEEDER_PAGE="$folder/page" WEEDER_FIRMWARE="$inside" cargo build --locked --release --package weeder-cli
-cp "$target/release/weeder" "$folder/"
-"$folder/weeder" hex --force "$inside/weeder.hex"
-cmp "$inside/weeder.hex" "$folder/weeder.hex"
 
-# The front door, and the rule for Linux.
-sed "s|SYSTEM|$(uname -s) on $(uname -m)|" page/START.html >"$folder/START.html"
-cp host/cli/60-weeder.rules "$folder/"
+# The host tools of the release.
+export WEEDER_PAGE="$folder/page" WEEDER_FIRMWARE="$inside"
+if [ "$system" = "$here" ]; then
+    cargo build --locked --release --package weeder-cli
+    cp "$target/release/weeder" "$folder/"
+    "$folder/weeder" hex --force "$inside/weeder.hex"
+    cmp "$inside/weeder.hex" "$folder/weeder.hex"
+else
+    build_for_another
+    cp "$target/$system/release/weeder$exe" "$folder/"
+fi
+unset WEEDER_PAGE WEEDER_FIRMWARE
+
+# The front door, with the part for this system. On Linux, the rule.
+if [ -n "$exe" ]; then
+    other=linux
+else
+    other=windows
+    cp host/cli/60-weeder.rules "$folder/"
+fi
+sed -e "s|SYSTEM|$title|" -e "/<!-- $other -->/,/<!-- end -->/d" -e '/<!--.*-->/d' page/START.html >"$folder/START.html"
 mkdir "$folder/wokwi"
 cp wokwi/diagram.json "$folder/wokwi/"
 cp "$inside/weeder-firmware.elf" "$folder/wokwi/weeder.elf"
@@ -114,13 +160,14 @@ This project's own files are licensed under MIT or Apache-2.0, at your choice. W
 each licence's text where its author gives one.
 
 - weeder has simavr in it (https://github.com/buserror/simavr, by simavr-ffi), which is under GPL-3.0: so is `weeder` as a whole, and
-  distributors have to offer all sources with it. libelf (LGPL-3.0 or GPL-2.0) is in it too.
+  distributors have to offer all sources with it.
 - weeder has Optiboot in it (https://github.com/Optiboot/optiboot, from arduino-core-avr), for the virtual Uno: GPL-2.0.
 - weeder.hex and weeder-tester.hex have code of avr-libc (modified BSD) and libgcc (GPL-3.0 with the GCC Runtime Library Exception) in them.
 - The page has avr8js in it (MIT), and this project's firmware and Rust.
 - book/ has mdBook's theme in it (MPL-2.0), with highlight.js (BSD-3-Clause) and fonts (OFL-1.1).
-
 END
+[ "$system" != "$here" ] || echo "- weeder has libelf in it (LGPL-3.0 or GPL-2.0)." >>"$list"
+echo >>"$list"
 # Lines `NAME VERSION LICENCE` of the crates that a package of this repository links.
 crates() {
     cargo tree --locked --edges normal,no-proc-macro --no-dedupe --prefix none --format '{p}|{l}' "$@" |
@@ -130,7 +177,7 @@ sources=(
     "weeder.hex|--package weeder-firmware --features avr --target avr-none"
     "weeder-tester.hex|--package tester-firmware --features avr --target avr-none"
     "page|--package page --target wasm32-unknown-unknown"
-    "weeder|--package weeder-cli"
+    "weeder|--package weeder-cli --target $system"
 )
 for source in "${sources[@]}"; do
     read -ra options <<<"${source#*|}"
@@ -176,7 +223,9 @@ sbom() {
 }
 sbom firmware . "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
 sbom tester yard/tester "$c_avr_libc" "$c_libgcc" -- --features avr --target avr-none
-sbom weeder host/cli "$c_simavr" "$c_libelf" -- --target "$(rustc --print host-tuple)"
+c_of_weeder=("$c_simavr")
+[ "$system" != "$here" ] || c_of_weeder+=("$c_libelf")
+sbom weeder host/cli "${c_of_weeder[@]}" -- --target "$system"
 sbom page host/page -- --target wasm32-unknown-unknown
 (cd page && npx --yes npm@10.9.4 sbom --sbom-format cyclonedx --omit dev) >"$target/npm-sbom.json"
 node .ci/sbom.mjs "$target/npm-sbom.json" "$folder/sbom/page-npm.json"

@@ -5,6 +5,7 @@
 #     ./setup.sh         all that cargo needs
 #     ./setup.sh page    also builds the page, with all that it and its tests need: Node.js 18.19 or later with npm,
 #                        Chromium and Firefox ESR
+#     ./setup.sh cross   also installs what a release for Windows or for Linux on arm64 needs, and Wine to try it
 #     ./setup.sh slurm   also installs Slurm, to try an experiment in shards; several words are possible
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -17,6 +18,7 @@ packages=(
 )
 
 page=no
+targets=()
 for word in "$@"; do
     case "$word" in
         page)
@@ -28,11 +30,15 @@ for word in "$@"; do
             # The page's tests measure texts in Hindi.
             if [ -z "$(fc-list :lang=hi 2>/dev/null)" ]; then packages+=(fonts-lohit-deva); fi
             ;;
+        cross)
+            packages+=(gcc-mingw-w64-x86-64 gcc-aarch64-linux-gnu libc6-dev-arm64-cross wine64)
+            targets+=(x86_64-pc-windows-gnu aarch64-unknown-linux-gnu)
+            ;;
         slurm)
             packages+=(munge procps slurm-client slurmctld slurmd)
             ;;
         *)
-            echo "setup.sh: unknown word \`$word\`. Use no word, page, slurm, or both." >&2
+            echo "setup.sh: unknown word \`$word\`. Use no word, or page, cross and slurm." >&2
             exit 1
             ;;
     esac
@@ -69,14 +75,17 @@ if ! command -v rustup >/dev/null; then
     exit 1
 fi
 channel=$(sed -n 's/^channel = "\(.*\)"$/\1/p' rust-toolchain.toml)
-target=$(sed -n 's/^targets = \["\(.*\)"\]$/\1/p' rust-toolchain.toml)
+targets+=("$(sed -n 's/^targets = \["\(.*\)"\]$/\1/p' rust-toolchain.toml)")
 installed=$(rustup component list --installed --toolchain "$channel" 2>/dev/null || true)
-is_there() { grep -q "^$1" <<<"$installed"; }
-if is_there rust-src && is_there rustfmt && is_there clippy && is_there "rust-std-$target"; then
+are_there() {
+    local component
+    for component in "$@"; do grep -q "^$component" <<<"$installed" || return 1; done
+}
+if are_there rust-src rustfmt clippy "${targets[@]/#/rust-std-}"; then
     echo "Rust: $channel is installed."
 else
     echo "Rust: installing $channel"
-    rustup toolchain install "$channel" --profile minimal --target "$target" \
+    rustup toolchain install "$channel" --profile minimal --target "$(IFS=,; echo "${targets[*]}")" \
         --component rust-src --component rustfmt --component clippy
 fi
 

@@ -1,8 +1,8 @@
 //! Another simulator's virtual Uno that replaces the weeder's: a process that answers turn by turn.
 //!
-//! A turn has 1600 cycles, which limits their number. Changes of its inputs come at their cycles. Its outputs are known
+//! A turn has 6400 cycles, which limits their number. Changes of its inputs come at their cycles. Its outputs are known
 //! when a turn is over. They always count as made a little more than a turn later. So widths and distances are right,
-//! and delays are longer by 0.1 ms.
+//! and delays are longer by 0.4 ms.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use serde::{Deserialize, Serialize};
@@ -16,8 +16,8 @@ use uno::{Pin, PinChange, hex};
 /// The name of what stopped, for errors.
 const SECOND: &str = "the second simulator";
 
-/// Cycles of a turn: 0.1 ms.
-const TURN: u64 = 1600;
+/// Cycles of a turn: 0.4 ms.
+const TURN: u64 = 6400;
 
 /// The delay of its edges: a turn, and its greatest excess, since both programs run on to the end of an instruction.
 const DELAY: u64 = TURN + 64;
@@ -134,9 +134,10 @@ impl SecondUno {
     }
 
     fn exchange(&mut self, said: &impl Serialize) -> Result<Done> {
-        serde_json::to_writer(&mut self.to, said)?;
-        self.to.write_all(b"\n")?;
-        let mut line = String::new();
+        let mut line = serde_json::to_string(said)? + "\n";
+        // At once: each write to a pipe wakes the other process.
+        self.to.write_all(line.as_bytes())?;
+        line.clear();
         ensure!(self.from.read_line(&mut line)? > 0, "the second simulator has ended");
         Ok(serde_json::from_str(&line)?)
     }

@@ -22,7 +22,8 @@ pub mod hex;
 #[cfg(feature = "simavr")]
 pub mod memory;
 mod pins;
-#[cfg(all(feature = "simavr", target_os = "linux"))]
+#[cfg(feature = "simavr")]
+#[cfg_attr(not(target_os = "linux"), path = "pty/none.rs")]
 pub mod pty;
 #[cfg(feature = "simavr")]
 pub mod recording;

@@ -20,6 +20,15 @@ const GRACE: Duration = Duration::from_secs(2);
 /// Time between two looks at the port.
 const LOOK: Duration = Duration::from_millis(100);
 
+/// How to get avrdude.
+const GET_IT: &str = if cfg!(windows) {
+    "put avrdude.exe and avrdude.conf from https://github.com/avrdudes/avrdude/releases beside weeder.exe"
+} else if cfg!(target_os = "macos") {
+    "`brew install avrdude` installs it"
+} else {
+    "`sudo apt install avrdude` or ./setup.sh installs it"
+};
+
 /// What came of it.
 pub struct Written {
     pub succeeded: bool,
@@ -34,8 +43,8 @@ pub struct Written {
 /// # Errors
 /// If avrdude is not installed.
 pub fn write(image: &Path, port: &str, baud: u32) -> Result<Written> {
-    // A link may stay when its port goes. On some systems a port is no file.
-    let device: Option<PathBuf> = fs::canonicalize(port).ok();
+    // A link may stay when its port goes. On Windows a port is no file.
+    let device: Option<PathBuf> = if cfg!(windows) { None } else { fs::canonicalize(port).ok() };
     let mut avrdude = Command::new("avrdude")
         // Each page is erased before it is written: a bootloader cannot erase the chip.
         .args(["-c", "arduino", "-p", "atmega328p", "-D", "-b", &baud.to_string(), "-P", port])
@@ -43,7 +52,7 @@ pub fn write(image: &Path, port: &str, baud: u32) -> Result<Written> {
         .arg(format!("flash:w:{}:i", image.display()))
         .stderr(Stdio::piped())
         .spawn()
-        .context("avrdude cannot be started: ./setup.sh installs it")?;
+        .with_context(|| format!("avrdude cannot be started: {GET_IT}, or flash in the page"))?;
     let (heard, alive) = mpsc::channel();
     let words = avrdude.stderr.take();
     let reader = thread::spawn(move || {

@@ -9,8 +9,8 @@
 
 use super::{LiveUno, SLICE_MS, Setup};
 use anyhow::{Error, Result};
+use cpu_time::ProcessTime;
 use rayon::ThreadPoolBuilder;
-use rustix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -110,7 +110,7 @@ impl LiveRows {
         let most_slices = time.map_or(u64::MAX, |time| time.as_millis() as u64 / SLICE_MS);
         let others = ThreadPoolBuilder::new().num_threads((threads - 1).max(1));
         let pool = others.build().map_err(|error| (0, error.into()))?;
-        let (began, worked) = (Instant::now(), worked());
+        let (began, worked) = (Instant::now(), ProcessTime::now());
         let (mut due, mut slices) = (began, 0);
         while !stop.load(Ordering::Relaxed) && slices < most_slices {
             for (row, mishap) in mishaps.try_iter() {
@@ -142,7 +142,7 @@ impl LiveRows {
             None => Ok(Ran {
                 simulated: Duration::from_millis(slices * SLICE_MS),
                 took: began.elapsed(),
-                cores: self::worked().saturating_sub(worked),
+                cores: worked.elapsed(),
                 threads: self.rows.len().div_ceil(each).max(1),
             }),
         }
@@ -165,12 +165,6 @@ impl LiveRows {
         });
         Background { paths, mishaps, stop, thread: Some(thread) }
     }
-}
-
-/// For how long this process has had cores at work.
-fn worked() -> Duration {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
-    Duration::try_from(time).unwrap_or_default()
 }
 
 /// A row's Uno, and the error that has stopped it.
