@@ -18,7 +18,7 @@ import type { Change } from "./row/machine.ts";
 import { isOn, isWaiting, turn, wakeOnTouch } from "./signals.ts";
 import { Drawing } from "./try/drawing.ts";
 import { inWords } from "./try/outcome.ts";
-import { Trial } from "./try/trial.ts";
+import { Simulation } from "./try/simulation.ts";
 import { CYCLES_PER_SECOND } from "./uno/uno.ts";
 import {
     type Code,
@@ -62,28 +62,28 @@ languages.value = language();
 languages.addEventListener("change", () => speak(languages.value as Code));
 page.say("unchecked", () => say("unchecked"));
 
-const trial = new Trial(hex, Date.now(), true);
-const drawing = new Drawing(page.get("drawing", SVGSVGElement), trial);
-const trialPanel = new Panel(page.html("try-panel"), "try");
-/** The chip's time. Timeouts use it, so that a slow or paused trial causes no timeout. */
-const trialMs = () => (trial.uno.cycle / CYCLES_PER_SECOND) * 1000;
-const wire = { send: (text: string) => trial.uno.send(text), close: async () => {} };
-const session = new Session(wire, trialMs(), true);
-trial.onText = (text) => session.receive(text);
-trialPanel.connect(session, trialMs());
-trialPanel.onHappening = (happening) => {
-    trial.take(happening);
+const simulation = new Simulation(hex, Date.now(), true);
+const drawing = new Drawing(page.get("drawing", SVGSVGElement), simulation);
+const tryPanel = new Panel(page.html("try-panel"), "try");
+/** The chip's time. Timeouts use it, so that a slow or paused simulation causes no timeout. */
+const chipMs = () => (simulation.uno.cycle / CYCLES_PER_SECOND) * 1000;
+const wire = { send: (text: string) => simulation.uno.send(text), close: async () => {} };
+const session = new Session(wire, chipMs(), true);
+simulation.onText = (text) => session.receive(text);
+tryPanel.connect(session, chipMs());
+tryPanel.onHappening = (happening) => {
+    simulation.take(happening);
     // A board without saved settings raises an alarm. Then this machine's settings are sent and saved.
     if (happening.is === "started" && happening.line.includes("settings_lost")) settleAt = "connected";
     if (happening.is !== settleAt) return;
     settleAt = undefined;
-    const asked = [...trial.machine.setUp, "save", "clear"].map((command) => trialPanel.ask(command));
+    const asked = [...simulation.machine.setUp, "save", "clear"].map((command) => tryPanel.ask(command));
     void Promise.all(asked).then(startWork, () => {});
 };
 /** Throws the work switch, so that the first machine weeds at once. */
 function startWork(): void {
     workSwitch.checked = true;
-    trial.work(true);
+    simulation.work(true);
 }
 /** The event to wait for before the settings are saved. */
 let settleAt: "connected" | undefined;
@@ -94,12 +94,12 @@ new RecordView(new Parts(page.html("view-record")), tryLog);
 async function tryLog({ progress, cancel }: Work): Promise<File> {
     for (;;) {
         if (cancel.aborted) throw new Cancelled();
-        const share = trial.machine.toolMm / EXAMPLE_MM;
+        const share = simulation.machine.toolMm / EXAMPLE_MM;
         progress(Math.min(Math.max(share, 0), 1));
         // A machine that stands makes the log no longer.
-        if (share >= 1 || (Number(speed.value) <= 0 && trial.uno.cycle > EXAMPLE_CYCLES)) return trialPanel.log;
-        trial.advance(LONGEST_FRAME_S, Number.POSITIVE_INFINITY);
-        trialPanel.turn(trialMs());
+        if (share >= 1 || (Number(speed.value) <= 0 && simulation.uno.cycle > EXAMPLE_CYCLES)) return tryPanel.log;
+        simulation.advance(LONGEST_FRAME_S, Number.POSITIVE_INFINITY);
+        tryPanel.turn(chipMs());
         await new Promise((done) => setTimeout(done));
     }
 }
@@ -162,7 +162,7 @@ globalThis.addEventListener("beforeunload", (event) => {
 /** The key for HOLD, for every shown machine. */
 globalThis.addEventListener("keydown", ({ key }) => {
     if (key !== "Escape") return;
-    if (!page.html("view-try").hidden) trialPanel.hold();
+    if (!page.html("view-try").hidden) tryPanel.hold();
     else for (const panel of workPanels) panel.hold();
 });
 
@@ -202,7 +202,7 @@ function slider(id: string, unit: string, digits: number, change: (value: number
     const apply = () => {
         const share = quantity(input.valueAsNumber, unit, digits);
         output.value = text ? say(text, { share }) : share;
-        trial.machine.change(change(input.valueAsNumber));
+        simulation.machine.change(change(input.valueAsNumber));
     };
     input.addEventListener("input", apply);
     inLanguage(apply);
@@ -217,11 +217,11 @@ function toggle(id: string, use: (on: boolean) => void): HTMLInputElement {
     input.addEventListener("change", () => use(input.checked));
     return input;
 }
-const workSwitch = toggle("switch", (on) => trial.work(on));
-toggle("torn", (beamWireTorn) => trial.machine.change({ beamWireTorn }));
-toggle("dead", (encoderDead) => trial.machine.change({ encoderDead }));
-page.button("brown-out", () => trial.uno.reset("brown-out"));
-page.button("press-reset", () => trial.uno.reset("external"));
+const workSwitch = toggle("switch", (on) => simulation.work(on));
+toggle("torn", (beamWireTorn) => simulation.machine.change({ beamWireTorn }));
+toggle("dead", (encoderDead) => simulation.machine.change({ encoderDead }));
+page.button("brown-out", () => simulation.uno.reset("brown-out"));
+page.button("press-reset", () => simulation.uno.reset("external"));
 
 const time = page.get("time", HTMLSelectElement);
 const lamp = page.html("lamp");
@@ -229,19 +229,19 @@ const hint = page.html("hint");
 const outcome = page.html("outcome");
 
 function showTrial(): void {
-    const { machine } = trial;
-    trialPanel.show();
+    const { machine } = simulation;
+    tryPanel.show();
     page.write("true-tool", say(machine.isWeeding ? "toolIn" : machine.isClear ? "toolOut" : "swings"));
-    lamp.classList.toggle("lit", trial.isLampLit);
-    lamp.ariaLabel = say(trial.isLampLit ? "lampLit" : "lampDark");
-    const { totals } = trial.outcome;
+    lamp.classList.toggle("lit", simulation.isLampLit);
+    lamp.ariaLabel = say(simulation.isLampLit ? "lampLit" : "lampDark");
+    const { totals } = simulation.outcome;
     page.write("outcome", inWords(totals));
-    page.write("why", trial.why);
+    page.write("why", simulation.why);
     outcome.classList.toggle("damaged", totals.plants.damaged > 0);
-    hint.hidden = !(workSwitch.checked && trialPanel.machine.mode !== "work");
+    hint.hidden = !(workSwitch.checked && tryPanel.machine.mode !== "work");
     if (isStill() && performance.now() - drawnMs < STILL_MS) return;
     drawnMs = performance.now();
-    drawing.draw(trial);
+    drawing.draw(simulation);
 }
 let drawnMs = Number.NEGATIVE_INFINITY;
 
@@ -252,15 +252,15 @@ let lastMs = performance.now();
 function frame(nowMs: number): void {
     const outsideS = Math.min(Math.max((nowMs - lastMs) / 1000, 0), LONGEST_FRAME_S);
     lastMs = nowMs;
-    // A hidden trial is paused.
+    // A hidden simulation is paused.
     if (!page.html("view-try").hidden) {
-        passed.chipS += trial.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
+        passed.chipS += simulation.advance(outsideS * Number(time.value), outsideS * 1000 * CHIP_SHARE);
         passed.outsideS += outsideS;
         if (passed.outsideS > PACE_S) {
             page.write("pace", `${number(passed.chipS / passed.outsideS, 2)} x`);
             passed.chipS = passed.outsideS = 0;
         }
-        trialPanel.turn(trialMs());
+        tryPanel.turn(chipMs());
         showTrial();
     } else if (!page.html("view-work").hidden) for (const panel of workPanels) panel.show();
     requestAnimationFrame(frame);
@@ -269,7 +269,7 @@ function frame(nowMs: number): void {
 requestAnimationFrame(frame);
 
 // For tests, and for the browser's console.
-Object.assign(globalThis, { trial });
+Object.assign(globalThis, { simulation });
 
 let loadNewer = () => {};
 page.button("load-newer", () => loadNewer());

@@ -13,12 +13,12 @@ import type { TestContext } from "node:test";
 import { pathToFileURL } from "node:url";
 import type { AxeResults } from "axe-core";
 import { type Browser, chromium, firefox, type Page } from "playwright-core";
-import type { Trial } from "../src/try/trial.ts";
+import type { Simulation } from "../src/try/simulation.ts";
 import { type Device, offerPorts } from "./ports.ts";
 
 /** The page's objects for tests. */
 declare global {
-    var trial: Trial;
+    var simulation: Simulation;
 }
 
 /** The longest wait for anything on the page: CI's machines are slow, and share their cores. */
@@ -94,7 +94,7 @@ export async function openAt(browser: Browser, address: string, viewport = DESK)
     const opened = await blank(browser, viewport, new URL(address).origin);
     await opened.page.goto(address);
     // The page is decompressed first. For an unpaired phone another page comes instead.
-    await opened.page.waitForFunction(() => "trial" in globalThis || !document.getElementById("view-try"));
+    await opened.page.waitForFunction(() => "simulation" in globalThis || !document.getElementById("view-try"));
     return opened;
 }
 
@@ -103,7 +103,7 @@ export async function open(browser: Browser, view: string, viewport = DESK, port
     const opened = await blank(browser, viewport, "file:");
     if (ports) await offerPorts(opened.page, ports);
     await opened.page.goto(`${pathToFileURL(resolve("dist/index.html")).href}#${view}`);
-    await opened.page.waitForFunction(() => "trial" in globalThis);
+    await opened.page.waitForFunction(() => "simulation" in globalThis);
     return opened;
 }
 

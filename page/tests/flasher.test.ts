@@ -138,7 +138,7 @@ test("a port that another tab of the page has open is told, and free when that t
     const tab = await page.context().newPage();
     await offerPorts(tab, [taken]);
     await tab.goto(page.url().replace("#work", "#flash"));
-    await tab.waitForFunction(() => "trial" in globalThis);
+    await tab.waitForFunction(() => "simulation" in globalThis);
     assert.match(await flash(tab), /^Not flashed: another tab of this page has a port open: disconnect there/);
     await page.getByRole("button", { name: "Disconnect" }).click();
     await page.getByRole("button", { name: "Connect an Uno" }).waitFor();

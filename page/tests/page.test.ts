@@ -23,19 +23,19 @@ test("the page weeds a row with the real firmware, no plant is damaged, and it s
     await part(page, "state").filter({ hasText: "work" }).waitFor();
     await rollTo(page, 4000);
     const { plants, passed, worked, shapes, free } = await page.evaluate(() => ({
-        plants: globalThis.trial.outcome.totals.plants,
-        passed: globalThis.trial.outcome.plants.size,
-        worked: globalThis.trial.track.filter(({ acrossMm }) => acrossMm < 1).length,
+        plants: globalThis.simulation.outcome.totals.plants,
+        passed: globalThis.simulation.outcome.plants.size,
+        worked: globalThis.simulation.track.filter(({ acrossMm }) => acrossMm < 1).length,
         // Plants of this stretch round which the firmware's zone is as wide as the canopy and both margins.
-        free: globalThis.trial.machine.things.filter(
+        free: globalThis.simulation.machine.things.filter(
             ({ kind, placeMm, widthMm }) =>
                 kind === "plant" &&
                 placeMm > 1000 &&
                 placeMm < 4000 &&
-                globalThis.trial.zones.some(
+                globalThis.simulation.zones.some(
                     ({ startMm, endMm }) =>
-                        Math.abs(startMm - (placeMm - widthMm / 2 - globalThis.trial.outcome.marginMm)) < 3 &&
-                        Math.abs(endMm - (placeMm + widthMm / 2 + globalThis.trial.outcome.marginMm)) < 3,
+                        Math.abs(startMm - (placeMm - widthMm / 2 - globalThis.simulation.outcome.marginMm)) < 3 &&
+                        Math.abs(endMm - (placeMm + widthMm / 2 + globalThis.simulation.outcome.marginMm)) < 3,
                 ),
         ).length,
         shapes: document.querySelectorAll("#drawing [data-kind=plant]").length,
@@ -91,7 +91,7 @@ test("a plant that was damaged is marked in the row, and told in words", async (
     await type(page, "set lead_out_ms 0", /^ok$/);
     await page.locator("#speed").fill("2.5");
     await page.getByLabel("Work switch").check();
-    while (await page.evaluate(() => globalThis.trial.outcome.totals.plants.damaged === 0)) await pass(page, 0.3);
+    while (await page.evaluate(() => globalThis.simulation.outcome.totals.plants.damaged === 0)) await pass(page, 0.3);
     await page.locator("#outcome", { hasText: /1 is damaged: the tool was at the stem/ }).waitFor();
     await page.locator("#drawing [data-verdict=damaged] .verdict").waitFor({ state: "attached" });
     await inspect(page, "desk-damaged");
@@ -101,7 +101,7 @@ test("a plant that was damaged is marked in the row, and told in words", async (
 test("what is moved or broken on the page is moved or broken on the machine", async () => {
     const opened = await tryIt(browser);
     const { page } = opened;
-    const sown = await page.evaluate(() => globalThis.trial.machine.things.length);
+    const sown = await page.evaluate(() => globalThis.simulation.machine.things.length);
     for (const [slider, value] of [
         ["speed", "2.5"],
         ["spacing", "400"],
@@ -111,19 +111,19 @@ test("what is moved or broken on the page is moved or broken on the machine", as
     // How far the row was sown before depends on the time until now.
     await rollTo(page, 6000);
     const kinds = await page.evaluate(
-        (sown) => globalThis.trial.machine.things.slice(sown).map(({ kind }) => kind),
+        (sown) => globalThis.simulation.machine.things.slice(sown).map(({ kind }) => kind),
         sown,
     );
     const [plants, weeds] = ["plant", "weed"].map((kind) => kinds.filter((other) => other === kind).length);
     assert(plants && weeds && plants >= 8 && weeds >= plants - 3, `${plants} plants, ${weeds} weeds`);
 
-    const tickMm = await page.evaluate(() => globalThis.trial.machine.groundMmATick);
+    const tickMm = await page.evaluate(() => globalThis.simulation.machine.groundMmATick);
     await page.locator("#speed").fill("-0.5");
     await page.locator("#slip").fill("12");
     for (const label of ["Tear the beam's wire", "Kill the encoder"]) await page.getByLabel(label).check();
     await pass(page, 4);
     const found = await page.evaluate(async () => {
-        const { machine, uno, advance } = globalThis.trial;
+        const { machine, uno, advance } = globalThis.simulation;
         const pins = new Set<number>();
         const set = uno.set.bind(uno);
         uno.set = (pin, high) => {
@@ -131,7 +131,7 @@ test("what is moved or broken on the page is moved or broken on the machine", as
             set(pin, high);
         };
         const wasTicks = machine.ticks;
-        advance.call(globalThis.trial, 5, Number.POSITIVE_INFINITY);
+        advance.call(globalThis.simulation, 5, Number.POSITIVE_INFINITY);
         uno.set = set;
         const { speedMmS, groundMmATick, ticks } = machine;
         return { pins: [...pins], ticks: ticks - wasTicks, speedMmS, groundMmATick };
@@ -171,7 +171,7 @@ test("a wheel that is measured once counts once, also where its setting is read 
     for (const lead of ["lead_out_ms 100", "lead_in_ms 99"]) await type(page, `set ${lead}`, /^ok$/);
     const timed = "calibrated lead_out_ms=100 lead_in_ms=99 set=yes\r\n";
     // The machine may be in the middle of a line.
-    await page.evaluate((line) => globalThis.trial.onText(`\r\n${line}${line}`), timed);
+    await page.evaluate((line) => globalThis.simulation.onText(`\r\n${line}${line}`), timed);
     // A stretch is measured from a stop to a stop.
     await page.locator("#speed").fill("0");
     await pass(page, 1);
@@ -217,7 +217,7 @@ for (const [device, viewport] of [
 
 test("how soon the page moves, and how fluently on a slow processor, is measured", async (test) => {
     const { page, errors } = await open(browser, "try", PHONE);
-    const moved = await page.waitForFunction(() => globalThis.trial.machine.placeMm > 0 && performance.now());
+    const moved = await page.waitForFunction(() => globalThis.simulation.machine.placeMm > 0 && performance.now());
     const processor = await page.context().newCDPSession(page);
     await processor.send("Emulation.setCPUThrottlingRate", { rate: 6 });
     const perSecond = await page.evaluate(async () => {

@@ -54,7 +54,7 @@ test("where little motion is asked for, the machine stands until it is driven, a
     await page.getByRole("link", { name: "Try" }).click();
     assert.equal(await page.locator("#speed-is").textContent(), "0.0 km/h");
     await pass(page, 1);
-    assert.equal(await page.evaluate(() => globalThis.trial.machine.placeMm), 0);
+    assert.equal(await page.evaluate(() => globalThis.simulation.machine.placeMm), 0);
     await page.locator("#speed").fill("2");
     const pictures = await page.evaluate(async () => {
         let pictures = 0;
@@ -112,7 +112,7 @@ test("an alarm, a lost machine and an obeyed HOLD are each heard and felt as ano
     await part(page, "hold").click();
     await page.evaluate(async () => {
         for (let turn = 0; turn < 2000; turn++) {
-            globalThis.trial.advance(1e-4, Number.POSITIVE_INFINITY);
+            globalThis.simulation.advance(1e-4, Number.POSITIVE_INFINITY);
             await Promise.resolve();
         }
     });

@@ -35,7 +35,7 @@ test("a log of the page is drawn with what was seen, kept free and worked, led t
     await part(tried.page, "state").filter({ hasText: "work" }).waitFor();
     // As a page has time for, so that the statuses come as often as they do.
     await tried.page.locator("#time").selectOption("4");
-    await tried.page.waitForFunction(() => globalThis.trial.machine.toolMm > 4000);
+    await tried.page.waitForFunction(() => globalThis.simulation.machine.toolMm > 4000);
     await tried.page.getByLabel("Kill the encoder").check();
     await part(tried.page, "alarm-name").filter({ hasText: "encoder_silent" }).waitFor();
     const saved = tried.page.waitForEvent("download");

@@ -23,7 +23,7 @@ export async function weeds(page: Page): Promise<void> {
 
 /** Lets time pass in the page until the tool has reached a position along the row, as fast as this machine can. */
 export async function rollTo(page: Page, toolMm: number): Promise<void> {
-    while (await page.evaluate((mm) => globalThis.trial.machine.toolMm < mm, toolMm)) await pass(page, 0.5);
+    while (await page.evaluate((mm) => globalThis.simulation.machine.toolMm < mm, toolMm)) await pass(page, 0.5);
 }
 
 /**
@@ -33,7 +33,7 @@ export async function rollTo(page: Page, toolMm: number): Promise<void> {
 export async function pass(page: Page, seconds: number): Promise<void> {
     await page.evaluate(async (seconds) => {
         for (let left = seconds; left > 0; left -= 0.1) {
-            globalThis.trial.advance(Math.min(left, 0.1), Number.POSITIVE_INFINITY);
+            globalThis.simulation.advance(Math.min(left, 0.1), Number.POSITIVE_INFINITY);
             await new Promise(requestAnimationFrame);
         }
     }, seconds);

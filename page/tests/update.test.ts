@@ -56,7 +56,7 @@ async function install(address: string): Promise<Opened> {
     const opened = await openAt(browser, address);
     await opened.page.evaluate(() => navigator.serviceWorker.ready);
     await opened.page.reload();
-    await opened.page.waitForFunction(() => "trial" in globalThis);
+    await opened.page.waitForFunction(() => "simulation" in globalThis);
     return opened;
 }
 
@@ -137,7 +137,7 @@ test("a newer page that does not start gives way to the older one, and can be tr
     await page.locator("h1", { hasText: "weeder 2" }).waitFor();
     // It is shown, and dead.
     await page.locator("h1", { hasText: /^weeder$/ }).waitFor();
-    await page.waitForFunction(() => "trial" in globalThis);
+    await page.waitForFunction(() => "simulation" in globalThis);
     await page.getByText("A newer page is there.").waitFor();
     await page.getByRole("button", { name: "Load it" }).click();
     await page.locator("h1", { hasText: "weeder 2" }).waitFor();
@@ -152,7 +152,7 @@ test("a page of two builds does not start, and says so", async (test) => {
     const page = await browser.newPage();
     await page.goto(address);
     await page.getByText("This page's files are of two versions").waitFor();
-    assert.equal(await page.evaluate(() => "trial" in globalThis), false);
+    assert.equal(await page.evaluate(() => "simulation" in globalThis), false);
     await page.close();
 });
 

@@ -343,7 +343,7 @@ test("another language leaves the machine connected, and what was said before is
     await part(page, "settings-read").click();
     await pass(page, 0.5);
     await part(page, "settings-said").filter({ hasText: en.words.areMachines }).waitFor();
-    const connected = await page.evaluate(() => globalThis.trial.uno.cycle);
+    const connected = await page.evaluate(() => globalThis.simulation.uno.cycle);
     await page.locator("#language").selectOption("fr");
     const { words } = LANGUAGES.fr.table;
     await part(page, "settings-said").filter({ hasText: words.areMachines }).waitFor();
@@ -351,7 +351,7 @@ test("another language leaves the machine connected, and what was said before is
         .filter({ hasText: LANGUAGES.fr.table.heard.range.split("{")[2]?.slice(-8) ?? "" })
         .waitFor();
     await part(page, "state").filter({ hasText: words.hold }).waitFor();
-    assert((await page.evaluate(() => globalThis.trial.uno.cycle)) > connected);
+    assert((await page.evaluate(() => globalThis.simulation.uno.cycle)) > connected);
     assert.equal(await part(page, "said").getByText("connected to weeder").count(), 1);
     assert.equal(await part(page, "said").getAttribute("lang"), "en");
     await close(opened);

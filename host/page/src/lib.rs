@@ -1,7 +1,7 @@
 //! The project's Rust for the page, so that no code is written twice: the meaning of a console line, the order of
 //! changed settings, the machine and plants of "Try it", and the content of a log.
 //!
-//! [`answer`] takes a question as JSON and returns its answer as JSON. `console`, `trial` and `record` define their
+//! [`answer`] takes a question as JSON and returns its answer as JSON. `console`, `simulation` and `record` define their
 //! forms, and `page/src/link/`, `page/src/row/` and `page/src/record/` have their types. In a browser, as WebAssembly,
 //! both pass through one buffer (`exports`). The only state between questions is the log that is being read, the rolling
 //! machine, and the measurements of a set-up.
@@ -10,12 +10,12 @@ mod console;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod record;
-mod trial;
+mod simulation;
 
 #[cfg(target_arch = "wasm32")]
 use exports::progress;
 pub use record::take;
-pub use trial::{hear, roll};
+pub use simulation::{hear, roll};
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -32,11 +32,11 @@ enum Question {
     /// What is the next step of setting up this machine?
     SetUp(console::Heard),
     /// Put this machine in front of this row.
-    Begin(trial::Begun),
+    Begin(simulation::Begun),
     /// Change this on the way.
-    Change(trial::Different),
+    Change(simulation::Different),
     /// What is the result for the plants and tall weeds behind the tool?
-    Judge(trial::Kept),
+    Judge(simulation::Kept),
     /// Begin a log. True keeps all its lines.
     Log(bool),
     /// What does the log show?
@@ -56,7 +56,7 @@ enum Question {
 fn progress(_share: f64) {}
 
 thread_local! {
-    /// What the log's picture shows, or what the rolling machine does, by the numbers in `record` and `trial`.
+    /// What the log's picture shows, or what the rolling machine does, by the numbers in `record` and `simulation`.
     static TABLES: RefCell<[Vec<f64>; 3]> = const { RefCell::new([const { Vec::new() }; 3]) };
 }
 

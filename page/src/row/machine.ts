@@ -1,4 +1,4 @@
-// The machine between row and Uno: the project's Rust (host/page/src/trial.rs) simulates it, and this module connects
+// The machine between row and Uno: the project's Rust (host/page/src/simulation.rs) simulates it, and this module connects
 // it to the Uno.
 //
 // The machine's position is that of the beam; the tool works the ground beamToToolMm behind it. `runUntil` lets the
@@ -24,7 +24,7 @@ export function span({ placeMm, widthMm }: Thing): { startMm: number; endMm: num
     return { startMm: placeMm - widthMm / 2, endMm: placeMm + widthMm / 2 };
 }
 
-/** The differences from the machine from the box: `Begun` in host/page/src/trial.rs. */
+/** The differences from the machine from the box: `Begun` in host/page/src/simulation.rs. */
 interface MachineKind {
     readonly isSetUp?: boolean;
     readonly secondBeamMm?: number;
@@ -48,7 +48,7 @@ export interface Dimensions {
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
 export type Verdict = "kept" | "marginCut" | "reached" | "damaged";
 
-/** A change from now on: `Different` in host/page/src/trial.rs. */
+/** A change from now on: `Different` in host/page/src/simulation.rs. */
 export type Change =
     | { speedKmH: number }
     | { slip: number }
@@ -65,7 +65,7 @@ interface Begun {
     readonly levels: Levels;
 }
 
-/** The tables of host/page/src/trial.rs. */
+/** The tables of host/page/src/simulation.rs. */
 const TABLE = { now: 0, changes: 1, sown: 2 } as const;
 
 export class Machine {

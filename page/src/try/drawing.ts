@@ -5,7 +5,7 @@
 
 import { draw, set } from "../dom.ts";
 import { span, type Thing, type Verdict } from "../row/machine.ts";
-import type { Trial } from "./trial.ts";
+import type { Simulation } from "./simulation.ts";
 
 /** The picture's width across the row, from its line: to the side of the tool's swing, and to the other side. */
 const ACROSS_MM = { out: 330, other: 170 };
@@ -87,7 +87,7 @@ export class Drawing {
     readonly #blade = draw("rect", { fill: "var(--ink)", rx: 6 });
     readonly #angle = draw("text", { fill: "var(--ink)", "font-size": 30, "text-anchor": "middle" });
 
-    constructor(svg: SVGSVGElement, { machine }: Trial) {
+    constructor(svg: SVGSVGElement, { machine }: Simulation) {
         this.#svg = svg;
         const { beamToToolMm, toolWidthMm } = machine.dimensions;
         set(this.#track, { "stroke-width": toolWidthMm });
@@ -113,8 +113,8 @@ export class Drawing {
         );
     }
 
-    draw(trial: Trial): void {
-        const { machine, zones } = trial;
+    draw(simulation: Simulation): void {
+        const { machine, zones } = simulation;
         const { toolMm, degrees } = machine;
         const heightMm = ACROSS_MM.out + ACROSS_MM.other;
         const { clientWidth, clientHeight } = this.#svg;
@@ -130,9 +130,9 @@ export class Drawing {
         const isSeen = (thing: Thing) => span(thing).endMm > fromMm && span(thing).startMm < toMm;
         const seen = things.flatMap((thing, number) => (isSeen(thing) ? [number] : []));
         this.#things.show(seen, (number) => thingShape(things[number] as Thing));
-        this.#drawVerdicts(trial);
+        this.#drawVerdicts(simulation);
         this.#drawSpecks(fromMm, toMm);
-        const way = trial.track.map(({ alongMm, acrossMm }) => `${alongMm.toFixed(1)} ${(-acrossMm).toFixed(1)}`);
+        const way = simulation.track.map(({ alongMm, acrossMm }) => `${alongMm.toFixed(1)} ${(-acrossMm).toFixed(1)}`);
         this.#track.setAttribute("d", way.length > 1 ? `M${way.join("L")}` : "");
         this.#zones.replaceChildren(
             ...zones
@@ -151,7 +151,7 @@ export class Drawing {
         );
 
         const { toolWidthMm } = machine.dimensions;
-        const tool = { x: trial.tool.alongMm - toolMm, y: -trial.tool.acrossMm };
+        const tool = { x: simulation.tool.alongMm - toolMm, y: -simulation.tool.acrossMm };
         const broken = machine.isBroken;
         set(this.#beam, { "stroke-width": broken ? 9 : 4, "stroke-dasharray": broken ? "none" : "12 7" });
         // A pendulum from above: it hangs from the servo over the row's line, and lifts the blade beside it.
@@ -162,7 +162,7 @@ export class Drawing {
         this.#angle.textContent = `${Math.round(degrees) + 0}\u00b0`;
     }
 
-    #drawVerdicts({ machine, outcome }: Trial): void {
+    #drawVerdicts({ machine, outcome }: Simulation): void {
         for (const [index, shape] of this.#things.shown) {
             const [thing, verdict] = [machine.things[index], outcome.plants.get(index)];
             if (!thing || !verdict || shape.dataset.verdict === verdict) continue;

@@ -1,4 +1,4 @@
-// The reasons why ground of a trial was not weeded, tall weeds were left and plants were not kept.
+// The reasons why ground of a simulation was not weeded, tall weeds were left and plants were not kept.
 //
 // Each stretch that the tool passes for the first time goes to one part of the loss budget. The parts are those of
 // host/field/src/budget.rs without guarded ground, and add up to the whole stretch. The firmware's output decides: its

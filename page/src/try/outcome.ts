@@ -1,4 +1,4 @@
-// The results for each plant and each tall weed of a trial. The machine judges a thing as soon as its tool is well
+// The results for each plant and each tall weed of a simulation. The machine judges a thing as soon as its tool is well
 // behind it.
 
 import type { Machine, Verdict } from "../row/machine.ts";

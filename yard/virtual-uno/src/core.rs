@@ -7,7 +7,7 @@
 //!
 //! # Memory
 //!
-//! Each chip has two allocations: simavr's `avr_t`, made by `avr_make_mcu_by_name`, and the recorder, a leaked box.
+//! Each chip has two allocations: simavr's `avr_t`, made by its `mega328`, and the recorder, a leaked box.
 //! Only `Drop` frees them. simavr holds the recorder's address, or that of its timer or EEPROM, as its callbacks'
 //! parameter. simavr calls the callbacks only from inside the functions that this file calls. None of those calls is
 //! made while a reference into the recorder or into `avr_t` is alive. simavr keeps no state outside `avr_t` except its
@@ -21,7 +21,7 @@ pub(crate) mod recorder;
 mod timer;
 mod uart;
 
-use std::ffi::{CStr, c_void};
+use std::ffi::c_void;
 use std::ptr::{self, NonNull};
 use std::{mem, slice};
 
@@ -42,10 +42,11 @@ use crate::pins::{CYCLES_PER_SECOND, Pin};
 unsafe extern "C" {
     /// Runs the next instruction. It is declared in sim_core.h, which simavr-ffi leaves out of its bindings.
     pub(crate) fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
-}
 
-/// The chip's name for simavr.
-const CHIP: &CStr = c"atmega328p";
+    /// The ATmega328P. simavr's search by name reads beyond the names of a chip that has four, and takes what lies there for
+    /// more names: on arm64 it finds the ATmega324 that way.
+    static mega328: simavr::avr_kind_t;
+}
 
 /// Highest interrupt vector of the ATmega328P (data sheet, table 12-6, counted from 0).
 const LAST_VECTOR: u8 = 25;
@@ -97,10 +98,9 @@ impl Core {
     /// [`crate::elf::Image`] and [`super::Uno`] ensure this. It starts at `reset_address` in flash, now and after every
     /// reset. Its events are appended to `log`.
     pub(super) fn new(flash: &[u8], eeprom: &[u8], reset_address: u32, cycle: u64, log: Log) -> Core {
-        // SAFETY: the name is a C string that lives for ever. Every simavr knows this chip, so a null pointer means
-        // that memory ran out.
-        let avr = unsafe { simavr::avr_make_mcu_by_name(CHIP.as_ptr()) };
-        assert!(!avr.is_null(), "simavr knows the ATmega328P");
+        // SAFETY: simavr never changes it, and its function takes nothing.
+        let avr = unsafe { mega328.make.map_or(ptr::null_mut(), |make| make()) };
+        assert!(!avr.is_null(), "simavr makes the chip unless memory has run out");
 
         // SAFETY: `avr` was just made and no other code has its address. `avr_init` is called once, after the clock was
         // set as it requires. `data` and `flash` are then simavr's, of `ramend + 1` and `flashend + 1` bytes, and

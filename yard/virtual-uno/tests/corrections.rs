@@ -5,7 +5,7 @@
 //! here fails, and the correction can be removed. Corrections that are visible only from outside the chip are tested in
 //! `virtual_uno.rs`.
 
-use std::ffi::{CStr, c_void};
+use std::ffi::c_void;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -15,6 +15,7 @@ use virtual_uno::{Pin, Uno, UnoError};
 
 unsafe extern "C" {
     fn avr_run_one(avr: *mut simavr::avr_t) -> simavr::avr_flashaddr_t;
+    static mega328: simavr::avr_kind_t;
 }
 
 /// A correction: its firmware, the section of the data sheet, and the firmware's output on simavr alone.
@@ -84,11 +85,10 @@ unsafe extern "C" fn take(_: *mut simavr::avr_irq_t, byte: u32, text: *mut c_voi
 fn on_simavr(elf: &Path) -> String {
     let flash = Image::read(elf).unwrap().flash;
     let mut text = Vec::<u8>::new();
-    let name: &CStr = c"atmega328p";
     // SAFETY: the chip is made, set up, run and ended here. `flash` fits, because `Image` checks it, and `text`
     // outlives the chip.
     unsafe {
-        let avr = simavr::avr_make_mcu_by_name(name.as_ptr());
+        let avr = mega328.make.expect("it has a function")();
         simavr::avr_init(avr);
         (*avr).set_log(0);
         (*avr).frequency = 16_000_000;

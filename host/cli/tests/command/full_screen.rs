@@ -13,6 +13,9 @@ use uno_run::live::rows::LiveRows;
 const LINES: u16 = 24;
 const COLUMNS: u16 = 100;
 
+/// Looks at the screen before a test fails: minutes, as a busy computer may need them.
+const LOOKS: usize = 60_000;
+
 /// What a terminal sends for this key.
 const PAGE_UP: &str = "\x1b[5~";
 
@@ -44,9 +47,12 @@ impl Terminal {
     }
 
     /// Waits until the screen shows something, and returns the screen.
+    ///
+    /// # Panics
+    /// If the monitor has ended, or never shows it.
     fn until(&mut self, shows: impl Fn(&str) -> bool) -> String {
         let mut bytes = [0; 4096];
-        loop {
+        for _ in 0..LOOKS {
             let count = self.pty.read(&mut bytes).expect("the terminal works");
             self.screen.process(&bytes[..count]);
             let text = self.screen.screen().contents();
@@ -56,6 +62,7 @@ impl Terminal {
             assert_eq!(self.monitor.try_wait().expect("it is a child"), None, "it ended:\n{text}");
             sleep(Duration::from_millis(5));
         }
+        panic!("that is never shown:\n{}", self.screen.screen().contents());
     }
 }
 

@@ -1,4 +1,4 @@
-// An endless trial: the real firmware on the virtual Uno, a machine, and a row that continues while it rolls.
+// An endless simulation: the real firmware on the virtual Uno, a machine, and a row that continues while it rolls.
 //
 // `advance` lets time pass. The operator may change the machine or the row between two calls. `outcome` has the result
 // for each plant behind the tool.
@@ -23,7 +23,7 @@ export interface TrackPoint {
     readonly acrossMm: number;
 }
 
-export class Trial {
+export class Simulation {
     readonly uno: Uno;
     readonly machine: Machine;
     readonly outcome = new Outcome();
@@ -36,7 +36,7 @@ export class Trial {
     /** The machine's count when the firmware began to count. */
     #zero = 0;
 
-    /** A trial with the machine from the box, or with the machine that is set up. */
+    /** A simulation with the machine from the box, or with the machine that is set up. */
     constructor(hex: string, seed: number, isSetUp = false) {
         this.uno = new Uno(hex);
         this.machine = new Machine(this.uno, { ...SOWING, seed }, { isSetUp });

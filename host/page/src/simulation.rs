@@ -1,7 +1,7 @@
 //! The machine and the row of "Try it", for the page's virtual Uno: [`field::rolling`], with the verdicts of
 //! [`field::verdict`] on the ground behind the tool.
 //!
-//! There is one trial, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are
+//! There is one simulation, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are
 //! direct calls and no questions. Their results are in tables of numbers ([`crate::table`]).
 
 use crate::put;
@@ -93,7 +93,7 @@ enum Fate {
 }
 
 /// The machine with its row and its verdicts.
-struct Trial {
+struct Simulation {
     rolling: Rolling,
     sowing: Sowing,
     /// The first canopy without a verdict, or to be judged again.
@@ -113,17 +113,17 @@ const CHANGES: usize = 1;
 const SOWN: usize = 2;
 
 thread_local! {
-    static TRIAL: RefCell<Option<Trial>> = const { RefCell::new(None) };
+    static TRIAL: RefCell<Option<Simulation>> = const { RefCell::new(None) };
 }
 
-/// Runs `act` on the trial. Fails if there is none.
-fn with<Answer>(act: impl FnOnce(&mut Trial) -> Answer) -> Result<Answer, String> {
+/// Runs `act` on the simulation. Fails if there is none.
+fn with<Answer>(act: impl FnOnce(&mut Simulation) -> Answer) -> Result<Answer, String> {
     let missing = || "no machine was put in front of a row".to_owned();
-    TRIAL.with_borrow_mut(|trial| trial.as_mut().map(act).ok_or_else(missing))
+    TRIAL.with_borrow_mut(|simulation| simulation.as_mut().map(act).ok_or_else(missing))
 }
 
 impl Begun {
-    /// Begins a trial, and replaces an earlier one. Returns the machine's dimensions, the levels of its pins, and the
+    /// Begins a simulation, and replaces an earlier one. Returns the machine's dimensions, the levels of its pins, and the
     /// commands that set up its firmware.
     pub fn begin(self) -> Value {
         let mut machine = Machine {
@@ -137,7 +137,7 @@ impl Begun {
         let mut sowing = Sowing::new(planting, weed_share, first_mm, seed);
         let mut row = Vec::new();
         sowing.sow(&mut row, SOWN_AHEAD_MM);
-        let mut trial = Trial {
+        let mut simulation = Simulation {
             rolling: Rolling::new(machine, row, 0.0, self.cycle),
             sowing,
             next: 0,
@@ -145,13 +145,13 @@ impl Begun {
             from_s: 0.0,
             told: 0,
         };
-        trial.tell_now();
-        trial.tell_sown();
+        simulation.tell_now();
+        simulation.tell_sown();
         let dimensions = json!({
             "beamToToolMm": machine.beam_to_tool_mm, "toolWidthMm": machine.tool_width_mm,
         });
-        let answer = json!({ "dimensions": dimensions, "levels": trial.levels(), "setUp": set_up });
-        TRIAL.set(Some(trial));
+        let answer = json!({ "dimensions": dimensions, "levels": simulation.levels(), "setUp": set_up });
+        TRIAL.set(Some(simulation));
         answer
     }
 }
@@ -180,8 +180,8 @@ fn set_up(machine: &mut Machine) -> Vec<String> {
 impl Different {
     /// Applies the change. Returns the levels of the machine's pins.
     pub fn take(self) -> Result<Value, String> {
-        with(|trial| {
-            let Trial { rolling, sowing, .. } = trial;
+        with(|simulation| {
+            let Simulation { rolling, sowing, .. } = simulation;
             match self {
                 Self::SpeedKmH(speed_km_h) => rolling.target_mm_s = mm_s(speed_km_h),
                 Self::Slip(share) => rolling.slip_by(share),
@@ -190,7 +190,7 @@ impl Different {
                 Self::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
                 Self::WeedShare(share) => sowing.weed_share = share,
             }
-            trial.levels()
+            simulation.levels()
         })
     }
 }
@@ -198,32 +198,32 @@ impl Different {
 impl Kept {
     /// Judges the canopies behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
     pub fn judge(&self) -> Result<Value, String> {
-        with(|trial| json!(trial.judge(self)))
+        with(|simulation| json!(simulation.judge(self)))
     }
 }
 
 /// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it.
 pub fn roll(cycle: f64) {
-    let _ = with(|trial| {
-        let changes = trial.rolling.roll_until(cycle as u64);
+    let _ = with(|simulation| {
+        let changes = simulation.rolling.roll_until(cycle as u64);
         let numbers = |change: &uno::PinChange| [change.cycle as f64, change.pin.number().into(), change.high.into()];
         put(CHANGES, changes.iter().flat_map(numbers).collect());
-        let until_mm = trial.rolling.place_mm() + SOWN_AHEAD_MM;
-        trial.sowing.sow(&mut trial.rolling.row, until_mm);
-        trial.tell_now();
-        trial.tell_sown();
+        let until_mm = simulation.rolling.place_mm() + SOWN_AHEAD_MM;
+        simulation.sowing.sow(&mut simulation.rolling.row, until_mm);
+        simulation.tell_now();
+        simulation.tell_sown();
     });
 }
 
 /// The Uno has sent its servo a pulse, by the cycles of its edges.
 pub fn hear(rise: f64, fall: f64) {
-    let _ = with(|trial| {
-        trial.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 });
-        trial.tell_now();
+    let _ = with(|simulation| {
+        simulation.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 });
+        simulation.tell_now();
     });
 }
 
-impl Trial {
+impl Simulation {
     /// Writes the machine's state into its table.
     fn tell_now(&self) {
         let Self { rolling, .. } = self;
