@@ -70,10 +70,13 @@ build_for_another() {
         "${linker//-/_}=$gnu-gcc" cargo build --locked --release --package weeder-cli --target "$system"
 }
 
-# The host tools of this computer, which build the rest: first without the firmware and the page inside.
-cargo build --locked --release --package weeder-cli
-weeder=$target/release-weeder
-cp "$target/release/weeder" "$weeder"
+# The host tools of this computer, which build the rest, without firmware and page inside: those that WEEDER names, or new ones.
+weeder=${WEEDER:-}
+if [ -z "$weeder" ]; then
+    cargo build --locked --release --package weeder-cli
+    weeder=$target/release-weeder
+    cp "$target/release/weeder" "$weeder"
+fi
 WEEDER_COMMIT=$("$weeder" --version | sed -n 's/.*(\(.*\))$/\1/p')
 export WEEDER_COMMIT
 
