@@ -167,7 +167,8 @@ fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // The logged values are the same at every pace.
     let Played { logged, notes, end, .. } = &played[0];
-    let bounds = Bounds { first: stretch.first.position, compared_from, end: *end };
+    let [widest, gap] = [Setting::MaxWidthMm, Setting::MergeGapMm].map(|setting| stretch.settings.ticks(setting).0);
+    let bounds = Bounds { first: stretch.first.position, compared_from, end: *end, untold: widest + gap };
     compare(logged, &heard, &bounds, replayed);
     replayed.notes.extend_from_slice(notes);
     Ok(())
@@ -194,8 +195,14 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
             }
             Happened::Event(event) => {
                 let mut is_given = false;
-                if let Some(at) = stretch.position_of_change(place) {
-                    player.roll_to(at, stretch.next_status(place));
+                let next = stretch.next_status(place);
+                let at = match event {
+                    // A log may end behind any line.
+                    EventLine::Swing { position, .. } if next.is_none() => Some(*position),
+                    _ => stretch.position_of_change(place),
+                };
+                if let Some(at) = at {
+                    player.roll_to(at, next);
                 }
                 match event {
                     EventLine::State { mode } => player.enter(*mode, std::mem::take(&mut starts_now)),
@@ -209,7 +216,7 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
             Happened::Command(line) => {
                 // The status that shows the new state must come nearer to the command.
                 if stretch.is_reported_by_event(place) {
-                    starts_now = link::command(line).is_ok_and(|command| command.action == Action::StartNow);
+                    starts_now |= link::command(line).is_ok_and(|command| command.action == Action::StartNow);
                     continue;
                 }
                 if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {

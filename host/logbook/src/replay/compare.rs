@@ -29,6 +29,8 @@ pub(super) struct Bounds {
     pub(super) compared_from: i32,
     /// The last position.
     pub(super) end: i32,
+    /// Within this distance of it a detection may have begun that the log does not tell. The tool keeps to it.
+    pub(super) untold: i32,
 }
 
 /// Compares the log's events with those of its replays, each kind in its order. Records the first difference: an event
@@ -48,7 +50,8 @@ pub(super) fn compare(logged: &[Heard], replays: &[&[Heard]], bounds: &Bounds, r
     // At the very end an event may be in only one of log and replay: a detection is reported some distance behind it.
     let is_at_end = |heard: &Heard| match heard.event {
         EventLine::Swing { position, .. } => {
-            bounds.end.wrapping_sub(position).saturating_abs() <= swing_ticks(heard, heard)
+            let untold = bounds.untold.max(swing_ticks(heard, heard));
+            bounds.end.wrapping_sub(position).saturating_abs() <= untold
         }
         EventLine::Detection { position, hold, .. } => {
             (-FAR_TICKS..=DETECTION_TICKS).contains(&bounds.end.wrapping_sub(position.wrapping_add(hold)))

@@ -174,10 +174,16 @@ impl<'a> Player<'a> {
         true
     }
 
-    /// Rolls to a position, if it lies before the next status.
+    /// Rolls to a position, if it lies before the next status. Behind the last status the machine rolls on at its speed.
     pub(super) fn roll_to(&mut self, place: i32, next: Option<&Status>) {
         let distance = place.wrapping_sub(self.position());
-        let Some(next) = next else { return };
+        let Some(next) = next else {
+            let is_ahead = distance != 0 && distance.signum() == self.speed_mm_s.signum();
+            if is_ahead && distance.saturating_abs() <= LONGEST_DISTANCE {
+                self.roll_by(distance, self.speed_mm_s, 0);
+            }
+            return;
+        };
         let whole = next.position.wrapping_sub(self.position());
         let farthest = whole.unsigned_abs().min(LONGEST_DISTANCE as u32);
         if distance == 0 || distance.signum() != whole.signum() || distance.unsigned_abs() > farthest {

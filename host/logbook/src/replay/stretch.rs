@@ -174,7 +174,8 @@ impl<'a> Stretch<'a> {
     }
 
     /// The position of a state change that an event reports. An alarm has its own position. Else the next swing has it.
-    /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows.
+    /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows. Or the
+    /// log ends before the swing, which then came at its end.
     pub(super) fn position_of_change(&self, place: usize) -> Option<i32> {
         let mode = match &self.happened[place].1 {
             Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
@@ -187,10 +188,12 @@ impl<'a> Stretch<'a> {
             until_next.find_map(|happened| Some(status(happened)?.position))
         };
         let before = || self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position);
-        match (self.swing_of_change(place), mode) {
-            (Some((_, position)), _) => Some(position),
-            (None, Mode::Work) => next_status().or_else(before),
-            (None, _) => before(),
+        // At most one status comes between the change and its swing.
+        let is_cut = || self.happened[place..].iter().filter_map(status).nth(1).is_none() && !self.was_out(place);
+        match self.swing_of_change(place) {
+            Some((_, position)) => Some(position),
+            None if *mode == Mode::Work || is_cut() => next_status().or_else(before),
+            None => before(),
         }
     }
 
@@ -213,8 +216,18 @@ impl<'a> Stretch<'a> {
         None
     }
 
+    /// Whether the tool was out of the row before an index, as far as the log tells.
+    fn was_out(&self, place: usize) -> bool {
+        let told = self.happened[..place].iter().rev().find_map(|(_, happened)| match happened {
+            Happened::Event(EventLine::Swing { out, .. }) => Some(*out),
+            Happened::Status(status) => Some(status.tool_out),
+            _ => None,
+        });
+        told.unwrap_or(true)
+    }
+
     /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
-    /// requested status between them.
+    /// requested status between them. At the end of a log it may be missing.
     pub(super) fn is_reported_by_event(&self, place: usize) -> bool {
         let Happened::Command(line) = self.happened[place].1 else { return false };
         let brings = match link::command(line).map(|command| command.action) {
@@ -223,15 +236,15 @@ impl<'a> Stretch<'a> {
             _ => return false,
         };
         let mut statuses = 0;
-        let soon = self.happened[place + 1..].iter().take_while(|(_, happened)| {
-            statuses += u8::from(matches!(happened, Happened::Status(_)));
-            statuses < 2
-        });
-        let told = soon.into_iter().find_map(|(_, happened)| match happened {
-            Happened::Event(EventLine::State { mode }) => Some(*mode),
-            _ => None,
-        });
-        told == Some(brings)
+        for (_, happened) in &self.happened[place + 1..] {
+            match happened {
+                Happened::Event(EventLine::State { mode }) => return *mode == brings,
+                Happened::Status(_) if statuses == 1 => return false,
+                Happened::Status(_) => statuses += 1,
+                _ => {}
+            }
+        }
+        true
     }
 
     /// Whether a swing belongs to a change of state before it.

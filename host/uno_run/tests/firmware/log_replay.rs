@@ -217,6 +217,21 @@ fn a_log_that_begins_anywhere_in_the_row_is_decided_the_same_on_the_host() {
     }
 }
 
+/// The session ends behind each line: one in which the operator types at random, as the cable is pulled at any moment.
+#[test]
+fn a_log_that_ends_anywhere_is_decided_the_same_on_the_host() {
+    let motion = Motion::steady(0.0, 500.0, 500.0, 3200.0).change_speed(0.0, 500.0);
+    for typed in [None, Some(ChaCha8Rng::seed_from_u64(1)), Some(ChaCha8Rng::seed_from_u64(2))] {
+        let (port, end) = port_along(&row(), &motion, 16_000_000);
+        let log = logged_at(port, typed, &["start"], end);
+        let first = log.iter().position(|entry| entry.kind == Kind::Status).expect("a status");
+        (first + 1..log.len()).into_par_iter().for_each(|end| {
+            let replayed = replay(&log[..end]).expect("the log can be replayed");
+            assert_eq!(replayed.difference, None, "to line {}: {replayed:#?}", log[end - 1].number);
+        });
+    }
+}
+
 #[test]
 fn a_row_with_changes_of_speed_and_a_stop_is_decided_the_same_on_the_host() {
     let motion = Motion::steady(0.0, 500.0, 300.0, 900.0)
@@ -261,6 +276,13 @@ fn random_rows_are_decided_the_same_on_the_host_for_all_commands_and_delays() {
             let log = logged_at(port, typed, commands, end);
             let replayed = replay(&log).expect("the log can be replayed");
             assert_eq!(replayed.difference, None, "seed {seed}, {commands:?}: {replayed:#?}\n{log:#?}");
+            // The same, as if the session had ended earlier.
+            let first = log.iter().position(|entry| entry.kind == Kind::Status).expect("a status");
+            for _ in 0..20 {
+                let log = &log[..rng.random_range(first + 1..log.len())];
+                let difference = replay(log).expect("the log can be replayed").difference;
+                assert_eq!(difference, None, "seed {seed}, {commands:?}, cut: {log:#?}");
+            }
             replayed
         })
         .collect();
