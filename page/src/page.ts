@@ -62,7 +62,9 @@ languages.value = language();
 languages.addEventListener("change", () => speak(languages.value as Code));
 page.say("unchecked", () => say("unchecked"));
 
-const simulation = new Simulation(hex, Date.now(), true);
+/** The row's seed: another row at each visit, or that of an address with `?seed=7`. */
+const seed = Number(new URLSearchParams(location.search).get("seed"));
+const simulation = new Simulation(hex, Number.isSafeInteger(seed) && seed > 0 ? seed : Date.now(), true);
 const drawing = new Drawing(page.get("drawing", SVGSVGElement), simulation);
 const tryPanel = new Panel(page.html("try-panel"), "try");
 /** The chip's time. Timeouts use it, so that a slow or paused simulation causes no timeout. */

@@ -102,7 +102,8 @@ export async function openAt(browser: Browser, address: string, viewport = DESK)
 export async function open(browser: Browser, view: string, viewport = DESK, ports?: Device[]): Promise<Opened> {
     const opened = await blank(browser, viewport, "file:");
     if (ports) await offerPorts(opened.page, ports);
-    await opened.page.goto(`${pathToFileURL(resolve("dist/index.html")).href}#${view}`);
+    const seed = process.env.WEEDER_SEED ?? "1";
+    await opened.page.goto(`${pathToFileURL(resolve("dist/index.html")).href}?seed=${seed}#${view}`);
     await opened.page.waitForFunction(() => "simulation" in globalThis);
     return opened;
 }
