@@ -164,12 +164,17 @@ test("an Uno is flashed, connected, set, started and held by Tab, Enter, Space a
     await press(page, "It was a plant", "Enter");
     await inWork("teach-said").filter({ hasText: /./ }).waitFor();
     await press(page, "Console", "Enter");
-    await tabTo(page, "Type to the machine");
-    await page.keyboard.type("get margin_mm");
-    await page.keyboard.press("Enter");
-    await inWork("answered")
-        .filter({ hasText: /^margin_mm=55 / })
-        .waitFor({ state: "attached" });
+    const answered = inWork("answered").filter({ hasText: /./ });
+    for (let tries = 1; ; tries++) {
+        await tabTo(page, "Type to the machine");
+        await page.keyboard.type("get margin_mm");
+        await page.keyboard.press("Enter");
+        await answered.waitFor({ state: "attached" });
+        const answer = (await answered.textContent()) ?? "";
+        if (/^margin_mm=55 /.test(answer)) break;
+        // A busy computer loses the machine for a moment, and the page says so.
+        assert(tries < 3, answer);
+    }
     await close(opened);
 });
 
