@@ -164,7 +164,7 @@ fn the_steps_in_their_order_end_at_the_machine_that_is_set_up() {
     let margin_mm = novice.settings().get(Setting::MarginMm);
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     for (file, named) in [
-        ("host/page/src/trial.rs", format!("const MARGIN_MM: u16 = {margin_mm};")),
+        ("host/page/src/simulation.rs", format!("const MARGIN_MM: u16 = {margin_mm};")),
         ("docs/set-up.md", format!("{margin_mm} mm on")),
     ] {
         let text = fs::read_to_string(root.join(file)).expect("it is there");
