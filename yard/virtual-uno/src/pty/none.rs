@@ -3,7 +3,7 @@
 use crate::file_error::FileError;
 use std::path::Path;
 
-/// A pseudo terminal, of which there is none.
+/// A pseudo terminal. This system has none, so the type has no value.
 #[derive(Debug)]
 pub enum Pty {}
 
