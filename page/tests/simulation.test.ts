@@ -5,7 +5,6 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { hex } from "../src/core.ts";
 import { isEvent, read } from "../src/link/grammar.ts";
-import { LineReader } from "../src/link/session.ts";
 import { inWords } from "../src/try/outcome.ts";
 import { Simulation } from "../src/try/simulation.ts";
 
@@ -18,10 +17,12 @@ class Tried {
     heard = "";
 
     constructor(...commands: string[]) {
-        const lines = new LineReader();
+        let partial = "";
         this.simulation.onText = (text) => {
             this.heard += text;
-            for (const line of lines.take(text)) {
+            const lines = (partial + text).split(/[\r\n]+/);
+            partial = lines.pop() ?? "";
+            for (const line of lines) {
                 const said = read(line);
                 if (said.is === "status") this.simulation.take({ is: "status", status: said, line });
                 else if (isEvent(said)) this.simulation.take({ is: "event", event: said, line });

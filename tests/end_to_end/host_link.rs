@@ -7,14 +7,14 @@ use field::motion::Motion;
 use field::row::{Canopy, Row};
 use field::wiring;
 use link::settings::{self, SettingsError};
-use link::{EventLine, Link, LinkError, Mode, Status};
+use link::{EventLine, Link, LinkError, Mode, Status, Wire};
 use uno::Uno;
 use uno_run::UnoPort;
 
 /// A link to a firmware that has just woken up.
 fn link() -> Link {
     let uno = Uno::boot(&elf()).expect("the firmware is an image").wired(&wiring::WIRES);
-    Link::over(UnoPort::new(uno), true).expect("the firmware answers")
+    Link::over(Wire::over(UnoPort::new(uno), true)).expect("the firmware answers")
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn a_link_waits_for_the_greeting_and_knows_the_version() {
 fn half_a_line_typed_before_the_link_was_there_harms_nothing() {
     let mut uno = uno_run::boot(&elf(), &[]).expect("the firmware wakes up");
     uno.send(b"set whe");
-    let mut link = Link::over(UnoPort::new(uno), false).expect("the firmware answers");
+    let mut link = Link::over(Wire::over(UnoPort::new(uno), false)).expect("the firmware answers");
     let status = link.ask("status").expect("the firmware knows the command").join(" ");
     assert_eq!(number(&status, "mistakes"), 0, "{status}");
 }
@@ -100,7 +100,7 @@ fn every_line_of_a_row_being_weeded_is_understood() {
     uno.received();
     let changes = machine.pin_changes(&row, &motion, uno.cycle());
     uno.drive(changes);
-    let mut link = Link::over(UnoPort::new(uno), false).expect("the firmware answers");
+    let mut link = Link::over(Wire::over(UnoPort::new(uno), false)).expect("the firmware answers");
 
     let (mut objects, mut swings) = (0, 0);
     for _ in 0..500 {

@@ -8,8 +8,8 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use etcetera::BaseStrategy;
 use link::Link;
+use link::connection::Opener;
 use link::row_names::{Board, Names, Plugged, Row, plugged, wrong_with};
-use link::rows::Opener;
 use std::collections::HashSet;
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
@@ -221,11 +221,11 @@ impl Chosen {
         self.rows.iter().map(|row| row.name.clone()).collect()
     }
 
-    /// A function for each row that opens its link.
+    /// A function for each row that opens its wire.
     pub fn openers(&self) -> Vec<Opener> {
         let opener = |row: &Row| -> Opener {
             let board = row.board.clone();
-            Box::new(move || board.open())
+            Box::new(move || board.wire())
         };
         self.rows.iter().map(opener).collect()
     }

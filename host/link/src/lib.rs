@@ -15,6 +15,7 @@
 
 pub mod advice;
 pub mod completion;
+pub mod connection;
 mod console_line;
 mod error;
 mod event_line;
@@ -30,6 +31,7 @@ pub mod rows;
 pub mod session;
 pub mod settings;
 pub mod settings_file;
+mod wire;
 
 pub use self::console_line::{ANSWERS, ConsoleLine};
 pub use self::error::LinkError;
@@ -39,24 +41,17 @@ pub use self::event_line::{
 pub use self::lines::LineReader;
 #[cfg(not(target_arch = "wasm32"))]
 pub use self::port::{Claim, claim, converter_at, find_uno, is_same, listen, open_other, open_to_flash, try_port};
+pub use self::wire::{Port, Wire};
 pub use control::{ground::class::Class, say::names};
 
+use self::moment::Moment;
+use self::session::Session;
 use control::say::command::{Command, ParseError, parse};
 use std::collections::VecDeque;
-use std::io::{self, ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
-
-/// Backspaces, which delete a line of any length.
-const ERASE: &str = {
-    const BACKSPACES: [u8; COMMAND_LENGTH] = [0x08; COMMAND_LENGTH];
-    match str::from_utf8(&BACKSPACES) {
-        Ok(text) => text,
-        Err(_) => panic!("a backspace is ASCII"),
-    }
-};
 
 /// Silent reads in a row after which the link gives up an answer: two seconds.
 const SILENT_READS: usize = 100;
@@ -70,16 +65,9 @@ const ANSWER_BYTES: usize = 40_000;
 /// Silent reads until the greeting must come after a reset: the longest wait of an old bootloader, and a reserve.
 const BOOT_READS: usize = 150;
 
-/// Times that the version is asked for again.
-const RETRIES: usize = 2;
-
-/// A connection that carries bytes both ways.
-///
-/// A read waits some hundredths of a second at most, and then fails with [`io::ErrorKind::TimedOut`]. A read of zero
-/// bytes, and any other error, means that the port is gone.
-pub trait Port: Read + Write {}
-
-impl<T: Read + Write + ?Sized> Port for T {}
+/// Time that a read takes in which nothing comes, and the least time of another one.
+const SILENT_READ: Duration = Duration::from_millis(20);
+const BUSY_READ: Duration = Duration::from_millis(1);
 
 /// Something from the port.
 enum Received {
@@ -90,16 +78,11 @@ enum Received {
 
 /// A link to the firmware's console.
 pub struct Link {
-    port: Box<dyn Port>,
+    wire: Wire,
     lines: LineReader,
     /// Lines that came before an answer and do not belong to it.
     events: VecDeque<String>,
     version: String,
-    /// The greeting of the last restart, until a caller takes it.
-    greeting: Option<String>,
-    /// The serial port again, to discard what it has not sent.
-    #[cfg(not(target_arch = "wasm32"))]
-    serial: Option<Box<dyn serialport::SerialPort>>,
 }
 
 impl Link {
@@ -109,65 +92,27 @@ impl Link {
     /// If the port is absent, busy or forbidden, or something else than the weeder's firmware is at its other end.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn open(port: Option<&str>) -> Result<Self, LinkError> {
-        let name = port.map_or_else(|| find_uno(None), |port| Ok(port.to_owned()))?;
-        let (port, resets) = port::open(&name)?;
-        // Without a second handle, a stalled port may send its bytes later.
-        let serial = port.try_clone().ok();
-        Ok(Self { serial, ..Self::over(port, resets)? })
+        Self::over(Wire::open(port)?)
     }
 
-    /// A link over a port that is open already; `resets` says whether opening it has reset the Uno.
+    /// A link over a wire.
     ///
     /// # Errors
     /// If the port is gone, or something else than the weeder's firmware is at its other end.
-    pub fn over(port: impl Port + 'static, resets: bool) -> Result<Self, LinkError> {
-        let mut link = Self {
-            port: Box::new(port),
-            lines: LineReader::default(),
-            events: VecDeque::new(),
-            version: String::new(),
-            greeting: None,
-            #[cfg(not(target_arch = "wasm32"))]
-            serial: None,
-        };
-        if resets {
-            link.greeting()?;
+    pub fn over(mut wire: Wire) -> Result<Self, LinkError> {
+        let mut session = Session::bare();
+        session.open(wire.resets);
+        // A port's reads are its clock: a simulated one has no other.
+        let mut now = Moment::default();
+        while !session.is_connected() {
+            let received = wire.read()?;
+            now = now.after(if received.is_empty() { SILENT_READ } else { BUSY_READ });
+            let turn = session.turn(now, &received);
+            wire.write(&turn.to_send)?;
+            session.take_failure().map_or(Ok(()), Err)?;
         }
-        link.check_firmware()?;
-        Ok(link)
-    }
-
-    /// Empties the line, and makes sure that the weeder's firmware answers. Asks again if another answer came: it may
-    /// belong to an earlier question, or its beginning may be lost.
-    pub(crate) fn check_firmware(&mut self) -> Result<(), LinkError> {
-        let mut retries = 0;
-        loop {
-            // Deletes the beginning of a line that could not be typed whole: ended now, it would be a late command.
-            self.type_line(ERASE)?;
-            self.wait_until_quiet()?;
-            let error = match self.ask("version") {
-                Ok(answer) => match answer.last().map(|line| ConsoleLine::parse(line)) {
-                    Some(ConsoleLine::Version { version }) => {
-                        self.version = version;
-                        break;
-                    }
-                    _ => LinkError::NotTheWeeder(answer.join(" ")),
-                },
-                // The Uno may be starting right now for another reason than this opening.
-                Err(error) if error.is_of_an_answer() => error,
-                Err(error) => return Err(error),
-            };
-            if retries == RETRIES {
-                return Err(error);
-            }
-            retries += 1;
-        }
-        if retries > 0 { self.drop_late_answers(retries) } else { Ok(()) }
-    }
-
-    /// The greeting of the last restart since the last call.
-    pub(crate) fn take_greeting(&mut self) -> Option<String> {
-        self.greeting.take()
+        let version = session.version().to_owned();
+        Ok(Self { wire, lines: session.lines, events: VecDeque::new(), version })
     }
 
     /// The firmware's version.
@@ -207,35 +152,13 @@ impl Link {
                 ConsoleLine::End { error: Some(_) } => {
                     return Err(LinkError::Refused { command: command.to_owned(), answer: line });
                 }
-                ConsoleLine::Greeting { .. } => {
-                    self.greeting = Some(line);
-                    return Err(LinkError::Restarted(command.to_owned()));
-                }
+                ConsoleLine::Greeting { .. } => return Err(LinkError::Restarted(command.to_owned())),
                 // The form of an event is no answer's. A newer firmware may send one at any time.
                 ConsoleLine::Event(_) => self.events.push_back(line),
                 _ => answer.push(line),
             }
         }
-        answer.push(self.lines.partial().to_owned());
-        let received = answer.join("\n");
-        let strange = received.matches(lines::STRANGE).count();
-        if 4 * strange > received.chars().count() {
-            return Err(LinkError::Noise);
-        }
-        let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
-        Err(LinkError::Silent { command: command.to_owned(), received: received[tail..].trim().to_owned() })
-    }
-
-    /// Asks for the status, and drops up to `count` answers before it. A virtual Uno on a busy computer may answer an
-    /// earlier question at any time.
-    fn drop_late_answers(&mut self, count: usize) -> Result<(), LinkError> {
-        self.send("status")?;
-        for _ in 0..=count {
-            if self.answer("status")?.iter().any(|line| Status::parse(line).is_some()) {
-                break;
-            }
-        }
-        Ok(())
+        Err(session::silence(command, &answer, self.lines.partial()))
     }
 
     /// Types a command and does not wait for its answer, which comes by [`next_line`](Self::next_line).
@@ -265,46 +188,26 @@ impl Link {
         }
     }
 
-    /// The next of the lines that have come with earlier ones.
-    pub(crate) fn buffered_line(&mut self) -> Option<String> {
-        self.events.pop_front().or_else(|| self.lines.next_line())
-    }
-
     /// Waits for the greeting of a firmware that starts. Returns whether it has come.
     ///
     /// # Errors
     /// If the port is gone.
     pub fn greeting(&mut self) -> Result<bool, LinkError> {
         for _ in 0..BOOT_READS {
-            if let Some(line) = self.next_line()?.filter(|line| is_greeting(line)) {
-                self.greeting = Some(line);
+            if self.next_line()?.is_some_and(|line| is_greeting(&line)) {
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// Discards what the port has not sent yet: the machine must not get a command after its sender has given it up.
-    pub(crate) fn discard_unsent(&self) {
-        #[cfg(not(target_arch = "wasm32"))]
-        if let Some(serial) = &self.serial {
-            // The port is given up in any case.
-            let _ = serial.clear(serialport::ClearBuffer::Output);
-        }
-    }
-
     /// Closes the port, so that it can be opened again. The link behaves as if the port were gone.
     pub fn close(&mut self) {
-        self.port = Box::new(io::empty());
-        #[cfg(not(target_arch = "wasm32"))]
-        {
-            self.serial = None;
-        }
+        self.wire.close();
     }
 
     fn type_line(&mut self, line: &str) -> Result<(), LinkError> {
-        let written = self.port.write_all(format!("{line}\n").as_bytes()).and_then(|()| self.port.flush());
-        written.map_err(LinkError::Gone)
+        self.wire.write(format!("{line}\n").as_bytes())
     }
 
     /// Returns a buffered line, or reads one.
@@ -312,36 +215,12 @@ impl Link {
         if let Some(line) = self.lines.next_line() {
             return Ok(Received::Line(line));
         }
-        let mut bytes = [0; 256];
-        match self.port.read(&mut bytes) {
-            Ok(0) => Err(LinkError::Gone(ErrorKind::UnexpectedEof.into())),
-            Ok(count) => {
-                self.lines.take(&bytes[..count]);
-                Ok(Received::Bytes(count))
-            }
-            Err(error) => match error.kind() {
-                ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted => Ok(Received::Nothing),
-                _ => Err(LinkError::Gone(error)),
-            },
+        let bytes = self.wire.read()?;
+        if bytes.is_empty() {
+            return Ok(Received::Nothing);
         }
-    }
-
-    /// Discards input until the line is silent, for a second at most.
-    fn wait_until_quiet(&mut self) -> Result<(), LinkError> {
-        let deadline = Instant::now() + Duration::from_secs(1);
-        let mut quiet_reads = 0;
-        while quiet_reads < 2 && Instant::now() < deadline {
-            quiet_reads = match self.hear()? {
-                Received::Nothing => quiet_reads + 1,
-                Received::Line(line) if is_greeting(&line) => {
-                    self.greeting = Some(line);
-                    0
-                }
-                _ => 0,
-            };
-        }
-        self.lines = LineReader::default();
-        Ok(())
+        self.lines.take(&bytes);
+        Ok(Received::Bytes(bytes.len()))
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::port::{calling_out, is_same, is_uno, listed};
 use super::settings_file::no_toml;
-use super::{Link, LinkError, find_uno};
+use super::{Link, LinkError, Wire, find_uno};
 use files::{FileError, bounded_file, whole_file};
 use serialport::{SerialPortInfo, SerialPortType};
 use std::fs;
@@ -107,12 +107,20 @@ impl Board {
         }
     }
 
+    /// Opens a wire to it, at whichever port it is now.
+    ///
+    /// # Errors
+    /// If it is not plugged in, or as [`Wire::open`].
+    pub fn wire(&self) -> Result<Wire, LinkError> {
+        Wire::open(Some(&self.port()?))
+    }
+
     /// Opens a link to it, at whichever port it is now.
     ///
     /// # Errors
     /// If it is not plugged in, or as [`Link::open`].
     pub fn open(&self) -> Result<Link, LinkError> {
-        Link::open(Some(&self.port()?))
+        Link::over(self.wire()?)
     }
 
     /// Its present port.

@@ -1,4 +1,4 @@
-//! Several rows at once. Each has a [`Session`] in its own thread, so that no row waits for another.
+//! Several rows at once. Each has a [`Connection`] in its own thread, so that no row waits for another.
 //!
 //! [`Rows::open`] opens all rows at the same time. [`Rows::command`] and [`Rows::hold`] send a command to one row.
 //! [`Rows::next`] returns the next event of any row. A lost row is opened again automatically, and its waiting commands
@@ -7,17 +7,14 @@
 //! [`Hold`] follows a HOLD to all rows: which rows have obeyed, and how long the last one took. It has no clock: events
 //! carry their times.
 
+use super::connection::{Connection, Opener, PAUSE};
 use super::moment::Moment;
-use super::session::{HOLD, Happening, PAUSE, Session};
-use super::settings::SettingsError;
-use super::{Link, LinkError, is_hold};
+use super::session::{HOLD, Happening, Unanswered};
+use super::{LinkError, is_hold};
 use std::cmp::Reverse;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::thread;
 use std::time::{Duration, Instant};
-
-/// Opens a link. Called again each time that the link is lost.
-pub type Opener = Box<dyn FnMut() -> Result<Link, LinkError> + Send>;
 
 /// An event of one row.
 #[derive(Debug)]
@@ -63,7 +60,7 @@ pub struct Rows {
 impl Rows {
     /// Opens all rows at the same time, and waits until each was tried once. Returns for each row why it is missing.
     /// Missing rows are tried again, and reported as lost.
-    pub fn open(openers: Vec<Opener>) -> (Self, Vec<Option<SettingsError>>) {
+    pub fn open(openers: Vec<Opener>) -> (Self, Vec<Option<LinkError>>) {
         let (sender, heard) = mpsc::channel();
         let (orders, firsts): (Vec<_>, Vec<_>) = openers
             .into_iter()
@@ -73,15 +70,9 @@ impl Rows {
                 let (tried, first) = mpsc::channel();
                 let talk = Talk { row, heard: sender.clone() };
                 thread::spawn(move || {
-                    let mut session = Session::waiting_for(open);
-                    session.keeps_hold = true;
-                    let missing = session.try_now().err();
-                    if let Some(why) = &missing {
-                        talk.tell(What::Happened(Happening::Lost(why.to_string())));
-                    }
-                    // The receiver is gone if the caller no longer waits.
-                    let _ = tried.send(missing);
-                    talk.run(session, &ordered);
+                    let mut connection = Connection::waiting_for(open);
+                    connection.session.keeps_hold = true;
+                    talk.run(connection, &ordered, tried);
                 });
                 (orders, first)
             })
@@ -131,9 +122,6 @@ impl Rows {
     }
 }
 
-/// Why a command was not typed.
-const LATE: &str = "it has waited too long, type it again";
-
 /// A row's thread.
 struct Talk {
     row: usize,
@@ -141,43 +129,37 @@ struct Talk {
 }
 
 impl Talk {
-    /// Runs until all senders of orders and all receivers of events are gone.
-    fn run(self, mut session: Session, orders: &Receiver<Order>) {
+    /// Runs until all senders of orders and all receivers of events are gone. `tried` gets the result of the first try.
+    fn run(self, mut connection: Connection, orders: &Receiver<Order>, tried: Sender<Option<LinkError>>) {
+        let mut tried = Some(tried);
         loop {
             loop {
                 match orders.try_recv() {
-                    Ok(Order::Hold) => {
-                        let dropped = session.hold();
-                        if dropped > 0 {
-                            let command =
-                                if dropped == 1 { "a command".to_owned() } else { format!("{dropped} commands") };
-                            self.tell(What::NotTyped { command, why: "hold came first".to_owned() });
-                        }
-                    }
-                    Ok(Order::Type(command, deadline)) => self.type_or_report(&mut session, command, deadline),
+                    Ok(Order::Hold) => drop(connection.session.hold()),
+                    Ok(Order::Type(command, deadline)) => self.type_or_report(&mut connection, command, deadline),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            if !session.is_connected() {
-                thread::sleep(PAUSE);
+            let happened = connection.turn(Moment::now());
+            if !happened.into_iter().all(|happening| self.tell(what(happening))) {
+                return;
             }
-            for happening in session.turn(Moment::now()) {
-                let what = match happening {
-                    Happening::Late(command) => What::NotTyped { command, why: LATE.to_owned() },
-                    happening => What::Happened(happening),
-                };
-                if !self.tell(what) {
-                    return;
-                }
+            let failure = connection.session.take_failure();
+            if failure.is_some() || connection.session.is_connected() {
+                // The receiver is gone if the caller no longer waits.
+                tried.take().map(|tried| tried.send(failure));
+            }
+            if !connection.session.is_open() {
+                thread::sleep(PAUSE);
             }
         }
     }
 
-    fn type_or_report(&self, session: &mut Session, command: String, deadline: Moment) {
-        if !session.is_connected() {
+    fn type_or_report(&self, connection: &mut Connection, command: String, deadline: Moment) {
+        if !connection.session.is_connected() {
             self.tell(What::NotTyped { command, why: "the row is not there".to_owned() });
-        } else if !session.command(&command, deadline) {
+        } else if connection.session.command(&command, deadline).is_none() {
             self.tell(What::NotTyped { command, why: "it is no command, or too many wait".to_owned() });
         }
     }
@@ -186,6 +168,18 @@ impl Talk {
     fn tell(&self, what: What) -> bool {
         self.heard.send(Heard { row: self.row, at: Instant::now(), what }).is_ok()
     }
+}
+
+/// The kind of a session's event.
+fn what(happening: Happening) -> What {
+    let (command, why) = match happening {
+        Happening::Unanswered { command, why: Unanswered::Late, .. } => {
+            (command, "it has waited too long, type it again")
+        }
+        Happening::Unanswered { command, why: Unanswered::Held, .. } => (command, "hold came first"),
+        happening => return What::Happened(happening),
+    };
+    What::NotTyped { command, why: why.to_owned() }
 }
 
 /// The state of one row in a HOLD to all.
@@ -215,7 +209,7 @@ impl Hold {
     pub fn take(&mut self, heard: &Heard) {
         let Some(held) = self.rows.get_mut(heard.row) else { return };
         match &heard.what {
-            What::Happened(Happening::Answered { command, refusal }) if command == HOLD => {
+            What::Happened(Happening::Answered { command, refusal, .. }) if command == HOLD => {
                 *held = match (&*held, refusal) {
                     (Held::Obeyed(_), _) => return,
                     (_, None) => Held::Obeyed(heard.at.saturating_duration_since(self.since)),

@@ -1,36 +1,59 @@
-//! A session: polls the machine over a link, and opens the link again if it is lost.
+//! A session with a machine, without input or output: which line is typed when, which answer belongs to which command,
+//! and what has happened.
 //!
-//! The caller calls [`Session::turn`] in a loop. It types one command at a time, polls the status when no command waits,
-//! and returns what happened. It waits for one read at most; only opening a port also waits for the Uno to start. Without
-//! a link it does not wait, and the caller does. After every start it asks for settings and examples, and turns the
-//! events on. After a command that changes either, it asks for them again. [`Session::hold`] does not wait. If the Uno is
-//! lost, unanswered commands are lost too.
+//! The caller opens a wire, calls [`Session::open`], and then [`Session::turn`] in a loop: with the time and what the
+//! wire has received. A turn returns what has happened, and what the wire has to send. A
+//! [`Connection`](super::connection::Connection) does this for a serial port of this computer, and `page` for one of the
+//! browser.
+//!
+//! # How it works
+//!
+//! A session types one command at a time, and polls the status. After every start of the machine it asks for version,
+//! settings and examples, and turns the events on. After a command that changes either, it asks for them again.
+//! [`Session::hold`] does not wait, neither for an answer nor for the rest of those questions.
+//!
+//! Each command has a number, and each number one end: [`Happening::Answered`] or [`Happening::Unanswered`].
 //!
 //! A command has a deadline: it is typed before that, or not at all. A machine must not start because a command was
 //! delayed behind others, by a port that stalled, or by a computer that slept. Such a sleep does not count as silence of
 //! the machine.
+//!
+//! # Limits
+//!
+//! The console does not say which command an answer belongs to. If a line of an answer is lost, the session may take
+//! that of a later command for it, until the end of the wait.
 
 use super::moment::Moment;
-use super::settings::{self, Settings, SettingsError, Shown};
-use super::{ConsoleLine, EventLine, Link, LinkError, Mode, Status};
-use control::say::command::Action;
+use super::settings::{self, Settings, Shown};
+use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_command, lines};
+use control::say::command::{Action, LINE_LENGTH};
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 /// Time between two polls of the status.
 const POLL: Duration = Duration::from_millis(100);
 
+/// Longest further wait of a poll for commands: between many of them the state must not become unknown.
+const BEHIND: Duration = Duration::from_millis(300);
+
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
 
+/// Longest silence during an answer to the first questions. The longest answer, all examples, takes less than a second.
+const FIRST_PATIENCE: Duration = Duration::from_secs(2);
+
+/// Most bytes that are received during the answer to a first question: six times the longest valid one.
+const ANSWER_BYTES: usize = 40_000;
+
+/// Longest time from a reset to the greeting: the wait of an old bootloader, and a reserve.
+const BOOT: Duration = Duration::from_secs(3);
+
+/// How long the line must be silent before the first question, and the longest wait for that.
+const QUIET: Duration = Duration::from_millis(40);
+const RESTLESS: Duration = Duration::from_secs(1);
+
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
-
-/// Pause of a caller between two turns without a link.
-pub const PAUSE: Duration = Duration::from_millis(20);
-
-/// Time between two tries to open the port again.
-const RETRY: Duration = Duration::from_secs(1);
 
 /// Longest time that counts as waiting between two turns. In a longer one the computer was busy, or has slept.
 const LONGEST_TURN: Duration = Duration::from_millis(200);
@@ -40,9 +63,18 @@ pub const HOLD: &str = "hold";
 
 /// The command that the session polls with.
 const STATUS: &str = "status";
+const VERSION: &str = "version";
 const SETTINGS: &str = "get";
 const EXAMPLES: &str = "examples";
 const EVENTS: &str = "events on";
+
+/// The first questions. The first status is asked only if earlier tries may still be answered: it is the first answer
+/// that cannot belong to those.
+const INTRODUCTION: [&str; 6] = [VERSION, STATUS, SETTINGS, EXAMPLES, EVENTS, STATUS];
+const LAST: usize = INTRODUCTION.len() - 1;
+
+/// Backspaces, which delete a line of any length. Ended instead, the rest of a line would be a late command.
+const ERASE: u8 = 0x08;
 
 /// Most commands that may wait.
 const WAITING: usize = 256;
@@ -57,7 +89,7 @@ pub enum Happening {
         /// The cause, if the machine was at work before: it has not weeded since.
         while_at_work: Option<String>,
     },
-    /// The Uno is connected, or has restarted.
+    /// The machine is connected, or has restarted.
     Connected {
         /// The firmware's version.
         version: String,
@@ -68,7 +100,7 @@ pub enum Happening {
         /// Its examples, a line each.
         examples: Vec<String>,
     },
-    /// The Uno is gone, and why.
+    /// The machine is gone or silent, or has been reset, and why.
     Lost(String),
     /// The machine's status.
     Status(Status, String),
@@ -78,14 +110,23 @@ pub enum Happening {
     Command(String),
     /// A line of the answer to it. The last one is `ok` or begins with `error:`.
     Answer(String),
-    /// A command was not typed: its deadline had passed. It was the first of those that waited.
-    Late(String),
     /// That was the last line of the answer.
     Answered {
+        /// The command's number.
+        number: u64,
         /// The command.
         command: String,
         /// The line that begins with `error:`, if the firmware refused.
         refusal: Option<String>,
+    },
+    /// A command will not be answered.
+    Unanswered {
+        /// The command's number.
+        number: u64,
+        /// The command.
+        command: String,
+        /// Why.
+        why: Unanswered,
     },
     /// The settings after a command has changed or saved some, and the lines that show them.
     Settings(Settings, Vec<String>),
@@ -93,90 +134,184 @@ pub enum Happening {
     Examples(Vec<String>),
 }
 
+/// Why a command will not be answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unanswered {
+    /// It was not typed: its deadline had passed.
+    Late,
+    /// It was not typed: a `hold` came first.
+    Held,
+    /// It was not typed: the machine is lost, and why.
+    NotTyped(String),
+    /// The machine is lost, and why. It may have obeyed, or may still do so.
+    Unknown(String),
+}
+
+/// What a turn has led to.
+#[derive(Debug, Default)]
+pub struct Turn {
+    /// What happened.
+    pub happened: Vec<Happening>,
+    /// The bytes to send now.
+    pub to_send: Vec<u8>,
+    /// Whether typed lines were given up: what the wire has not sent yet must not be sent any more.
+    pub is_given_up: bool,
+}
+
+/// How far the connection has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// There is no wire.
+    Closed,
+    /// The wire was opened, and the Uno may be starting.
+    Starting { since: Duration },
+    /// The line has to become silent.
+    Settling { since: Duration, heard: Duration },
+    /// The machine is asked the question of this number in [`INTRODUCTION`].
+    Asking(usize),
+    /// The machine is connected.
+    Ready,
+}
+
 /// A typed line, and when it was typed.
 struct Asked {
     line: String,
-    /// The received lines, if the session itself asked; `None` for the caller's commands.
-    own: Option<Vec<String>>,
-    /// The waiting time when it was typed.
+    /// The number of a caller's command; `None` if the session itself asked.
+    number: Option<u64>,
     since: Duration,
+    /// The received lines, if the session itself asked.
+    answer: Vec<String>,
 }
 
-/// Opens a link.
-type Opener = Box<dyn FnMut() -> Result<Link, LinkError>>;
+/// A command that is not typed yet.
+struct Waiting {
+    number: u64,
+    line: String,
+    deadline: Moment,
+}
 
-/// A link that is opened again after a loss.
+/// What the first answers have said.
+#[derive(Default)]
+struct Introduction {
+    /// Earlier tries.
+    tries: usize,
+    /// Most answers to earlier questions that may still come.
+    late: usize,
+    /// Whether a `hold` was typed whose answer cannot be told from those. It is typed again behind them.
+    has_held: bool,
+    /// The last answer that was taken for one of those.
+    wrong: Option<LinkError>,
+    shown: Vec<String>,
+    examples: Vec<String>,
+    /// Bytes received since the last question.
+    bytes: usize,
+    /// What was reported in the meantime.
+    early: Vec<Happening>,
+}
+
+/// A session with a machine.
 pub struct Session {
     /// Whether a `hold` without an answer outlasts a loss. It is then the first line that is typed after the loss.
     pub keeps_hold: bool,
-    open: Opener,
-    link: Option<Link>,
+    /// Whether it asks only for the version, and does not poll.
+    is_bare: bool,
+    state: State,
+    introduction: Introduction,
+    pub(crate) lines: LineReader,
+    version: String,
     /// Lines without an answer, in the order of the answers: one command, and each `hold` typed after it.
     asked: VecDeque<Asked>,
-    /// Commands and their deadlines.
-    waiting: VecDeque<(String, Moment)>,
-    /// Whether to type `hold` before anything else.
-    is_to_hold: bool,
+    waiting: VecDeque<Waiting>,
+    /// The number of the `hold` to type before anything else.
+    to_hold: Option<u64>,
     /// The session's own questions, typed when no command waits. `hold` does not drop them.
     own: BTreeSet<String>,
-    poll_at: Option<Duration>,
-    retry_at: Option<Duration>,
+    numbers: u64,
+    poll_at: Duration,
     /// The waiting time in all turns so far, and the moment of the last turn.
     waited: Duration,
     turned: Option<Moment>,
     /// Whether the machine was at work, as far as it has told.
     is_at_work: bool,
-    /// Whether the reason for the missing Uno was not reported yet.
+    /// Whether the reason for the missing machine was not reported yet.
     is_loss_unreported: bool,
-    happened: VecDeque<Happening>,
+    failure: Option<LinkError>,
+    turn: Turn,
 }
 
 impl Session {
-    /// A session without a link: the turns call `open` until it returns one. The first failure is reported.
-    pub fn waiting_for(open: impl FnMut() -> Result<Link, LinkError> + 'static) -> Self {
+    /// A session without a wire.
+    #[expect(clippy::new_without_default, reason = "a session has a state, and no value is the default of one")]
+    pub fn new() -> Self {
         Self {
             keeps_hold: false,
-            open: Box::new(open),
-            link: None,
+            is_bare: false,
+            state: State::Closed,
+            introduction: Introduction::default(),
+            lines: LineReader::default(),
+            version: String::new(),
             asked: VecDeque::new(),
             waiting: VecDeque::new(),
-            is_to_hold: false,
+            to_hold: None,
             own: BTreeSet::new(),
-            poll_at: None,
-            retry_at: None,
+            numbers: 0,
+            poll_at: Duration::ZERO,
             waited: Duration::ZERO,
             turned: None,
             is_at_work: false,
             is_loss_unreported: true,
-            happened: VecDeque::new(),
+            failure: None,
+            turn: Turn::default(),
         }
     }
 
-    /// Opens the missing link now. The turns then try again, without reporting this error a second time.
-    ///
-    /// # Errors
-    /// If the link fails.
-    pub fn try_now(&mut self) -> Result<(), SettingsError> {
-        (self.retry_at, self.is_loss_unreported) = (Some(self.waited + RETRY), false);
-        (self.open)().map_err(SettingsError::from).and_then(|link| self.connect(link))
+    /// A session that only makes sure that the weeder's firmware answers. It types nothing after that by itself.
+    pub(crate) fn bare() -> Self {
+        Self { is_bare: true, ..Self::new() }
+    }
+
+    /// A wire was opened; `resets` says whether that has reset the Uno.
+    pub fn open(&mut self, resets: bool) {
+        (self.lines, self.introduction) = Default::default();
+        if resets {
+            self.state = State::Starting { since: self.waited };
+        } else {
+            self.settle();
+        }
+    }
+
+    /// The wire is gone, or cannot be opened. The next turn reports it, the first time after a connection.
+    pub fn lose(&mut self, error: LinkError) {
+        self.give_up(error.to_string());
+        (self.state, self.failure) = (State::Closed, Some(error));
+    }
+
+    /// Why there is no machine, once.
+    pub fn take_failure(&mut self) -> Option<LinkError> {
+        self.failure.take()
     }
 
     /// Types a command after the commands before it have been answered, or not at all if that is after the deadline.
-    /// False if it is no command or too many wait.
-    pub fn command(&mut self, command: &str, deadline: Moment) -> bool {
-        let fits = super::is_command(command) && self.waiting.len() < WAITING;
-        if fits {
-            self.waiting.push_back((command.to_owned(), deadline));
-        }
-        fits
+    /// Returns its number, or `None` if it is no command or too many wait.
+    pub fn command(&mut self, line: &str, deadline: Moment) -> Option<u64> {
+        (is_command(line) && self.waiting.len() < WAITING).then(|| {
+            let number = self.next_number();
+            self.waiting.push_back(Waiting { number, line: line.to_owned(), deadline });
+            number
+        })
     }
 
-    /// Types `hold` in the next turn and drops all waiting commands. Returns how many were dropped. Answers in progress
-    /// still come, before that of `hold`. A `hold` that is already typed and is the last line counts for this one too.
-    pub fn hold(&mut self) -> usize {
-        // The chip's receive queue is short, so a `hold` in progress is not typed again.
-        self.is_to_hold |= self.asked.back().is_none_or(|asked| asked.line != HOLD);
-        self.waiting.drain(..).count()
+    /// Types `hold` in the next turn and drops all waiting commands. Returns its number. Answers in progress still come,
+    /// before that of `hold`. A `hold` that is already typed and is the last line counts for this one too: the chip's
+    /// receive queue is short.
+    pub fn hold(&mut self) -> u64 {
+        for waiting in std::mem::take(&mut self.waiting) {
+            self.end(waiting.number, waiting.line, Unanswered::Held);
+        }
+        let pending = self.asked.back().filter(|asked| asked.line == HOLD).and_then(|asked| asked.number);
+        let number = pending.or(self.to_hold).unwrap_or_else(|| self.next_number());
+        self.to_hold = pending.is_none().then_some(number);
+        number
     }
 
     /// Turns the events on, after all waiting commands.
@@ -186,76 +321,217 @@ impl Session {
 
     /// Whether no command waits for its answer.
     pub fn is_idle(&self) -> bool {
-        self.waiting.is_empty() && !self.is_to_hold && self.asked.iter().all(|asked| asked.own.is_some())
+        self.waiting.is_empty() && self.to_hold.is_none() && self.asked.iter().all(|asked| asked.number.is_none())
     }
 
-    /// Whether the link is open.
+    /// Whether there is a wire.
+    pub fn is_open(&self) -> bool {
+        self.state != State::Closed
+    }
+
+    /// Whether the machine has answered all first questions.
     pub fn is_connected(&self) -> bool {
-        self.link.is_some()
+        self.state == State::Ready
     }
 
-    /// Types, reads, and returns what happened since the last turn.
-    pub fn turn(&mut self, now: Moment) -> Vec<Happening> {
+    /// The firmware's version; empty before the first connection.
+    pub fn version(&self) -> &str {
+        &self.version
+    }
+
+    /// Takes what the wire has received since the last turn.
+    pub fn turn(&mut self, now: Moment, received: &[u8]) -> Turn {
         let turned = self.turned.replace(now).unwrap_or(now);
         self.waited += now.ticking.saturating_sub(turned.ticking).min(LONGEST_TURN);
-        let result = match self.link.take() {
-            Some(link) => self.listen(link, now),
-            None if self.retry_at.is_none_or(|at| self.waited >= at) => {
-                let is_loss_reported = !self.is_loss_unreported;
-                let opened = self.try_now();
-                // The reason was reported when it was lost.
-                if is_loss_reported { Ok(()) } else { opened }
+        self.introduction.bytes += received.len();
+        // In pieces, because the reader drops lines that nobody takes.
+        for piece in received.chunks(256) {
+            self.lines.take(piece);
+            while let Some(line) = self.lines.next_line() {
+                self.take(line);
             }
-            None => Ok(()),
-        };
-        if let Err(error) = result {
-            self.retry_at = Some(self.waited + RETRY);
-            self.lose(error.to_string());
         }
-        self.happened.drain(..).collect()
+        self.wait(received.is_empty());
+        let late: VecDeque<Waiting>;
+        (late, self.waiting) = self.waiting.drain(..).partition(|one| now.is_after(one.deadline));
+        for Waiting { number, line, .. } in late {
+            self.end(number, line, Unanswered::Late);
+        }
+        self.type_next();
+        std::mem::take(&mut self.turn)
     }
 
-    /// The Uno is gone, or has restarted: pending commands will not be answered.
-    fn lose(&mut self, why: String) {
-        self.is_to_hold |= self.asked.drain(..).any(|asked| asked.line == HOLD);
-        self.is_to_hold &= self.keeps_hold;
-        self.waiting.clear();
+    fn next_number(&mut self) -> u64 {
+        self.numbers += 1;
+        self.numbers
+    }
+
+    fn end(&mut self, number: u64, command: String, why: Unanswered) {
+        self.turn.happened.push(Happening::Unanswered { number, command, why });
+    }
+
+    /// The machine is lost or has restarted: pending commands will not be answered.
+    fn give_up(&mut self, why: String) {
+        self.turn.is_given_up = true;
+        if std::mem::take(&mut self.is_loss_unreported) || self.state == State::Ready {
+            self.turn.happened.push(Happening::Lost(why.clone()));
+        }
+        let mut is_to_hold = self.to_hold.is_some();
+        for Asked { line, number, .. } in std::mem::take(&mut self.asked) {
+            is_to_hold |= line == HOLD;
+            if let Some(number) = number {
+                self.end(number, line, Unanswered::Unknown(why.clone()));
+            }
+        }
+        for Waiting { number, line, .. } in std::mem::take(&mut self.waiting) {
+            self.end(number, line, Unanswered::NotTyped(why.clone()));
+        }
+        if let Some(number) = self.to_hold.take() {
+            self.end(number, HOLD.to_owned(), Unanswered::NotTyped(why));
+        }
+        self.to_hold = (is_to_hold && self.keeps_hold).then(|| self.next_number());
         self.own.clear();
-        self.is_loss_unreported = false;
-        self.happened.push_back(Happening::Lost(why));
     }
 
-    /// Reports a start of the firmware.
-    fn start(&mut self, greeting: String) {
-        let ConsoleLine::Greeting { cause, was_at_work, .. } = ConsoleLine::parse(&greeting) else { return };
-        // The machine may have been at work before this session, whose opening of the port has reset it.
-        let while_at_work = (std::mem::take(&mut self.is_at_work) | was_at_work).then_some(cause);
-        self.happened.push_back(Happening::Started { greeting, while_at_work });
+    /// Empties the machine's line, and waits for silence.
+    fn settle(&mut self) {
+        self.turn.to_send.extend([ERASE; LINE_LENGTH]);
+        self.turn.to_send.push(b'\n');
+        self.state = State::Settling { since: self.waited, heard: self.waited };
     }
 
-    /// Takes a link whose firmware has just started. Asks again if an answer belongs to another question, because the
-    /// firmware may have restarted in the middle of one.
-    fn connect(&mut self, mut link: Link) -> Result<(), SettingsError> {
-        let mut introduced = introduce(&mut link);
-        for _ in 0..RETRIES {
-            if introduced.as_ref().err().is_none_or(|error| !error.is_of_an_answer()) {
-                break;
+    /// Asks for everything again, if that may help. A `hold` without an answer is typed again.
+    fn ask_again(&mut self, error: LinkError) {
+        if !error.is_of_an_answer() || self.introduction.tries == RETRIES {
+            return self.lose(error);
+        }
+        let Introduction { tries, early, .. } = std::mem::take(&mut self.introduction);
+        self.introduction = Introduction { tries: tries + 1, late: tries + 1, early, ..Introduction::default() };
+        let hold = self.asked.drain(..).find(|asked| asked.line == HOLD);
+        self.to_hold = hold.and_then(|hold| hold.number).or(self.to_hold);
+        self.settle();
+    }
+
+    /// Goes on after a time, or gives an answer up. `is_silent` says that nothing was received in this turn.
+    fn wait(&mut self, is_silent: bool) {
+        let waited = self.waited;
+        let is_over = |since: Duration, patience: Duration| waited.saturating_sub(since) > patience;
+        match &mut self.state {
+            State::Closed => {}
+            State::Starting { since } => {
+                if is_over(*since, BOOT) {
+                    self.settle();
+                }
             }
-            introduced = link.check_firmware().map_err(SettingsError::from).and_then(|()| introduce(&mut link));
+            State::Settling { since, heard } => {
+                if !is_silent {
+                    *heard = waited;
+                }
+                if waited.saturating_sub(*heard) >= QUIET || is_over(*since, RESTLESS) {
+                    self.lines = LineReader::default();
+                    self.state = State::Asking(0);
+                }
+            }
+            State::Asking(_) => {
+                let Some(asked) = self.asked.front() else { return };
+                if self.introduction.bytes > ANSWER_BYTES || is_silent && is_over(asked.since, FIRST_PATIENCE) {
+                    let silence = || silence(&asked.line, &asked.answer, self.lines.partial());
+                    let error = self.introduction.wrong.take().unwrap_or_else(silence);
+                    self.ask_again(error);
+                }
+            }
+            // The answer may be behind lines that came while the computer was busy.
+            State::Ready => {
+                if let Some(asked) = self.asked.front().filter(|asked| is_silent && is_over(asked.since, PATIENCE)) {
+                    let error = LinkError::Unanswered { command: asked.line.clone(), seconds: PATIENCE.as_secs() };
+                    self.give_up(error.to_string());
+                    self.introduction = Introduction { late: 1, ..Introduction::default() };
+                    self.settle();
+                }
+            }
         }
-        if let Some(greeting) = link.take_greeting() {
-            self.start(greeting);
-        }
-        let (connected, status) = introduced?;
-        self.happened.push_back(connected);
-        // Before the first command, so that a log begins with the machine's state.
-        status.into_iter().for_each(|status| self.report(status));
-        self.link = Some(link);
-        (self.poll_at, self.is_loss_unreported) = (None, false);
-        Ok(())
     }
 
-    /// Reports an event, and stores whether the machine is at work.
+    /// Types the next line, if none waits for its answer. `hold` does not wait.
+    fn type_next(&mut self) {
+        if matches!(self.state, State::Closed | State::Starting { .. }) {
+            return;
+        }
+        if self.introduction.late > 0 {
+            if self.to_hold.is_some() && !std::mem::replace(&mut self.introduction.has_held, true) {
+                self.turn.to_send.extend(HOLD.bytes().chain(*b"\n"));
+                self.introduction.late += 1;
+            }
+        } else if matches!(self.state, State::Asking(_) | State::Ready)
+            && let Some(number) = self.to_hold.take()
+        {
+            return self.send(HOLD.to_owned(), Some(number));
+        }
+        if !self.asked.is_empty() {
+            return;
+        }
+        match self.state {
+            State::Ready if self.is_bare => {}
+            State::Closed | State::Starting { .. } | State::Settling { .. } => {}
+            State::Asking(question) => {
+                self.introduction.bytes = 0;
+                self.send(INTRODUCTION[question].to_owned(), None);
+            }
+            State::Ready => {
+                let behind = if self.waiting.is_empty() { Duration::ZERO } else { BEHIND };
+                if self.waited >= self.poll_at + behind {
+                    self.poll_at = self.waited + POLL;
+                    self.send(STATUS.to_owned(), None);
+                } else if let Some(Waiting { number, line, .. }) = self.waiting.pop_front() {
+                    self.send(line, Some(number));
+                } else if let Some(own) = self.own.pop_first() {
+                    self.send(own, None);
+                }
+            }
+        }
+    }
+
+    fn send(&mut self, line: String, number: Option<u64>) {
+        if number.is_some() {
+            self.turn.happened.push(Happening::Command(line.clone()));
+        }
+        self.turn.to_send.extend(line.bytes().chain(*b"\n"));
+        self.asked.push_back(Asked { line, number, since: self.waited, answer: Vec::new() });
+    }
+
+    /// Takes a received line: a greeting, an event, or a line of an answer.
+    fn take(&mut self, line: String) {
+        match ConsoleLine::parse(&line) {
+            ConsoleLine::Greeting { cause, was_at_work, .. } => self.restart(line, cause, was_at_work),
+            ConsoleLine::Event(event) => {
+                if let EventLine::CalibratedBySwitch { is_set: true, .. } = event {
+                    self.own.insert(SETTINGS.to_owned());
+                }
+                self.report(Happening::Event(event, line));
+            }
+            said => self.take_answer(said, line),
+        }
+    }
+
+    /// The firmware has started. It may have been at work before this session, whose opening of the port has reset it.
+    fn restart(&mut self, greeting: String, cause: String, was_at_work: bool) {
+        let why = format!("the Uno was reset ({cause})");
+        let while_at_work = (std::mem::take(&mut self.is_at_work) | was_at_work).then_some(cause);
+        self.turn.happened.push(Happening::Started { greeting, while_at_work });
+        match self.state {
+            State::Closed | State::Settling { .. } => {}
+            State::Starting { .. } => self.settle(),
+            State::Asking(question) => self.ask_again(LinkError::Restarted(INTRODUCTION[question].to_owned())),
+            State::Ready => {
+                self.give_up(why);
+                self.introduction = Introduction::default();
+                self.state = State::Asking(0);
+            }
+        }
+    }
+
+    /// Reports an event or a status, and stores whether the machine is at work. A log begins with the machine's state,
+    /// so that comes before events during the first questions.
     fn report(&mut self, happening: Happening) {
         match &happening {
             Happening::Status(Status { mode, .. }, _) | Happening::Event(EventLine::State { mode }, _) => {
@@ -264,136 +540,132 @@ impl Session {
             Happening::Event(EventLine::Alarm { .. }, _) => self.is_at_work = false,
             _ => {}
         }
-        self.happened.push_back(happening);
+        match self.state {
+            State::Ready => self.turn.happened.push(happening),
+            State::Asking(_) => self.introduction.early.push(happening),
+            State::Closed | State::Starting { .. } | State::Settling { .. } => {}
+        }
     }
 
-    fn listen(&mut self, mut link: Link, now: Moment) -> Result<(), SettingsError> {
-        // One read at most waits, so that `hold` does not.
-        let mut line = link.next_line()?;
-        let is_more_to_read = line.is_some();
-        while let Some(read) = line {
-            if let ConsoleLine::Greeting { cause, .. } = ConsoleLine::parse(&read) {
-                self.start(read);
-                self.lose(format!("the Uno was reset ({cause})"));
-                return self.connect(link);
-            }
-            self.take(read);
-            line = link.buffered_line();
-        }
-        // The answer may be behind lines that came while the computer was busy.
-        let is_old = |asked: &&Asked| !is_more_to_read && self.waited.saturating_sub(asked.since) > PATIENCE;
-        if let Some(Asked { line, .. }) = self.asked.front().filter(is_old) {
-            link.discard_unsent();
-            return Err(LinkError::Unanswered { command: line.clone(), seconds: PATIENCE.as_secs() }.into());
-        }
-        let next = if std::mem::take(&mut self.is_to_hold) {
-            Some((HOLD.to_owned(), None))
-        } else if !self.asked.is_empty() {
-            None
-        } else if let Some((command, deadline)) = self.waiting.pop_front() {
-            if now.is_after(deadline) {
-                self.happened.push_back(Happening::Late(command));
-                self.link = Some(link);
-                return Ok(());
-            }
-            Some((command, None))
-        } else if self.poll_at.is_none_or(|at| self.waited >= at) {
-            self.poll_at = Some(self.waited + POLL);
-            Some((STATUS.to_owned(), Some(Vec::new())))
-        } else {
-            self.own.pop_first().map(|own| (own, Some(Vec::new())))
-        };
-        if let Some((line, own)) = next {
-            if own.is_none() {
-                self.happened.push_back(Happening::Command(line.clone()));
-            }
-            link.send(&line).inspect_err(|_| link.discard_unsent())?;
-            self.asked.push_back(Asked { line, own, since: self.waited });
-        }
-        self.link = Some(link);
-        Ok(())
-    }
-
-    /// Takes a received line: an event, or a line of an answer.
-    fn take(&mut self, line: String) {
-        let said = ConsoleLine::parse(&line);
-        if let ConsoleLine::Event(event) = said {
-            if let EventLine::CalibratedBySwitch { is_set: true, .. } = event {
-                self.own.insert(SETTINGS.to_owned());
-            }
-            self.report(Happening::Event(event, line));
-            return;
-        }
+    fn take_answer(&mut self, said: ConsoleLine, line: String) {
         let is_end = matches!(said, ConsoleLine::End { .. });
         let is_done = said == ConsoleLine::End { error: None };
         // The end of an abandoned answer is ignored.
         let Some(asked) = self.asked.front_mut() else { return };
-        match &mut asked.own {
-            Some(lines) if is_end => match parse_answer(&asked.line, std::mem::take(lines)) {
-                Ok(happening) if is_done => self.happened.extend(happening),
-                // Noise has damaged a line: ask again.
-                _ => drop(self.own.insert(asked.line.clone())),
-            },
-            // At once, not at the answer's end: a log and a map take the machine's position from it.
-            Some(_) if let ConsoleLine::Status(status) = said => self.report(Happening::Status(status, line)),
-            Some(lines) => lines.push(line),
-            None => {
-                if is_done {
-                    self.own.extend(changed_by(&asked.line));
+        if asked.number.is_some() {
+            self.turn.happened.push(Happening::Answer(line.clone()));
+        } else if !is_end {
+            match said {
+                // At once, not at the answer's end: a log and a map take the machine's position from it.
+                ConsoleLine::Status(status) if self.state == State::Ready => {
+                    return self.report(Happening::Status(status, line));
                 }
-                let refusal = (is_end && !is_done).then(|| line.clone());
-                self.happened.push_back(Happening::Answer(line));
-                if is_end {
-                    self.happened.push_back(Happening::Answered { command: asked.line.clone(), refusal });
-                }
+                _ => asked.answer.push(line.clone()),
             }
         }
-        if is_end {
-            self.asked.pop_front();
+        if !is_end {
+            return;
+        }
+        let Some(Asked { line: command, number, answer, .. }) = self.asked.pop_front() else { return };
+        let refusal = (!is_done).then_some(line);
+        if let Some(number) = number {
+            if is_done {
+                self.own.extend(changed_by(&command).map(str::to_owned));
+            }
+            self.turn.happened.push(Happening::Answered { number, command, refusal });
+        } else if let State::Asking(question) = self.state {
+            self.take_first_answer(question, command, answer, refusal);
+        } else if is_done {
+            self.turn.happened.extend(parse_answer(&command, answer));
+        } else {
+            // Noise has damaged the line: ask again.
+            self.own.insert(command);
         }
     }
-}
 
-/// Asks a machine for all that a session reports at its connection. The second is its status, if it is understood.
-fn introduce(link: &mut Link) -> Result<(Happening, Option<Happening>), SettingsError> {
-    let shown = link.ask(SETTINGS)?;
-    if !shown.iter().any(|line| settings::shown(line).is_some()) {
-        return Err(LinkError::Refused { command: SETTINGS.to_owned(), answer: shown.join(" ") }.into());
+    /// Takes the answer to a first question, and goes on to the next one.
+    fn take_first_answer(&mut self, question: usize, command: String, answer: Vec<String>, refusal: Option<String>) {
+        let version = answer.last().and_then(|line| match ConsoleLine::parse(line) {
+            ConsoleLine::Version { version } if refusal.is_none() => Some(version),
+            _ => None,
+        });
+        let is_wrong = match question {
+            0 => version.is_none(),
+            1 => !answer.iter().any(|line| Status::parse(line).is_some()),
+            2 => !answer.iter().any(|line| settings::shown(line).is_some()),
+            _ => refusal.is_some(),
+        };
+        if is_wrong {
+            let error = match refusal {
+                None if question == 0 => LinkError::NotTheWeeder(answer.join(" ")),
+                refusal => LinkError::Refused { command, answer: refusal.unwrap_or_else(|| answer.join(" ")) },
+            };
+            if question > 1 || self.introduction.late == 0 {
+                return self.ask_again(error);
+            }
+            // The answer to an earlier question: the one to this is still to come.
+            self.introduction.late -= 1;
+            self.introduction.wrong = Some(error);
+            let (line, since) = (INTRODUCTION[question].to_owned(), self.waited);
+            return self.asked.push_front(Asked { line, number: None, since, answer: Vec::new() });
+        }
+        match (question, version) {
+            (0, Some(version)) => self.version = version,
+            (1, _) => self.introduction.late = 0,
+            (2, _) => self.introduction.shown = answer,
+            (3, _) => self.introduction.examples = answer,
+            (LAST, _) => return self.connect(answer),
+            _ => {}
+        }
+        let next = if question == 0 && self.introduction.late == 0 { 2 } else { question + 1 };
+        self.state = if next == 2 && self.is_bare { State::Ready } else { State::Asking(next) };
     }
-    let settings = Shown::by(&shown).settings;
-    let examples = link.ask(EXAMPLES)?;
-    link.ask(EVENTS)?;
-    let status = link.ask(STATUS)?;
-    let connected = Happening::Connected { version: link.version().to_owned(), settings, shown, examples };
-    // A newer firmware's status may be unknown here.
-    Ok((connected, parse_answer(STATUS, status)?))
+
+    /// All first questions are answered, with this status as the last. A newer firmware's may be unknown here.
+    fn connect(&mut self, status: Vec<String>) {
+        let Introduction { shown, examples, early, .. } = std::mem::take(&mut self.introduction);
+        let (settings, version) = (Shown::by(&shown).settings, self.version.clone());
+        self.state = State::Ready;
+        (self.poll_at, self.is_loss_unreported) = (self.waited + POLL, false);
+        self.turn.happened.push(Happening::Connected { version, settings, shown, examples });
+        // Before the first event, so that a log begins with the machine's state.
+        let status = status.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line)));
+        status.into_iter().chain(early).for_each(|happening| self.report(happening));
+    }
 }
 
-/// Parses the answer to one of the session's own questions.
-fn parse_answer(question: &str, answer: Vec<String>) -> Result<Option<Happening>, SettingsError> {
-    Ok(match question {
-        STATUS => answer.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line))),
+/// Why a question has no answer, by the lines that have come and the beginning of another one.
+pub(crate) fn silence(question: &str, answer: &[String], partial: &str) -> LinkError {
+    let received = answer.iter().map(String::as_str).chain([partial]).collect::<Vec<_>>().join("\n");
+    let strange = received.matches(lines::STRANGE).count();
+    if 4 * strange > received.chars().count() {
+        return LinkError::Noise;
+    }
+    let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
+    LinkError::Silent { command: question.to_owned(), received: received[tail..].trim().to_owned() }
+}
+
+/// The meaning of the answer to one of the session's own questions, if it has not been reported yet.
+fn parse_answer(question: &str, answer: Vec<String>) -> Option<Happening> {
+    match question {
         SETTINGS => Some(Happening::Settings(Shown::by(&answer).settings, answer)),
         EXAMPLES => Some(Happening::Examples(answer)),
         _ => None,
-    })
+    }
 }
 
 /// The question to ask again after this command was answered by `ok`; `None` if it changes nothing.
-fn changed_by(command: &str) -> Option<String> {
-    Some(
-        match crate::command(command).ok()?.action {
-            Action::Set | Action::Save | Action::Revert | Action::Defaults | Action::Calibrate => SETTINGS,
-            Action::LabelPlant
-            | Action::LabelWeed
-            | Action::TeachPlant
-            | Action::TeachWeed
-            | Action::Forget
-            | Action::ForgetAll => EXAMPLES,
-            _ => return None,
-        }
-        .to_owned(),
-    )
+fn changed_by(command: &str) -> Option<&'static str> {
+    Some(match crate::command(command).ok()?.action {
+        Action::Set | Action::Save | Action::Revert | Action::Defaults | Action::Calibrate => SETTINGS,
+        Action::LabelPlant
+        | Action::LabelWeed
+        | Action::TeachPlant
+        | Action::TeachWeed
+        | Action::Forget
+        | Action::ForgetAll => EXAMPLES,
+        _ => return None,
+    })
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 use super::{ConsoleLine, Link, LinkError, Mode, Status};
 pub use control::settings::{Contradiction, Setting, Settings};
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Why settings could not be read or changed.
@@ -26,16 +27,6 @@ pub enum SettingsError {
     NotTaken { setting: String, wanted: u16, found: u16 },
 }
 
-impl SettingsError {
-    /// Whether it may be the fault of one answer: the same question may succeed.
-    pub(super) fn is_of_an_answer(&self) -> bool {
-        match self {
-            Self::Link(error) => error.is_of_an_answer(),
-            _ => false,
-        }
-    }
-}
-
 /// A setting's name.
 pub fn name(setting: Setting) -> String {
     setting.text().to_string()
@@ -44,6 +35,11 @@ pub fn name(setting: Setting) -> String {
 /// A setting's help for the operator.
 pub fn help(setting: Setting) -> String {
     setting.help().to_string()
+}
+
+/// The help for the operator of all settings, by their names.
+pub fn helps() -> BTreeMap<String, String> {
+    Setting::all().map(|setting| (name(setting), help(setting))).collect()
 }
 
 /// A setting's unit; empty for a count.

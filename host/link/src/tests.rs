@@ -23,14 +23,14 @@ fn link(answer: impl Fn(&str) -> Vec<u8> + 'static) -> Link {
         "version" => b"weeder 0.2.0\r\nok\r\n".to_vec(),
         line => answer(line),
     };
-    Link::over(script("", answer), false).expect("the firmware answers")
+    Link::over(Wire::over(script("", answer), false)).expect("the firmware answers")
 }
 
 #[test]
 fn the_greeting_after_a_reset_is_waited_for_and_the_version_asked() {
     let answer = |line: &str| if line.is_empty() { Vec::new() } else { b"weeder 0.2.0\r\nok\r\n".to_vec() };
     let greeting = "\0\x1Bgarbage\r\nweeder 0.2.0, reset by power, state hold, tool out; help lists the commands\r\n";
-    let link = Link::over(script(greeting, answer), true).unwrap();
+    let link = Link::over(Wire::over(script(greeting, answer), true)).unwrap();
     assert_eq!(link.version(), "0.2.0");
 }
 
@@ -42,7 +42,7 @@ fn an_uno_that_starts_while_it_is_asked_is_asked_again() {
         let greeting = b"weeder 0.2.0, reset by button, state hold\r\n".to_vec();
         if lines <= 2 { greeting } else { (machine(line).join("\r\n") + "\r\n").into_bytes() }
     };
-    let link = Link::over(script("", answer), false).unwrap();
+    let link = Link::over(Wire::over(script("", answer), false)).unwrap();
     assert!(link.version().starts_with(env!("CARGO_PKG_VERSION")), "{}", link.version());
 }
 
@@ -63,7 +63,7 @@ fn an_answer_that_comes_late_and_slowly_belongs_to_its_own_question() {
         let due = if is_due { lines.pop_front() } else { None };
         Some(due.map_or_else(Vec::new, |line| format!("{line}\r\n").into_bytes()))
     });
-    let mut link = Link::over(port, false).expect("the firmware answers");
+    let mut link = Link::over(Wire::over(port, false)).expect("the firmware answers");
     assert_eq!(settings::read(&mut link).expect("all are shown"), settings::Settings::new());
 }
 
@@ -77,7 +77,7 @@ fn a_line_that_is_cut_before_an_answer_is_no_other_firmware() {
             let cut = if asked == 1 && line == "version" { cut } else { "" };
             (cut.to_owned() + &machine(line).join("\r\n") + "\r\n").into_bytes()
         };
-        let link = Link::over(script("", answer), false);
+        let link = Link::over(Wire::over(script("", answer), false));
         assert!(link.is_ok(), "{cut}: {:?}", link.err());
     }
 }
@@ -99,14 +99,14 @@ fn a_refusal_is_an_error_with_the_firmware_s_words() {
 
 #[test]
 fn a_port_at_which_nothing_answers_is_given_up() {
-    let error = Link::over(script("", |_: &str| Vec::new()), true).err().unwrap();
+    let error = Link::over(Wire::over(script("", |_: &str| Vec::new()), true)).err().unwrap();
     assert!(error.to_string().contains("`weeder flash`"), "{error}");
 }
 
 #[test]
 fn noise_without_an_end_is_given_up_as_noise() {
     let noise: Vec<u8> = (0..=255).filter(|&byte| byte != b'\n' && byte != b'\r').cycle().take(60_000).collect();
-    let error = Link::over(script("", move |_: &str| noise.clone()), false).err().unwrap();
+    let error = Link::over(Wire::over(script("", move |_: &str| noise.clone()), false)).err().unwrap();
     assert!(matches!(error, LinkError::Noise), "{error}");
 }
 
@@ -119,7 +119,7 @@ fn text_without_an_end_is_given_up_and_only_its_end_is_shown() {
 
 #[test]
 fn another_firmware_is_recognised() {
-    let error = Link::over(script("", |_: &str| b"Grbl 1.1h\r\nok\r\n".to_vec()), false).err().unwrap();
+    let error = Link::over(Wire::over(script("", |_: &str| b"Grbl 1.1h\r\nok\r\n".to_vec()), false)).err().unwrap();
     assert!(error.to_string().contains("not the weeder's firmware that answers, but \"Grbl 1.1h\""), "{error}");
 }
 
@@ -139,7 +139,7 @@ fn a_command_that_would_be_two_lines_or_no_text_is_not_typed() {
 
 #[test]
 fn a_port_that_goes_away_says_so() {
-    let error = Link::over(ScriptedPort::new(|_: Option<&str>| None), false).err().unwrap();
+    let error = Link::over(Wire::over(ScriptedPort::new(|_: Option<&str>| None), false)).err().unwrap();
     assert_eq!(error.to_string(), "the port is gone: plug the Uno in again");
 }
 

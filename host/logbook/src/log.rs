@@ -150,7 +150,7 @@ impl LogWriter {
             // What `revert` restored, or another session set, follows from no other line.
             Happening::Settings(_, lines) => lines.iter().try_for_each(|line| self.line(time_ms, Kind::Answer, line)),
             // They follow from the commands.
-            Happening::Late(_) | Happening::Answered { .. } | Happening::Examples(_) => Ok(()),
+            Happening::Unanswered { .. } | Happening::Answered { .. } | Happening::Examples(_) => Ok(()),
         }
     }
 

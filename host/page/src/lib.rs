@@ -1,15 +1,16 @@
-//! The project's Rust for the page, so that no code is written twice: the meaning of a console line, the order of
-//! changed settings, the machine and plants of "Try it", and the content of a log.
+//! The project's Rust for the page, so that no code is written twice: sessions with machines, the meaning of a console
+//! line, the order of changed settings, the machine and plants of "Try it", and the content of a log.
 //!
-//! [`answer`] takes a question as JSON and returns its answer as JSON. `console`, `simulation` and `record` define their
-//! forms, and `page/src/link/`, `page/src/row/` and `page/src/record/` have their types. In a browser, as WebAssembly,
-//! both pass through one buffer (`exports`). The only state between questions is the log that is being read, the rolling
-//! machine, and the measurements of a set-up.
+//! [`answer`] takes a question as JSON and returns its answer as JSON. `console`, `session`, `simulation` and `record` define
+//! their forms, and `page/src/link/`, `page/src/row/` and `page/src/record/` have their types. In a browser, as WebAssembly,
+//! both pass through one buffer (`exports`). The only state between questions are the sessions, the log that is being read,
+//! the rolling machine, and the measurements of a set-up.
 
 mod console;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod record;
+mod session;
 mod simulation;
 
 #[cfg(target_arch = "wasm32")]
@@ -27,6 +28,10 @@ use std::cell::RefCell;
 enum Question {
     /// What does this line of the console say?
     Read(String),
+    /// Begin a session over an open wire. True if opening it has reset the Uno.
+    Open(bool),
+    /// What does this session answer?
+    Session(session::Request),
     /// Which values change these settings to those?
     Steps(console::Change),
     /// What is the next step of setting up this machine?
@@ -74,6 +79,8 @@ pub fn answer(question: &[u8]) -> String {
     let answer =
         serde_json::from_slice(question).map_err(|error| error.to_string()).and_then(|question| match question {
             Question::Read(line) => Ok(console::read(&line)),
+            Question::Open(resets) => Ok(session::open(resets)),
+            Question::Session(request) => request.take(),
             Question::Steps(change) => Ok(change.steps()),
             Question::SetUp(heard) => Ok(heard.advice()),
             Question::Begin(begun) => Ok(begun.begin()),

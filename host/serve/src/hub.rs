@@ -5,10 +5,9 @@
 
 use super::knowledge::{Knowledge, Stale};
 use link::moment::Moment;
-use link::settings::{Setting, help, name};
+use link::settings::helps;
 use parking_lot::Mutex;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use tokio::sync::broadcast::{self, Receiver};
 
@@ -61,7 +60,6 @@ impl Hub {
 
     /// The machine is connected: the firmware's version, and the lines that show its settings and examples.
     pub fn there(&self, machine: usize, version: &str, settings: &[String], examples: &[String]) {
-        let help: BTreeMap<_, _> = Setting::all().map(|setting| (name(setting), help(setting))).collect();
         self.change(
             machine,
             json!({
@@ -70,7 +68,7 @@ impl Hub {
                 "version": version,
                 "settings": settings,
                 "examples": examples,
-                "help": help,
+                "help": helps(),
             }),
         );
     }

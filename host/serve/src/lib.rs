@@ -50,7 +50,7 @@ use tokio::time::sleep;
 use tokio_io_timeout::TimeoutStream;
 
 pub use self::machine::Tell;
-pub use link::rows::Opener;
+pub use link::connection::Opener;
 
 /// Time limit for a request's head, including the wait before it.
 const HEAD_TIME: Duration = Duration::from_secs(10);

@@ -6,12 +6,12 @@ use super::knowledge::Stale;
 use super::rules::Order;
 use control::say::command::Action;
 use link::advice;
+use link::connection::{Connection, Opener, PAUSE};
 use link::moment::Moment;
-use link::rows::Opener;
-use link::session::{HOLD, Happening, PAUSE, Session};
+use link::session::{HOLD, Happening, Session, Unanswered};
 use link::settings::other_version;
 use link::{EventLine, Mode};
-use std::collections::VecDeque;
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
@@ -54,14 +54,12 @@ pub enum NoAnswer {
     Silent,
 }
 
-/// A line to type, the clients that wait for it, and its answer.
+/// A client's line to type, and where its answer goes.
 struct Asked {
     line: String,
     /// The last moment at which it may be typed. It does not hold for `hold`.
     deadline: Moment,
-    is_typed: bool,
-    askers: Vec<oneshot::Sender<Answer>>,
-    answer: Vec<String>,
+    asker: oneshot::Sender<Answer>,
 }
 
 /// A machine, as its clients see it.
@@ -80,10 +78,9 @@ impl Machine {
         let (holds, holds_to_type) = mpsc::channel(WAITING);
         let named = name.clone();
         thread::spawn(move || {
-            let talk = Talk { number, name: named, hub, tell, asked: VecDeque::new() };
-            let mut session = Session::waiting_for(open);
-            session.keeps_hold = true;
-            talk.run(session, commands_to_type, holds_to_type);
+            let mut connection = Connection::waiting_for(open);
+            connection.session.keeps_hold = true;
+            Talk::new(number, named, hub, tell).run(connection, commands_to_type, holds_to_type);
         });
         Self { name, number, commands, holds }
     }
@@ -112,21 +109,14 @@ impl Machine {
 
 async fn ask(lines: &mpsc::Sender<Asked>, line: String, deadline: Moment) -> Answer {
     let (asker, answer) = oneshot::channel();
-    let asked = Asked { deadline, askers: vec![asker], ..Asked::new(line) };
-    lines.try_send(asked).map_err(|_| NoAnswer::Busy)?;
+    lines.try_send(Asked { line, deadline, asker }).map_err(|_| NoAnswer::Busy)?;
     timeout(ANSWER_TIME, answer).await.map_err(|_| NoAnswer::Silent)?.unwrap_or(Err(NoAnswer::Busy))
 }
 
-impl Asked {
-    fn new(line: String) -> Self {
-        Self { line, deadline: Moment::default(), is_typed: false, askers: Vec::new(), answer: Vec::new() }
-    }
-
-    fn end(self, answer: &Answer) {
-        for asker in self.askers {
-            // The client may have gone.
-            let _ = asker.send(answer.clone());
-        }
+/// Sends an answer to its clients, if they are still there.
+fn answer(askers: impl IntoIterator<Item = oneshot::Sender<Answer>>, answer: &Answer) {
+    for asker in askers {
+        let _ = asker.send(answer.clone());
     }
 }
 
@@ -135,14 +125,25 @@ struct Talk {
     name: String,
     hub: Arc<Hub>,
     tell: Tell,
-    /// The session's lines without an answer, in its order.
-    asked: VecDeque<Asked>,
+    /// The clients that wait for the answer to a command, by its number in the session. Several may wait for a `hold`.
+    askers: HashMap<u64, Vec<oneshot::Sender<Answer>>>,
+    /// The lines of the answer in progress.
+    answer: Vec<String>,
 }
 
 impl Talk {
-    fn run(mut self, mut session: Session, mut commands: mpsc::Receiver<Asked>, mut holds: mpsc::Receiver<Asked>) {
-        while self.turn(&mut session, &mut commands, &mut holds) {
-            if !session.is_connected() {
+    fn new(number: usize, name: String, hub: Arc<Hub>, tell: Tell) -> Self {
+        Self { number, name, hub, tell, askers: HashMap::new(), answer: Vec::new() }
+    }
+
+    fn run(
+        mut self,
+        mut connection: Connection,
+        mut commands: mpsc::Receiver<Asked>,
+        mut holds: mpsc::Receiver<Asked>,
+    ) {
+        while self.turn(&mut connection, &mut commands, &mut holds) {
+            if !connection.session.is_open() {
                 thread::sleep(PAUSE);
             }
         }
@@ -151,10 +152,11 @@ impl Talk {
     /// Returns false when the machine is dropped.
     fn turn(
         &mut self,
-        session: &mut Session,
+        connection: &mut Connection,
         commands: &mut mpsc::Receiver<Asked>,
         holds: &mut mpsc::Receiver<Asked>,
     ) -> bool {
+        let session = &mut connection.session;
         // Holds are read before commands. So all commands sent before a hold are dropped by it.
         let to_hold: Vec<_> = std::iter::from_fn(|| holds.try_recv().ok()).collect();
         loop {
@@ -167,8 +169,8 @@ impl Talk {
         for asked in to_hold {
             self.hold(session, asked);
         }
-        for happening in session.turn(self.hub.now()) {
-            self.take(session, happening);
+        for happening in connection.turn(self.hub.now()) {
+            self.take(&mut connection.session, happening);
         }
         true
     }
@@ -176,29 +178,21 @@ impl Talk {
     fn order(&mut self, session: &mut Session, asked: Asked) {
         if !session.is_connected() {
             // A command to a lost machine must not wait for it.
-            asked.end(&Err(NoAnswer::Lost(self.why_lost())));
-        } else if session.command(&asked.line, asked.deadline) {
-            self.asked.push_back(asked);
+            answer([asked.asker], &Err(NoAnswer::Lost(self.why_lost())));
+        } else if let Some(number) = session.command(&asked.line, asked.deadline) {
+            self.askers.insert(number, vec![asked.asker]);
         } else {
-            asked.end(&Err(NoAnswer::Busy));
+            answer([asked.asker], &Err(NoAnswer::Busy));
         }
     }
 
-    fn hold(&mut self, session: &mut Session, mut asked: Asked) {
-        for _ in 0..session.hold() {
-            if let Some(dropped) = self.asked.pop_back() {
-                dropped.end(&Err(Stale::Held.into()));
-            }
-        }
-        if !session.is_connected() {
-            // It is typed when the machine is back. Its senders do not wait for that.
-            let askers = std::mem::take(&mut asked.askers);
-            Asked { askers, ..Asked::new(HOLD.to_owned()) }.end(&Err(NoAnswer::Lost(self.why_lost())));
-        }
-        match self.asked.back_mut() {
-            // A hold in progress counts for this one too, as in the session.
-            Some(last) if last.line == HOLD => last.askers.extend(asked.askers),
-            _ => self.asked.push_back(asked),
+    fn hold(&mut self, session: &mut Session, asked: Asked) {
+        let number = session.hold();
+        if session.is_connected() {
+            self.askers.entry(number).or_default().push(asked.asker);
+        } else {
+            // It is typed when the machine is back. Its sender does not wait for that.
+            answer([asked.asker], &Err(NoAnswer::Lost(self.why_lost())));
         }
     }
 
@@ -206,14 +200,9 @@ impl Talk {
         self.hub.why_lost(self.number).unwrap_or_else(|| "the machine is not there".to_owned())
     }
 
-    /// Ends the commands to a machine that is lost. The session keeps `hold`.
-    fn lose(&mut self, why: &str) {
-        let is_to_hold = self.asked.iter().any(|asked| asked.line == HOLD);
-        for asked in self.asked.drain(..) {
-            let no_answer = if asked.is_typed { NoAnswer::Unknown } else { NoAnswer::Lost };
-            asked.end(&Err(no_answer(why.to_owned())));
-        }
-        self.asked.extend(is_to_hold.then(|| Asked::new(HOLD.to_owned())));
+    /// Ends a command.
+    fn end(&mut self, number: u64, ended: &Answer) {
+        answer(self.askers.remove(&number).unwrap_or_default(), ended);
     }
 
     fn take(&mut self, session: &mut Session, happening: Happening) {
@@ -233,7 +222,7 @@ impl Talk {
             Happening::Lost(why) => {
                 self.hub.lost(self.number, &why);
                 (self.tell)(&format!("{}: {why}.", self.name));
-                self.lose(&why);
+                self.answer.clear();
             }
             Happening::Status(_, line) => self.hub.know(self.number, "status", line.into()),
             Happening::Event(event, line) => {
@@ -249,29 +238,27 @@ impl Talk {
                 }
                 self.hub.event(self.number, &line);
             }
-            Happening::Late(_) => {
-                if let Some(asked) = self.asked.pop_front() {
-                    asked.end(&Err(Stale::Late.into()));
-                }
-            }
-            Happening::Command(_) => {
-                if let Some(asked) = self.asked.iter_mut().find(|asked| !asked.is_typed) {
-                    asked.is_typed = true;
-                }
-            }
+            Happening::Command(_) => {}
             Happening::Answer(line) => {
-                let Some(asked) = self.asked.front_mut() else { return };
-                asked.answer.truncate(LINES - 1);
-                asked.answer.push(line);
+                self.answer.truncate(LINES - 1);
+                self.answer.push(line);
             }
-            Happening::Answered { command, .. } => {
-                let Some(mut asked) = self.asked.pop_front() else { return };
-                let answer = std::mem::take(&mut asked.answer);
+            Happening::Answered { number, command, .. } => {
                 // The pages need the events.
                 if link::command(&command).is_ok_and(|command| command.action == Action::EventsOff) {
                     session.turn_events_on();
                 }
-                asked.end(&Ok(answer));
+                let lines = std::mem::take(&mut self.answer);
+                self.end(number, &Ok(lines));
+            }
+            Happening::Unanswered { number, why, .. } => {
+                let why = match why {
+                    Unanswered::Late => Stale::Late.into(),
+                    Unanswered::Held => Stale::Held.into(),
+                    Unanswered::NotTyped(why) => NoAnswer::Lost(why),
+                    Unanswered::Unknown(why) => NoAnswer::Unknown(why),
+                };
+                self.end(number, &Err(why));
             }
             Happening::Settings(_, shown) => self.hub.know(self.number, "settings", shown.into()),
             Happening::Examples(lines) => self.hub.know(self.number, "examples", lines.into()),
@@ -285,7 +272,7 @@ mod any_order;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use link::{Link, LinkError};
+    use link::{LinkError, Wire};
     use rig::ScriptedBoard;
     use serde_json::Value;
     use tokio::runtime;
@@ -295,7 +282,7 @@ mod tests {
     async fn machine() -> (Machine, Arc<Hub>, ScriptedBoard) {
         let (hub, board) = (Arc::new(Hub::new(1, 0, Box::new(Moment::now))), ScriptedBoard::plugged_in());
         let port = board.clone();
-        let open = move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false);
+        let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
         let machine = Machine::start(0, "uno".to_owned(), Box::new(open), Arc::clone(&hub), Arc::new(|_| {}));
         until(|| hub.why_lost(0).is_none()).await;
         (machine, hub, board)
@@ -383,7 +370,7 @@ mod tests {
             board.plug(true);
             until(|| hub.why_lost(0).is_none()).await;
             assert_eq!(type_soon(&machine, "clear").await, ok());
-            assert_eq!(board.typed(), ["events on", "silence", "events on", "hold", "clear"]);
+            assert_eq!(board.typed(), ["events on", "silence", "hold", "events on", "clear"]);
         });
     }
 }

@@ -8,8 +8,8 @@
 // that the page had received when the operator gave it. The computer refuses it if that is too old.
 
 import { english } from "../words/words.ts";
-import { isEvent, linesOf, read } from "./grammar.ts";
-import { type Happening, type Link, NoMachine, Refused } from "./session.ts";
+import { read } from "./grammar.ts";
+import { type Happening, type Link, type News, NoMachine, Refused, tell } from "./session.ts";
 
 /** Silence after which the computer counts as lost: it sends a message twice a second. */
 const SILENCE_MS = 3000;
@@ -43,19 +43,8 @@ export function isServed(): boolean {
     return new URLSearchParams(location.search).has("served");
 }
 
-/** News of a machine. Settings and examples are the lines that show them. Help texts are by the setting's name. */
-type About =
-    | {
-          is: "there";
-          version: string;
-          settings: readonly string[];
-          examples: readonly string[];
-          help: Record<string, string>;
-          status?: string;
-      }
-    | { is: "lost"; why: string }
-    | { is: "settings" | "examples"; said: string[] }
-    | { is: "status" | "event" | "restarted"; said: string };
+/** News of a machine. */
+type About = News | { is: "lost"; why: string };
 
 type Message = (About & { machine: number }) | { is: "beat" | "dropped" | "held" };
 
@@ -184,30 +173,12 @@ export class ServedMachine implements Link {
 
     /** Takes the computer's news of it. */
     tell(message: About): void {
-        switch (message.is) {
-            case "there":
-                this.#there = new AbortController();
-                this.onHappening({ ...message, is: "connected", settings: linesOf("setting", message.settings) });
-                this.onHappening({ is: "help", help: new Map(Object.entries(message.help)) });
-                if (message.status !== undefined) this.#read(message.status);
-                break;
-            case "lost":
-                this.#lose(message.why);
-                break;
-            case "settings": {
-                const lines = message.said;
-                this.onHappening({ is: "settings", settings: linesOf("setting", lines), lines });
-                break;
-            }
-            case "examples":
-                this.onHappening({ is: "examples", examples: message.said });
-                break;
-            case "restarted":
-                this.onHappening({ is: "started", line: message.said, wasAtWork: true });
-                break;
-            default:
-                this.#read(message.said);
+        if (message.is === "lost") {
+            this.#lose(message.why);
+            return;
         }
+        if (message.is === "there") this.#there = new AbortController();
+        tell(message, (happening) => this.onHappening(happening));
     }
 
     #lose(why: string): void {
@@ -215,13 +186,6 @@ export class ServedMachine implements Link {
         if (this.#there) this.onHappening({ is: "lost", why, forGood: true, isWanted: false });
         else this.onAbsent(why);
         this.#there = undefined;
-    }
-
-    /** A status, or an event. */
-    #read(line: string): void {
-        const said = read(line);
-        if (said.is === "status") this.onHappening({ is: "status", status: said, line });
-        else if (isEvent(said)) this.onHappening({ is: "event", event: said, line });
     }
 
     async #type(line: string, limitMs: number, request?: RequestInit, gone?: AbortSignal): Promise<string[]> {

@@ -73,6 +73,7 @@ export class Machine {
                 this.version = happening.version;
                 this.settings = happening.settings;
                 this.examples = happening.examples;
+                this.help = happening.help;
                 [this.objects, this.zones] = [[], []];
                 [this.warning, this.status, this.mode, this.toolOut] = [undefined, undefined, undefined, undefined];
                 break;
@@ -95,9 +96,6 @@ export class Machine {
                 break;
             case "examples":
                 this.examples = happening.examples;
-                break;
-            case "help":
-                this.help = happening.help;
                 break;
             case "status": {
                 const { status } = happening;

@@ -82,9 +82,9 @@ export class Panel {
         parts.button("log-save", () => download("weeder-log.csv", this.#log.text(), "text/csv"));
         parts.button("log-clear", () => {
             this.#log = new Log();
-            const { version, settings, examples } = this.machine;
+            const { version, settings, examples, help } = this.machine;
             // So that the later lines can be replayed by themselves.
-            if (version !== undefined) this.#log.add({ is: "connected", version, settings, examples }, this.#now);
+            if (version !== undefined) this.#log.add({ is: "connected", version, settings, examples, help }, this.#now);
         });
         this.machine.mayStart = allowed.mayStart;
         into.classList.toggle("may-not-start", !allowed.mayStart);
@@ -243,7 +243,7 @@ export class Panel {
             this.#parts.write("drive-said", "");
         if (is === "event") this.#calibration.take(happening.event);
         if (is === "connected" || is === "lost") this.#showConnected();
-        if (is === "connected" || is === "settings" || is === "help") {
+        if (is === "connected" || is === "settings") {
             this.#settings.show();
             this.#calibration.showSettings();
         }

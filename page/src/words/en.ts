@@ -355,7 +355,7 @@ export const en = {
         noSerial:
             "This browser has no Web Serial. Chrome, Edge and Opera have it on a computer: open the page in one of them. Without one, avrdude writes the HEX, and any serial monitor at 115200 baud talks to the machine.",
 
-        // Texts of the session, as in session.ts and `weeder serve`.
+        // Texts of the session (host/page/src/session.rs), and of `weeder serve`.
         waitingForMachine: "Waiting for the machine to answer.",
         noneConnected: "no machine is connected",
         mayBeDone: "{why}. This may have been done, or may still be done: look at the machine",
@@ -364,9 +364,8 @@ export const en = {
         holdPending: "HOLD has not come through yet, so this was not sent",
         holdFirst: "hold came first, so this was not sent",
         waitedTooLong: "this waited for 3 s, so it was not sent: try again",
-        wasReset: "the Uno was reset",
-        resetWhileAsked: "the Uno was reset while it was asked",
-        noSettings: "the firmware shows no settings: flash this page's, and try again",
+        wasReset: "the Uno was reset ({cause})",
+        resetWhileAsked: "the Uno was reset while it was asked `{command}`: see to its supply, then try again",
         nothingAnswers:
             "nothing answers at this port: choose another, or press the Uno's reset; flash a new board first",
         noText: "this port sends no text: choose another; on an Uno check that D0 and D1 are free, and flash it again",

@@ -358,9 +358,9 @@ export const es: Language = {
         holdPending: "la PAUSA aún no ha llegado, así que esto no se envió",
         holdFirst: "la pausa fue antes, así que esto no se envió",
         waitedTooLong: "esperó 3 s y no se envió: inténtelo de nuevo",
-        wasReset: "el Uno se reinició",
-        resetWhileAsked: "el Uno se reinició mientras se le preguntaba",
-        noSettings: "el firmware no muestra ajustes: grabe el de esta página e inténtelo otra vez",
+        wasReset: "el Uno se reinició ({cause})",
+        resetWhileAsked:
+            "el Uno se reinició mientras se le preguntaba `{command}`: revise su alimentación e inténtelo otra vez",
         nothingAnswers:
             "en este puerto no responde nada: elija otro, o pulse el reset del Uno; una placa nueva hay que grabarla primero",
         noText: "lo que viene de este puerto no es texto: elija otro; en un Uno mire que D0 y D1 estén libres, y grábelo otra vez",

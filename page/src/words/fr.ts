@@ -358,9 +358,9 @@ export const fr: Language = {
         holdPending: "la PAUSE n'est pas encore passée, ceci n'a donc pas été envoyé",
         holdFirst: "la pause est passée avant, ceci n'a donc pas été envoyé",
         waitedTooLong: "la commande a attendu 3 s et n'a pas été envoyée : réessayez",
-        wasReset: "l'Uno a redémarré",
-        resetWhileAsked: "l'Uno a redémarré pendant la question",
-        noSettings: "le micrologiciel ne montre aucun réglage : flashez celui de cette page, et réessayez",
+        wasReset: "l'Uno a redémarré ({cause})",
+        resetWhileAsked:
+            "l'Uno a redémarré pendant la question `{command}` : vérifiez son alimentation, puis réessayez",
         nothingAnswers:
             "rien ne répond à ce port : choisissez-en un autre, ou appuyez sur le reset de l'Uno ; une carte neuve doit d'abord être flashée",
         noText: "ce qui vient de ce port n'est pas du texte : choisissez-en un autre ; sur un Uno, voyez que D0 et D1 sont libres, et reflashez-le",

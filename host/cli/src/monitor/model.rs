@@ -330,7 +330,7 @@ impl RowModel {
             }
             Happening::Started { while_at_work: Some(cause), .. } => self.restarted = Some(advice::restarted(&cause)),
             Happening::Started { .. }
-            | Happening::Late(_)
+            | Happening::Unanswered { .. }
             | Happening::Command(_)
             | Happening::Answer(_)
             | Happening::Examples(_) => {}

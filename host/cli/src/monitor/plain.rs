@@ -210,7 +210,7 @@ impl<'a> Talk<'a> {
                 }
             }
             What::Happened(
-                Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_) | Happening::Late(_),
+                Happening::Settings(..) | Happening::Examples(_) | Happening::Command(_) | Happening::Unanswered { .. },
             ) => {}
             What::Happened(Happening::Status(..)) => standing.statuses += 1,
             What::Happened(Happening::Started { while_at_work, .. }) => {
@@ -266,16 +266,17 @@ impl<'a> Talk<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use link::connection::Opener;
     use link::row_names::{Board, Row};
-    use link::rows::Opener;
-    use link::{Link, LinkError};
+    use link::{LinkError, Wire};
     use rig::ScriptedBoard;
 
     #[test]
     fn a_hold_goes_before_an_answer_that_does_not_come() {
         let board = ScriptedBoard::plugged_in();
         let port = board.clone();
-        let open: Opener = Box::new(move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
+        let open: Opener =
+            Box::new(move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false)));
         let (rows, missing) = Rows::open(vec![open]);
         assert!(missing[0].is_none());
         let row = Row { name: "Uno".to_owned(), board: Board::Only { beside: None } };

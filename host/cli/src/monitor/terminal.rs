@@ -106,7 +106,7 @@ fn ends(key: KeyEvent) -> bool {
 mod tests {
     use super::*;
     use crate::monitor::model::Answer;
-    use link::rows::Opener;
+    use link::connection::Opener;
     use link::session::Happening;
     use link::settings::Settings;
     use link::{EventLine, LinkError};

@@ -1,6 +1,7 @@
 //! Rows whose firmware stops answering, or is unplugged.
 
 use super::*;
+use crate::Wire;
 use rig::ScriptedBoard;
 
 /// Reads events of the rows until `is_so` returns true.
@@ -23,10 +24,10 @@ fn types(heard: &Heard, line: &str) -> bool {
     matches!(&heard.what, What::Happened(Happening::Command(typed)) if typed == line)
 }
 
-fn open(boards: &[ScriptedBoard]) -> (Rows, Vec<Option<SettingsError>>) {
+fn open(boards: &[ScriptedBoard]) -> (Rows, Vec<Option<LinkError>>) {
     let opener = |board: &ScriptedBoard| -> Opener {
         let board = board.clone();
-        Box::new(move || Link::over(board.open().ok_or(LinkError::Absent("it".to_owned()))?, false))
+        Box::new(move || Ok(Wire::over(board.open().ok_or(LinkError::Absent("it".to_owned()))?, false)))
     };
     Rows::open(boards.iter().map(opener).collect())
 }
@@ -95,7 +96,8 @@ fn a_row_that_was_lost_with_a_hold_unanswered_holds_first_when_it_is_back_and_ty
     until(&rows, |heard| matches!(&heard.what, What::NotTyped { command, .. } if command == "clear"));
     board.plug(true);
     until(&rows, |heard| answers(heard, 0, "hold"));
-    assert_eq!(board.typed(), ["events on", "silence", "hold", "events on", "hold"]);
+    until(&rows, |heard| matches!(&heard.what, What::Happened(Happening::Connected { .. })));
+    assert_eq!(board.typed(), ["events on", "silence", "hold", "hold", "events on"]);
 }
 
 #[test]
@@ -105,7 +107,7 @@ fn a_hold_to_all_has_the_time_of_the_last_row_and_the_rows_that_have_not_obeyed(
     let obeyed = |row, ms| Heard {
         row,
         at: since + Duration::from_millis(ms),
-        what: What::Happened(Happening::Answered { command: "hold".to_owned(), refusal: None }),
+        what: What::Happened(Happening::Answered { number: 1, command: "hold".to_owned(), refusal: None }),
     };
     let mut hold = Hold::new(since, [true; 3]);
     assert_eq!(hold.summary(&names), "HOLD 0 of 3; no answer yet: 1, 2, 3");
@@ -122,8 +124,11 @@ fn a_hold_to_all_has_the_time_of_the_last_row_and_the_rows_that_have_not_obeyed(
     assert_eq!((lost.is_obeyed(), lost.summary(&names)), (true, "HOLD 3 of 3 in 4000 ms; 3 last".to_owned()));
     hold.take(&obeyed(2, 30));
     assert_eq!(hold.summary(&names), "HOLD 3 of 3 in 31 ms; 1 last");
-    let refusal =
-        What::Happened(Happening::Answered { command: "hold".to_owned(), refusal: Some("error: no".to_owned()) });
+    let refusal = What::Happened(Happening::Answered {
+        number: 1,
+        command: "hold".to_owned(),
+        refusal: Some("error: no".to_owned()),
+    });
     let mut refused = Hold::new(since, [true]);
     refused.take(&Heard { row: 0, at: since, what: refusal });
     assert_eq!((refused.is_over(), refused.summary(&names)), (true, "HOLD 0 of 1; REFUSED: 1".to_owned()));

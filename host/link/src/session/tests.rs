@@ -1,42 +1,49 @@
 //! Sessions with a firmware that may be silent, say something by itself, or be unplugged.
 
 use super::*;
+use crate::connection::Connection;
+use crate::{Link, Wire};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::ScriptedBoard;
 use std::io::Write;
 
-/// A session with a board, at a time.
+/// A connection to a board, at a time.
 struct Talk {
-    session: Session,
+    connection: Connection,
     board: ScriptedBoard,
     now: Moment,
 }
 
 impl Talk {
-    /// A session that waits for a board.
+    /// A connection that waits for a board.
     fn waiting(board: ScriptedBoard) -> Self {
         let port = board.clone();
-        let open = move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false);
-        Self { session: Session::waiting_for(open), board, now: Moment::default() }
+        let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
+        Self { connection: Connection::waiting_for(open), board, now: Moment::default() }
     }
 
-    /// A session that is connected, and has reported it.
+    /// A connection that has reported its machine.
     fn connected() -> Self {
         let mut talk = Self::waiting(ScriptedBoard::plugged_in());
-        talk.session.try_now().unwrap();
         talk.second();
+        assert!(talk.session().is_connected());
         talk
+    }
+
+    fn session(&mut self) -> &mut Session {
+        &mut self.connection.session
     }
 
     /// Types a command with a deadline far ahead.
     fn command(&mut self, command: &str) -> bool {
-        self.session.command(command, self.now.after(Duration::from_secs(60)))
+        let deadline = self.now.after(Duration::from_secs(60));
+        self.session().command(command, deadline).is_some()
     }
 
     /// The next turn's events, without the ends of answers.
     fn turn(&mut self) -> Vec<Happening> {
-        let mut happened = self.session.turn(self.now);
+        let mut happened = self.connection.turn(self.now);
         happened.retain(|happening| !matches!(happening, Happening::Answered { .. }));
         happened
     }
@@ -64,11 +71,11 @@ fn answered(line: &str) -> Happening {
 #[test]
 fn commands_are_answered_one_after_the_other_beside_the_status() {
     let mut talk = Talk::waiting(ScriptedBoard::plugged_in());
-    assert!(matches!(talk.turn().as_slice(), [Happening::Connected { .. }, Happening::Status(..)]));
-    assert!(talk.command("hold") && talk.command("hepl") && !talk.session.is_idle());
+    assert!(matches!(talk.second().as_slice(), [Happening::Connected { .. }]));
+    assert!(talk.command("hold") && talk.command("hepl") && !talk.session().is_idle());
     let unknown = answered("error: no such command, help lists them all");
     assert_eq!(talk.second(), [typed("hold"), answered("ok"), typed("hepl"), unknown]);
-    assert!(talk.session.is_idle());
+    assert!(talk.session().is_idle());
     assert!(!talk.command("two\nlines"));
 }
 
@@ -112,9 +119,9 @@ fn examples_are_asked_for_again_behind_a_command_that_changes_them() {
 fn hold_drops_nothing_that_the_session_asks_for_itself() {
     let mut talk = Talk::connected();
     assert!(talk.command("set wheel_mm 405"));
-    talk.session.turn_events_on();
+    talk.session().turn_events_on();
     assert_eq!(talk.turn(), [typed("set wheel_mm 405")]);
-    talk.session.hold();
+    talk.session().hold();
     let happened = talk.second();
     let held = [answered("ok"), typed("hold"), answered("ok")];
     assert!(
@@ -137,7 +144,7 @@ fn noise_between_the_lines_does_not_end_a_session() {
             let happened = talk.second();
             assert!(!happened.iter().any(|happening| matches!(happening, Happening::Lost(_))), "{happened:?}");
         }
-        assert!(talk.session.is_idle() && talk.session.is_connected());
+        assert!(talk.session().is_idle() && talk.session().is_connected());
     }
 }
 
@@ -149,7 +156,7 @@ fn an_uno_that_is_unplugged_or_never_was_there_is_lost_once_and_found_later() {
     for (mut talk, problem) in [(unplugged, "plug the Uno in again"), (absent, "there is no port it")] {
         let lost = talk.second();
         assert!(matches!(lost.as_slice(), [Happening::Lost(why)] if why.contains(problem)), "{lost:?}");
-        assert!(!talk.session.is_connected());
+        assert!(!talk.session().is_connected());
         assert_eq!(talk.second(), []);
         talk.board.plug(true);
         let found = [talk.second(), talk.second()].concat();
@@ -163,7 +170,7 @@ fn an_answer_that_does_not_come_is_given_up() {
     assert!(talk.command("silence"));
     let happened: Vec<_> = (0..4).flat_map(|_| talk.second()).collect();
     assert!(happened.iter().any(|happening| matches!(happening, Happening::Lost(_))), "{happened:?}");
-    assert!(talk.session.is_idle());
+    assert!(talk.session().is_idle());
 }
 
 #[test]
@@ -175,7 +182,7 @@ fn a_computer_that_was_busy_reads_all_that_has_come_before_it_gives_an_answer_up
     talk.now = talk.now.after(2 * PATIENCE);
     let happened: Vec<_> = (0..50).flat_map(|_| talk.turn()).collect();
     assert!(happened.contains(&answered("ok")), "{happened:?}");
-    assert!(talk.session.is_connected());
+    assert!(talk.session().is_connected());
 }
 
 #[test]
@@ -185,15 +192,17 @@ fn hold_is_typed_at_once_and_waiting_commands_are_dropped() {
     assert!(talk.command("silence"));
     talk.turn();
     assert!(talk.command("start") && talk.command("start now"));
-    assert_eq!(talk.session.hold(), 2);
-    assert!(!talk.session.is_idle());
-    assert_eq!(talk.turn(), [typed("hold")]);
+    let number = talk.session().hold();
+    assert!(!talk.session().is_idle());
+    let dropped =
+        |number, command: &str| Happening::Unanswered { number, command: command.to_owned(), why: Unanswered::Held };
+    assert_eq!(talk.turn(), [dropped(2, "start"), dropped(3, "start now"), typed("hold")]);
     // The first answer belongs to the first hold. A second hold is not typed.
-    assert_eq!(talk.session.hold(), 0);
+    assert_eq!(talk.session().hold(), number);
     assert_eq!(talk.turn(), [answered("ok")]);
     talk.board.say(b"ok\r\n");
     assert_eq!(talk.second(), [answered("ok")]);
-    assert!(talk.session.is_idle());
+    assert!(talk.session().is_idle());
 }
 
 #[test]
@@ -202,15 +211,22 @@ fn after_a_reset_everything_is_asked_again_and_commands_from_before_it_are_not_e
     assert!(talk.command("silence"));
     talk.turn();
     assert!(talk.command("start"));
-    talk.session.hold();
+    talk.session().hold();
     assert!(talk.command("start"));
     talk.board.say(b"weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n");
-    let happened = talk.second();
+    let mut happened = talk.second();
+    let ends: Vec<(u64, Unanswered)> = happened
+        .extract_if(.., |happening| matches!(happening, Happening::Unanswered { .. }))
+        .filter_map(|end| if let Happening::Unanswered { number, why, .. } = end { Some((number, why)) } else { None })
+        .collect();
     assert!(
         matches!(happened.as_slice(), [Happening::Started { .. }, Happening::Lost(_), Happening::Connected { .. }]),
         "{happened:?}"
     );
-    assert!(talk.session.is_idle());
+    let why = "the Uno was reset (brown_out)".to_owned();
+    let [unknown, not_typed] = [Unanswered::Unknown(why.clone()), Unanswered::NotTyped(why)];
+    assert_eq!(ends, [(2, Unanswered::Held), (1, unknown), (4, not_typed.clone()), (3, not_typed)]);
+    assert!(talk.session().is_idle());
 }
 
 /// Whether a restart at work was reported, by its cause.
@@ -251,7 +267,7 @@ fn an_answer_to_an_earlier_question_is_taken_for_no_other_and_the_machine_is_ask
         talk.board.say(&[&greeting[..], &late.repeat(count)].concat());
         let happened = [talk.second(), talk.second()].concat();
         let connected = happened.iter().filter(|happening| matches!(happening, Happening::Connected { .. })).count();
-        assert!(connected == 1 && talk.session.is_connected(), "{count}: {happened:?}");
+        assert!(connected == 1 && talk.session().is_connected(), "{count}: {happened:?}");
     }
 }
 
@@ -261,12 +277,14 @@ fn a_command_is_typed_before_its_deadline_or_not_at_all() {
     assert!(talk.command("silence"));
     talk.turn();
     let deadline = talk.now.after(Duration::from_secs(1));
-    assert!(talk.session.command("start", deadline) && talk.session.command("clear", Moment::NEVER));
-    talk.second();
+    let start = talk.session().command("start", deadline).unwrap();
+    assert!(talk.session().command("clear", Moment::NEVER).is_some());
+    assert_eq!(talk.second(), []);
     talk.now = talk.now.after(Duration::from_millis(20));
     talk.board.say(b"ok\r\n");
     let happened = talk.second();
-    let expected = [answered("ok"), Happening::Late("start".to_owned()), typed("clear"), answered("ok")];
+    let late = Happening::Unanswered { number: start, command: "start".to_owned(), why: Unanswered::Late };
+    let expected = [answered("ok"), late, typed("clear"), answered("ok")];
     assert_eq!(happened, expected);
     assert!(!talk.board.typed().contains(&"start".to_owned()));
 }
@@ -277,7 +295,7 @@ fn half_a_line_that_was_typed_before_is_deleted_and_not_ended() {
     let mut port = board.open().unwrap();
     // The port stalled in the middle of a command.
     port.write_all(b"start").unwrap();
-    let mut link = Link::over(port, false).unwrap();
+    let mut link = Link::over(Wire::over(port, false)).unwrap();
     assert_eq!(board.typed(), [""; 0]);
     assert!(link.ask("status").unwrap()[0].starts_with("state=hold "));
 }

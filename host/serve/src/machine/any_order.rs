@@ -8,10 +8,11 @@
 
 use super::*;
 use crate::hub::Message;
-use link::{Link, LinkError};
+use link::{LinkError, Wire};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::ScriptedBoard;
+use std::collections::VecDeque;
 use std::pin::Pin;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Poll, Waker};
@@ -71,7 +72,7 @@ struct World {
     machine: Arc<Machine>,
     board: ScriptedBoard,
     talk: Talk,
-    session: Session,
+    connection: Connection,
     commands: mpsc::Receiver<Asked>,
     holds: mpsc::Receiver<Asked>,
     pages: [Page; 2],
@@ -93,19 +94,13 @@ impl World {
         let hub = Arc::new(Hub::new(1, seed << 20, Box::new(clock)));
         let board = ScriptedBoard::plugged_in();
         let port = board.clone();
-        let open = move || Link::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false);
-        let mut session = Session::waiting_for(open);
-        session.keeps_hold = true;
+        let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
+        let mut connection = Connection::waiting_for(open);
+        connection.session.keeps_hold = true;
         let (send_commands, commands) = mpsc::channel(WAITING);
         let (send_holds, holds) = mpsc::channel(WAITING);
         let machine = Machine { name: "uno".to_owned(), number: 0, commands: send_commands, holds: send_holds };
-        let talk = Talk {
-            number: 0,
-            name: "uno".to_owned(),
-            hub: Arc::clone(&hub),
-            tell: Arc::new(|_| {}),
-            asked: VecDeque::new(),
-        };
+        let talk = Talk::new(0, "uno".to_owned(), Arc::clone(&hub), Arc::new(|_| {}));
         let page = || Page { messages: None, coming: VecDeque::new(), seen: 0, sleeps_until: 0, hold_at: None };
         Self {
             random: ChaCha8Rng::seed_from_u64(seed),
@@ -115,7 +110,7 @@ impl World {
             machine: Arc::new(machine),
             board,
             talk,
-            session,
+            connection,
             commands,
             holds,
             pages: [page(), page()],
@@ -187,7 +182,7 @@ impl World {
             self.pending.push((page, start, Box::pin(answer)));
             self.poll();
         }
-        self.talk.turn(&mut self.session, &mut self.commands, &mut self.holds);
+        self.talk.turn(&mut self.connection, &mut self.commands, &mut self.holds);
         self.poll();
         self.deliver();
     }

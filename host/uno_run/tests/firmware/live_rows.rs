@@ -4,9 +4,10 @@
 use field::machine::Machine;
 use field::planting::Planting;
 use field::row::{Canopy, Row};
-use link::rows::{Heard, Hold, Opener, Rows, What};
+use link::connection::Opener;
+use link::rows::{Heard, Hold, Rows, What};
 use link::session::Happening;
-use link::{EventLine, Link, Mode};
+use link::{EventLine, Mode, Wire};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -54,7 +55,7 @@ impl Laptop {
     fn open(machine: &Background) -> Self {
         let opener = |path: &PathBuf| -> Opener {
             let path = path.to_str().expect("it is text").to_owned();
-            Box::new(move || Link::open(Some(&path)))
+            Box::new(move || Wire::open(Some(&path)))
         };
         let (rows, missing) = Rows::open(machine.paths().iter().map(opener).collect());
         assert!(missing.iter().all(Option::is_none), "{missing:?}");

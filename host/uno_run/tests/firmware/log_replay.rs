@@ -4,9 +4,10 @@ use field::machine::Machine;
 use field::motion::Motion;
 use field::planting::Planting;
 use field::row::{Canopy, Row};
+use link::connection::Connection;
 use link::moment::Moment;
-use link::session::{Happening, Session};
-use link::{EventLine, Link, LinkError, Status};
+use link::session::Happening;
+use link::{EventLine, LinkError, Status, Wire};
 use logbook::log::{self, Entry, Kind, LogWriter};
 use logbook::replay::{Replayed, replay};
 use model_test::cases;
@@ -61,12 +62,12 @@ fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], e
     let ms = Arc::clone(&port.ms);
     let mut port = Some(port);
     let open = move || match port.take() {
-        Some(port) => Link::over(port, false),
+        Some(port) => Ok(Wire::over(port, false)),
         None => Err(LinkError::Absent("it is gone".to_owned())),
     };
-    let mut session = Session::waiting_for(open);
+    let mut connection = Connection::waiting_for(open);
     for command in commands {
-        assert!(session.command(command, Moment::NEVER), "{command}");
+        assert!(connection.session.command(command, Moment::NEVER).is_some(), "{command}");
     }
     let folder = tempfile::tempdir().expect("there is room for a log");
     let path = folder.path().join("log.csv");
@@ -77,12 +78,15 @@ fn logged_at(port: HostPort, mut typed: Option<ChaCha8Rng>, commands: &[&str], e
             && typed.random_ratio(1, 100)
         {
             match typed.random_range(0..5) {
-                place @ 0..3 => assert!(session.command(["start", "start now", "clear"][place], Moment::NEVER)),
-                _ => _ = session.hold(),
+                place @ 0..3 => {
+                    let line = ["start", "start now", "clear"][place];
+                    assert!(connection.session.command(line, Moment::NEVER).is_some());
+                }
+                _ => _ = connection.session.hold(),
             }
         }
         let now = Moment::default().after(Duration::from_millis(ms.load(Ordering::Relaxed)));
-        for happening in session.turn(now) {
+        for happening in connection.turn(now) {
             assert!(!matches!(happening, Happening::Lost(_)), "{happening:?}");
             if let Happening::Status(status, _) = &happening {
                 let is_there = i64::from(status.position) > end;

@@ -9,9 +9,10 @@ use gps::simulated::{ReceiverSetup, SimulatedReceiver, Trouble};
 use gps::summary::{Stand, Summary};
 use gps::track::{Basis, Missing, Offset};
 use gps::{Antenna, Recorder, Wanted};
+use link::connection::Connection;
 use link::moment::Moment;
-use link::session::{Happening, Session};
-use link::{Class, Link, LinkError};
+use link::session::Happening;
+use link::{Class, LinkError, Wire};
 use logbook::log::{self, Entry, Kind, LogWriter};
 use logbook::replay::replay;
 use std::cell::Cell;
@@ -86,12 +87,14 @@ fn recorded(
     let cycle = Rc::new(Cell::new(uno.cycle()));
     let mut port = Some(Clocked { port: UnoPort::new(uno), cycle: Rc::clone(&cycle) });
     let open = move || match port.take() {
-        Some(port) => Link::over(port, false),
+        Some(port) => Ok(Wire::over(port, false)),
         None => Err(LinkError::Absent("it is gone".to_owned())),
     };
-    let mut session = Session::waiting_for(open);
+    let mut connection = Connection::waiting_for(open);
     // The simulated servo has no load, and the tool swings in between any two plants.
-    assert!(session.command("set lead_out_ms 180", Moment::NEVER) && session.command("start", Moment::NEVER));
+    for line in ["set lead_out_ms 180", "start"] {
+        assert!(connection.session.command(line, Moment::NEVER).is_some());
+    }
     let folder = tempfile::tempdir().expect("there is room for a log");
     let path = folder.path().join("log.csv");
     let mut log = LogWriter::open(&path).expect("the log can be written");
@@ -104,7 +107,7 @@ fn recorded(
     log.lines_at(0, &lines).expect("the log can be written");
     log.lines_at(0, &recorder.found(0, "simulated")).expect("the log can be written");
     while time_s() < end_s {
-        let happened = session.turn(Moment::default().after(Duration::from_secs_f64(time_s() - began_s)));
+        let happened = connection.turn(Moment::default().after(Duration::from_secs_f64(time_s() - began_s)));
         let since_s = time_s() - began_s;
         let time_ms = (since_s * 1000.0) as u64;
         for happening in happened {
@@ -116,7 +119,7 @@ fn recorded(
                 && line.starts_with("weed ")
                 && since_s > 30.0
             {
-                assert!(session.command("label weed force", Moment::NEVER));
+                assert!(connection.session.command("label weed force", Moment::NEVER).is_some());
             }
         }
         let bytes = simulated.bytes_until(time_s(), distance_m);

@@ -4,7 +4,7 @@ use check_board::Boards;
 use check_board::pair::{CLOCK_PPM, Pair, Side, Wiring};
 use check_board::tester::Tester;
 use check_board::wiring::Weeder;
-use link::Link;
+use link::{Link, Wire};
 use std::cell::RefCell;
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -30,7 +30,7 @@ pub fn boards_with(weeder: &Path, wiring: Wiring) -> (Rc<RefCell<Pair>>, Boards)
     let opened = Rc::clone(&pair);
     let open = move || {
         opened.borrow_mut().reset(Side::Weeder).expect("it is reset");
-        Link::over(PairPort { pair: Rc::clone(&opened), side: Side::Weeder }, true)
+        Link::over(Wire::over(PairPort { pair: Rc::clone(&opened), side: Side::Weeder }, true))
     };
     let weeder = Weeder::over(open).expect("the weeder answers");
     (pair, Boards { weeder, tester, clock_ratio: 1.0 + CLOCK_PPM as f64 / 1e6 })

@@ -271,7 +271,7 @@ fn held(model: &mut Model) {
     let count = model.rows.len();
     model.held(Hold::new(since, model.rows.iter().map(RowModel::is_there)));
     for row in 0..count - 1 {
-        let what = What::Happened(Happening::Answered { command: "hold".to_owned(), refusal: None });
+        let what = What::Happened(Happening::Answered { number: 1, command: "hold".to_owned(), refusal: None });
         model.take(Heard { row, at: since + Duration::from_millis(20 + row as u64), what });
     }
 }
@@ -332,7 +332,7 @@ fn the_row_that_commands_go_to_is_chosen_and_its_answer_is_marked() {
     model.sent(model.target, "start");
     assert!(screen_of(&model, 80, 24).contains("row 2 work  ? in"), "{}", screen_of(&model, 80, 24));
     let refusal = Some("error: alarm latched".to_owned());
-    model.update(1, Happening::Answered { command: "start".to_owned(), refusal });
+    model.update(1, Happening::Answered { number: 1, command: "start".to_owned(), refusal });
     let drawn = screen_of(&model, 80, 24);
     assert!(
         drawn.contains("row 2 work  ! in") && drawn.contains("row 2> ") && drawn.contains("> row 2: start"),

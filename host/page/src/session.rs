@@ -1,0 +1,144 @@
+//! Sessions with machines, over wires that the page opens. `page/src/link/session.ts` passes time and bytes.
+
+use link::LinkError;
+use link::moment::Moment;
+use link::session::{Happening, Session, Unanswered};
+use link::settings::helps;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::cell::RefCell;
+use std::time::Duration;
+
+thread_local! {
+    /// The sessions so far, by their numbers; `None` if it was closed.
+    static SESSIONS: RefCell<Vec<Option<Session>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// A request to a session, by the session's number.
+#[derive(Deserialize)]
+pub struct Request {
+    session: usize,
+    what: What,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
+enum What {
+    /// Type a command. Answers its number, or `null` if it is no command or too many wait.
+    Command { line: String, deadline_ms: f64 },
+    /// Type `hold` at once. Answers its number.
+    Hold,
+    /// What has the wire received, with a character for each byte? Answers what happened, and what to send.
+    Turn { now_ms: f64, received: String },
+    /// The wire is closed.
+    Close,
+}
+
+/// Begins a session over an open wire. Answers its number.
+pub fn open(resets: bool) -> Value {
+    SESSIONS.with_borrow_mut(|sessions| {
+        let mut session = Session::new();
+        session.open(resets);
+        sessions.push(Some(session));
+        json!(sessions.len() - 1)
+    })
+}
+
+impl Request {
+    /// Does what is requested.
+    ///
+    /// # Errors
+    /// If there is no such session.
+    pub fn take(self) -> Result<Value, String> {
+        SESSIONS.with_borrow_mut(|sessions| {
+            let place =
+                sessions.get_mut(self.session).filter(|place| place.is_some()).ok_or("there is no such session")?;
+            if let What::Close = self.what {
+                *place = None;
+            }
+            Ok(place.as_mut().map_or(Value::Null, |session| match self.what {
+                What::Command { line, deadline_ms } => json!(session.command(&line, moment(deadline_ms))),
+                What::Hold => json!(session.hold()),
+                What::Turn { now_ms, received } => turn(session, moment(now_ms), &received),
+                What::Close => Value::Null,
+            }))
+        })
+    }
+}
+
+/// A page has one clock.
+fn moment(ms: f64) -> Moment {
+    let time = Duration::try_from_secs_f64(ms / 1000.0).unwrap_or_default();
+    Moment { ticking: time, calendar: time }
+}
+
+/// The failure ends the session.
+fn turn(session: &mut Session, now: Moment, received: &str) -> Value {
+    let received: Vec<u8> = received.chars().map(|byte| u8::try_from(byte).unwrap_or(b'?')).collect();
+    let turn = session.turn(now, &received);
+    let send: String = turn.to_send.into_iter().map(char::from).collect();
+    let news: Vec<Value> = turn.happened.into_iter().map(news).collect();
+    json!({ "news": news, "send": send, "failure": session.take_failure().map(|error| failure(&error)) })
+}
+
+/// A happening in the form of `News` in `page/src/link/session.ts`.
+fn news(happening: Happening) -> Value {
+    match happening {
+        Happening::Started { greeting, while_at_work } => {
+            json!({ "is": "restarted", "said": greeting, "wasAtWork": while_at_work.is_some() })
+        }
+        Happening::Connected { version, shown, examples, .. } => {
+            json!({ "is": "there", "version": version, "settings": shown, "examples": examples, "help": helps() })
+        }
+        Happening::Lost(why) => json!({ "is": "lost", "why": why }),
+        Happening::Status(_, line) => json!({ "is": "status", "said": line }),
+        Happening::Event(_, line) => json!({ "is": "event", "said": line }),
+        Happening::Settings(_, lines) => json!({ "is": "settings", "said": lines }),
+        Happening::Examples(lines) => json!({ "is": "examples", "said": lines }),
+        Happening::Command(line) => json!({ "is": "command", "line": line }),
+        Happening::Answer(line) => json!({ "is": "answer", "line": line }),
+        Happening::Answered { number, refusal, .. } => {
+            json!({ "is": "answered", "number": number, "refusal": refusal })
+        }
+        Happening::Unanswered { number, why, .. } => {
+            let (why, because) = match why {
+                Unanswered::Late => ("late", None),
+                Unanswered::Held => ("held", None),
+                Unanswered::NotTyped(because) => ("notTyped", Some(because)),
+                Unanswered::Unknown(because) => ("unknown", Some(because)),
+            };
+            json!({ "is": "unanswered", "number": number, "why": why, "because": because })
+        }
+    }
+}
+
+/// Why no weeder answers, in the form of `Failure` in `page/src/link/session.ts`.
+fn failure(error: &LinkError) -> Value {
+    let (is, about) = match error {
+        LinkError::Noise => ("noText", String::new()),
+        LinkError::Silent { received, .. } if received.is_empty() => ("nothingAnswers", String::new()),
+        LinkError::Restarted(command) => ("resetWhileAsked", command.clone()),
+        LinkError::Silent { received: answer, .. }
+        | LinkError::NotTheWeeder(answer)
+        | LinkError::Refused { answer, .. } => ("otherDevice", answer.chars().take(60).collect()),
+        error => ("otherDevice", error.to_string()),
+    };
+    json!({ "is": is, "about": about })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_that_is_closed_takes_no_request() {
+        let number = usize::try_from(open(false).as_u64().unwrap()).unwrap();
+        let request = |what| Request { session: number, what }.take();
+        let turn = request(What::Turn { now_ms: 0.0, received: "\u{ff}\u{100}".to_owned() }).unwrap();
+        assert!(turn["send"].as_str().unwrap().ends_with("\u{8}\n") && turn["failure"].is_null(), "{turn}");
+        assert_eq!(request(What::Command { line: "two\nlines".to_owned(), deadline_ms: 9.0 }), Ok(Value::Null));
+        assert_eq!(request(What::Hold), Ok(json!(1)));
+        assert_eq!(request(What::Close), Ok(Value::Null));
+        assert!(request(What::Hold).is_err());
+    }
+}
