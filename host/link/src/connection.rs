@@ -30,7 +30,7 @@ pub struct Connection {
 impl Connection {
     /// A connection without a port: the turns call `open` until it returns one.
     pub fn waiting_for(open: impl FnMut() -> Result<Wire, LinkError> + 'static) -> Self {
-        Self { session: Session::new(), open: Box::new(open), wire: None, tried: None }
+        Self { session: Session::default(), open: Box::new(open), wire: None, tried: None }
     }
 
     /// Reads, types, and returns what happened since the last turn.

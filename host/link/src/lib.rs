@@ -2,16 +2,17 @@
 //!
 //! [`Link::open`] opens the port of a real or virtual Uno. It waits for the reset that opening a real port causes, and
 //! checks that the weeder's firmware answers. [`Link::ask`] types a command and waits for its answer.
-//! [`Link::next_line`] returns the lines that the machine sends by itself. A [`session`] does both, and runs until the
-//! caller ends it. [`ConsoleLine`] is a parsed line. [`settings`] and [`settings_file`] transfer all settings, and
-//! [`examples`] transfers all taught examples.
+//! [`Link::next_line`] returns the lines that the machine sends by itself. A [`session`] does all of this without input
+//! or output, also for a browser's port. A [`connection`] runs a session at a port of this computer, and opens a lost port
+//! again. [`rows`] runs several connections at once. [`row_names`] maps boards to rows.
+//!
+//! [`ConsoleLine`] is a parsed line. [`settings`] and [`settings_file`] transfer all settings, and [`examples`] transfers
+//! all taught examples.
 //!
 //! Input from the port is not trusted: it may be noise, lines without an end, or another firmware. Buffers are bounded,
 //! control characters are removed, and every wait has a timeout.
 //!
-//! A link does not reconnect. If its port is gone, it returns an error, and the session opens a new link. [`rows`] runs
-//! several sessions at once. [`row_names`] maps boards to rows. This crate knows no plants and no simulator. All except
-//! the serial port also compiles for a browser.
+//! This crate knows no plants and no simulator. All except the serial port also compiles for a browser.
 
 pub mod advice;
 pub mod completion;
@@ -53,21 +54,18 @@ use std::time::{Duration, Instant};
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
 
-/// Silent reads in a row after which the link gives up an answer: two seconds.
-const SILENT_READS: usize = 100;
-
-/// Longest time of an answer while lines keep coming. The longest valid answer, all examples, takes less than a second.
-const ANSWER_TIME: Duration = Duration::from_secs(10);
-
-/// Greatest length of an answer in bytes: six times the longest valid one.
-const ANSWER_BYTES: usize = 40_000;
-
-/// Silent reads until the greeting must come after a reset: the longest wait of an old bootloader, and a reserve.
-const BOOT_READS: usize = 150;
-
 /// Time that a read takes in which nothing comes, and the least time of another one.
 const SILENT_READ: Duration = Duration::from_millis(20);
 const BUSY_READ: Duration = Duration::from_millis(1);
+
+/// Silent reads in a row after which the link gives up an answer.
+const SILENT_READS: u128 = session::FIRST_PATIENCE.as_millis() / SILENT_READ.as_millis();
+
+/// Silent reads until the greeting must come after a reset.
+const BOOT_READS: u128 = session::BOOT.as_millis() / SILENT_READ.as_millis();
+
+/// Longest time of an answer while lines keep coming.
+const ANSWER_TIME: Duration = Duration::from_secs(10);
 
 /// Something from the port.
 enum Received {
@@ -134,7 +132,7 @@ impl Link {
         let deadline = Instant::now() + ANSWER_TIME;
         let (mut silent_reads, mut bytes) = (0, 0);
         let mut answer: Vec<String> = Vec::new();
-        while silent_reads < SILENT_READS && bytes < ANSWER_BYTES && Instant::now() < deadline {
+        while silent_reads < SILENT_READS && bytes < session::ANSWER_BYTES && Instant::now() < deadline {
             let line = match self.hear()? {
                 Received::Nothing => {
                     silent_reads += 1;

@@ -40,13 +40,13 @@ const BEHIND: Duration = Duration::from_millis(300);
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Longest silence during an answer to the first questions. The longest answer, all examples, takes less than a second.
-const FIRST_PATIENCE: Duration = Duration::from_secs(2);
+pub(crate) const FIRST_PATIENCE: Duration = Duration::from_secs(2);
 
-/// Most bytes that are received during the answer to a first question: six times the longest valid one.
-const ANSWER_BYTES: usize = 40_000;
+/// Most bytes that come during the answer to a first question: six times the longest valid answer.
+pub(crate) const ANSWER_BYTES: usize = 40_000;
 
 /// Longest time from a reset to the greeting: the wait of an old bootloader, and a reserve.
-const BOOT: Duration = Duration::from_secs(3);
+pub(crate) const BOOT: Duration = Duration::from_secs(3);
 
 /// How long the line must be silent before the first question, and the longest wait for that.
 const QUIET: Duration = Duration::from_millis(40);
@@ -159,9 +159,10 @@ pub struct Turn {
 }
 
 /// How far the connection has come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum State {
     /// There is no wire.
+    #[default]
     Closed,
     /// The wire was opened, and the Uno may be starting.
     Starting { since: Duration },
@@ -209,7 +210,8 @@ struct Introduction {
     early: Vec<Happening>,
 }
 
-/// A session with a machine.
+/// A session with a machine; by default one without a wire.
+#[derive(Default)]
 pub struct Session {
     /// Whether a `hold` without an answer outlasts a loss. It is then the first line that is typed after the loss.
     pub keeps_hold: bool,
@@ -233,41 +235,16 @@ pub struct Session {
     turned: Option<Moment>,
     /// Whether the machine was at work, as far as it has told.
     is_at_work: bool,
-    /// Whether the reason for the missing machine was not reported yet.
-    is_loss_unreported: bool,
+    /// Whether the reason for the missing machine was reported.
+    is_loss_told: bool,
     failure: Option<LinkError>,
     turn: Turn,
 }
 
 impl Session {
-    /// A session without a wire.
-    #[expect(clippy::new_without_default, reason = "a session has a state, and no value is the default of one")]
-    pub fn new() -> Self {
-        Self {
-            keeps_hold: false,
-            is_bare: false,
-            state: State::Closed,
-            introduction: Introduction::default(),
-            lines: LineReader::default(),
-            version: String::new(),
-            asked: VecDeque::new(),
-            waiting: VecDeque::new(),
-            to_hold: None,
-            own: BTreeSet::new(),
-            numbers: 0,
-            poll_at: Duration::ZERO,
-            waited: Duration::ZERO,
-            turned: None,
-            is_at_work: false,
-            is_loss_unreported: true,
-            failure: None,
-            turn: Turn::default(),
-        }
-    }
-
     /// A session that only makes sure that the weeder's firmware answers. It types nothing after that by itself.
     pub(crate) fn bare() -> Self {
-        Self { is_bare: true, ..Self::new() }
+        Self { is_bare: true, ..Self::default() }
     }
 
     /// A wire was opened; `resets` says whether that has reset the Uno.
@@ -373,7 +350,7 @@ impl Session {
     /// The machine is lost or has restarted: pending commands will not be answered.
     fn give_up(&mut self, why: String) {
         self.turn.is_given_up = true;
-        if std::mem::take(&mut self.is_loss_unreported) || self.state == State::Ready {
+        if !std::mem::replace(&mut self.is_loss_told, true) || self.state == State::Ready {
             self.turn.happened.push(Happening::Lost(why.clone()));
         }
         let mut is_to_hold = self.to_hold.is_some();
@@ -626,7 +603,7 @@ impl Session {
         let Introduction { shown, examples, early, .. } = std::mem::take(&mut self.introduction);
         let (settings, version) = (Shown::by(&shown).settings, self.version.clone());
         self.state = State::Ready;
-        (self.poll_at, self.is_loss_unreported) = (self.waited + POLL, false);
+        (self.poll_at, self.is_loss_told) = (self.waited + POLL, true);
         self.turn.happened.push(Happening::Connected { version, settings, shown, examples });
         // Before the first event, so that a log begins with the machine's state.
         let status = status.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line)));

@@ -37,7 +37,7 @@ enum What {
 /// Begins a session over an open wire. Answers its number.
 pub fn open(resets: bool) -> Value {
     SESSIONS.with_borrow_mut(|sessions| {
-        let mut session = Session::new();
+        let mut session = Session::default();
         session.open(resets);
         sessions.push(Some(session));
         json!(sessions.len() - 1)

@@ -3,7 +3,7 @@
 use super::*;
 use crate::connection::Connection;
 use crate::{Link, Wire};
-use rand::{Rng, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::ScriptedBoard;
 use std::io::Write;
@@ -298,4 +298,147 @@ fn half_a_line_that_was_typed_before_is_deleted_and_not_ended() {
     let mut link = Link::over(Wire::over(port, false)).unwrap();
     assert_eq!(board.typed(), [""; 0]);
     assert!(link.ask("status").unwrap()[0].starts_with("state=hold "));
+}
+
+/// A session without a port, 20 ms later each time; and what it sends.
+fn sends(session: &mut Session, now: &mut Moment, received: &str) -> String {
+    *now = now.after(Duration::from_millis(20));
+    String::from_utf8(session.turn(*now, received.as_bytes()).to_send).unwrap()
+}
+
+#[test]
+fn hold_does_not_wait_for_the_first_answers() {
+    let (mut session, mut now) = (Session::default(), Moment::default());
+    session.open(false);
+    for _ in 0..3 {
+        sends(&mut session, &mut now, "");
+    }
+    let number = session.hold();
+    assert_eq!(sends(&mut session, &mut now, ""), "hold\n");
+    assert_eq!(sends(&mut session, &mut now, "weeder 0.2.0\r\nok\r\n"), "");
+    let turn = session.turn(now, b"ok\r\n");
+    let answered = Happening::Answered { number, command: HOLD.to_owned(), refusal: None };
+    assert!(turn.happened.contains(&answered), "{turn:?}");
+    assert_eq!(turn.to_send, b"get\n");
+}
+
+#[test]
+fn where_an_answer_may_be_late_hold_is_typed_at_once_and_again_behind_the_first_certain_answer() {
+    let (mut session, mut now) = (Session::default(), Moment::default());
+    session.open(false);
+    let mut sent = String::new();
+    // The first question stays unanswered, so its answer may still come.
+    while !sent.ends_with(&format!("version\n{}\n", "\u{8}".repeat(LINE_LENGTH))) {
+        sent += &sends(&mut session, &mut now, "");
+        assert!(now.ticking < Duration::from_secs(9));
+    }
+    let number = session.hold();
+    assert_eq!(sends(&mut session, &mut now, ""), "hold\n");
+    let status = "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n";
+    let answers = [("", "version\n"), ("ok\r\n", ""), ("weeder 0.2.0\r\nok\r\n", "status\n"), (status, "hold\n")];
+    for (received, sent) in answers {
+        assert_eq!(sends(&mut session, &mut now, received), sent, "behind {received:?}");
+    }
+    let answered = Happening::Answered { number, command: HOLD.to_owned(), refusal: None };
+    assert!(session.turn(now, b"ok\r\n").happened.contains(&answered));
+}
+
+/// What a caller knows of a command.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    line: String,
+    is_typed: bool,
+    ends: usize,
+}
+
+#[test]
+fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
+    let seed = std::env::var("WEEDER_SEED").map_or(1, |seed| seed.parse().unwrap());
+    println!("WEEDER_SEED={seed}");
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let lines = [
+        "ok\r\n",
+        "ok",
+        "\r\n",
+        "weeder 0.2.0\r\nok\r\n",
+        "k=3 from 1 to 15, default 3, not saved\r\nok\r\n",
+        "spoiled=0\r\nok\r\n",
+        "state=hold tool=out pos=0 speed_mm_s=0 windows=0 unseen_mm=400\r\nok\r\n",
+        "error: no such command\r\n",
+        "swing tool=out pos=9\r\n",
+        "weeder 0.2.0, reset by brown_out, state hold, tool out; help lists the commands\r\n",
+        "\u{1}\u{7f}~",
+        "",
+    ];
+    let (mut connections, mut ends) = (0, [0; 5]);
+    for _ in 0..200 {
+        let (mut session, mut now) = (Session { keeps_hold: random.random(), ..Session::default() }, Moment::default());
+        let mut known: std::collections::BTreeMap<u64, Known> = std::collections::BTreeMap::new();
+        let mut answered = true;
+        for step in 0..600 {
+            match random.random_range(0..40) {
+                0 if !session.is_open() => session.open(random.random()),
+                1 if step % 7 == 0 => session.lose(LinkError::Noise),
+                2..6 => {
+                    let line = format!("start {step}");
+                    let deadline = now.after(Duration::from_millis(random.random_range(0..500)));
+                    let number = session.command(&line, deadline).unwrap();
+                    known.insert(number, Known { line, ..Known::default() });
+                }
+                6 => drop(known.entry(session.hold()).or_insert(Known { line: HOLD.to_owned(), ..Known::default() })),
+                _ => {}
+            }
+            now = now.after(Duration::from_millis(random.random_range(0..60)));
+            // Mostly the answer that is due, and sometimes another line.
+            let received = match &*session.asked.make_contiguous() {
+                [asked, ..] if random.random_ratio(3, 4) => match asked.line.as_str() {
+                    VERSION => lines[3],
+                    SETTINGS => lines[4],
+                    EXAMPLES => lines[5],
+                    STATUS => lines[6],
+                    _ => lines[0],
+                },
+                _ if random.random_ratio(1, 3) => lines[random.random_range(0..lines.len())],
+                _ => "",
+            };
+            answered = !answered;
+            let turn = session.turn(now, if answered { received.as_bytes() } else { b"" });
+            let sent = String::from_utf8(turn.to_send).unwrap();
+            for happening in turn.happened {
+                let (number, end) = match happening {
+                    Happening::Answered { number, .. } => (number, 0),
+                    Happening::Unanswered { number, why: Unanswered::Late, .. } => (number, 1),
+                    Happening::Unanswered { number, why: Unanswered::Held, .. } => (number, 2),
+                    Happening::Unanswered { number, why: Unanswered::NotTyped(_), .. } => (number, 3),
+                    Happening::Unanswered { number, why: Unanswered::Unknown(_), .. } => (number, 4),
+                    Happening::Connected { .. } => {
+                        connections += 1;
+                        continue;
+                    }
+                    _ => continue,
+                };
+                ends[end] += 1;
+                if let Some(known) = known.get_mut(&number) {
+                    known.ends += 1;
+                    let is_typed = end == 0 || end == 4;
+                    // A `hold` may also be typed blindly.
+                    assert!(known.is_typed == is_typed || known.line == HOLD, "{known:?} ends by {end}");
+                }
+            }
+            for known in known.values_mut().filter(|known| sent.lines().any(|line| line == known.line)) {
+                assert!(known.ends == 0 || known.line == HOLD, "{known:?} is typed behind its end");
+                known.is_typed = true;
+            }
+        }
+        session.lose(LinkError::Noise);
+        for happening in session.turn(now, b"").happened {
+            if let Happening::Unanswered { number, .. } = happening
+                && let Some(known) = known.get_mut(&number)
+            {
+                known.ends += 1;
+            }
+        }
+        assert!(known.values().all(|known| known.ends == 1), "{known:?}");
+    }
+    assert!(connections > 100 && ends.iter().all(|&count| count > 100), "{connections} {ends:?}");
 }
