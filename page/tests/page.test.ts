@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import test, { after, before } from "node:test";
 import type { Browser } from "playwright-core";
-import { close, DESK, inspect, launch, open, PHONE } from "./browser.ts";
+import { close, DESK, inspect, launch, moving, open, PHONE } from "./browser.ts";
 import { part, pass, rollTo, tryIt, type, weeds } from "./trying.ts";
 
 let browser: Browser;
@@ -18,6 +18,7 @@ after(() => browser?.close());
 test("the page weeds a row with the real firmware, no plant is damaged, and it says so", async () => {
     const opened = await tryIt(browser);
     const { page } = opened;
+    await moving(page);
     await page.getByLabel("Work switch").check();
     await pass(page, 0.2);
     await part(page, "state").filter({ hasText: "work" }).waitFor();
@@ -217,6 +218,7 @@ for (const [device, viewport] of [
 
 test("how soon the page moves, and how fluently on a slow processor, is measured", async (test) => {
     const { page, errors } = await open(browser, "try", PHONE);
+    await moving(page);
     const moved = await page.waitForFunction(() => globalThis.simulation.machine.placeMm > 0 && performance.now());
     const processor = await page.context().newCDPSession(page);
     await processor.send("Emulation.setCPUThrottlingRate", { rate: 6 });

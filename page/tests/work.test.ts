@@ -6,7 +6,7 @@ import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
 import test, { after, before, type TestContext } from "node:test";
 import type { Browser, Page } from "playwright-core";
-import { close, DESK, inspect, launch, type Opened, open, PHONE } from "./browser.ts";
+import { close, DESK, inspect, launch, moving, type Opened, open, PHONE } from "./browser.ts";
 import { type Device, Foreign, VirtualUno } from "./ports.ts";
 import { WEEDER } from "./weeder.ts";
 
@@ -64,6 +64,7 @@ test("a new board shows its alarm with what to do, works, and holds, and all of 
     const uno = await VirtualUno.start(test, "--elf", FIRMWARE);
     const opened = await connect(uno, PHONE);
     const { page } = opened;
+    await moving(page);
     await part(page, "alarm-name").filter({ hasText: "Alarm 5-1 settings_lost" }).waitFor();
     assert.match(
         (await part(page, "alarm-advice").textContent()) ?? "",
