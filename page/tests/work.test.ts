@@ -337,9 +337,7 @@ test("pasted lines are typed one by one, whatever ends them, and HOLD drops the 
         .waitFor();
     assert.deepEqual((await lines()).slice(before), ["> set margin_mm 41", "> set stem_zone_mm 0", "> get margin_mm"]);
     await paste("x".repeat(200));
-    await part(page, "said")
-        .getByText(/^error: .*80 characters/)
-        .waitFor();
+    await part(page, "said").getByText("send 80 characters at most").waitFor();
     await page.evaluate(() => {
         const input = document.querySelector("#work-panel [data-part=typed]");
         const clipboardData = new DataTransfer();

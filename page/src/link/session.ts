@@ -54,6 +54,9 @@ export const isHold = (line: string): boolean => /^\s*hold[\s!-/:-@[-\x60{-~]*$/
 /** No machine answers, and what to do. */
 export class NoMachine extends Error {}
 
+/** A line that cannot be typed, and what would be right. */
+export class NoCommand extends Error {}
+
 /** A machine to talk to: by a session here, or by the session of another computer (served.ts). */
 export interface Link {
     onHappening: (happening: Happening) => void;
@@ -166,7 +169,7 @@ export class Session implements Link {
         if (this.#ended) return Promise.reject(new NoMachine(english("noneConnected")));
         const number = this.#request<number | null>({ command: { line, deadlineMs: this.now + WAIT_MS } });
         if (number !== null) return this.#end(number);
-        return Promise.reject(new Refused(english(line.length > 80 ? "refusedTooLong" : "refusedNotText")));
+        return Promise.reject(new NoCommand(english(line.length > 80 ? "refusedTooLong" : "refusedNotText")));
     }
 
     async hold(): Promise<void> {

@@ -7,7 +7,7 @@ import { download, Parts } from "../dom.ts";
 import type { EventLine } from "../link/console_line.ts";
 import { Log } from "../link/log.ts";
 import type { Allowed } from "../link/served.ts";
-import { type Ask, type Happening, isHold, type Link, NoMachine, Refused } from "../link/session.ts";
+import { type Ask, type Happening, isHold, type Link, NoCommand, NoMachine, Refused } from "../link/session.ts";
 import { isStill, STILL_MS } from "../preferences.ts";
 import { signal } from "../signals.ts";
 import { english, number, onLanguage, quantity, say, told, translate } from "../words/words.ts";
@@ -282,7 +282,7 @@ export class Panel {
         } catch (error) {
             const { message } = error as Error;
             this.#parts.write("answered", told(message));
-            if (error instanceof NoMachine) this.#console.add(message, "error");
+            if (error instanceof NoMachine || error instanceof NoCommand) this.#console.add(message, "error");
         }
     }
 
