@@ -364,7 +364,8 @@ impl Session {
             self.end(number, line, Unanswered::NotTyped(why.clone()));
         }
         if let Some(number) = self.to_hold.take() {
-            self.end(number, HOLD.to_owned(), Unanswered::NotTyped(why));
+            let is_typed = self.introduction.has_held;
+            self.end(number, HOLD.to_owned(), if is_typed { Unanswered::Unknown(why) } else { Unanswered::NotTyped(why) });
         }
         self.to_hold = (is_to_hold && self.keeps_hold).then(|| self.next_number());
         self.own.clear();
@@ -382,8 +383,9 @@ impl Session {
         if !error.is_of_an_answer() || self.introduction.tries == RETRIES {
             return self.lose(error);
         }
-        let Introduction { tries, early, .. } = std::mem::take(&mut self.introduction);
-        self.introduction = Introduction { tries: tries + 1, late: tries + 1, early, ..Introduction::default() };
+        let Introduction { tries, late, early, .. } = std::mem::take(&mut self.introduction);
+        let late = late + self.asked.len();
+        self.introduction = Introduction { tries: tries + 1, late, early, ..Introduction::default() };
         let hold = self.asked.drain(..).find(|asked| asked.line == HOLD);
         self.to_hold = hold.and_then(|hold| hold.number).or(self.to_hold);
         self.settle();
@@ -421,8 +423,9 @@ impl Session {
             State::Ready => {
                 if let Some(asked) = self.asked.front().filter(|asked| is_silent && is_over(asked.since, PATIENCE)) {
                     let error = LinkError::Unanswered { command: asked.line.clone(), seconds: PATIENCE.as_secs() };
+                    let late = self.asked.len();
                     self.give_up(error.to_string());
-                    self.introduction = Introduction { late: 1, ..Introduction::default() };
+                    self.introduction = Introduction { late, ..Introduction::default() };
                     self.settle();
                 }
             }
