@@ -233,6 +233,8 @@ pub struct Session {
     /// The waiting time in all turns so far, and the moment of the last turn.
     waited: Duration,
     turned: Option<Moment>,
+    /// Whether nothing was received since the last turn.
+    is_silent: bool,
     /// Whether the machine was at work, as far as it has told.
     is_at_work: bool,
     /// Whether the reason for the missing machine was reported.
@@ -316,10 +318,10 @@ impl Session {
         &self.version
     }
 
-    /// Takes what the wire has received since the last turn.
-    pub fn turn(&mut self, now: Moment, received: &[u8]) -> Turn {
-        let turned = self.turned.replace(now).unwrap_or(now);
-        self.waited += now.ticking.saturating_sub(turned.ticking).min(LONGEST_TURN);
+    /// Takes what the wire has received, and returns what happened. Types nothing: the next turn does. For a caller that
+    /// has to know the moment.
+    pub fn listen(&mut self, received: &[u8]) -> Vec<Happening> {
+        self.is_silent &= received.is_empty();
         self.introduction.bytes += received.len();
         // In pieces, because the reader drops lines that nobody takes.
         for piece in received.chunks(256) {
@@ -328,7 +330,15 @@ impl Session {
                 self.take(line);
             }
         }
-        self.wait(received.is_empty());
+        std::mem::take(&mut self.turn.happened)
+    }
+
+    /// Takes what the wire has received since the last turn, and says what it has to send.
+    pub fn turn(&mut self, now: Moment, received: &[u8]) -> Turn {
+        let turned = self.turned.replace(now).unwrap_or(now);
+        self.waited += now.ticking.saturating_sub(turned.ticking).min(LONGEST_TURN);
+        self.turn.happened = self.listen(received);
+        self.wait();
         let late: VecDeque<Waiting>;
         (late, self.waiting) = self.waiting.drain(..).partition(|one| now.is_after(one.deadline));
         for Waiting { number, line, .. } in late {
@@ -364,8 +374,8 @@ impl Session {
             self.end(number, line, Unanswered::NotTyped(why.clone()));
         }
         if let Some(number) = self.to_hold.take() {
-            let is_typed = self.introduction.has_held;
-            self.end(number, HOLD.to_owned(), if is_typed { Unanswered::Unknown(why) } else { Unanswered::NotTyped(why) });
+            let end = if self.introduction.has_held { Unanswered::Unknown } else { Unanswered::NotTyped };
+            self.end(number, HOLD.to_owned(), end(why));
         }
         self.to_hold = (is_to_hold && self.keeps_hold).then(|| self.next_number());
         self.own.clear();
@@ -391,9 +401,9 @@ impl Session {
         self.settle();
     }
 
-    /// Goes on after a time, or gives an answer up. `is_silent` says that nothing was received in this turn.
-    fn wait(&mut self, is_silent: bool) {
-        let waited = self.waited;
+    /// Goes on after a time, or gives an answer up.
+    fn wait(&mut self) {
+        let (waited, is_silent) = (self.waited, std::mem::replace(&mut self.is_silent, true));
         let is_over = |since: Duration, patience: Duration| waited.saturating_sub(since) > patience;
         match &mut self.state {
             State::Closed => {}

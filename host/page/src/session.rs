@@ -2,7 +2,7 @@
 
 use link::LinkError;
 use link::moment::Moment;
-use link::session::{Happening, Session, Unanswered};
+use link::session::{Happening, Session, Turn, Unanswered};
 use link::settings::helps;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -28,8 +28,10 @@ enum What {
     Command { line: String, deadline_ms: f64 },
     /// Type `hold` at once. Answers its number.
     Hold,
-    /// What has the wire received, with a character for each byte? Answers what happened, and what to send.
-    Turn { now_ms: f64, received: String },
+    /// What has the wire received, with a character for each byte? Answers what happened.
+    Listen { received: String },
+    /// What is the time? Answers what happened, and what to send.
+    Turn { now_ms: f64 },
     /// The wire is closed.
     Close,
 }
@@ -59,7 +61,15 @@ impl Request {
             Ok(place.as_mut().map_or(Value::Null, |session| match self.what {
                 What::Command { line, deadline_ms } => json!(session.command(&line, moment(deadline_ms))),
                 What::Hold => json!(session.hold()),
-                What::Turn { now_ms, received } => turn(session, moment(now_ms), &received),
+                What::Listen { received } => {
+                    let received: Vec<u8> = received.chars().map(|byte| u8::try_from(byte).unwrap_or(b'?')).collect();
+                    let happened = session.listen(&received);
+                    answer(session, Turn { happened, ..Turn::default() })
+                }
+                What::Turn { now_ms } => {
+                    let turn = session.turn(moment(now_ms), &[]);
+                    answer(session, turn)
+                }
                 What::Close => Value::Null,
             }))
         })
@@ -72,10 +82,8 @@ fn moment(ms: f64) -> Moment {
     Moment { ticking: time, calendar: time }
 }
 
-/// The failure ends the session.
-fn turn(session: &mut Session, now: Moment, received: &str) -> Value {
-    let received: Vec<u8> = received.chars().map(|byte| u8::try_from(byte).unwrap_or(b'?')).collect();
-    let turn = session.turn(now, &received);
+/// A turn in the form of `Turn` in `page/src/link/session.ts`.
+fn answer(session: &mut Session, turn: Turn) -> Value {
     let send: String = turn.to_send.into_iter().map(char::from).collect();
     let news: Vec<Value> = turn.happened.into_iter().map(news).collect();
     json!({ "news": news, "send": send, "failure": session.take_failure().map(|error| failure(&error)) })
@@ -134,7 +142,9 @@ mod tests {
     fn a_session_that_is_closed_takes_no_request() {
         let number = usize::try_from(open(false).as_u64().unwrap()).unwrap();
         let request = |what| Request { session: number, what }.take();
-        let turn = request(What::Turn { now_ms: 0.0, received: "\u{ff}\u{100}".to_owned() }).unwrap();
+        let heard = request(What::Listen { received: "\u{ff}\u{100}\r\n".to_owned() }).unwrap();
+        assert_eq!(heard, json!({ "news": [], "send": "", "failure": null }));
+        let turn = request(What::Turn { now_ms: 0.0 }).unwrap();
         assert!(turn["send"].as_str().unwrap().ends_with("\u{8}\n") && turn["failure"].is_null(), "{turn}");
         assert_eq!(request(What::Command { line: "two\nlines".to_owned(), deadline_ms: 9.0 }), Ok(Value::Null));
         assert_eq!(request(What::Hold), Ok(json!(1)));

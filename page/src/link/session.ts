@@ -142,7 +142,7 @@ export class Session implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Its number in the Rust. */
     readonly #session: number;
-    /** Text that was received since the last turn. */
+    /** Received text that the Rust does not have yet. */
     #received = "";
     #ended = false;
     #isTurning = false;
@@ -160,9 +160,10 @@ export class Session implements Link {
         this.#session = ask<number>({ open: resets });
     }
 
-    /** Takes received text, with a character for each byte. */
+    /** Takes received text, with a character for each byte. Whole lines are told at once: where the machine is counts. */
     receive(text: string): void {
         this.#received += text;
+        if (/[\r\n]/.test(text)) this.#listen();
     }
 
     ask(line: string): Promise<string[]> {
@@ -180,15 +181,9 @@ export class Session implements Link {
     }
 
     turn(now: number): void {
-        if (this.#ended || this.#isTurning) return;
-        this.#isTurning = true;
         this.now = now;
-        const { news, send, failure } = this.#request<Turn>({ turn: { nowMs: now, received: this.#received } });
-        this.#received = "";
-        if (send !== "") this.wire.send(send);
-        for (const one of news) if (one.is !== "lost" || !failure) this.#take(one);
-        this.#isTurning = false;
-        if (failure) this.end(whyNone(failure));
+        this.#listen();
+        this.#go({ turn: { nowMs: now } });
     }
 
     async close(): Promise<void> {
@@ -204,6 +199,26 @@ export class Session implements Link {
         for (const number of [...this.#askers.keys()]) this.#fail(number, new NoMachine(why));
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
         void this.wire.close();
+    }
+
+    #listen(): void {
+        if (this.#isTurning || this.#received === "") return;
+        const received = this.#received;
+        this.#received = "";
+        this.#go({ listen: { received } });
+    }
+
+    #go(what: unknown): void {
+        if (this.#ended || this.#isTurning) return;
+        this.#isTurning = true;
+        const { news, send, failure } = this.#request<Turn>(what);
+        try {
+            if (send !== "") this.wire.send(send);
+            for (const one of news) if (one.is !== "lost" || !failure) this.#take(one);
+        } finally {
+            this.#isTurning = false;
+        }
+        if (failure) this.end(whyNone(failure));
     }
 
     #request<Answer>(what: unknown): Answer {
