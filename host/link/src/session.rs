@@ -23,9 +23,16 @@
 //! The console does not say which command an answer belongs to. If a line of an answer is lost, the session may take
 //! that of a later command for it, until the end of the wait.
 
+mod happening;
+mod introduction;
+
+pub use self::happening::{Happening, Unanswered};
+pub(crate) use self::introduction::silence;
+
+use self::introduction::{INTRODUCTION, Introduction};
 use super::moment::Moment;
-use super::settings::{self, Settings, Shown};
-use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_command, lines};
+use super::settings::Shown;
+use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_command};
 use control::say::command::{Action, LINE_LENGTH};
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -52,9 +59,6 @@ pub(crate) const BOOT: Duration = Duration::from_secs(3);
 const QUIET: Duration = Duration::from_millis(40);
 const RESTLESS: Duration = Duration::from_secs(1);
 
-/// Further tries to ask for everything, if an answer is missing or belongs to another question.
-const RETRIES: usize = 2;
-
 /// Longest time that counts as waiting between two turns. In a longer one the computer was busy, or has slept.
 const LONGEST_TURN: Duration = Duration::from_millis(200);
 
@@ -68,84 +72,11 @@ const SETTINGS: &str = "get";
 const EXAMPLES: &str = "examples";
 const EVENTS: &str = "events on";
 
-/// The first questions. The first status is asked only if earlier tries may still be answered: it is the first answer
-/// that cannot belong to those.
-const INTRODUCTION: [&str; 6] = [VERSION, STATUS, SETTINGS, EXAMPLES, EVENTS, STATUS];
-const LAST: usize = INTRODUCTION.len() - 1;
-
 /// Backspaces, which delete a line of any length. Ended instead, the rest of a line would be a late command.
 const ERASE: u8 = 0x08;
 
 /// Most commands that may wait.
 const WAITING: usize = 256;
-
-/// Something that happened in a session.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Happening {
-    /// The firmware has started. An Uno that starts when its port is opened reports this too.
-    Started {
-        /// Its greeting, with the cause.
-        greeting: String,
-        /// The cause, if the machine was at work before: it has not weeded since.
-        while_at_work: Option<String>,
-    },
-    /// The machine is connected, or has restarted.
-    Connected {
-        /// The firmware's version.
-        version: String,
-        /// Its settings, as far as this version knows them: see [`other_version`](super::settings::other_version).
-        settings: Settings,
-        /// The lines that show them.
-        shown: Vec<String>,
-        /// Its examples, a line each.
-        examples: Vec<String>,
-    },
-    /// The machine is gone or silent, or has been reset, and why.
-    Lost(String),
-    /// The machine's status.
-    Status(Status, String),
-    /// The machine sent an event line.
-    Event(EventLine, String),
-    /// A command was typed.
-    Command(String),
-    /// A line of the answer to it. The last one is `ok` or begins with `error:`.
-    Answer(String),
-    /// That was the last line of the answer.
-    Answered {
-        /// The command's number.
-        number: u64,
-        /// The command.
-        command: String,
-        /// The line that begins with `error:`, if the firmware refused.
-        refusal: Option<String>,
-    },
-    /// A command will not be answered.
-    Unanswered {
-        /// The command's number.
-        number: u64,
-        /// The command.
-        command: String,
-        /// Why.
-        why: Unanswered,
-    },
-    /// The settings after a command has changed or saved some, and the lines that show them.
-    Settings(Settings, Vec<String>),
-    /// The examples after a command has changed some, a line each.
-    Examples(Vec<String>),
-}
-
-/// Why a command will not be answered.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Unanswered {
-    /// It was not typed: its deadline had passed.
-    Late,
-    /// It was not typed: a `hold` came first.
-    Held,
-    /// It was not typed: the machine is lost, and why.
-    NotTyped(String),
-    /// The machine is lost, and why. It may have obeyed, or may still do so.
-    Unknown(String),
-}
 
 /// What a turn has led to.
 #[derive(Debug, Default)]
@@ -189,25 +120,6 @@ struct Waiting {
     number: u64,
     line: String,
     deadline: Moment,
-}
-
-/// What the first answers have said.
-#[derive(Default)]
-struct Introduction {
-    /// Earlier tries.
-    tries: usize,
-    /// Most answers to earlier questions that may still come.
-    late: usize,
-    /// Whether a `hold` was typed whose answer cannot be told from those. It is typed again behind them.
-    has_held: bool,
-    /// The last answer that was taken for one of those.
-    wrong: Option<LinkError>,
-    shown: Vec<String>,
-    examples: Vec<String>,
-    /// Bytes received since the last question.
-    bytes: usize,
-    /// What was reported in the meantime.
-    early: Vec<Happening>,
 }
 
 /// A session with a machine; by default one without a wire.
@@ -388,19 +300,6 @@ impl Session {
         self.state = State::Settling { since: self.waited, heard: self.waited };
     }
 
-    /// Asks for everything again, if that may help. A `hold` without an answer is typed again.
-    fn ask_again(&mut self, error: LinkError) {
-        if !error.is_of_an_answer() || self.introduction.tries == RETRIES {
-            return self.lose(error);
-        }
-        let Introduction { tries, late, early, .. } = std::mem::take(&mut self.introduction);
-        let late = late + self.asked.len();
-        self.introduction = Introduction { tries: tries + 1, late, early, ..Introduction::default() };
-        let hold = self.asked.drain(..).find(|asked| asked.line == HOLD);
-        self.to_hold = hold.and_then(|hold| hold.number).or(self.to_hold);
-        self.settle();
-    }
-
     /// Goes on after a time, or gives an answer up.
     fn wait(&mut self) {
         let (waited, is_silent) = (self.waited, std::mem::replace(&mut self.is_silent, true));
@@ -572,67 +471,6 @@ impl Session {
             self.own.insert(command);
         }
     }
-
-    /// Takes the answer to a first question, and goes on to the next one.
-    fn take_first_answer(&mut self, question: usize, command: String, answer: Vec<String>, refusal: Option<String>) {
-        let version = answer.last().and_then(|line| match ConsoleLine::parse(line) {
-            ConsoleLine::Version { version } if refusal.is_none() => Some(version),
-            _ => None,
-        });
-        let is_wrong = match question {
-            0 => version.is_none(),
-            1 => !answer.iter().any(|line| Status::parse(line).is_some()),
-            2 => !answer.iter().any(|line| settings::shown(line).is_some()),
-            _ => refusal.is_some(),
-        };
-        if is_wrong {
-            let error = match refusal {
-                None if question == 0 => LinkError::NotTheWeeder(answer.join(" ")),
-                refusal => LinkError::Refused { command, answer: refusal.unwrap_or_else(|| answer.join(" ")) },
-            };
-            if question > 1 || self.introduction.late == 0 {
-                return self.ask_again(error);
-            }
-            // The answer to an earlier question: the one to this is still to come.
-            self.introduction.late -= 1;
-            self.introduction.wrong = Some(error);
-            let (line, since) = (INTRODUCTION[question].to_owned(), self.waited);
-            return self.asked.push_front(Asked { line, number: None, since, answer: Vec::new() });
-        }
-        match (question, version) {
-            (0, Some(version)) => self.version = version,
-            (1, _) => self.introduction.late = 0,
-            (2, _) => self.introduction.shown = answer,
-            (3, _) => self.introduction.examples = answer,
-            (LAST, _) => return self.connect(answer),
-            _ => {}
-        }
-        let next = if question == 0 && self.introduction.late == 0 { 2 } else { question + 1 };
-        self.state = if next == 2 && self.is_bare { State::Ready } else { State::Asking(next) };
-    }
-
-    /// All first questions are answered, with this status as the last. A newer firmware's may be unknown here.
-    fn connect(&mut self, status: Vec<String>) {
-        let Introduction { shown, examples, early, .. } = std::mem::take(&mut self.introduction);
-        let (settings, version) = (Shown::by(&shown).settings, self.version.clone());
-        self.state = State::Ready;
-        (self.poll_at, self.is_loss_told) = (self.waited + POLL, true);
-        self.turn.happened.push(Happening::Connected { version, settings, shown, examples });
-        // Before the first event, so that a log begins with the machine's state.
-        let status = status.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line)));
-        status.into_iter().chain(early).for_each(|happening| self.report(happening));
-    }
-}
-
-/// Why a question has no answer, by the lines that have come and the beginning of another one.
-pub(crate) fn silence(question: &str, answer: &[String], partial: &str) -> LinkError {
-    let received = answer.iter().map(String::as_str).chain([partial]).collect::<Vec<_>>().join("\n");
-    let strange = received.matches(lines::STRANGE).count();
-    if 4 * strange > received.chars().count() {
-        return LinkError::Noise;
-    }
-    let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
-    LinkError::Silent { command: question.to_owned(), received: received[tail..].trim().to_owned() }
 }
 
 /// The meaning of the answer to one of the session's own questions, if it has not been reported yet.

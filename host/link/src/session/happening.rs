@@ -1,0 +1,72 @@
+//! What happens in a session.
+
+use crate::settings::Settings;
+use crate::{EventLine, Status};
+
+/// Something that happened in a session.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Happening {
+    /// The firmware has started. An Uno that starts when its port is opened reports this too.
+    Started {
+        /// Its greeting, with the cause.
+        greeting: String,
+        /// The cause, if the machine was at work before: it has not weeded since.
+        while_at_work: Option<String>,
+    },
+    /// The machine is connected, or has restarted.
+    Connected {
+        /// The firmware's version.
+        version: String,
+        /// Its settings, as far as this version knows them: see [`other_version`](crate::settings::other_version).
+        settings: Settings,
+        /// The lines that show them.
+        shown: Vec<String>,
+        /// Its examples, a line each.
+        examples: Vec<String>,
+    },
+    /// The machine is gone or silent, or has been reset, and why.
+    Lost(String),
+    /// The machine's status.
+    Status(Status, String),
+    /// The machine sent an event line.
+    Event(EventLine, String),
+    /// A command was typed.
+    Command(String),
+    /// A line of the answer to it. The last one is `ok` or begins with `error:`.
+    Answer(String),
+    /// That was the last line of the answer.
+    Answered {
+        /// The command's number.
+        number: u64,
+        /// The command.
+        command: String,
+        /// The line that begins with `error:`, if the firmware refused.
+        refusal: Option<String>,
+    },
+    /// A command will not be answered.
+    Unanswered {
+        /// The command's number.
+        number: u64,
+        /// The command.
+        command: String,
+        /// Why.
+        why: Unanswered,
+    },
+    /// The settings after a command has changed or saved some, and the lines that show them.
+    Settings(Settings, Vec<String>),
+    /// The examples after a command has changed some, a line each.
+    Examples(Vec<String>),
+}
+
+/// Why a command will not be answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unanswered {
+    /// It was not typed: its deadline had passed.
+    Late,
+    /// It was not typed: a `hold` came first.
+    Held,
+    /// It was not typed: the machine is lost, and why.
+    NotTyped(String),
+    /// The machine is lost, and why. It may have obeyed, or may still do so.
+    Unknown(String),
+}

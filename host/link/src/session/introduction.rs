@@ -1,0 +1,115 @@
+//! The first questions of a session: version, settings, examples and status. If an answer is missing or wrong, they are
+//! asked from the beginning.
+
+use super::{Asked, EVENTS, EXAMPLES, HOLD, Happening, POLL, SETTINGS, STATUS, Session, State, VERSION};
+use crate::settings::{self, Shown};
+use crate::{ConsoleLine, LinkError, Status, lines};
+
+/// Further tries to ask for everything, if an answer is missing or belongs to another question.
+const RETRIES: usize = 2;
+
+/// The first questions. The first status is asked only if earlier tries may still be answered: it is the first answer
+/// that cannot belong to those.
+pub(super) const INTRODUCTION: [&str; 6] = [VERSION, STATUS, SETTINGS, EXAMPLES, EVENTS, STATUS];
+const LAST: usize = INTRODUCTION.len() - 1;
+
+/// What the first answers have said.
+#[derive(Default)]
+pub(super) struct Introduction {
+    /// Earlier tries.
+    pub(super) tries: usize,
+    /// Most answers to earlier questions that may still come.
+    pub(super) late: usize,
+    /// Whether a `hold` was typed whose answer cannot be told from those. It is typed again behind them.
+    pub(super) has_held: bool,
+    /// The last answer that was taken for one of those.
+    pub(super) wrong: Option<LinkError>,
+    pub(super) shown: Vec<String>,
+    pub(super) examples: Vec<String>,
+    /// Bytes received since the last question.
+    pub(super) bytes: usize,
+    /// What was reported in the meantime.
+    pub(super) early: Vec<Happening>,
+}
+
+impl Session {
+    /// Asks for everything again, if that may help. A `hold` without an answer is typed again.
+    pub(super) fn ask_again(&mut self, error: LinkError) {
+        if !error.is_of_an_answer() || self.introduction.tries == RETRIES {
+            return self.lose(error);
+        }
+        let Introduction { tries, late, early, .. } = std::mem::take(&mut self.introduction);
+        let late = late + self.asked.len();
+        self.introduction = Introduction { tries: tries + 1, late, early, ..Introduction::default() };
+        let hold = self.asked.drain(..).find(|asked| asked.line == HOLD);
+        self.to_hold = hold.and_then(|hold| hold.number).or(self.to_hold);
+        self.settle();
+    }
+
+    /// Takes the answer to a first question, and goes on to the next one.
+    pub(super) fn take_first_answer(
+        &mut self,
+        question: usize,
+        command: String,
+        answer: Vec<String>,
+        refusal: Option<String>,
+    ) {
+        let version = answer.last().and_then(|line| match ConsoleLine::parse(line) {
+            ConsoleLine::Version { version } if refusal.is_none() => Some(version),
+            _ => None,
+        });
+        let is_wrong = match question {
+            0 => version.is_none(),
+            1 => !answer.iter().any(|line| Status::parse(line).is_some()),
+            2 => !answer.iter().any(|line| settings::shown(line).is_some()),
+            _ => refusal.is_some(),
+        };
+        if is_wrong {
+            let error = match refusal {
+                None if question == 0 => LinkError::NotTheWeeder(answer.join(" ")),
+                refusal => LinkError::Refused { command, answer: refusal.unwrap_or_else(|| answer.join(" ")) },
+            };
+            if question > 1 || self.introduction.late == 0 {
+                return self.ask_again(error);
+            }
+            // The answer to an earlier question: the one to this is still to come.
+            self.introduction.late -= 1;
+            self.introduction.wrong = Some(error);
+            let (line, since) = (INTRODUCTION[question].to_owned(), self.waited);
+            return self.asked.push_front(Asked { line, number: None, since, answer: Vec::new() });
+        }
+        match (question, version) {
+            (0, Some(version)) => self.version = version,
+            (1, _) => self.introduction.late = 0,
+            (2, _) => self.introduction.shown = answer,
+            (3, _) => self.introduction.examples = answer,
+            (LAST, _) => return self.connect(answer),
+            _ => {}
+        }
+        let next = if question == 0 && self.introduction.late == 0 { 2 } else { question + 1 };
+        self.state = if next == 2 && self.is_bare { State::Ready } else { State::Asking(next) };
+    }
+
+    /// All first questions are answered, with this status as the last. A newer firmware's may be unknown here.
+    fn connect(&mut self, status: Vec<String>) {
+        let Introduction { shown, examples, early, .. } = std::mem::take(&mut self.introduction);
+        let (settings, version) = (Shown::by(&shown).settings, self.version.clone());
+        self.state = State::Ready;
+        (self.poll_at, self.is_loss_told) = (self.waited + POLL, true);
+        self.turn.happened.push(Happening::Connected { version, settings, shown, examples });
+        // Before the first event, so that a log begins with the machine's state.
+        let status = status.into_iter().find_map(|line| Some(Happening::Status(Status::parse(&line)?, line)));
+        status.into_iter().chain(early).for_each(|happening| self.report(happening));
+    }
+}
+
+/// Why a question has no answer, by the lines that have come and the beginning of another one.
+pub(crate) fn silence(question: &str, answer: &[String], partial: &str) -> LinkError {
+    let received = answer.iter().map(String::as_str).chain([partial]).collect::<Vec<_>>().join("\n");
+    let strange = received.matches(lines::STRANGE).count();
+    if 4 * strange > received.chars().count() {
+        return LinkError::Noise;
+    }
+    let tail = received.char_indices().rev().nth(200).map_or(0, |(at, _)| at);
+    LinkError::Silent { command: question.to_owned(), received: received[tail..].trim().to_owned() }
+}
