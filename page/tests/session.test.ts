@@ -147,6 +147,40 @@ test("a line is told when it comes, and not in the next turn: its moment says wh
     assert(event?.is === "event" && event.event.is === "swing");
 });
 
+test("where the wire is gone, what was sent may have been done, and what waited was not sent", async () => {
+    const machine = new Connected();
+    while (!machine.has("connected")) await machine.turn();
+    const sent = machine.session.ask("start now");
+    while (!machine.has("command")) await machine.turn();
+    const waiting = machine.session.ask("clear");
+    machine.session.end("the port is gone");
+    await assert.rejects(sent, { message: /^the port is gone\. This may have been done/ });
+    await assert.rejects(waiting, { message: "the port is gone" });
+});
+
+test("the page turns the events on again, and says which line cannot be typed", async () => {
+    const machine = new Connected();
+    while (!machine.has("connected")) await machine.turn();
+    await Promise.all([machine.session.ask("events off"), machine.turn(), machine.turn(400), machine.turn(400)]);
+    for (let turn = 0; turn < 50; turn++) await machine.turn();
+    await Promise.all([machine.session.hold(), machine.turn(), machine.turn()]);
+    for (let turn = 0; turn < 20; turn++) await machine.turn();
+    assert(
+        machine.happened.some((happening) => happening.is === "event" && happening.line === "state is=hold"),
+        "the event comes",
+    );
+    for (const [line, why] of [
+        ["x".repeat(81), "send 80 characters at most"],
+        ["h\u00e4lt", "send letters, digits and blanks only"],
+    ] as const)
+        await assert.rejects(machine.session.ask(line), { message: why });
+    const asked = Array.from({ length: 300 }, () =>
+        machine.session.ask("status").catch((error: Error) => error.message),
+    );
+    machine.session.end("over");
+    assert((await Promise.all(asked)).includes("too much waits for the machine: try again"));
+});
+
 test("many commands at a slow page leave no second without a status", async () => {
     const machine = new Connected();
     while (!machine.has("connected")) await machine.turn();

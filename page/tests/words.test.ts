@@ -121,6 +121,7 @@ test("what weeder serve and the project's Rust say in English is known by the ta
         ["../host/link/src/error.rs", en.heard.unanswered],
         ["../host/link/src/session.rs", en.heard.wasReset],
         ["../host/serve/src/machine.rs", en.heard.servedNoAnswer],
+        ["../host/serve/src/machine.rs", en.heard.tooMuchWaits],
         ["../host/serve/src/machine.rs", en.heard.servedNotThere],
     ] as const)
         assert(readFileSync(path, "utf8").includes(text), `${path} does not say: ${text}`);

@@ -54,18 +54,15 @@ use std::time::{Duration, Instant};
 /// Characters that the firmware takes in a line.
 pub const COMMAND_LENGTH: usize = control::say::command::LINE_LENGTH;
 
-/// Time that a read takes in which nothing comes, and the least time of another one.
+/// Time that a read takes in which nothing comes, and that of another one, on average.
 const SILENT_READ: Duration = Duration::from_millis(20);
-const BUSY_READ: Duration = Duration::from_millis(1);
+const BUSY_READ: Duration = Duration::from_millis(10);
 
 /// Silent reads in a row after which the link gives up an answer.
 const SILENT_READS: u128 = session::FIRST_PATIENCE.as_millis() / SILENT_READ.as_millis();
 
 /// Silent reads until the greeting must come after a reset.
 const BOOT_READS: u128 = session::BOOT.as_millis() / SILENT_READ.as_millis();
-
-/// Longest time of an answer while lines keep coming.
-const ANSWER_TIME: Duration = Duration::from_secs(10);
 
 /// Something from the port.
 enum Received {
@@ -129,7 +126,7 @@ impl Link {
 
     /// Waits for the answer to a command that was typed.
     fn answer(&mut self, command: &str) -> Result<Vec<String>, LinkError> {
-        let deadline = Instant::now() + ANSWER_TIME;
+        let deadline = Instant::now() + session::ANSWER_TIME;
         let (mut silent_reads, mut bytes) = (0, 0);
         let mut answer: Vec<String> = Vec::new();
         while silent_reads < SILENT_READS && bytes < session::ANSWER_BYTES && Instant::now() < deadline {

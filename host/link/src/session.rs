@@ -26,14 +26,14 @@
 mod happening;
 mod introduction;
 
-pub use self::happening::{Happening, Unanswered};
+pub use self::happening::{Happening, Turn, Unanswered};
 pub(crate) use self::introduction::silence;
 
 use self::introduction::{INTRODUCTION, Introduction};
 use super::moment::Moment;
 use super::settings::Shown;
 use super::{ConsoleLine, EventLine, LineReader, LinkError, Mode, Status, is_command};
-use control::say::command::{Action, LINE_LENGTH};
+use control::say::command::Action;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
@@ -49,6 +49,9 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Longest silence during an answer to the first questions. The longest answer, all examples, takes less than a second.
 pub(crate) const FIRST_PATIENCE: Duration = Duration::from_secs(2);
 
+/// Longest time of an answer to a first question while bytes keep coming.
+pub(crate) const ANSWER_TIME: Duration = Duration::from_secs(10);
+
 /// Most bytes that come during the answer to a first question: six times the longest valid answer.
 pub(crate) const ANSWER_BYTES: usize = 40_000;
 
@@ -57,7 +60,7 @@ pub(crate) const BOOT: Duration = Duration::from_secs(3);
 
 /// How long the line must be silent before the first question, and the longest wait for that.
 const QUIET: Duration = Duration::from_millis(40);
-const RESTLESS: Duration = Duration::from_secs(1);
+const LONGEST_SETTLING: Duration = Duration::from_secs(1);
 
 /// Longest time that counts as waiting between two turns. In a longer one the computer was busy, or has slept.
 const LONGEST_TURN: Duration = Duration::from_millis(200);
@@ -72,22 +75,8 @@ const SETTINGS: &str = "get";
 const EXAMPLES: &str = "examples";
 const EVENTS: &str = "events on";
 
-/// Backspaces, which delete a line of any length. Ended instead, the rest of a line would be a late command.
-const ERASE: u8 = 0x08;
-
 /// Most commands that may wait.
 const WAITING: usize = 256;
-
-/// What a turn has led to.
-#[derive(Debug, Default)]
-pub struct Turn {
-    /// What happened.
-    pub happened: Vec<Happening>,
-    /// The bytes to send now.
-    pub to_send: Vec<u8>,
-    /// Whether typed lines were given up: what the wire has not sent yet must not be sent any more.
-    pub is_given_up: bool,
-}
 
 /// How far the connection has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -127,6 +116,8 @@ struct Waiting {
 pub struct Session {
     /// Whether a `hold` without an answer outlasts a loss. It is then the first line that is typed after the loss.
     pub keeps_hold: bool,
+    /// Whether the events are turned on again after a command has turned them off.
+    pub keeps_events: bool,
     /// Whether it asks only for the version, and does not poll.
     is_bare: bool,
     state: State,
@@ -173,8 +164,14 @@ impl Session {
 
     /// The wire is gone, or cannot be opened. The next turn reports it, the first time after a connection.
     pub fn lose(&mut self, error: LinkError) {
-        self.give_up(error.to_string());
-        (self.state, self.failure) = (State::Closed, Some(error));
+        self.close(error.to_string());
+        self.failure = Some(error);
+    }
+
+    /// The wire is closed, and why. The next turn reports it, and the ends of all commands.
+    pub fn close(&mut self, why: String) {
+        self.give_up(why);
+        self.state = State::Closed;
     }
 
     /// Why there is no machine, once.
@@ -205,11 +202,6 @@ impl Session {
         number
     }
 
-    /// Turns the events on, after all waiting commands.
-    pub fn turn_events_on(&mut self) {
-        self.own.insert(EVENTS.to_owned());
-    }
-
     /// Whether no command waits for its answer.
     pub fn is_idle(&self) -> bool {
         self.waiting.is_empty() && self.to_hold.is_none() && self.asked.iter().all(|asked| asked.number.is_none())
@@ -235,7 +227,7 @@ impl Session {
     pub fn listen(&mut self, received: &[u8]) -> Vec<Happening> {
         self.is_silent &= received.is_empty();
         self.introduction.bytes += received.len();
-        // In pieces, because the reader drops lines that nobody takes.
+        // In pieces, because the reader stores a limited number of lines.
         for piece in received.chunks(256) {
             self.lines.take(piece);
             while let Some(line) = self.lines.next_line() {
@@ -285,19 +277,16 @@ impl Session {
         for Waiting { number, line, .. } in std::mem::take(&mut self.waiting) {
             self.end(number, line, Unanswered::NotTyped(why.clone()));
         }
-        if let Some(number) = self.to_hold.take() {
+        // Without a wire, it waits for the next one.
+        let stays = self.keeps_hold && self.state == State::Closed;
+        if let Some(number) = self.to_hold.take_if(|_| !stays) {
             let end = if self.introduction.has_held { Unanswered::Unknown } else { Unanswered::NotTyped };
             self.end(number, HOLD.to_owned(), end(why));
         }
-        self.to_hold = (is_to_hold && self.keeps_hold).then(|| self.next_number());
+        if !stays {
+            self.to_hold = (is_to_hold && self.keeps_hold).then(|| self.next_number());
+        }
         self.own.clear();
-    }
-
-    /// Empties the machine's line, and waits for silence.
-    fn settle(&mut self) {
-        self.turn.to_send.extend([ERASE; LINE_LENGTH]);
-        self.turn.to_send.push(b'\n');
-        self.state = State::Settling { since: self.waited, heard: self.waited };
     }
 
     /// Goes on after a time, or gives an answer up.
@@ -315,14 +304,15 @@ impl Session {
                 if !is_silent {
                     *heard = waited;
                 }
-                if waited.saturating_sub(*heard) >= QUIET || is_over(*since, RESTLESS) {
+                if waited.saturating_sub(*heard) >= QUIET || is_over(*since, LONGEST_SETTLING) {
                     self.lines = LineReader::default();
                     self.state = State::Asking(0);
                 }
             }
             State::Asking(_) => {
                 let Some(asked) = self.asked.front() else { return };
-                if self.introduction.bytes > ANSWER_BYTES || is_silent && is_over(asked.since, FIRST_PATIENCE) {
+                let patience = if is_silent { FIRST_PATIENCE } else { ANSWER_TIME };
+                if self.introduction.bytes > ANSWER_BYTES || is_over(asked.since, patience) {
                     let silence = || silence(&asked.line, &asked.answer, self.lines.partial());
                     let error = self.introduction.wrong.take().unwrap_or_else(silence);
                     self.ask_again(error);
@@ -459,7 +449,7 @@ impl Session {
         let refusal = (!is_done).then_some(line);
         if let Some(number) = number {
             if is_done {
-                self.own.extend(changed_by(&command).map(str::to_owned));
+                self.own.extend(self.changed_by(&command).map(str::to_owned));
             }
             self.turn.happened.push(Happening::Answered { number, command, refusal });
         } else if let State::Asking(question) = self.state {
@@ -471,6 +461,21 @@ impl Session {
             self.own.insert(command);
         }
     }
+
+    /// What to ask again after this command was answered by `ok`; `None` if it changes nothing that the session needs.
+    fn changed_by(&self, command: &str) -> Option<&'static str> {
+        match crate::command(command).ok()?.action {
+            Action::Set | Action::Save | Action::Revert | Action::Defaults | Action::Calibrate => Some(SETTINGS),
+            Action::LabelPlant
+            | Action::LabelWeed
+            | Action::TeachPlant
+            | Action::TeachWeed
+            | Action::Forget
+            | Action::ForgetAll => Some(EXAMPLES),
+            Action::EventsOff => self.keeps_events.then_some(EVENTS),
+            _ => None,
+        }
+    }
 }
 
 /// The meaning of the answer to one of the session's own questions, if it has not been reported yet.
@@ -480,20 +485,6 @@ fn parse_answer(question: &str, answer: Vec<String>) -> Option<Happening> {
         EXAMPLES => Some(Happening::Examples(answer)),
         _ => None,
     }
-}
-
-/// The question to ask again after this command was answered by `ok`; `None` if it changes nothing.
-fn changed_by(command: &str) -> Option<&'static str> {
-    Some(match crate::command(command).ok()?.action {
-        Action::Set | Action::Save | Action::Revert | Action::Defaults | Action::Calibrate => SETTINGS,
-        Action::LabelPlant
-        | Action::LabelWeed
-        | Action::TeachPlant
-        | Action::TeachWeed
-        | Action::Forget
-        | Action::ForgetAll => EXAMPLES,
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

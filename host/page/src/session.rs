@@ -32,14 +32,16 @@ enum What {
     Listen { received: String },
     /// What is the time? Answers what happened, and what to send.
     Turn { now_ms: f64 },
-    /// The wire is closed.
-    Close,
+    /// The wire is closed, and why. Answers the ends of all commands.
+    Close { why: String },
 }
 
 /// Begins a session over an open wire. Answers its number.
 pub fn open(resets: bool) -> Value {
     SESSIONS.with_borrow_mut(|sessions| {
+        // The page needs the events.
         let mut session = Session::default();
+        session.keeps_events = true;
         session.open(resets);
         sessions.push(Some(session));
         json!(sessions.len() - 1)
@@ -53,27 +55,33 @@ impl Request {
     /// If there is no such session.
     pub fn take(self) -> Result<Value, String> {
         SESSIONS.with_borrow_mut(|sessions| {
-            let place =
-                sessions.get_mut(self.session).filter(|place| place.is_some()).ok_or("there is no such session")?;
-            if let What::Close = self.what {
-                *place = None;
-            }
-            Ok(place.as_mut().map_or(Value::Null, |session| match self.what {
+            let place = sessions.get_mut(self.session).ok_or("there is no such session")?;
+            let session = place.as_mut().ok_or("the session is closed")?;
+            Ok(match self.what {
                 What::Command { line, deadline_ms } => json!(session.command(&line, moment(deadline_ms))),
                 What::Hold => json!(session.hold()),
                 What::Listen { received } => {
                     let received: Vec<u8> = received.chars().map(|byte| u8::try_from(byte).unwrap_or(b'?')).collect();
-                    let happened = session.listen(&received);
-                    answer(session, Turn { happened, ..Turn::default() })
+                    listen(session, &received)
                 }
                 What::Turn { now_ms } => {
                     let turn = session.turn(moment(now_ms), &[]);
                     answer(session, turn)
                 }
-                What::Close => Value::Null,
-            }))
+                What::Close { why } => {
+                    session.close(why);
+                    let ends = listen(session, &[]);
+                    *place = None;
+                    ends
+                }
+            })
         })
     }
+}
+
+fn listen(session: &mut Session, received: &[u8]) -> Value {
+    let happened = session.listen(received);
+    answer(session, Turn { happened, ..Turn::default() })
 }
 
 /// A page has one clock.
@@ -148,7 +156,11 @@ mod tests {
         assert!(turn["send"].as_str().unwrap().ends_with("\u{8}\n") && turn["failure"].is_null(), "{turn}");
         assert_eq!(request(What::Command { line: "two\nlines".to_owned(), deadline_ms: 9.0 }), Ok(Value::Null));
         assert_eq!(request(What::Hold), Ok(json!(1)));
-        assert_eq!(request(What::Close), Ok(Value::Null));
+        let closed = request(What::Close { why: "pulled".to_owned() }).unwrap();
+        assert_eq!(
+            closed["news"][1],
+            json!({ "is": "unanswered", "number": 1, "why": "notTyped", "because": "pulled" })
+        );
         assert!(request(What::Hold).is_err());
     }
 }

@@ -4,7 +4,6 @@
 use super::hub::Hub;
 use super::knowledge::Stale;
 use super::rules::Order;
-use control::say::command::Action;
 use link::advice;
 use link::connection::{Connection, Opener, PAUSE};
 use link::moment::Moment;
@@ -79,7 +78,7 @@ impl Machine {
         let named = name.clone();
         thread::spawn(move || {
             let mut connection = Connection::waiting_for(open);
-            connection.session.keeps_hold = true;
+            (connection.session.keeps_hold, connection.session.keeps_events) = (true, true);
             Talk::new(number, named, hub, tell).run(connection, commands_to_type, holds_to_type);
         });
         Self { name, number, commands, holds }
@@ -170,7 +169,7 @@ impl Talk {
             self.hold(session, asked);
         }
         for happening in connection.turn(self.hub.now()) {
-            self.take(&mut connection.session, happening);
+            self.take(happening);
         }
         true
     }
@@ -205,7 +204,7 @@ impl Talk {
         answer(self.askers.remove(&number).unwrap_or_default(), ended);
     }
 
-    fn take(&mut self, session: &mut Session, happening: Happening) {
+    fn take(&mut self, happening: Happening) {
         match happening {
             Happening::Connected { version, shown, examples, .. } => {
                 self.hub.there(self.number, &version, &shown, &examples);
@@ -243,11 +242,7 @@ impl Talk {
                 self.answer.truncate(LINES - 1);
                 self.answer.push(line);
             }
-            Happening::Answered { number, command, .. } => {
-                // The pages need the events.
-                if link::command(&command).is_ok_and(|command| command.action == Action::EventsOff) {
-                    session.turn_events_on();
-                }
+            Happening::Answered { number, .. } => {
                 let lines = std::mem::take(&mut self.answer);
                 self.end(number, &Ok(lines));
             }

@@ -170,7 +170,9 @@ export class Session implements Link {
         if (this.#ended) return Promise.reject(new NoMachine(english("noneConnected")));
         const number = this.#request<number | null>({ command: { line, deadlineMs: this.now + WAIT_MS } });
         if (number !== null) return this.#end(number);
-        return Promise.reject(new NoCommand(english(line.length > 80 ? "refusedTooLong" : "refusedNotText")));
+        const isText = /^[ -~]*$/.test(line);
+        const why = line.length > 80 ? "refusedTooLong" : isText ? "tooMuchWaits" : "refusedNotText";
+        return Promise.reject(new NoCommand(english(why)));
     }
 
     async hold(): Promise<void> {
@@ -195,8 +197,8 @@ export class Session implements Link {
     end(why: string, isWanted = false): void {
         if (this.#ended) return;
         this.#ended = true;
-        this.#request({ close: null });
-        for (const number of [...this.#askers.keys()]) this.#fail(number, new NoMachine(why));
+        const { news } = this.#request<Turn>({ close: { why } });
+        for (const one of news) if (one.is === "unanswered") this.#take({ ...one, because: why });
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
         void this.wire.close();
     }
@@ -214,7 +216,13 @@ export class Session implements Link {
         const { news, send, failure } = this.#request<Turn>(what);
         try {
             if (send !== "") this.wire.send(send);
-            for (const one of news) if (one.is !== "lost" || !failure) this.#take(one);
+            const why = failure && whyNone(failure);
+            for (const one of news) {
+                if (why === null) this.#take(one);
+                else if (one.is === "unanswered") this.#take({ ...one, because: why });
+                // `end` tells it.
+                else if (one.is !== "lost") this.#take(one);
+            }
         } finally {
             this.#isTurning = false;
         }

@@ -364,6 +364,7 @@ export const en = {
         holdPending: "HOLD has not come through yet, so this was not sent",
         holdFirst: "hold came first, so this was not sent",
         waitedTooLong: "this waited for 3 s, so it was not sent: try again",
+        tooMuchWaits: "too much waits for the machine: try again",
         wasReset: "the Uno was reset ({cause})",
         resetWhileAsked: "the Uno was reset while it was asked `{command}`: see to its supply, then try again",
         nothingAnswers:

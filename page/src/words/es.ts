@@ -358,6 +358,7 @@ export const es: Language = {
         holdPending: "la PAUSA aún no ha llegado, así que esto no se envió",
         holdFirst: "la pausa fue antes, así que esto no se envió",
         waitedTooLong: "esperó 3 s y no se envió: inténtelo de nuevo",
+        tooMuchWaits: "hay demasiado en espera para la máquina: inténtelo otra vez",
         wasReset: "el Uno se reinició ({cause})",
         resetWhileAsked:
             "el Uno se reinició mientras se le preguntaba `{command}`: revise su alimentación e inténtelo otra vez",

@@ -358,6 +358,7 @@ export const fr: Language = {
         holdPending: "la PAUSE n'est pas encore passée, ceci n'a donc pas été envoyé",
         holdFirst: "la pause est passée avant, ceci n'a donc pas été envoyé",
         waitedTooLong: "la commande a attendu 3 s et n'a pas été envoyée : réessayez",
+        tooMuchWaits: "trop de commandes attendent la machine : réessayez",
         wasReset: "l'Uno a redémarré ({cause})",
         resetWhileAsked:
             "l'Uno a redémarré pendant la question `{command}` : vérifiez son alimentation, puis réessayez",

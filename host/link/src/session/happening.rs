@@ -70,3 +70,14 @@ pub enum Unanswered {
     /// The machine is lost, and why. It may have obeyed, or may still do so.
     Unknown(String),
 }
+
+/// What a turn has led to.
+#[derive(Debug, Default)]
+pub struct Turn {
+    /// What happened.
+    pub happened: Vec<Happening>,
+    /// The bytes to send now.
+    pub to_send: Vec<u8>,
+    /// Whether typed lines were given up: what the wire has not sent yet must not be sent any more.
+    pub is_given_up: bool,
+}

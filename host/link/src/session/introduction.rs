@@ -3,7 +3,7 @@
 
 use super::{Asked, EVENTS, EXAMPLES, HOLD, Happening, POLL, SETTINGS, STATUS, Session, State, VERSION};
 use crate::settings::{self, Shown};
-use crate::{ConsoleLine, LinkError, Status, lines};
+use crate::{COMMAND_LENGTH, ConsoleLine, LinkError, Status, lines};
 
 /// Further tries to ask for everything, if an answer is missing or belongs to another question.
 const RETRIES: usize = 2;
@@ -12,6 +12,9 @@ const RETRIES: usize = 2;
 /// that cannot belong to those.
 pub(super) const INTRODUCTION: [&str; 6] = [VERSION, STATUS, SETTINGS, EXAMPLES, EVENTS, STATUS];
 const LAST: usize = INTRODUCTION.len() - 1;
+
+/// Backspaces, which delete a line of any length. Ended instead, the rest of a line would be a late command.
+const ERASE: u8 = 0x08;
 
 /// What the first answers have said.
 #[derive(Default)]
@@ -33,6 +36,13 @@ pub(super) struct Introduction {
 }
 
 impl Session {
+    /// Empties the machine's line, and waits for silence.
+    pub(super) fn settle(&mut self) {
+        self.turn.to_send.extend([ERASE; COMMAND_LENGTH]);
+        self.turn.to_send.push(b'\n');
+        self.state = State::Settling { since: self.waited, heard: self.waited };
+    }
+
     /// Asks for everything again, if that may help. A `hold` without an answer is typed again.
     pub(super) fn ask_again(&mut self, error: LinkError) {
         if !error.is_of_an_answer() || self.introduction.tries == RETRIES {

@@ -6,7 +6,10 @@ use crate::{Link, Wire};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig::ScriptedBoard;
+use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::io::Write;
+use std::rc::Rc;
 
 /// A connection to a board, at a time.
 struct Talk {
@@ -119,7 +122,6 @@ fn examples_are_asked_for_again_behind_a_command_that_changes_them() {
 fn hold_drops_nothing_that_the_session_asks_for_itself() {
     let mut talk = Talk::connected();
     assert!(talk.command("set wheel_mm 405"));
-    talk.session().turn_events_on();
     assert_eq!(talk.turn(), [typed("set wheel_mm 405")]);
     talk.session().hold();
     let happened = talk.second();
@@ -128,6 +130,18 @@ fn hold_drops_nothing_that_the_session_asks_for_itself() {
         matches!(happened.split_last(), Some((Happening::Settings(..), before)) if *before == held),
         "{happened:?}"
     );
+}
+
+#[test]
+fn a_session_that_needs_the_events_turns_them_on_again() {
+    for keeps_events in [false, true] {
+        let mut talk = Talk::connected();
+        talk.session().keeps_events = keeps_events;
+        assert!(talk.command("events off"));
+        assert_eq!(talk.second(), [typed("events off"), answered("ok")]);
+        let again: &[&str] = if keeps_events { &["events on"] } else { &[] };
+        assert_eq!(talk.board.typed(), [&["events on", "events off"], again].concat());
+    }
 }
 
 #[test]
@@ -165,12 +179,37 @@ fn an_uno_that_is_unplugged_or_never_was_there_is_lost_once_and_found_later() {
 }
 
 #[test]
-fn an_answer_that_does_not_come_is_given_up() {
-    let mut talk = Talk::connected();
+fn an_answer_that_does_not_come_is_given_up_and_the_port_stays_open() {
+    let board = ScriptedBoard::plugged_in();
+    let (port, opened) = (board.clone(), Rc::new(Cell::new(0)));
+    let count = Rc::clone(&opened);
+    // Opening a real port resets its Uno, which may be at work.
+    let open = move || {
+        count.set(count.get() + 1);
+        Ok(Wire::over(port.open().expect("it is plugged in"), false))
+    };
+    let mut talk = Talk { connection: Connection::waiting_for(open), board, now: Moment::default() };
+    talk.second();
     assert!(talk.command("silence"));
-    let happened: Vec<_> = (0..4).flat_map(|_| talk.second()).collect();
-    assert!(happened.iter().any(|happening| matches!(happening, Happening::Lost(_))), "{happened:?}");
-    assert!(talk.session().is_idle());
+    let happened: Vec<_> = (0..6).flat_map(|_| talk.second()).collect();
+    let lost = happened.iter().position(|happening| matches!(happening, Happening::Lost(_)));
+    let found = happened.iter().position(|happening| matches!(happening, Happening::Connected { .. }));
+    assert!(lost.is_some() && lost < found, "{happened:?}");
+    assert_eq!((opened.get(), talk.session().is_idle()), (1, true));
+}
+
+#[test]
+fn a_hold_that_waits_for_a_board_is_not_ended_at_each_try() {
+    let mut talk = Talk::connected();
+    talk.session().keeps_hold = true;
+    talk.session().hold();
+    talk.board.plug(false);
+    let happened: Vec<_> = (0..5).flat_map(|_| talk.second()).collect();
+    let ends = happened.iter().filter(|happening| matches!(happening, Happening::Unanswered { .. })).count();
+    assert_eq!(ends, 1, "{happened:?}");
+    talk.board.plug(true);
+    let happened = [talk.second(), talk.second()].concat();
+    assert!(happened.contains(&typed("hold")), "{happened:?}");
 }
 
 #[test]
@@ -328,7 +367,7 @@ fn where_an_answer_may_be_late_hold_is_typed_at_once_and_again_behind_the_first_
     session.open(false);
     let mut sent = String::new();
     // The first question stays unanswered, so its answer may still come.
-    while !sent.ends_with(&format!("version\n{}\n", "\u{8}".repeat(LINE_LENGTH))) {
+    while !sent.ends_with(&format!("version\n{}\n", "\u{8}".repeat(crate::COMMAND_LENGTH))) {
         sent += &sends(&mut session, &mut now, "");
         assert!(now.ticking < Duration::from_secs(9));
     }
@@ -373,8 +412,8 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
     let (mut connections, mut ends) = (0, [0; 5]);
     for _ in 0..200 {
         let (mut session, mut now) = (Session { keeps_hold: random.random(), ..Session::default() }, Moment::default());
-        let mut known: std::collections::BTreeMap<u64, Known> = std::collections::BTreeMap::new();
-        let mut answered = true;
+        let mut known: BTreeMap<u64, Known> = BTreeMap::new();
+        let mut is_heard = true;
         for step in 0..600 {
             match random.random_range(0..40) {
                 0 if !session.is_open() => session.open(random.random()),
@@ -401,8 +440,8 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
                 _ if random.random_ratio(1, 3) => lines[random.random_range(0..lines.len())],
                 _ => "",
             };
-            answered = !answered;
-            let turn = session.turn(now, if answered { received.as_bytes() } else { b"" });
+            is_heard = !is_heard;
+            let turn = session.turn(now, if is_heard { received.as_bytes() } else { b"" });
             let sent = String::from_utf8(turn.to_send).unwrap();
             for happening in turn.happened {
                 let (number, end) = match happening {
@@ -438,6 +477,8 @@ fn every_command_has_one_end_and_none_is_typed_that_ends_as_not_typed() {
                 known.ends += 1;
             }
         }
+        // A `hold` may wait for the next wire.
+        known.retain(|number, known| session.to_hold != Some(*number) || known.ends > 0);
         assert!(known.values().all(|known| known.ends == 1), "{known:?}");
     }
     assert!(connections > 100 && ends.iter().all(|&count| count > 100), "{connections} {ends:?}");

@@ -96,7 +96,7 @@ impl World {
         let port = board.clone();
         let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
         let mut connection = Connection::waiting_for(open);
-        connection.session.keeps_hold = true;
+        (connection.session.keeps_hold, connection.session.keeps_events) = (true, true);
         let (send_commands, commands) = mpsc::channel(WAITING);
         let (send_holds, holds) = mpsc::channel(WAITING);
         let machine = Machine { name: "uno".to_owned(), number: 0, commands: send_commands, holds: send_holds };
