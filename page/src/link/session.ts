@@ -214,9 +214,9 @@ export class Session implements Link {
         if (this.#ended || this.#isTurning) return;
         this.#isTurning = true;
         const { news, send, failure } = this.#request<Turn>(what);
+        const why = failure && whyNone(failure);
         try {
             if (send !== "") this.wire.send(send);
-            const why = failure && whyNone(failure);
             for (const one of news) {
                 if (why === null) this.#take(one);
                 else if (one.is === "unanswered") this.#take({ ...one, because: why });
@@ -226,7 +226,7 @@ export class Session implements Link {
         } finally {
             this.#isTurning = false;
         }
-        if (failure) this.end(whyNone(failure));
+        if (why !== null) this.end(why);
     }
 
     #request<Answer>(what: unknown): Answer {
