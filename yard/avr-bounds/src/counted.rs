@@ -69,7 +69,7 @@ pub(crate) fn exits_with_zero(nodes: &[Node], circle: &BTreeSet<usize>, register
         let ordered: Vec<usize> = circles(&others, &edges).into_iter().flatten().chain([exit]).collect();
         let counted = Loop { nodes, circle, ordered: &ordered, entries: &entries, runs_once: &passes };
         let (_, needed, ends) = counted.by(exit)?;
-        let is_zero = needed.contains(register) && ends.iter().all(|end| end.registers[register] == 0);
+        let is_zero = needed.has(register) && ends.iter().all(|end| end.registers[register] == 0);
         is_zero.then_some((exit, out))
     };
     circle.iter().filter_map(of_exit).collect()
@@ -148,7 +148,7 @@ impl Loop<'_> {
         let stays_when_next = self.nodes[stays.to].place.address == branch.next();
         let (mut most, mut ends) = (0, Vec::new());
         for Edge { constants, .. } in self.entries {
-            if !needed.iter().all(|register| constants[register].is_some()) {
+            if !needed.numbers().all(|register| constants[register].is_some()) {
                 return None;
             }
             let registers = constants.map(Option::unwrap_or_default);
@@ -172,7 +172,7 @@ fn run(
     let mut before = held.clone();
     for turn in 0..MOST_TURNS {
         // If a state repeats, the loop never ends.
-        if turn > 0 && needed.iter().all(|register| held.registers[register] == before.registers[register]) {
+        if turn > 0 && needed.numbers().all(|register| held.registers[register] == before.registers[register]) {
             return None;
         }
         if turn.is_power_of_two() {
@@ -201,7 +201,7 @@ fn run(
 fn moves_pointer(step: &Instruction, held: &mut Concrete, needed: Registers) -> bool {
     let Some((pointer, by)) = step.pointer() else { return false };
     let is_load = matches!(step.operation, Ld | Lpm | Elpm);
-    if by == 0 || is_load && needed.contains(step.destination) {
+    if by == 0 || is_load && needed.has(step.destination) {
         return false;
     }
     let address = u16::from_le_bytes([held.registers[pointer], held.registers[pointer + 1]]);

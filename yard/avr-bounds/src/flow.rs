@@ -242,8 +242,8 @@ impl Follower<'_, '_> {
             let node = &nodes[number];
             for edge in &node.edges {
                 let keeps = match &edge.through {
-                    Some(called) => called.keeps.contains(ZERO) || called.leaves_zero,
-                    None => !node.instruction.effects().changes.contains(ZERO),
+                    Some(called) => called.keeps.has(ZERO) || called.leaves_zero,
+                    None => !node.instruction.effects().changes.has(ZERO),
                 };
                 let comes_zero =
                     edge.constants[ZERO] == Some(0) || is_zero[number] && keeps || exits.contains(&(number, edge.to));
@@ -316,7 +316,7 @@ impl Follower<'_, '_> {
         self.routine.nodes[number] = Node::new(place, instruction);
         let (next, target) = (instruction.next(), instruction.target(chip.flash_bytes));
         match instruction.operation {
-            Rjmp | Jmp | Rcall | Call if target.is_some_and(|target| self.program.targets.is_table_jump(target)) => {
+            Rjmp | Jmp | Rcall | Call if target.is_some_and(|target| self.program.elf.table_jumps.contains(&target)) => {
                 let targets = self.program.targets.of_table(self.program.elf, at, &after.known);
                 let (targets, table_cycles) = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
                 // The routine changes R0 and the pointer.
@@ -466,7 +466,7 @@ impl Follower<'_, '_> {
         after.known.after(called.keeps);
         after.known.kept = [Value::Unknown; 3];
         // The calling convention, which is checked at the function's return.
-        if called.leaves_zero && !called.keeps.contains(1) {
+        if called.leaves_zero && !called.keeps.has(1) {
             after.known.registers[1] = Value::Constant(0);
         }
         let next = self.routine.nodes[from].instruction.next();

@@ -138,7 +138,7 @@ pub fn prove(elf: &Program, budgets: &Budgets) -> Result<Bounds, BoundsError> {
     }
     let mut timer = Timer::new(passes(&code, budgets));
     let (critical_section, closed) = [Stretch::FlagClear, Stretch::Closed]
-        .map(|kind| timer.longest_stretch(&main, kind).map(|time| time.longest(&code)))
+        .map(|kind| timer.stretches(&main, kind).inner.map(|time| time.longest(&code)))
         .map(|longest| longest.unwrap_or(Longest { cycles: Some(0), without_bound: Vec::new() }))
         .into();
     let of_handlers = time_handlers(&code, &handlers, &mut timer, &closed);
@@ -319,7 +319,7 @@ impl Time {
     /// The time with its unbounded places.
     fn longest(&self, code: &Code) -> Longest {
         let without_bound = self.unbounded.iter().map(|&address| code.place(address)).collect();
-        Longest { cycles: self.is_bound().then_some(self.cycles), without_bound }
+        Longest { cycles: self.unbounded.is_empty().then_some(self.cycles), without_bound }
     }
 }
 

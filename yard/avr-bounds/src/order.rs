@@ -10,6 +10,7 @@
 //! libraries are not moved.
 
 use crate::decode::Instruction;
+use crate::decode::Operation::*;
 use crate::elf::Program;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -59,7 +60,7 @@ impl Graph {
             while address < first + function.bytes
                 && let Some(found) = Instruction::at(&elf.flash, address)
             {
-                if matches!(found.mnemonic().as_str(), "call" | "jmp" | "rcall" | "rjmp")
+                if matches!(found.operation, Call | Jmp | Rcall | Rjmp)
                     && let Some(target) = found.target(elf.flash.len() as u32)
                     && !(first..first + function.bytes).contains(&target)
                 {

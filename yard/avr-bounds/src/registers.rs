@@ -22,13 +22,13 @@ pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Res
     let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function && is_named(routine));
     for routine in functions.filter(|routine| !routine.returns.is_empty()) {
         let broken = |routine: &Routine| {
-            let zero = if routine.leaves_zero { Registers::NONE } else { Registers::one(ZERO) };
+            let zero = if routine.leaves_zero { Registers::empty() } else { Registers::one(ZERO) };
             (Registers::PRESERVED - routine.keeps) | zero
         };
         // An error names the function itself, not its caller.
         let called = routine.nodes.iter().flat_map(Node::called);
         let called = called.filter(|called| !called.returns.is_empty() && is_named(called));
-        let broken = broken(routine) - called.fold(Registers::NONE, |all, called| all | broken(called));
+        let broken = broken(routine) - called.map(|called| broken(called)).collect();
         if !broken.is_empty() {
             let function = program.name_of(routine.entry);
             return Err(BoundsError(format!(

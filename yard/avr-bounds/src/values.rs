@@ -172,7 +172,7 @@ impl Known {
 
     /// The effect of a routine: registers and flags that it does not preserve are unknown.
     pub(crate) fn after(&mut self, keeps: Registers) {
-        for register in (Registers::ALL - Registers::FLAGS - keeps).iter() {
+        for register in (Registers::ALL - Registers::FLAGS - keeps).numbers() {
             self.registers[register] = Value::Unknown;
         }
         self.flags = (0, 0);
@@ -245,7 +245,7 @@ impl Known {
             Some(flag) => self.flags.0 >> flag & 1 == 1,
             None => self.constant(place).is_some(),
         };
-        if !effects.reads.iter().all(known) {
+        if !effects.reads.numbers().all(known) {
             return false;
         }
         let registers = std::array::from_fn(|register| self.constant(register).unwrap_or_default());
@@ -253,7 +253,7 @@ impl Known {
         if !concrete.carry_out(instruction) {
             return false;
         }
-        for place in effects.changes.iter() {
+        for place in effects.changes.numbers() {
             match place.checked_sub(FLAGS) {
                 None => self.registers[place] = Value::Constant(concrete.registers[place]),
                 Some(flag) => {
@@ -303,7 +303,7 @@ impl Known {
         match address {
             SREG => {
                 self.flags = (0, 0);
-                self.unchanged = Registers::NONE;
+                self.unchanged = Registers::empty();
                 self.counted = None;
                 match value {
                     Status(on, is_of_entry) => {
@@ -376,7 +376,7 @@ impl Known {
             // Registers that are only moved may hold more than constants.
             return Ok(());
         }
-        let changed_flags = (0..8).filter(|&flag| changes.contains(FLAGS + flag)).fold(0, |all, flag| all | 1 << flag);
+        let changed_flags = (0..8).filter(|&flag| changes.has(FLAGS + flag)).fold(0, |all, flag| all | 1 << flag);
         self.flags = (self.flags.0 & !changed_flags, self.flags.1 & !changed_flags);
         if moves {
             return Ok(());
@@ -462,7 +462,7 @@ impl Known {
 /// compilers save count.
 fn lasting(value: Value) -> Value {
     match value {
-        Value::AtEntry(register) if Registers::PRESERVED.contains(register) => value,
+        Value::AtEntry(register) if Registers::PRESERVED.has(register) => value,
         Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
         _ => Value::Unknown,
     }
