@@ -41,7 +41,6 @@ impl Uno {
     /// Powers up an Uno with the firmware at `elf` and an erased EEPROM. Nothing is wired to its inputs yet ([`Uno::wired`]).
     ///
     /// # Errors
-    ///
     /// If the ELF cannot be read or does not fit the chip.
     pub fn boot(elf: &Path) -> Result<Uno, UnoError> {
         Uno::boot_with_eeprom(elf, &[])
@@ -50,7 +49,6 @@ impl Uno {
     /// As [`Uno::boot`], with `eeprom` at the EEPROM's address 0; the rest is erased.
     ///
     /// # Errors
-    ///
     /// As [`Uno::boot`], and if `eeprom` is longer than 1024 bytes.
     pub fn boot_with_eeprom(elf: &Path, eeprom: &[u8]) -> Result<Uno, UnoError> {
         let image = Image::read(elf)?;
@@ -63,7 +61,6 @@ impl Uno {
     /// erased. Every reset starts the bootloader, as with the fuses of a real Uno.
     ///
     /// # Errors
-    ///
     /// As [`Uno::boot_with_eeprom`], and if the firmware overlaps the bootloader.
     pub fn boot_with_bootloader(bootloader: &Bootloader, elf: Option<&Path>, eeprom: &[u8]) -> Result<Uno, UnoError> {
         let mut image = elf.map(Image::read).transpose()?.unwrap_or_default();
@@ -169,7 +166,6 @@ impl Uno {
     /// to 1.5 V; in between it keeps its level (data sheet, DC characteristics).
     ///
     /// # Panics
-    ///
     /// If the pin is none of A0 to A5.
     pub fn set_millivolts(&mut self, pin: Pin, millivolts: u16) {
         let channel = pin.adc_channel().unwrap_or_else(|| panic!("{pin} is not an analogue pin: take A0 to A5"));
@@ -215,7 +211,6 @@ impl Uno {
     /// Runs until the firmware has sent `text`. Takes all output up to the text's end.
     ///
     /// # Errors
-    ///
     /// As [`Uno::run_until`], and if the text has not come after `timeout_cycles`.
     pub fn run_until_serial(&mut self, text: &str, timeout_cycles: u64) -> Result<String, UnoError> {
         let deadline = self.cycle() + timeout_cycles;
@@ -243,7 +238,6 @@ impl Uno {
     /// At `main` the start-up code has filled SRAM, and no line of the firmware's own has run.
     ///
     /// # Errors
-    ///
     /// As [`Uno::run_until`], if the ELF has no such function, and if it is not reached within `timeout_cycles`.
     pub fn run_until_symbol(&mut self, symbol: &str, timeout_cycles: u64) -> Result<(), UnoError> {
         let address = self.image.functions.get(symbol).copied();
@@ -389,7 +383,6 @@ impl Uno {
     /// Puts bytes into a variable from its first byte on, as bits that fall over would. It is named as in [`Uno::read`].
     ///
     /// # Errors
-    ///
     /// If there is no such symbol, or more bytes than it has.
     pub fn write(&mut self, symbol: &str, bytes: &[u8]) -> Result<(), UnoError> {
         let length = bytes.len();
@@ -402,7 +395,6 @@ impl Uno {
     /// Puts bytes into SRAM from an address of the data space on.
     ///
     /// # Errors
-    ///
     /// If they do not fit into SRAM, which is from 0x0100 to 0x08FF.
     pub fn write_sram(&mut self, address: u16, bytes: &[u8]) -> Result<(), UnoError> {
         let sram = self.core.sram_mut();

@@ -132,8 +132,8 @@ impl Core {
         let parameter = recorder.as_ptr().cast::<c_void>();
 
         // SAFETY: `avr` is valid and initialised. Each `avr_io_getirq` names a peripheral that the chip
-        // has, and simavr ignores a null for a vector that it lacks. The callbacks get the recorder's address, which
-        // stays valid until `Drop` has ended the chip.
+        // has, and simavr ignores a null for a vector that it lacks. The callbacks get the address of the recorder,
+        // its timer or its EEPROM, which stays valid until `Drop` has ended the chip.
         unsafe {
             (*avr).custom.data = parameter;
             (*avr).reset = Some(on_reset);
@@ -151,8 +151,10 @@ impl Core {
             }
             listen(request(b"adc0"), simavr::ADC_IRQ_OUT_TRIGGER, on_sample);
             listen(request(b"uar0"), simavr::UART_IRQ_OUTPUT, on_transmit);
-            timer::take_over_writes(chip, &raw mut (*recorder.as_ptr()).timer);
-            eeprom::take_over_writes(chip, &raw mut (*recorder.as_ptr()).eeprom);
+            let (timer, eeprom) = (&raw mut (*recorder.as_ptr()).timer, &raw mut (*recorder.as_ptr()).eeprom);
+            chip.replace_writer(timer::OCR1AL, timer::on_compare_write, timer.cast());
+            chip.replace_writer(timer::TCNT1L, timer::on_counter_write, timer.cast());
+            chip.replace_writer(eeprom::EECR, eeprom::on_control_write, eeprom.cast());
             for vector in 1..=LAST_VECTOR {
                 let irq = simavr::avr_get_interrupt_irq(avr, vector);
                 if !irq.is_null() {
@@ -216,7 +218,6 @@ impl Core {
     /// run in one step. A step passes `until` at most by the length of its last instruction.
     ///
     /// # Errors
-    ///
     /// If the firmware crashed or halted for good.
     pub(super) fn step(&mut self, until: u64) -> Result<(), UnoError> {
         let avr = self.chip.avr();

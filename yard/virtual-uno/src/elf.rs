@@ -40,7 +40,6 @@ impl Size {
     /// The memory that the ELF at `path` takes, whether or not the chip has it.
     ///
     /// # Errors
-    ///
     /// Where the file cannot be read or is no ELF for AVR.
     pub fn read(path: &Path) -> Result<Size, FileError> {
         let bytes = FileError::bytes(path)?;
@@ -81,7 +80,6 @@ impl Image {
     /// Reads the ELF or the Intel HEX file at `path`. A HEX file has the flash alone.
     ///
     /// # Errors
-    ///
     /// Where the file cannot be read, is neither an ELF for AVR nor HEX, is for another chip, or holds more than the
     /// ATmega328P does.
     pub fn read(path: &Path) -> Result<Image, FileError> {

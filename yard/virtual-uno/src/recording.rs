@@ -41,7 +41,6 @@ struct Channel {
 /// scopes is written `scope.name`.
 ///
 /// # Errors
-///
 /// If the file is no VCD, has no such channels, or leaves their levels open.
 pub fn read(path: &Path, channels: &[(Pin, &str)]) -> Result<Vec<PinChange>, FileError> {
     let file = File::open(path).map_err(|source| FileError::unread(path, source))?;
@@ -72,43 +71,37 @@ fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Ve
     let mut changes = Vec::new();
     let mut time = 0;
     while let Some(command) = parser.next().transpose().map_err(read_error)? {
-        match command {
+        let line = parser.line();
+        let (wire, value) = match command {
             Command::Timestamp(later) if later < time => {
-                return Err(wrong(format!("goes back in time at line {}", parser.line())));
+                return Err(wrong(format!("goes back in time at line {line}")));
             }
-            Command::Timestamp(later) => time = later,
-            Command::ChangeScalar(..) | Command::ChangeVector(..) => {
-                let (wire, value) = match &command {
-                    Command::ChangeScalar(wire, value) => (*wire, Some(*value)),
-                    // Some programs write a single wire as a vector, too.
-                    Command::ChangeVector(wire, bits) => (*wire, bits.iter().last()),
-                    _ => continue,
-                };
-                let (Some(value), true) = (value, wires.contains_key(&wire)) else { continue };
-                let Some(channel) = wires.get_mut(&wire) else { continue };
-                let high = match value {
-                    Value::V0 => false,
-                    Value::V1 => true,
-                    Value::X | Value::Z => {
-                        return Err(wrong(format!(
-                            "has `{value}` on channel `{}` at line {}: only 0 and 1 are levels",
-                            channel.name,
-                            parser.line()
-                        )));
-                    }
-                };
-                if channel.level.replace(high) != Some(high) {
-                    let cycle = to_cycles(time, timescale);
-                    if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
-                        return Err(wrong(format!(
-                            "is longer than {MOST_HOURS} h at line {}: cut the recording, or check its $timescale",
-                            parser.line()
-                        )));
-                    }
-                    changes.push(PinChange { cycle, pin: channel.pin, high });
-                }
+            Command::Timestamp(later) => {
+                time = later;
+                continue;
             }
-            _ => {}
+            Command::ChangeScalar(wire, value) => (wire, Some(value)),
+            // Some programs write a single wire as a vector, too.
+            Command::ChangeVector(wire, bits) => (wire, bits.iter().last()),
+            _ => continue,
+        };
+        let (Some(channel), Some(value)) = (wires.get_mut(&wire), value) else { continue };
+        let high = match value {
+            Value::V0 => false,
+            Value::V1 => true,
+            Value::X | Value::Z => {
+                let name = &channel.name;
+                return Err(wrong(format!("has `{value}` on channel `{name}` at line {line}: only 0 and 1 are levels")));
+            }
+        };
+        if channel.level.replace(high) != Some(high) {
+            let cycle = to_cycles(time, timescale);
+            if cycle > MOST_HOURS * 3600 * CYCLES_PER_SECOND {
+                return Err(wrong(format!(
+                    "is longer than {MOST_HOURS} h at line {line}: cut the recording, or check its $timescale"
+                )));
+            }
+            changes.push(PinChange { cycle, pin: channel.pin, high });
         }
     }
     match wires.into_values().find(|channel| channel.level.is_none()) {
@@ -121,7 +114,6 @@ fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Ve
 /// starts at rest. Changes on other pins are left out. [`read`] returns exactly the same cycles.
 ///
 /// # Errors
-///
 /// The errors of the writer.
 pub fn write(file: impl Write, wires: &[Wire], changes: impl IntoIterator<Item = PinChange>) -> io::Result<()> {
     let mut changes: Vec<PinChange> = changes.into_iter().collect();
@@ -277,8 +269,8 @@ mod tests {
         )
     }
 
-    fn levels(file: &str, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
-        parse(Path::new("pins.vcd"), file.as_bytes(), channels)
+    fn levels(file: impl AsRef<[u8]>, channels: &[(Pin, &str)]) -> Result<Vec<(u64, Pin, bool)>, String> {
+        parse(Path::new("pins.vcd"), file.as_ref(), channels)
             .map(|changes| changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect())
             .map_err(|error| error.to_string())
     }
@@ -324,10 +316,7 @@ mod tests {
                 file.splice(0..0, *b"\xEF\xBB\xBF");
             }
             let channels = [(Pin::D2, names[0]), (Pin::D3, names[1])];
-            let changes = parse(Path::new("pins.vcd"), &*file, &channels)
-                .unwrap_or_else(|error| panic!("{habits:#b}: {error:?}: {}", String::from_utf8_lossy(&file)));
-            let found: Vec<_> = changes.iter().map(|change| (change.cycle, change.pin, change.high)).collect();
-            assert_eq!(found, expected, "{habits:#b}");
+            assert_eq!(levels(&file, &channels).as_ref(), Ok(&expected), "{habits:#b}: {}", String::from_utf8_lossy(&file));
         }
     }
 

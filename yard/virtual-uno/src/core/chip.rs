@@ -17,7 +17,6 @@ pub(super) struct Chip(*mut simavr::avr_t);
 
 impl Chip {
     /// # Safety
-    ///
     /// `avr` must be an initialised chip for as long as the result is used. No reference into its I/O registers or into
     /// their writers may be alive when a method is called.
     pub(super) unsafe fn of(avr: *mut simavr::avr_t) -> Chip {
@@ -64,7 +63,6 @@ impl Chip {
     /// Replaces the writer of an I/O register by `function`, which is called with `parameter`.
     ///
     /// # Safety
-    ///
     /// `function` must be sound with `parameter` at every write that the chip makes.
     pub(super) unsafe fn replace_writer(
         self,
@@ -90,7 +88,6 @@ impl Writer {
     /// Has the register written.
     ///
     /// # Safety
-    ///
     /// `chip` must be the chip that this writer is of.
     pub(super) unsafe fn write(self, chip: Chip, register: u16, value: u8) {
         if let Some(function) = self.function {
