@@ -129,7 +129,7 @@ impl Boards {
     /// Plays a scene. The weeder is in hold afterwards.
     pub fn play_scene(&mut self, scene: &Scene) -> Result<Raised, CheckError> {
         self.set_to_work(scene.alarm == Alarm::ToolStuck)?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         plan.at(ms(STILL_MS).into(), Action::Pause);
         plan.roll(scene.rolled, COUNTS_PER_S);
         let fault = plan.end() + u64::from(ms(scene.wait_ms));
@@ -141,7 +141,7 @@ impl Boards {
         // The record may begin at any phase: so it must hold a code with the pauses before and after it.
         let code_ms = f64::from(2 * (2 * u16::from(first + second) + 8) + 10) * QUARTER_MS;
         let records = self.tester.record_for_ms(code_ms as u32)?;
-        let mut free = Plan::new();
+        let mut free = Plan::default();
         free.at(ms(1).into(), Action::Freeze { mask: 0 });
         self.play(free)?;
         self.tester.set(AT_REST, AT_REST)?;
@@ -190,7 +190,7 @@ impl Boards {
         self.tester.set(Line::WorkSwitch.bit(), 0)?;
         // `start now` at work would skip the unseen ground, so `set_to_work` first goes to hold.
         self.set_to_work(false)?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         plan.at(u64::from(ms(2 * STILL_MS)), Action::level(Line::WorkSwitch, true));
         let opened = plan.end();
         plan.at(opened + u64::from(ms(AFTER_MS)), Action::Pause);
@@ -207,7 +207,7 @@ impl Boards {
         }
         self.weeder.ask("start now")?;
         self.tester.record_for_ms(2 * STILL_MS)?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         plan.roll(100, SLOW_COUNTS_PER_S);
         plan.at(plan.end(), Action::level(Line::Beam, false));
         let edge = plan.end();

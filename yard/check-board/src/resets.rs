@@ -105,7 +105,7 @@ impl Boards {
         self.weeder.to_hold()?;
         if reset_by != ResetBy::Watchdog {
             self.weeder.ask("start now")?;
-            let mut plan = Plan::new();
+            let mut plan = Plan::default();
             plan.roll(ROLL_COUNTS, ROLL_COUNTS_PER_S);
             self.tester.begin(&plan.finish())?;
         }

@@ -60,7 +60,7 @@ impl Boards {
         }
         let before = self.weeder.status()?.position;
         self.weeder.ask("start")?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         let begin = u64::from(ms(STILL_MS));
         plan.follow(&machine.pin_changes(row, motion, 0), begin);
         plan.at(begin + (motion.duration_s() * CYCLES_PER_SECOND as f64) as u64, Action::Pause);

@@ -90,8 +90,8 @@ impl SecondUno {
 
     /// Changes input pins.
     pub fn drive(&mut self, changes: impl IntoIterator<Item = PinChange>) {
-        let number = |pin| Pin::ALL.iter().position(|&one| one == pin).unwrap_or_default();
-        self.edges.extend(changes.into_iter().map(|change| (change.cycle, number(change.pin), change.high)));
+        let edge = |change: PinChange| (change.cycle, change.pin.number().into(), change.high);
+        self.edges.extend(changes.into_iter().map(edge));
     }
 
     /// Its new output edges.

@@ -270,7 +270,7 @@ impl Boards {
         let Self { weeder, tester, .. } = self;
         weeder.to_hold()?;
         weeder.ask(&format!("set second_beam_mm {SECOND_BEAM_MM}"))?;
-        let mut plan = Plan::new();
+        let mut plan = Plan::default();
         let mut play = |counts, line: Line, high: bool| {
             plan.roll(counts, PLANT_COUNTS_PER_S);
             plan.at(plan.end(), Action::level(line, high));

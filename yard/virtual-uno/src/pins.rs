@@ -58,17 +58,6 @@ impl Pin {
         }
     }
 
-    /// The pin at a bit of a port; `None` if the board has none there.
-    pub const fn at(port: char, bit: u8) -> Option<Pin> {
-        let number = match (port, bit) {
-            ('D', 0..8) => bit,
-            ('B', 0..6) => bit + 8,
-            ('C', 0..6) => bit + 14,
-            _ => return None,
-        };
-        Some(Pin::ALL[number as usize])
-    }
-
     /// The pin's channel of the ADC, 0 to 5; `None` for D0 to D13.
     pub const fn adc_channel(self) -> Option<u8> {
         self.number().checked_sub(14)

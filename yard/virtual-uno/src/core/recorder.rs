@@ -99,8 +99,8 @@ impl Recorder {
 
     /// Records the levels of a port, from the present values of its registers.
     fn record_port(&mut self, name: char, direction: u8, port: u8) {
-        for bit in 0..8 {
-            let Some(pin) = Pin::at(name, bit) else { continue };
+        for pin in Pin::ALL.into_iter().filter(|pin| pin.port_and_bit().0 == name) {
+            let (_, bit) = pin.port_and_bit();
             let timer = timer_level(self.chip, pin, &self.timer_levels);
             let high = direction & 1 << bit != 0 && timer.unwrap_or(port & 1 << bit != 0);
             if self.is_driven_high(pin) != high {
