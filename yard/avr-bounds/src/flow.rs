@@ -29,7 +29,7 @@ use crate::proved::{self, Found, Frame};
 use crate::reach::Reach;
 use crate::routine::{Edge, Entry, Kind, Node, Place, Routine, bytes};
 use crate::targets::{Targets, Where};
-use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value, turn};
+use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
@@ -198,7 +198,6 @@ impl<'a> Code<'a> {
 #[derive(Clone)]
 struct After {
     known: Known,
-    interrupts: Interrupts,
     cycles: u32,
 }
 
@@ -215,7 +214,7 @@ struct Follower<'p, 'a> {
 impl Follower<'_, '_> {
     fn follow(mut self) -> Result<Routine, BoundsError> {
         let Entry { address, interrupts, kind, .. } = self.routine.entry;
-        self.reach(Place { address, depth: 0, interrupts }, Known::at_entry(kind == Kind::Function))?;
+        self.reach(address, Known::at_entry(kind == Kind::Function, interrupts))?;
         while let Some(number) = self.to_do.pop() {
             self.step(number)?;
         }
@@ -255,13 +254,14 @@ impl Follower<'_, '_> {
         nodes.iter().zip(is_zero).all(|(node, is_zero)| node.returns.is_none() || is_zero)
     }
 
-    /// The number of a place that a path reaches with these facts. If they are new, the place is to be followed.
-    fn reach(&mut self, place: Place, known: Known) -> Result<usize, BoundsError> {
+    /// The number of the place that a path reaches with these facts. If they are new, the place is to be followed.
+    fn reach(&mut self, address: u32, known: Known) -> Result<usize, BoundsError> {
+        let place = Place { address, depth: known.stack.len(), interrupts: known.interrupts };
         let number = match self.numbers.get(&place) {
             Some(&number) if !self.known[number].meet(&known) => return Ok(number),
             Some(&number) => number,
             None => {
-                self.routine.nodes.push(Node::new(place, self.program.instruction(place.address)?));
+                self.routine.nodes.push(Node::new(place, self.program.instruction(address)?));
                 self.known.push(known);
                 self.numbers.insert(place, self.known.len() - 1);
                 self.known.len() - 1
@@ -308,11 +308,11 @@ impl Follower<'_, '_> {
         }
         let cycles =
             instruction.cycles + chip.more_cycles(instruction.operation) + halt_cycles(&instruction, chip.eecr);
-        let interrupts = match place.interrupts {
-            Interrupts::Off => Interrupts::Off,
-            Interrupts::Soon | Interrupts::On => Interrupts::On,
-        };
-        let mut after = After { known, interrupts, cycles };
+        if known.interrupts == Interrupts::Soon {
+            known.interrupts = Interrupts::On;
+        }
+        let interrupts = known.interrupts;
+        let mut after = After { known, cycles };
         self.routine.nodes[number] = Node::new(place, instruction);
         let (next, target) = (instruction.next(), instruction.target(chip.flash_bytes));
         match instruction.operation {
@@ -384,22 +384,24 @@ impl Follower<'_, '_> {
             }
             _ => {
                 let Entry { kind, interrupts: at_entry, .. } = self.routine.entry;
-                let After { known, interrupts: now, .. } = &mut after;
+                let known = &mut after.known;
                 if let Some(depth) = known.starts_again(&instruction, &chip) {
-                    let place = Place { address: next, depth, interrupts: *now };
+                    let place = Place { address: next, depth, interrupts };
                     self.program.restarts.insert(place);
                     return Ok(());
                 }
-                match known.carry_out(&instruction, &chip, place.interrupts, now, kind == Kind::Reset) {
+                match known.carry_out(&instruction, &chip, kind == Kind::Reset) {
                     // The value is unknown, so interrupts can be on or off.
                     Err(Problem::UnknownStatus) if kind != Kind::Handler => {
-                        turn(now, true);
-                        self.go(number, next, After { interrupts: Interrupts::Off, ..after.clone() }, None)?;
+                        let mut off = after.clone();
+                        off.known.interrupts = Interrupts::Off;
+                        self.go(number, next, off, None)?;
+                        after.known.turn_interrupts(true);
                     }
                     Ok(()) => {}
                     Err(problem) => return Err(self.program.refuse(at, problem)),
                 }
-                if interrupts == Interrupts::Off && after.interrupts != Interrupts::Off && at_entry == Interrupts::Off {
+                if interrupts == Interrupts::Off && after.known.interrupts != Interrupts::Off && at_entry == Interrupts::Off {
                     self.routine.enables.get_or_insert(at);
                 }
                 // A sleep with interrupts off does not end, and the time of a write to flash is unknown.
@@ -418,10 +420,10 @@ impl Follower<'_, '_> {
         if self.is_other_program(address) {
             return Ok(());
         }
-        let After { mut known, interrupts, cycles } = after;
+        let After { mut known, cycles } = after;
         known.restarts |= address == self.program.elf.start;
         let (length, constants) = (self.known[from].pair(20), known.constants());
-        let to = self.reach(Place { address, depth: known.stack.len(), interrupts }, known)?;
+        let to = self.reach(address, known)?;
         self.routine.nodes[from].edges.push(Edge { to, cycles, through, length, constants });
         Ok(())
     }
@@ -450,7 +452,7 @@ impl Follower<'_, '_> {
     /// Calls a function and continues after it.
     fn call(&mut self, from: usize, address: u32, mut after: After) -> Result<(), BoundsError> {
         let Entry { interrupts: at_entry, active, .. } = self.routine.entry;
-        let interrupts = after.interrupts;
+        let interrupts = after.known.interrupts;
         if self.is_other_program(address) {
             return Ok(());
         }
@@ -471,7 +473,8 @@ impl Follower<'_, '_> {
         }
         let next = self.routine.nodes[from].instruction.next();
         for &interrupts in &called.returns {
-            self.go(from, next, After { interrupts, ..after.clone() }, Some(Rc::clone(&called)))?;
+            after.known.interrupts = interrupts;
+            self.go(from, next, after.clone(), Some(Rc::clone(&called)))?;
         }
         if called.returns.is_empty() {
             self.routine.nodes[from].ends_in.push((after.cycles, called));

@@ -93,6 +93,7 @@ pub(crate) struct Known {
     counted: Option<usize>,
     /// Whether every path here has started the program again.
     pub(crate) restarts: bool,
+    pub(crate) interrupts: Interrupts,
 }
 
 /// The registers with known constants.
@@ -100,7 +101,7 @@ pub(crate) type Constants = [Option<u8>; 32];
 
 impl Known {
     /// The known facts at a routine's entry.
-    pub(crate) fn at_entry(is_function: bool) -> Known {
+    pub(crate) fn at_entry(is_function: bool, interrupts: Interrupts) -> Known {
         Known {
             registers: std::array::from_fn(Value::AtEntry),
             flags: (0, 0),
@@ -112,7 +113,17 @@ impl Known {
             upper_half: None,
             counted: None,
             restarts: false,
+            interrupts,
         }
+    }
+
+    /// Sets the interrupt flag, or clears it.
+    pub(crate) fn turn_interrupts(&mut self, on: bool) {
+        self.interrupts = match (on, self.interrupts) {
+            (false, _) => Interrupts::Off,
+            (true, Interrupts::Off) => Interrupts::Soon,
+            (true, already) => already,
+        };
     }
 
     /// Takes the branch on which the last result was zero.
@@ -289,14 +300,7 @@ impl Known {
 
     /// Writes a register's value to an address in the data space. Only start-up code may set the stack pointer to a
     /// constant.
-    fn write(
-        &mut self,
-        address: u16,
-        register: usize,
-        chip: &Chip,
-        interrupts: &mut Interrupts,
-        is_start_up: bool,
-    ) -> Result<(), Problem> {
+    fn write(&mut self, address: u16, register: usize, chip: &Chip, is_start_up: bool) -> Result<(), Problem> {
         use Value::{Constant, StackHigh, StackLow, Status, Unknown};
 
         let value = self.constant(register).map_or(self.registers[register], Constant);
@@ -307,12 +311,12 @@ impl Known {
                 self.counted = None;
                 match value {
                     Status(on, is_of_entry) => {
-                        turn(interrupts, on);
+                        self.turn_interrupts(on);
                         if is_of_entry {
                             self.unchanged = Registers::FLAGS;
                         }
                     }
-                    Constant(status) => turn(interrupts, status >> INTERRUPT_FLAG & 1 == 1),
+                    Constant(status) => self.turn_interrupts(status >> INTERRUPT_FLAG & 1 == 1),
                     _ => return Err(Problem::UnknownStatus),
                 }
             }
@@ -346,14 +350,7 @@ impl Known {
 
     /// Executes an instruction that continues at the next one. Only start-up code may set the stack pointer to a
     /// constant.
-    pub(crate) fn carry_out(
-        &mut self,
-        instruction: &Instruction,
-        chip: &Chip,
-        interrupts_before: Interrupts,
-        interrupts: &mut Interrupts,
-        is_start_up: bool,
-    ) -> Result<(), Problem> {
+    pub(crate) fn carry_out(&mut self, instruction: &Instruction, chip: &Chip, is_start_up: bool) -> Result<(), Problem> {
         use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
 
         let (d, r) = (instruction.destination, instruction.source);
@@ -382,8 +379,8 @@ impl Known {
             return Ok(());
         }
         match instruction.operation {
-            Bset if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, true),
-            Bclr if instruction.operand('s') == INTERRUPT_FLAG => turn(interrupts, false),
+            Bset if instruction.operand('s') == INTERRUPT_FLAG => self.turn_interrupts(true),
+            Bclr if instruction.operand('s') == INTERRUPT_FLAG => self.turn_interrupts(false),
             Push => self.stack.push(self.registers[r]),
             Pop => self.registers[d] = self.stack.pop().ok_or(Problem::TakesTooMuch)?,
             Mov => self.registers[d] = self.registers[r],
@@ -397,7 +394,7 @@ impl Known {
                 self.registers[d] = match instruction.data_address() {
                     Some(SPL) => StackLow(depth as u8),
                     Some(SPH) => StackHigh(depth),
-                    Some(SREG) => Status(interrupts_before != Interrupts::Off, self.unchanged == Registers::FLAGS),
+                    Some(SREG) => Status(self.interrupts != Interrupts::Off, self.unchanged == Registers::FLAGS),
                     _ if instruction.operation == Lds && gpior.is_none() => Loaded(None, false),
                     _ => gpior.map_or(Unknown, |gpior| self.kept[gpior]),
                 };
@@ -407,7 +404,7 @@ impl Known {
                 if address < 0x20 {
                     return Err(Problem::RegisterInMemory);
                 }
-                self.write(address, r, chip, interrupts, is_start_up)?;
+                self.write(address, r, chip, is_start_up)?;
             }
             Sbi | Cbi => gpior.into_iter().for_each(|gpior| self.kept[gpior] = Unknown),
             Mul | Muls | Mulsu | Fmul | Fmuls | Fmulsu => self.registers[..2].fill(Unknown),
@@ -417,7 +414,7 @@ impl Known {
                 if matches!(instruction.operation, St | Std)
                     && let Some(address) = self.pointed_at(instruction)
                 {
-                    self.write(address, r, chip, interrupts, is_start_up)?;
+                    self.write(address, r, chip, is_start_up)?;
                 }
                 match instruction.operation {
                     Lpm | Elpm => self.registers[d] = Unknown,
@@ -466,13 +463,4 @@ fn lasting(value: Value) -> Value {
         Value::Status(..) | Value::StackLow(_) | Value::StackHigh(_) => value,
         _ => Value::Unknown,
     }
-}
-
-/// Sets the interrupt flag, or clears it.
-pub(crate) fn turn(interrupts: &mut Interrupts, on: bool) {
-    *interrupts = match (on, *interrupts) {
-        (false, _) => Interrupts::Off,
-        (true, Interrupts::Off) => Interrupts::Soon,
-        (true, already) => already,
-    };
 }
