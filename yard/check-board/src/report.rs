@@ -16,26 +16,17 @@ pub const FORM: u32 = 1;
 const SIMULATED: &str = include_str!("simulated.json");
 
 /// The verdict on a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Verdict {
     /// Within its limits, and as simulated.
     Pass,
     /// Within its limits, and not as simulated.
     Differs,
     /// Outside its limits.
+    #[strum(to_string = "FAIL")]
     Fail,
-}
-
-impl Verdict {
-    /// Its word in the report.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Differs => "differs",
-            Self::Fail => "FAIL",
-        }
-    }
 }
 
 /// A figure.
@@ -204,14 +195,14 @@ impl Report {
             let _ = writeln!(
                 page,
                 "<tr class={:?}><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>",
-                line.verdict.word().to_lowercase(),
+                line.verdict.to_string().to_lowercase(),
                 escaped(&line.what),
                 number(line.simulated),
                 number(line.proved),
                 measured(line),
                 limits(line),
                 escaped(&line.unit),
-                line.verdict.word()
+                line.verdict
             );
         }
         page.push_str("</table>\n");
@@ -228,7 +219,7 @@ impl Report {
             let _ = writeln!(
                 text,
                 "{:8} {:<58} {:>10} {:<7} simulated {:>9}  proved {:>7}  right {}",
-                line.verdict.word(),
+                line.verdict,
                 line.what,
                 measured(line),
                 line.unit,

@@ -3,8 +3,8 @@
 use crate::plan::Plan;
 use crate::servo;
 use crate::{Boards, CheckError};
+use derive_more::{Deref, DerefMut};
 use link::{Link, LinkError, Mode, Status};
-use std::ops::{Deref, DerefMut};
 use tester_core::message::{Command, Record};
 use tester_core::pins::{AT_REST, Line, WIRES, Wire};
 use tester_core::player::Action;
@@ -23,23 +23,12 @@ const OWN_PULSE: u16 = 16_000;
 const OWN_PULSE_ERROR: u32 = 800;
 
 /// The weeder's console. Its methods fail if the port is gone, or the weeder does not answer.
+#[derive(Deref, DerefMut)]
 pub struct Weeder {
+    #[deref]
+    #[deref_mut]
     link: Link,
     open: Box<dyn FnMut() -> Result<Link, LinkError>>,
-}
-
-impl Deref for Weeder {
-    type Target = Link;
-
-    fn deref(&self) -> &Link {
-        &self.link
-    }
-}
-
-impl DerefMut for Weeder {
-    fn deref_mut(&mut self) -> &mut Link {
-        &mut self.link
-    }
 }
 
 impl Weeder {

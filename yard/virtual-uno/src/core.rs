@@ -170,7 +170,6 @@ impl Core {
         core
     }
 
-    /// Cycles since the first power-up.
     pub(super) fn cycle(&self) -> u64 {
         self.chip.cycle()
     }
@@ -181,26 +180,22 @@ impl Core {
         unsafe { (*self.chip.avr()).pc }
     }
 
-    /// The recorded events.
     pub(super) fn recorder(&self) -> &Recorder {
         // SAFETY: the recorder is valid for as long as `self` is. simavr is its only other user, and runs only in
         // methods that borrow `self` mutably.
         unsafe { self.recorder.as_ref() }
     }
 
-    /// The recorded events, for a caller that takes them.
     pub(super) fn recorder_mut(&mut self) -> &mut Recorder {
         // SAFETY: as in `recorder`.
         unsafe { self.recorder.as_mut() }
     }
 
-    /// Whether an interrupt's handler runs.
     pub(super) fn is_in_handler(&self) -> bool {
         // SAFETY: as in `program_counter`.
         unsafe { (*self.chip.avr()).interrupts.running_ptr > 0 }
     }
 
-    /// Where the program stands.
     pub(super) fn place(&self) -> Place {
         match self.next_instruction() {
             _ if self.is_in_handler() => Place::InHandler,
@@ -388,12 +383,10 @@ impl Core {
         Port::of(self.chip, port).pins & 1 << bit != 0
     }
 
-    /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
     pub(super) fn receive(&mut self, byte: u8) -> bool {
         uart::receive(self.chip, byte)
     }
 
-    /// Gives the receiver a byte, independent of the line's pace and the receiver's room.
     pub(super) fn flood(&mut self, byte: u8) {
         uart::flood(self.chip, byte);
     }
@@ -421,18 +414,15 @@ impl Core {
         unsafe { slice::from_raw_parts((*self.chip.avr()).flash, FLASH_BYTES) }
     }
 
-    /// Cycles of a byte on the serial line, as the chip's UART is set up.
     pub(super) fn byte_cycles(&self) -> u64 {
         uart::cycles_per_byte(self.chip)
     }
 
-    /// All of SRAM.
     pub(super) fn sram(&self) -> &[u8] {
         // SAFETY: SRAM lies inside `data`, which simavr owns and changes only in methods that borrow `self` mutably.
         unsafe { slice::from_raw_parts((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }
     }
 
-    /// All of SRAM, to write to.
     pub(super) fn sram_mut(&mut self) -> &mut [u8] {
         // SAFETY: as in `sram`, and `self` is borrowed mutably.
         unsafe { slice::from_raw_parts_mut((*self.chip.avr()).data.add(SRAM_START.into()), SRAM_BYTES) }
