@@ -40,8 +40,7 @@ pub(crate) fn turns(nodes: &[Node], circle: &BTreeSet<usize>, head: usize) -> Op
     exits.filter_map(|exit| Some(counted.by(exit)?.0)).min()
 }
 
-/// The edges out of a loop behind which this register is zero, because the loop counts with it. `circle` may have several
-/// entries, but no loop within it.
+/// The edges out of a loop that counts with this register down to zero. `circle` may have several entries.
 pub(crate) fn exits_with_zero(nodes: &[Node], circle: &BTreeSet<usize>, register: usize) -> Vec<(usize, usize)> {
     let edges = |node: usize| -> Vec<usize> { nodes[node].edges.iter().map(|edge| edge.to).collect() };
     let entries: Vec<&Edge> = entering(nodes, circle).collect();
@@ -95,8 +94,7 @@ impl Loop<'_> {
         (!is_entry && before.next().is_none()).then_some(only)
     }
 
-    /// The number of returns to the loop's head by the branch at `exit`, the registers that decide it, and their values
-    /// at the end for each entry.
+    /// The returns to the loop's head by the branch at `exit`, the registers that decide it, and how each entry ends.
     fn by(&self, exit: usize) -> Option<(u64, Registers, Vec<Concrete>)> {
         let branch = self.nodes[exit].instruction;
         if !matches!(branch.operation, Brbs | Brbc | Cpse | Sbrc | Sbrs) {

@@ -5,8 +5,7 @@
 //! calculated before outer loops. A loop bound comes from the source or a table ([`crate::loops`]), or is counted
 //! (`counted`). Without a bound the loop is taken once, and its head is kept in the result. Such a result is no bound.
 //!
-//! Paths that never end are left out. For example, a loop that waits for the watchdog's reset adds no time to a
-//! routine.
+//! Paths that never end are left out, such as a loop that waits for the watchdog's reset.
 
 use crate::counted;
 use crate::paths::{circles, entering, loops, reaching, runs_once};
@@ -52,8 +51,7 @@ pub(crate) fn longer(one: Option<Time>, other: Option<Time>) -> Option<Time> {
 pub(crate) struct Passes {
     /// By addresses in loops: the most executions of the address for each entry to the loop.
     pub(crate) stated: BTreeMap<u32, u64>,
-    /// By addresses where loops may begin: the bounds for the outermost loop of a function and for each depth within
-    /// it.
+    /// By addresses where loops may begin: the bounds of the outermost loop and of each depth within it.
     pub(crate) of_heads: BTreeMap<u32, Vec<u64>>,
     /// Entries of functions with a single loop, which turns once for each byte of a length, and once more.
     pub(crate) by_length: BTreeSet<u32>,
@@ -64,8 +62,7 @@ pub(crate) struct Passes {
 pub(crate) enum Stretch {
     /// From the end of the instruction that clears the interrupt flag to the end of the one that sets it.
     FlagClear,
-    /// From one moment at which an interrupt can be served to the next. It includes one instruction before and one
-    /// after.
+    /// From one moment at which an interrupt can be served to the next, with one instruction before and one after.
     Closed,
 }
 
@@ -128,8 +125,7 @@ impl Timer {
         time
     }
 
-    /// The longest paths from a routine's entry to the end of each of some places, and from there to the end of a
-    /// return.
+    /// The longest paths from a routine's entry to the end of some places, and from there to the end of a return.
     pub(crate) fn around(&mut self, routine: &Routine, is_place: impl Fn(&Node) -> bool) -> Option<(Time, Time)> {
         let nodes = &routine.nodes;
         let returning = reaching(nodes, |node| nodes[node].returns.is_some());
@@ -232,8 +228,7 @@ impl Timer {
         (to_return, to_open)
     }
 
-    /// The longest turn of the endless loop that feeds the watchdog: from one `is_fed` to the next. `None` if the
-    /// routine has no such loop.
+    /// The longest turn of a loop that feeds the watchdog: from one `is_fed` to the next. `None` without such a loop.
     pub(crate) fn turn(&mut self, routine: &Routine, is_fed: impl Fn(&Node) -> bool) -> Option<Time> {
         let nodes = &routine.nodes;
         let mut turn = None;
@@ -306,8 +301,7 @@ impl Timer {
         found
     }
 
-    /// The longest time to the beginning of each place that can be reached from the starting places, over places that
-    /// are `within`.
+    /// The longest time from the starting places to the beginning of each place, over places that are `within`.
     fn times(
         &mut self,
         nodes: &[Node],
@@ -351,8 +345,7 @@ impl Paths<'_> {
         self.nodes[node].place.address
     }
 
-    /// Propagates the times of the starting places to all others of a set at this loop depth. Ways back to `heads` are
-    /// left out.
+    /// Propagates the times of the starting places to all others of a set at this loop depth, but not back to `heads`.
     fn fill(&self, set: BTreeSet<usize>, heads: &BTreeSet<usize>, depth: usize, times: &mut [Option<Time>]) {
         let edges = |node: usize| self.edges[node].iter().filter(|(to, _)| set.contains(to) && !heads.contains(to));
         for circle in circles(&set, &|node| edges(node).map(|(to, _)| *to).collect()) {

@@ -203,8 +203,7 @@ impl Instruction {
         bits.fold(0, |operand, (_, bit)| operand << 1 | self.word >> bit & 1)
     }
 
-    /// The data address in the instruction itself: of `in`, `out` and the instructions for a bit of a register, and of
-    /// `lds` and `sts`.
+    /// The data address in the instruction itself: of `in`, `out`, `lds`, `sts`, and of those for a register's bit.
     pub(crate) fn data_address(&self) -> Option<u16> {
         /// The address of the registers for `in` and `out` in the data space (data sheet, register summary).
         const IO_START: u16 = 0x20;
@@ -221,8 +220,7 @@ impl Instruction {
         matches!(self.operation, In | Lds | Sbic | Sbis) && self.data_address() == Some(address)
     }
 
-    /// The lower register of the pointer of a load or a store, and how it moves: after the access, or before it if
-    /// negative.
+    /// The lower register of a load's or store's pointer, and how it moves: after the access, or before if negative.
     pub(crate) fn pointer(&self) -> Option<(usize, i8)> {
         Some(match (self.operation, self.word & 0xF) {
             (Ld | St, 0xC) => (X, 0),

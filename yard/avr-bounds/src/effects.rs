@@ -92,8 +92,7 @@ impl Instruction {
         let flag = flags(1 << self.operand('s')) & R::FLAGS;
         let pointer = self.pointer().map_or(R::empty(), |(pointer, _)| R::pair(pointer));
         let moved = if self.pointer().is_some_and(|(_, by)| by != 0) { pointer } else { R::empty() };
-        // Subtracting a register from itself, or XOR with itself, gives 0 or a value made from the carry. The old value
-        // does not matter.
+        // A register minus itself, or XOR itself, is 0 or made from the carry. The old value does not matter.
         let is_same = d == r;
         let (reads, changes) = match self.operation {
             Sub | Eor if is_same => (R::empty(), to | if self.operation == Sub { HSVNZC } else { SVNZ }),
@@ -192,8 +191,7 @@ mod tests {
         }
     }
 
-    /// Random registers and flags. Pointers lead into SRAM, and stay further from its ends than the largest
-    /// displacement.
+    /// Random registers and flags. Pointers lead into SRAM, with room for the largest displacement.
     fn any_contents(random: &mut ChaCha8Rng) -> Contents {
         std::array::from_fn(|register| match register {
             27 | 29 | 31 => random.random_range(2..6),

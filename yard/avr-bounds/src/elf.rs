@@ -1,5 +1,4 @@
-//! Reads an ELF: the bytes in flash and of initialised variables, the functions, the chip, and the program's records of
-//! loop bounds.
+//! Reads an ELF: flash, initialised variables, functions, the chip, and the program's records of loop bounds.
 
 use crate::chip::{CHIPS, Chip};
 use crate::error::BoundsError;

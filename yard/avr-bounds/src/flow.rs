@@ -1,5 +1,4 @@
-//! The control flow of a program: its calls and paths, the depth of the stack on each path, and whether interrupts are
-//! on.
+//! The control flow of a program: its calls and paths, with the stack and the state of the interrupts on each.
 //!
 //! A [`Routine`] has one entry, with interrupts on or off: a function, a handler, or the program after a reset. From
 //! its entry every path is followed to its ends. A place on a path consists of an address, the bytes on the stack, and
@@ -33,8 +32,7 @@ use crate::values::{DEEPEST, INTERRUPT_FLAG, Interrupts, Known, Value};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
-/// The EEPROM control register's bits that start a read and a write, and for how many cycles they halt the core (data
-/// sheets, EEPROM data memory).
+/// EECR's bits that start a read and a write, and how long they halt the core (data sheets, EEPROM data memory).
 const EERE: u16 = 0;
 const EEPE: u16 = 1;
 const READ_HALT_CYCLES: u32 = 4;
@@ -483,8 +481,7 @@ impl Follower<'_, '_> {
     }
 }
 
-/// Cycles that the EEPROM halts the core after an instruction. A write of the whole register may start either; it
-/// counts as the longer one.
+/// Cycles that the EEPROM halts the core. A write of the whole register may start either, so the longer one counts.
 fn halt_cycles(instruction: &Instruction, eecr: u16) -> u32 {
     match (instruction.operation, instruction.data_address()) {
         (Sbi, Some(address)) if address == eecr => match instruction.operand('b') {

@@ -77,8 +77,7 @@ use self::values::Interrupts;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-/// Additional cycles of a response in sleep (data sheets, interrupt response time), without the oscillator's start-up
-/// time.
+/// Additional cycles of a response in sleep, without the oscillator's start (data sheets, interrupt response time).
 const WAKE_UP_CYCLES: u64 = 4;
 
 /// The most cycles from an edge at a pin to its interrupt request. An edge that comes up to this time before a read may
@@ -217,8 +216,7 @@ fn time_handlers(
         .collect()
 }
 
-/// The longest wait of an input's edge for a read, and the highest rate of its edges. `of_handlers` are all handlers
-/// with their times.
+/// The longest wait of an input's edge for a read, and the highest rate of its edges.
 fn watch(
     input: &Input,
     code: &Code,
@@ -255,8 +253,7 @@ fn watch(
     Ok(EdgeBounds { wait_cycles, never_lost_per_s: input.edges_between_looks * input.clock_hz / wait_cycles })
 }
 
-/// The deepest stack: the main program plus a handler with interrupts on, or the main program alone with interrupts
-/// off.
+/// The deepest stack: the main program with interrupts on plus a handler, or with interrupts off alone.
 fn deepest<'a>(
     main: &Routine,
     handlers: impl Iterator<Item = &'a Rc<Routine>>,

@@ -97,8 +97,7 @@ impl Dice {
     }
 }
 
-/// The lines of a linker script for an order of functions with few long calls, and the number of long calls before and
-/// after.
+/// A linker script's lines for an order with few long calls, and the number of long calls before and after.
 ///
 /// The crates' numbers are left out of the names, since they differ between compilers.
 pub fn order(elf: &Program) -> (String, usize, usize) {

@@ -15,8 +15,7 @@ use std::rc::Rc;
 /// The register that is zero except between instructions that change it (AVR calling convention).
 const ZERO: usize = 1;
 
-/// Proves that every function of this program keeps the calling convention, and that handlers restore all registers and
-/// flags.
+/// Proves that functions keep the calling convention, and that handlers restore all registers and flags.
 pub(crate) fn prove(program: &Code, handlers: &BTreeMap<u8, Rc<Routine>>) -> Result<(), BoundsError> {
     let is_named = |routine: &Routine| program.elf.functions.contains_key(&routine.entry.address);
     let functions = program.routines().filter(|routine| routine.entry.kind == Kind::Function && is_named(routine));

@@ -50,8 +50,7 @@ pub(crate) enum Value {
     StackHigh(i32),
     /// The status register, with interrupts on or off, and whether all other flags are as at the entry.
     Status(bool, bool),
-    /// From memory, at this displacement from a pointer, and whether the pointer itself came from memory. `None` is a
-    /// fixed address.
+    /// From memory, at this displacement from a pointer (`None`: a fixed address), and whether the pointer did so too.
     Loaded(Option<u8>, bool),
     /// An unknown value, less a constant.
     Less(u8),
@@ -283,8 +282,7 @@ impl Known {
         Some(if by < 0 { address.wrapping_add_signed(by.into()) } else { address })
     }
 
-    /// The stack's depth below the last address of SRAM if this instruction sets the stack pointer to a constant, on a
-    /// path that has started the program again.
+    /// The stack's depth if this instruction sets the stack pointer to a constant, in a program that has started again.
     pub(crate) fn starts_again(&self, instruction: &Instruction, chip: &Chip) -> Option<usize> {
         let writes = match instruction.operation {
             Out | Sts => instruction.data_address(),
@@ -298,8 +296,7 @@ impl Known {
         chip.ram_last.checked_sub(address).map(usize::from)
     }
 
-    /// Writes a register's value to an address in the data space. Only start-up code may set the stack pointer to a
-    /// constant.
+    /// Writes a register to the data space. Only start-up code may set the stack pointer to a constant.
     fn write(&mut self, address: u16, register: usize, chip: &Chip, is_start_up: bool) -> Result<(), Problem> {
         use Value::{Constant, StackHigh, StackLow, Status, Unknown};
 
@@ -348,8 +345,7 @@ impl Known {
         Ok(())
     }
 
-    /// Executes an instruction that continues at the next one. Only start-up code may set the stack pointer to a
-    /// constant.
+    /// Executes an instruction that continues at the next one. Start-up code may set the stack pointer.
     pub(crate) fn carry_out(&mut self, instruction: &Instruction, chip: &Chip, is_start_up: bool) -> Result<(), Problem> {
         use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
 
@@ -455,8 +451,7 @@ impl Known {
     }
 }
 
-/// The value of a byte in a frame that stays valid. Variables can be changed through pointers, so only values that
-/// compilers save count.
+/// The value of a byte in a frame, if compilers save such values. Others can be changed through pointers.
 fn lasting(value: Value) -> Value {
     match value {
         Value::AtEntry(register) if Registers::PRESERVED.has(register) => value,

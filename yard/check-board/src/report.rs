@@ -55,8 +55,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A figure without limits and with this tolerance, not yet judged. If `measured` is not finite, the event never
-    /// came.
+    /// A figure without limits, not yet judged. If `measured` is not finite, the event never came.
     pub fn new(id: impl Into<String>, what: impl Into<String>, unit: &str, measured: f64, tolerance: f64) -> Self {
         Self {
             id: id.into(),

@@ -18,8 +18,7 @@ const STUCK_MS: u32 = 800;
 /// Width of the pulse with which the tester checks its own capture, in cycles.
 const OWN_PULSE: u16 = 16_000;
 
-/// Greatest positive error of the tester's measurement of its own pulse, in cycles: its loop reads the clock every few
-/// microseconds.
+/// Greatest excess of the tester's own pulse, in cycles: its loop reads the clock every few microseconds.
 const OWN_PULSE_ERROR: u32 = 800;
 
 /// The weeder's console. Its methods fail if the port is gone, or the weeder does not answer.

@@ -83,8 +83,7 @@ impl Uno {
         })
     }
 
-    /// The Uno with these wires on its pins, each at its level at rest. Before the first instruction this is the same
-    /// as wires that were there at power-up.
+    /// The Uno with these wires on its pins, each at its level at rest: before the first instruction, as at power-up.
     #[must_use]
     pub fn wired(mut self, wires: &[Wire]) -> Uno {
         for wire in wires {
@@ -263,8 +262,7 @@ impl Uno {
         self.core.place()
     }
 
-    /// Gives the receiver a byte whose stop bit ends now, independent of the queue of [`Uno::send`]. Returns whether it
-    /// had room.
+    /// Gives the receiver a byte whose stop bit ends now, past the queue of [`Uno::send`]. Returns whether it had room.
     pub fn receive(&mut self, byte: u8) -> bool {
         self.core.receive(byte)
     }
@@ -297,8 +295,7 @@ impl Uno {
         if self.follows_baud { self.core.byte_cycles() } else { SENT_BYTE_CYCLES }
     }
 
-    /// From now on sent bytes use the rate of the chip's UART instead of 115,200 baud: a bootloader may have another
-    /// rate.
+    /// From now on bytes are sent at the rate of the chip's UART: a bootloader may have another one than [`BAUD`].
     pub fn follow_baud(&mut self) {
         self.follows_baud = true;
     }
@@ -308,8 +305,7 @@ impl Uno {
         self.to_send.len()
     }
 
-    /// Pushes up to 63 bytes into the receiver at once, faster than any line could. simavr buffers them and passes them
-    /// on one by one.
+    /// Pushes up to 63 bytes into the receiver at once, faster than any line. simavr passes them on one by one.
     pub fn send_at_once(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.core.flood(byte);
@@ -332,8 +328,7 @@ impl Uno {
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Takes the edges of the output pins: from now on [`Uno::changes`] begins with the next one. This limits the
-    /// memory of an Uno that runs for days.
+    /// Takes the edges of the output pins out of [`Uno::changes`], so that an Uno can run for days.
     pub fn take_changes(&mut self) -> Vec<PinChange> {
         std::mem::take(&mut self.core.recorder_mut().log.changes)
     }
@@ -373,8 +368,7 @@ impl Uno {
         self.core.recorder().log.turns.turns.as_ref()
     }
 
-    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` if there is no such
-    /// symbol.
+    /// A variable's bytes in SRAM, by its symbol: in Rust the path from the crate on. `None` without such a symbol.
     pub fn read(&self, symbol: &str) -> Option<&[u8]> {
         let &Variable { address, size } = self.image.variables.get(symbol)?;
         self.core.sram().get(in_sram(address, size.into())?)

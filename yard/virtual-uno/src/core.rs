@@ -271,8 +271,7 @@ impl Core {
         Ok(())
     }
 
-    /// Halts the core for a moment after a wake-up: by a level at a pin between two steps, or by a peripheral in the
-    /// last step.
+    /// Halts the core for a moment after a wake-up, by a pin between two steps or by a peripheral in the last step.
     fn add_wake_up(&mut self) {
         // SAFETY: as in `program_counter`.
         let chip = unsafe { &mut *self.chip.avr() };
@@ -308,8 +307,7 @@ impl Core {
         }
     }
 
-    /// Replaces the chip by one that powers up now. It has the same flash, EEPROM, recorded events, and levels at its
-    /// inputs.
+    /// Replaces the chip by one that powers up now, with the same flash, EEPROM, recorded events and input levels.
     pub(super) fn power_cycle(&mut self) {
         let (eeprom, cycle) = (self.eeprom(), self.cycle());
         // SAFETY: as in `program_counter`.

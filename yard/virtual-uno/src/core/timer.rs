@@ -5,8 +5,7 @@
 //! pins disconnected and with the compare value of the running period's start. In other modes simavr's writers work
 //! alone.
 //!
-//! Only the non-inverting output A is corrected. A counter that is set above its top restarts at the bottom, as in
-//! simavr.
+//! Only the non-inverting output A is corrected. A counter above its top restarts at the bottom, as in simavr.
 
 use std::ffi::c_void;
 
@@ -53,8 +52,7 @@ impl Timer1 {
     /// Records a level of output A. In fast PWM it rises at the bottom, where OCR1A's buffer takes effect.
     pub(super) fn output_becomes(&mut self, high: bool) {
         if high {
-            // SAFETY: the timer lives as long as its chip, which outlives `self`, and simavr does not change it
-            // meanwhile.
+            // SAFETY: the timer lives as long as its chip, which outlives `self`. simavr does not change it now.
             self.running_compare_cycles = unsafe { (*self.timer).comp[0].comp_cycles };
         }
     }

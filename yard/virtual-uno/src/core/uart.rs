@@ -9,8 +9,7 @@ use simavr_ffi as simavr;
 
 use super::chip::Chip;
 
-/// Complete bytes that the receiver holds: two in its buffer and one in the shift register (data sheet, USART0,
-/// receiver error flags).
+/// Bytes that the receiver holds: two in its buffer, one in the shift register (data sheet, receiver error flags).
 const RECEIVER_BYTES: u16 = 3;
 
 // Registers by their address in the data space (data sheet, register summary).
@@ -34,8 +33,7 @@ const USBS0: u8 = 1 << 3;
 /// UCSR0C: parity is on.
 const UPM01: u8 = 1 << 5;
 
-/// Cycles of a byte on the serial line, from the UART's registers (data sheet, USART0, clock generation and frame
-/// formats).
+/// Cycles of a byte, from the UART's registers (data sheet, USART0, clock generation and frame formats).
 pub(super) fn cycles_per_byte(chip: Chip) -> u64 {
     let divisor = u64::from(u16::from_le_bytes([chip.read(UBRR0L), chip.read(UBRR0H) & 0x0F])) + 1;
     let cycles_per_bit = match chip.read(UCSR0A) & U2X0 {
