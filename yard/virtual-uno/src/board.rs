@@ -305,13 +305,6 @@ impl Uno {
         self.to_send.len()
     }
 
-    /// Pushes up to 63 bytes into the receiver at once, faster than any line. simavr passes them on one by one.
-    pub fn send_at_once(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.core.flood(byte);
-        }
-    }
-
     /// Sent bytes that the receiver had no room for, because the firmware did not read in time.
     pub fn lost_bytes(&self) -> u64 {
         self.lost_bytes

@@ -385,10 +385,6 @@ impl Core {
         uart::receive(self.chip, byte)
     }
 
-    pub(super) fn flood(&mut self, byte: u8) {
-        uart::flood(self.chip, byte);
-    }
-
     /// The EEPROM's content after a power failure now.
     pub(super) fn eeprom(&self) -> Vec<u8> {
         let mut content = vec![0; EEPROM_BYTES];

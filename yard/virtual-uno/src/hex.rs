@@ -38,14 +38,15 @@ pub(crate) fn flash(path: &Path, content: &[u8]) -> Result<Vec<u8>, FileError> {
 
 /// From the lowest to the highest address that a file fills, and the flash with those of its bytes that are in flash.
 pub(crate) fn filled(text: &str) -> Result<(Range<usize>, Vec<u8>), ReaderError> {
-    let (mut base, mut filled, mut flash) = (0, usize::MAX..0, vec![0xFF; FLASH_BYTES]);
+    let (mut base, mut first, mut end) = (0, usize::MAX, 0);
+    let mut flash = vec![0xFF; FLASH_BYTES];
     for record in Reader::new(text) {
         match record? {
             Record::Data { offset, value } => {
                 let start = base + usize::from(offset);
-                let end = start + value.len();
-                filled = filled.start.min(start)..filled.end.max(end);
-                if let Some(place) = flash.get_mut(start..end) {
+                let behind = start + value.len();
+                (first, end) = (first.min(start), end.max(behind));
+                if let Some(place) = flash.get_mut(start..behind) {
                     place.copy_from_slice(&value);
                 }
             }
@@ -55,7 +56,7 @@ pub(crate) fn filled(text: &str) -> Result<(Range<usize>, Vec<u8>), ReaderError>
             Record::StartSegmentAddress { .. } | Record::StartLinearAddress(_) | Record::EndOfFile => {}
         }
     }
-    Ok((filled, flash))
+    Ok((first..end, flash))
 }
 
 #[cfg(test)]

@@ -73,7 +73,7 @@ pub(super) fn hand_over_received(chip: Chip) {
 /// Gives the receiver a byte whose stop bit has just ended. Returns whether it had room.
 pub(super) fn receive(chip: Chip, byte: u8) -> bool {
     let uart = of(chip);
-    // SAFETY: as in `hand_over_received`.
+    // SAFETY: as in `hand_over_received`; the UART has the line of its input.
     unsafe {
         let waiting = (*uart).input.write.wrapping_sub((*uart).input.read) % (*uart).input.buffer.len() as u16;
         if chip.read(UCSR0B) & RXEN0 != 0 && waiting >= RECEIVER_BYTES {
@@ -82,14 +82,8 @@ pub(super) fn receive(chip: Chip, byte: u8) -> bool {
         }
         // simavr would set the flag a whole byte later; it is due now.
         (*uart).cycles_per_byte = 1;
-        flood(chip, byte);
+        simavr::avr_raise_irq((*uart).io.irq.add(simavr::UART_IRQ_INPUT as usize), byte.into());
         (*uart).cycles_per_byte = cycles_per_byte(chip);
     }
     true
-}
-
-/// Gives the receiver a byte, independent of the line's pace and the receiver's room.
-pub(super) fn flood(chip: Chip, byte: u8) {
-    // SAFETY: as in `hand_over_received`; the UART has this line.
-    unsafe { simavr::avr_raise_irq((*of(chip)).io.irq.add(simavr::UART_IRQ_INPUT as usize), byte.into()) };
 }
