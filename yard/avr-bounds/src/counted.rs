@@ -113,9 +113,9 @@ impl Loop<'_> {
                     }
                     let effects = self.nodes[node].instruction.effects();
                     if !(effects.changes & flags).is_empty() {
-                        flags = flags - effects.changes;
+                        flags -= effects.changes;
                         slice.insert(node);
-                        needed = needed | (effects.reads - Registers::FLAGS);
+                        needed |= effects.reads - Registers::FLAGS;
                         flags_of.push((node, effects.reads & Registers::FLAGS));
                     }
                 }
@@ -129,7 +129,7 @@ impl Loop<'_> {
                     return None;
                 }
                 if !(effects.changes & needed).is_empty() && slice.insert(node) {
-                    needed = needed | (effects.reads - Registers::FLAGS);
+                    needed |= effects.reads - Registers::FLAGS;
                     flags_of.push((node, effects.reads & Registers::FLAGS));
                 }
             }

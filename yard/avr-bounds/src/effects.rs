@@ -243,8 +243,7 @@ mod tests {
                 }
                 // Unread registers get other values.
                 let other = any_contents(&mut random);
-                let other =
-                    std::array::from_fn(|place| if reads.has(place) { before[place] } else { other[place] });
+                let other = std::array::from_fn(|place| if reads.has(place) { before[place] } else { other[place] });
                 let behind_other = chip.run([word, ADDRESS], &other);
                 for place in changes.numbers() {
                     assert_eq!(behind_other[place], behind[place], "{name:?} reads more for {}", Registers::one(place));

@@ -314,7 +314,9 @@ impl Follower<'_, '_> {
         self.routine.nodes[number] = Node::new(place, instruction);
         let (next, target) = (instruction.next(), instruction.target(chip.flash_bytes));
         match instruction.operation {
-            Rjmp | Jmp | Rcall | Call if target.is_some_and(|target| self.program.elf.table_jumps.contains(&target)) => {
+            Rjmp | Jmp | Rcall | Call
+                if target.is_some_and(|target| self.program.elf.table_jumps.contains(&target)) =>
+            {
                 let targets = self.program.targets.of_table(self.program.elf, at, &after.known);
                 let (targets, table_cycles) = targets.ok_or_else(|| self.program.refuse(at, Problem::Indirect))?;
                 // The routine changes R0 and the pointer.
@@ -375,7 +377,7 @@ impl Follower<'_, '_> {
                     return Err(self.program.refuse(at, Problem::WrongReturn));
                 }
                 let holds = |register: usize| after.known.registers[register] == Value::AtEntry(register);
-                *keeps = *keeps & (Registers::which(holds) | after.known.unchanged);
+                *keeps &= Registers::which(holds) | after.known.unchanged;
                 *leaves_zero &= after.known.constant(1) == Some(0);
                 self.routine.returns.insert(interrupts);
                 self.routine.nodes[number].returns = Some(cycles);
@@ -399,7 +401,10 @@ impl Follower<'_, '_> {
                     Ok(()) => {}
                     Err(problem) => return Err(self.program.refuse(at, problem)),
                 }
-                if interrupts == Interrupts::Off && after.known.interrupts != Interrupts::Off && at_entry == Interrupts::Off {
+                if interrupts == Interrupts::Off
+                    && after.known.interrupts != Interrupts::Off
+                    && at_entry == Interrupts::Off
+                {
                     self.routine.enables.get_or_insert(at);
                 }
                 // A sleep with interrupts off does not end, and the time of a write to flash is unknown.

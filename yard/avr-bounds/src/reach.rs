@@ -48,8 +48,9 @@ impl Reach {
         let mut roots: BTreeSet<u32> = elf.functions.keys().copied().chain([elf.start]).chain(handlers).collect();
         let mut returning = BTreeSet::new();
         loop {
-            let follow =
-                |&root: &u32| (root, paths(elf, root, &elf.table_jumps, |_| false, |called| returning.contains(&called)));
+            let follow = |&root: &u32| {
+                (root, paths(elf, root, &elf.table_jumps, |_| false, |called| returning.contains(&called)))
+            };
             let all: BTreeMap<u32, Paths> = roots.iter().map(follow).collect();
             let before = (roots.len(), returning.len());
             roots.extend(all.values().flat_map(|paths| &paths.called));

@@ -166,7 +166,7 @@ impl Known {
         let (mask, bits) = self.flags;
         let mask = mask & other.flags.0 & !(bits ^ other.flags.1);
         self.flags = (mask, bits & mask);
-        self.unchanged = self.unchanged & other.unchanged;
+        self.unchanged &= other.unchanged;
         if self.borrow != other.borrow {
             self.borrow = None;
         }
@@ -186,7 +186,7 @@ impl Known {
             self.registers[register] = Value::Unknown;
         }
         self.flags = (0, 0);
-        self.unchanged = self.unchanged & keeps;
+        self.unchanged &= keeps;
         self.borrow = None;
         self.counted = None;
     }
@@ -346,7 +346,12 @@ impl Known {
     }
 
     /// Executes an instruction that continues at the next one. Start-up code may set the stack pointer.
-    pub(crate) fn carry_out(&mut self, instruction: &Instruction, chip: &Chip, is_start_up: bool) -> Result<(), Problem> {
+    pub(crate) fn carry_out(
+        &mut self,
+        instruction: &Instruction,
+        chip: &Chip,
+        is_start_up: bool,
+    ) -> Result<(), Problem> {
         use Value::{Constant, Less, Loaded, StackHigh, StackLow, Status, Unknown};
 
         let (d, r) = (instruction.destination, instruction.source);
@@ -360,7 +365,7 @@ impl Known {
             Add | Adc | Sub | Subi | And | Andi | Or | Ori | Eor | Com | Neg | Inc | Dec | Lsr | Ror | Asr
         );
         self.counted = if is_of_one { Some(d) } else { self.counted.filter(tells) };
-        self.unchanged = self.unchanged - changes;
+        self.unchanged -= changes;
         let moves = self.moves_stack_pointer(instruction);
         if !moves && !(changes & Registers::CARRY_FLAG).is_empty() {
             self.borrow = None;

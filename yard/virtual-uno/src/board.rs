@@ -1,12 +1,5 @@
 //! The board: an Uno with its firmware, the wires on its pins, and a terminal at its serial line.
 
-use std::collections::VecDeque;
-use std::ops::Range;
-use std::path::Path;
-
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-
 use crate::bootloader::Bootloader;
 use crate::core::adc::SUPPLY_MILLIVOLTS;
 use crate::core::measuring::{Cycles, InterruptStatistics, Place};
@@ -16,6 +9,11 @@ use crate::elf::{Image, Size, Variable};
 use crate::error::UnoError;
 use crate::memory::EEPROM_BYTES;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Pulse, Wire};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::path::Path;
 
 /// The terminal's bit rate, until it follows the chip.
 pub const BAUD: u64 = 115_200;

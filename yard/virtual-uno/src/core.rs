@@ -21,12 +21,6 @@ pub(crate) mod recorder;
 mod timer;
 mod uart;
 
-use std::ffi::c_void;
-use std::ptr::{self, NonNull};
-use std::{mem, slice};
-
-use simavr_ffi as simavr;
-
 use self::adc::{ADC_CHANNELS, SUPPLY_MILLIVOLTS};
 use self::chip::Chip;
 use self::eeprom::Eeprom;
@@ -38,6 +32,10 @@ use self::timer::Timer1;
 use crate::error::UnoError;
 use crate::memory::{EEPROM_BYTES, FLASH_BYTES};
 use crate::pins::{CYCLES_PER_SECOND, Pin};
+use simavr_ffi as simavr;
+use std::ffi::c_void;
+use std::ptr::{self, NonNull};
+use std::{mem, slice};
 
 unsafe extern "C" {
     /// Runs the next instruction. It is declared in sim_core.h, which simavr-ffi leaves out of its bindings.

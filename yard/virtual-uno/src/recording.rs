@@ -4,15 +4,13 @@
 //! the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an error. The firmware,
 //! not this module, interprets the signal.
 
+use crate::file_error::FileError;
+use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Wire};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::Path;
-
 use vcd::{Command, IdCode, Parser, Scope, ScopeItem, SimulationCommand, TimescaleUnit, Value, Var, Writer};
-
-use crate::file_error::FileError;
-use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Wire};
 
 /// Longest recording, in hours. The firmware would take days to play a longer one.
 const MOST_HOURS: u64 = 24;
@@ -91,7 +89,9 @@ fn parse(path: &Path, file: impl BufRead, channels: &[(Pin, &str)]) -> Result<Ve
             Value::V1 => true,
             Value::X | Value::Z => {
                 let name = &channel.name;
-                return Err(wrong(format!("has `{value}` on channel `{name}` at line {line}: only 0 and 1 are levels")));
+                return Err(wrong(format!(
+                    "has `{value}` on channel `{name}` at line {line}: only 0 and 1 are levels"
+                )));
             }
         };
         if channel.level.replace(high) != Some(high) {
@@ -160,8 +160,7 @@ fn head(file: &mut impl BufRead) -> io::Result<io::Cursor<Vec<u8>>> {
         if rest.read_until(b'\n', &mut head)? == 0 {
             break;
         }
-        let words = head[start..].split(u8::is_ascii_whitespace);
-        for word in words {
+        for word in head[start..].split(u8::is_ascii_whitespace) {
             match word {
                 b"$scope" => scopes += 1,
                 b"$upscope" => scopes = scopes.saturating_sub(1),
@@ -287,7 +286,7 @@ mod tests {
 
     #[test]
     fn any_habits_of_other_programs_together_leave_the_levels_as_they_are() {
-        let expected = levels(&recording("1 us", "#0 0! 1\" #5 1!"), &CHANNELS).unwrap();
+        let expected = levels(recording("1 us", "#0 0! 1\" #5 1!"), &CHANNELS).unwrap();
         for habits in 0..1_u32 << 8 {
             let has = |habit: u32| habits >> habit & 1 == 1;
             let samples = match (has(0), has(1)) {
@@ -316,7 +315,12 @@ mod tests {
                 file.splice(0..0, *b"\xEF\xBB\xBF");
             }
             let channels = [(Pin::D2, names[0]), (Pin::D3, names[1])];
-            assert_eq!(levels(&file, &channels).as_ref(), Ok(&expected), "{habits:#b}: {}", String::from_utf8_lossy(&file));
+            assert_eq!(
+                levels(&file, &channels).as_ref(),
+                Ok(&expected),
+                "{habits:#b}: {}",
+                String::from_utf8_lossy(&file)
+            );
         }
     }
 
@@ -366,7 +370,7 @@ mod tests {
 
     #[test]
     fn a_recording_that_would_never_end_or_is_nested_without_end_is_refused() {
-        let endless = levels(&recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
+        let endless = levels(recording("1 s", "#0 0! 0\"\n#18446744073709551615 1!"), &CHANNELS).unwrap_err();
         assert!(endless.contains("pins.vcd is longer than 24 h at line 9"), "{endless}");
         let nested = "$timescale 1 us $end\n".to_owned() + &"$scope module a $end\n".repeat(100_000);
         let error = parse(Path::new("pins.vcd"), nested.as_bytes(), &CHANNELS).unwrap_err();

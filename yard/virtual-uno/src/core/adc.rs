@@ -7,9 +7,8 @@
 //!
 //! AVCC and AREF are at 5 V. There is no temperature sensor and no noise, and free running is the only trigger.
 
-use simavr_ffi as simavr;
-
 use super::chip::Chip;
+use simavr_ffi as simavr;
 
 /// Inputs that are pins of the board.
 pub(super) const ADC_CHANNELS: usize = 6;

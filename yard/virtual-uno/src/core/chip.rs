@@ -4,9 +4,8 @@
 //! stores simavr's own writer and puts its own function in its place. That function calls simavr's for the parts that
 //! are right.
 
-use std::ffi::c_void;
-
 use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 /// Addresses of the I/O registers in the data space (data sheet, figure 8-3). simavr counts registers from the first.
 const IO: std::ops::Range<u16> = 0x20..0x100;

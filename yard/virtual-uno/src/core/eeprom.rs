@@ -6,12 +6,10 @@
 //!
 //! Only writes that erase first are timed (EEPM 00). The core is not halted for the few cycles after a command.
 
-use std::ffi::c_void;
-
-use simavr_ffi as simavr;
-
 use super::chip::{Chip, Writer};
 use crate::pins::CYCLES_PER_SECOND;
+use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 /// Cycles of a write (data sheet, table 8-1): the first half erases the byte, the second writes it.
 pub(super) const WRITE_CYCLES: u64 = CYCLES_PER_SECOND * 34 / 10_000;
@@ -62,7 +60,12 @@ impl Eeprom {
 }
 
 /// simavr's callback for a write of EECR. `parameter` is the chip's EEPROM.
-pub(super) unsafe extern "C" fn on_control_write(avr: *mut simavr::avr_t, register: u16, value: u8, parameter: *mut c_void) {
+pub(super) unsafe extern "C" fn on_control_write(
+    avr: *mut simavr::avr_t,
+    register: u16,
+    value: u8,
+    parameter: *mut c_void,
+) {
     // SAFETY: `parameter` is the one that `Core::new` registered, alive and not borrowed, and `avr` its chip.
     unsafe {
         let (chip, eeprom) = (Chip::of(avr), parameter.cast::<Eeprom>());

@@ -9,10 +9,6 @@
 //! (data sheet, section 14.3). simavr copies a timer's level into PORTx. A firmware that reads PORTx before an edge and
 //! writes it back after the edge would undo the edge. So the recorder stores the level of a connected output.
 
-use std::ffi::c_void;
-
-use simavr_ffi as simavr;
-
 use super::adc::{self, ADC_CHANNELS};
 use super::chip::Chip;
 use super::eeprom::Eeprom;
@@ -20,6 +16,8 @@ use super::measuring::{InterruptRecorder, TurnRecorder};
 use super::timer::Timer1;
 use super::uart;
 use crate::pins::{Pin, PinChange};
+use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 /// Cycles from the end of an instruction to the first one of the vector (data sheet, section 7.7.1).
 const INTERRUPT_ENTRY_CYCLES: u64 = 4;

@@ -7,11 +7,9 @@
 //!
 //! Only the non-inverting output A is corrected. A counter above its top restarts at the bottom, as in simavr.
 
-use std::ffi::c_void;
-
-use simavr_ffi as simavr;
-
 use super::chip::{Chip, Writer};
+use simavr_ffi as simavr;
+use std::ffi::c_void;
 
 // Registers by their address in the data space (data sheet, register summary).
 const TCNT0: u16 = 0x46;

@@ -5,9 +5,8 @@
 //! select. It is available when its stop bit ends, and is lost if three bytes wait. The transmitter's second buffer is
 //! not simulated.
 
-use simavr_ffi as simavr;
-
 use super::chip::Chip;
+use simavr_ffi as simavr;
 
 /// Bytes that the receiver holds: two in its buffer, one in the shift register (data sheet, receiver error flags).
 const RECEIVER_BYTES: u16 = 3;
