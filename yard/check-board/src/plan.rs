@@ -1,8 +1,7 @@
 //! Plans: converts levels at cycles to the pieces that the tester plays.
 //!
 //! A wheel makes thousands of counts a second, and the serial line carries 11 bytes a millisecond. So evenly spaced
-//! counts become one piece. Each count is at most `TOLERANCE` away from its time. Its error does not shift later
-//! events.
+//! counts become one piece, each at most `TOLERANCE` away from its time. Later events are not shifted.
 
 use field::wiring;
 use tester_core::pins::Line;

@@ -46,8 +46,7 @@ pub fn pass(plants: usize, weeds: usize, speed_km_h: f64) -> Result<Pass, CheckE
     Ok(pass)
 }
 
-/// A width this near to one of the servo's two settings counts as that setting, in us. The simulated servo would
-/// otherwise follow smaller differences.
+/// A width this near to a setting of the servo counts as it, in us: the simulated servo follows any difference.
 const SAME_WIDTH_US: f64 = 1.0;
 
 impl Boards {

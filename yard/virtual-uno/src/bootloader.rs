@@ -1,8 +1,7 @@
 //! A bootloader, read from its HEX file or compiled.
 //!
 //! A bootloader is at the end of the flash, and every reset starts it. If it receives new firmware in time it writes
-//! that, otherwise it starts the present firmware. Its address limits the flash for the firmware. This module does not
-//! run a bootloader; [`Uno`](crate::Uno) does.
+//! that, otherwise it starts the present firmware. [`Uno`](crate::Uno) runs it.
 
 use crate::elf::Image;
 use crate::error::UnoError;

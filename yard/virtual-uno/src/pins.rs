@@ -1,8 +1,7 @@
 //! The board's pins, and levels on them at cycles.
 //!
 //! A [`Pin`] has the board's number. A [`PinChange`] is a new level of a pin, driven by either side. A [`Wire`]
-//! describes the connection of a pin. This module needs no simulator: programs that only write or check signals use the
-//! crate without its default features.
+//! describes the connection of a pin. This module is what the crate has without its default features.
 
 use std::fmt;
 

@@ -1,8 +1,7 @@
 //! Recordings of the pins, as VCD files: [`read`] takes a logic analyser's, [`write()`] makes one for PulseView or GTKWave.
 //!
-//! Levels are at cycles of the Uno. The reader converts from any time unit of the file. The caller chooses channels by
-//! the names in the analyser's software. Nothing is filtered or repaired: an undefined level is an error. The firmware,
-//! not this module, interprets the signal.
+//! Levels are at cycles of the Uno, from any time unit of the file. The caller chooses channels by the names in the
+//! analyser's software. Nothing is filtered or repaired: an undefined level is an error.
 
 use crate::file_error::FileError;
 use crate::pins::{CYCLES_PER_SECOND, Pin, PinChange, Wire};
@@ -315,12 +314,8 @@ mod tests {
                 file.splice(0..0, *b"\xEF\xBB\xBF");
             }
             let channels = [(Pin::D2, names[0]), (Pin::D3, names[1])];
-            assert_eq!(
-                levels(&file, &channels).as_ref(),
-                Ok(&expected),
-                "{habits:#b}: {}",
-                String::from_utf8_lossy(&file)
-            );
+            let shown = String::from_utf8_lossy(&file);
+            assert_eq!(levels(&file, &channels).as_ref(), Ok(&expected), "{habits:#b}: {shown}");
         }
     }
 

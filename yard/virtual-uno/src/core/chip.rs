@@ -1,8 +1,7 @@
 //! A chip in simavr: its I/O registers, the peripherals behind them, and simavr's functions for writes to them.
 //!
-//! simavr stores a function and its parameter for each register, and calls it with the written byte. A correction
-//! stores simavr's own writer and puts its own function in its place. That function calls simavr's for the parts that
-//! are right.
+//! simavr stores a function and its parameter for each register, and calls it with the written byte. A correction puts
+//! its own function in place of simavr's, and calls simavr's for the parts that are right.
 
 use simavr_ffi as simavr;
 use std::ffi::c_void;
