@@ -16,7 +16,8 @@ use anyhow::{Context, Result};
 use askama::Template;
 use field::budget::Part;
 use field::counted;
-use figure::{Curve, Figure};
+use chart::{Look, Series};
+use figure::Figure;
 
 /// A trial's report.
 #[derive(Debug, Clone)]
@@ -41,35 +42,27 @@ pub struct Page<'a> {
     pub row: Option<&'a str>,
 }
 
-/// Sentences on the first screen.
-const LEAD: usize = 2;
-
 impl Page<'_> {
     /// The page as HTML, a complete file.
     ///
     /// # Errors
     /// If plotters cannot draw.
     pub fn html(&self) -> Result<String> {
+        /// Sentences on the first screen.
+        const LEAD: usize = 2;
         let analysis = self.analysis;
         let figures = Response::ALL.map(|response| figure::response(analysis, response));
         let chapter = |of| Ok((of, figure::residuals(analysis, of)?));
+        let (lead, further) = self.summary.split_at(self.summary.len().min(LEAD));
         let sheet = Sheet {
             page: self,
+            lead,
+            further,
             controllers: (!self.totals.is_empty()).then(|| Controllers::of(self.totals)).transpose()?,
             figures: figures.into_iter().collect::<Result<_>>()?,
             chapters: analysis.responses.iter().map(chapter).collect::<Result<_>>()?,
         };
         sheet.render().context("the page cannot be put together")
-    }
-
-    /// The sentences of the first screen.
-    fn lead(&self) -> &[String] {
-        &self.summary[..self.summary.len().min(LEAD)]
-    }
-
-    /// The sentences below it.
-    fn further(&self) -> &[String] {
-        &self.summary[self.summary.len().min(LEAD)..]
     }
 
     /// The results with their intervals, and where they are from.
@@ -127,6 +120,9 @@ impl Page<'_> {
 #[template(path = "page.html")]
 struct Sheet<'a> {
     page: &'a Page<'a>,
+    /// The sentences of the first screen, and those below it.
+    lead: &'a [String],
+    further: &'a [String],
     controllers: Option<Controllers>,
     figures: Vec<Figure>,
     /// The analysis of each measure, and its residuals if it has a model.
@@ -143,43 +139,33 @@ struct Controllers {
     beside_others: Table,
 }
 
-/// A measure of the controllers.
-struct Measure {
-    /// Title, unit and caption of its chart.
-    chart: [&'static str; 3],
-    /// Caption of its table.
-    table: &'static str,
-    value: fn(&Total) -> f64,
-}
+/// A measure of the controllers: title, unit and caption of its chart, the caption of its table, and its value.
+type Measure = ([&'static str; 3], &'static str, fn(&Total) -> f64);
 
 const MEASURES: [Measure; 3] = [
-    Measure {
-        chart: [
-            "Plant damage",
-            "% of the plants",
-            "Share of the plants whose stem zone the tool entered. Lower is better.",
-        ],
-        table: "Plants damaged by each controller, %",
-        value: Total::plant_damage_percent,
-    },
-    Measure {
-        chart: [
+    (
+        ["Plant damage", "% of the plants", "Share of the plants whose stem zone the tool entered. Lower is better."],
+        "Plants damaged by each controller, %",
+        Total::plant_damage_percent,
+    ),
+    (
+        [
             "In-row weeding",
             "% of the row's ground",
             "Share of the row's ground that the tool worked. Higher is better, but above the line it costs margins or zones.",
         ],
-        table: "Ground of the row weeded by each controller, %",
-        value: |total| 100.0 * total.plots.weeded_share,
-    },
-    Measure {
-        chart: [
+        "Ground of the row weeded by each controller, %",
+        |total| 100.0 * total.plots.weeded_share,
+    ),
+    (
+        [
             "Zones reached",
             "% of the plants' zones",
             "Share of the zones over which the tool was not fully out. A zone is a plant's protected stretch without the margin. Lower is better.",
         ],
-        table: "Zones reached by each controller, %",
-        value: Total::zones_reached_percent,
-    },
+        "Zones reached by each controller, %",
+        Total::zones_reached_percent,
+    ),
 ];
 
 /// The name of the line below which a controller cuts no margin.
@@ -188,17 +174,19 @@ const BOUND: &str = "most with every zone and margin kept";
 impl Controllers {
     fn of(totals: &[Total]) -> Result<Self> {
         let of = |controller| totals.iter().filter(move |total| total.plots.controller == controller);
-        let curve = |name: &str, controller, value: fn(&Total) -> f64| Curve {
-            name: name.to_owned(),
-            points: of(controller).map(|total| (total.speed_km_h(), value(total))).collect(),
+        let curve = |name: &str, look, controller, value: fn(&Total) -> f64| Series {
+            line: of(controller).map(|total| (total.speed_km_h(), value(total))).collect(),
+            ..Series::of(name, look)
         };
         // The largest share that this servo can weed is that of every controller.
         let first = totals.first().map_or(Treatment::Firmware, |total| total.plots.controller);
-        let bound = curve(BOUND, first, |total| 100.0 * total.plots.weedable_share);
+        let bound = curve(BOUND, Look::LIMIT, first, |total| 100.0 * total.plots.weedable_share);
         let present = || Treatment::ALL.into_iter().filter(|&controller| of(controller).next().is_some());
         let (mut figures, mut tables) = (Vec::new(), Vec::new());
-        for (Measure { chart, table, value }, bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
-            let mut curves: Vec<Curve> = present().map(|one| curve(one.title(), one, value)).collect();
+        for ((chart, table, value), bound) in MEASURES.into_iter().zip([None, Some(bound), None]) {
+            let looks = (0..).map(Look::of_series);
+            let mut curves: Vec<Series> =
+                present().zip(looks).map(|(one, look)| curve(one.title(), look, one, value)).collect();
             figures.push(figure::curves(chart, &curves, bound.as_ref())?);
             curves.extend(bound);
             tables.push(by_speed(table, &curves));
@@ -215,12 +203,12 @@ impl Controllers {
 }
 
 /// Curves over speed as a table, a row a speed.
-fn by_speed(caption: &str, curves: &[Curve]) -> Table {
-    let speeds = distinct(curves.iter().flat_map(|curve| &curve.points).map(|point| point.0));
+fn by_speed(caption: &str, curves: &[Series]) -> Table {
+    let speeds = distinct(curves.iter().flat_map(|curve| &curve.line).map(|point| point.0));
     let names = curves.iter().map(|curve| curve.name.as_str());
     let mut table = Table::new(caption, ["speed"].into_iter().chain(names));
     for speed in speeds {
-        let value = |curve: &Curve| curve.points.iter().find(|point| point.0 == speed).map(|point| point.1);
+        let value = |curve: &Series| curve.line.iter().find(|point| point.0 == speed).map(|point| point.1);
         let cells = curves.iter().map(|curve| optional(value(curve), |value| fixed(value, 1)));
         table.rows.push([format!("{} km/h", short(speed))].into_iter().chain(cells).collect());
     }
