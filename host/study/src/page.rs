@@ -14,9 +14,9 @@ use crate::statistics::{Mean, NoModel};
 use crate::table::{Table, distinct, fixed, optional, short, significant};
 use anyhow::{Context, Result};
 use askama::Template;
+use chart::{Look, Series};
 use field::budget::Part;
 use field::counted;
-use chart::{Look, Series};
 use figure::Figure;
 
 /// A trial's report.
