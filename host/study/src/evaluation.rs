@@ -20,7 +20,7 @@ pub use self::table::read_csv;
 
 use self::published::Published;
 use crate::statistics::{
-    AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share, grouped, mean,
+    AnalysisOfVariance, BinomialModel, Checks, Design, LinearModel, Mean, NoModel, Share, grouped,
 };
 use anyhow::{Result, anyhow, ensure};
 use serde::Serialize;
@@ -166,13 +166,11 @@ impl Treatment {
     /// The treatment of these plots, at least one.
     fn of((speed_km_h, spacing_cm): (f64, f64), plots: Vec<(&PlotRecord, &Performance)>) -> Self {
         let (records, performances): (Vec<&PlotRecord>, Vec<&Performance>) = plots.into_iter().unzip();
-        let values =
-            |quantity: fn(&Performance) -> Option<f64>| performances.iter().copied().filter_map(quantity).collect();
-        let mean_of = |quantity| {
-            let values: Vec<f64> = values(quantity);
-            (!values.is_empty()).then(|| mean(&values))
+        let mean = |quantity: fn(&Performance) -> Option<f64>| {
+            let values: Vec<f64> = performances.iter().copied().filter_map(quantity).collect();
+            (!values.is_empty()).then(|| Mean::of(&values))
         };
-        let efficiencies: Vec<f64> = values(|plot| plot.weeding_efficiency_percent);
+        let mean_of = |quantity| mean(quantity).map(|of| of.mean);
         Self {
             speed_km_h,
             spacing_cm,
@@ -186,7 +184,7 @@ impl Treatment {
                 performance_index: mean_of(|plot| plot.performance_index),
             },
             damaged: damaged(records),
-            weeding_efficiency: (!efficiencies.is_empty()).then(|| Mean::of(&efficiencies)),
+            weeding_efficiency: mean(|plot| plot.weeding_efficiency_percent),
         }
     }
 }

@@ -56,7 +56,8 @@ impl Analysis {
 
     /// The plots with more weeds after weeding than before.
     fn more_weeds(&self) -> Option<String> {
-        let plots = self.named(|record, _| record.has_more_weeds_after())?;
+        let plots =
+            self.named(|record, _| record.weeds_before.is_some_and(|before| record.weeds_after > Some(before)))?;
         Some(format!(
             "{plots}: more weeds were counted after weeding than before. The weeding efficiency is negative there; in the binomial model no weed counts as gone. If this is a mistake, correct it; {LEAVE_OUT}."
         ))

@@ -172,11 +172,6 @@ impl PlotRecord {
         }
     }
 
-    /// Whether more weeds were counted after weeding than before.
-    pub fn has_more_weeds_after(&self) -> bool {
-        self.weeds_before.zip(self.weeds_after).is_some_and(|(before, after)| after > before)
-    }
-
     /// Whether nothing of the plot was counted or timed. Area, width and power may be known beforehand.
     pub fn is_blank(&self) -> bool {
         [self.weeds_before, self.weeds_after, self.plants, self.damaged].iter().all(Option::is_none)
@@ -250,13 +245,8 @@ impl Response {
     }
 }
 
-/// Texts of a cell that say that a count was not made.
+/// Texts of a cell that say that a count or measurement was not made.
 const NOT_COUNTED: [&str; 8] = ["", "na", "n/a", "n.a.", "-", "\u{2013}", "?", "."];
-
-/// Whether a cell says that its count or measurement was not made.
-pub(super) fn is_not_counted(cell: &str) -> bool {
-    NOT_COUNTED.contains(&cell.to_lowercase().as_str())
-}
 
 /// Parses a whole number.
 pub(super) fn whole(line: Line, column: &str) -> Result<u32, FileError> {
@@ -269,13 +259,18 @@ fn number(line: Line, column: &str) -> Result<f64, FileError> {
 }
 
 fn count(line: Line, column: &str) -> Result<Option<u32>, FileError> {
-    let right = "a whole number, 0 or more, or empty if it was not counted";
-    (!is_not_counted(line.text(column))).then(|| line.value(column, right)).transpose()
+    made(line, column, "a whole number, 0 or more, or empty if it was not counted")
 }
 
 fn measured(line: Line, column: &str) -> Result<Option<f64>, FileError> {
-    let right = "a number, like 1.5, or empty if it was not measured";
-    (!is_not_counted(line.text(column))).then(|| line.value(column, right).map(|Number(value)| value)).transpose()
+    let number = made(line, column, "a number, like 1.5, or empty if it was not measured")?;
+    Ok(number.map(|Number(value)| value))
+}
+
+/// A count or measurement, if it was made.
+fn made<T: FromStr>(line: Line, column: &str, right: &str) -> Result<Option<T>, FileError> {
+    let is_made = !NOT_COUNTED.contains(&line.text(column).to_lowercase().as_str());
+    is_made.then(|| line.value(column, right)).transpose()
 }
 
 /// A decimal number, without `inf` and `nan`.
