@@ -67,14 +67,15 @@ impl Page<'_> {
 
     /// The results with their intervals, and where they are from.
     fn results(&self) -> Table {
-        let Analysis { records, performances, .. } = self.analysis;
+        let records = &self.analysis.records;
         let damage = self.analysis.damage();
         let mut rows = vec![vec![
             "plants damaged".to_owned(),
             format!("{} %", damage.shown()),
             format!("{} %, {}, of {} plants", damage, damage.kind(), damage.of),
         ]];
-        let efficiencies: Vec<f64> = performances.iter().filter_map(|plot| plot.weeding_efficiency_percent).collect();
+        let efficiencies = records.iter().filter_map(|plot| plot.performance().weeding_efficiency_percent);
+        let efficiencies: Vec<f64> = efficiencies.collect();
         if !efficiencies.is_empty() {
             let Mean { mean, within } = Mean::of(&efficiencies);
             let within = within

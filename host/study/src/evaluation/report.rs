@@ -103,8 +103,9 @@ impl Analysis {
     pub(crate) fn plots(&self) -> Table {
         let columns = ["plot"].into_iter().chain(COLUMNS.map(|(_, heading, ..)| heading)).chain(MEASURES);
         let mut table = Table::new("Each plot: counts, measurements and results", columns);
-        for (record, performance) in self.records.iter().zip(&self.performances) {
-            table.rows.push([vec![record.plot.to_string()], record.cells(), measures(performance).into()].concat());
+        for record in &self.records {
+            let measures = measures(&record.performance());
+            table.rows.push([vec![record.plot.to_string()], record.cells(), measures.into()].concat());
         }
         table
     }

@@ -64,9 +64,8 @@ pub fn response(analysis: &Analysis, response: Response) -> Result<Figure> {
         let moved = |(speed_km_h, value): (f64, f64)| (speed_km_h + aside(index), value);
         let treatments = treatments.iter().filter(|treatment| treatment.spacing_cm == spacing_cm);
         let means = treatments.filter_map(|of| Some((of.speed_km_h, response.value(&of.mean)?)));
-        let plots = analysis.records.iter().zip(&analysis.performances);
-        let plots = plots.filter(|(record, _)| record.spacing_cm == spacing_cm);
-        let cloud = plots.filter_map(|(record, plot)| Some(moved((record.speed_km_h, response.value(plot)?))));
+        let plots = analysis.records.iter().filter(|record| record.spacing_cm == spacing_cm);
+        let cloud = plots.filter_map(|plot| Some(moved((plot.speed_km_h, response.value(&plot.performance())?))));
         let means = Series { line: means.collect(), cloud: cloud.collect(), ..Series::of_spacing(index, spacing_cm) };
         let words = said(&means);
         (words, Series { line: means.line.into_iter().map(moved).collect(), ..means })
