@@ -87,12 +87,10 @@ impl Written for Mass {
 
 /// Second.
 pub const SECOND: Unit<Time> = unit("s", Time::new::<second>, Time::get::<second>);
-/// Millisecond.
-pub const MS: Unit<Time> = unit("ms", Time::new::<millisecond>, Time::get::<millisecond>);
 
 impl Written for Time {
     const KIND: &'static str = "a time";
-    const UNITS: &'static [Unit<Self>] = &[SECOND, MS];
+    const UNITS: &'static [Unit<Self>] = &[SECOND, unit("ms", Time::new::<millisecond>, Time::get::<millisecond>)];
 }
 
 /// Kilometre per hour.
