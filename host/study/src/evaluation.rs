@@ -126,7 +126,7 @@ impl Analysis {
         let plots = self.records.iter().zip(&self.levels_km_h);
         let mut of_treatments = grouped(plots.map(|(plot, level)| ((*level, plot.spacing_cm), plot)));
         of_treatments.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        of_treatments.into_iter().map(|(treatment, plots)| Treatment::of(treatment, plots)).collect()
+        of_treatments.into_iter().map(|(treatment, plots)| Treatment::of(treatment, &plots)).collect()
     }
 }
 
@@ -161,7 +161,7 @@ impl ResponseAnalysis {
 
 impl Treatment {
     /// The treatment of these plots, at least one.
-    fn of((speed_km_h, spacing_cm): (f64, f64), records: Vec<&PlotRecord>) -> Self {
+    fn of((speed_km_h, spacing_cm): (f64, f64), records: &[&PlotRecord]) -> Self {
         let mean = |quantity: fn(Performance) -> Option<f64>| {
             let values: Vec<f64> = records.iter().filter_map(|record| quantity(record.performance())).collect();
             (!values.is_empty()).then(|| Mean::of(&values))
@@ -179,7 +179,7 @@ impl Treatment {
                 field_efficiency_percent: mean_of(|plot| plot.field_efficiency_percent),
                 performance_index: mean_of(|plot| plot.performance_index),
             },
-            damaged: damaged(records),
+            damaged: damaged(records.iter().copied()),
             weeding_efficiency: mean(|plot| plot.weeding_efficiency_percent),
         }
     }
