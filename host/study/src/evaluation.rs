@@ -137,9 +137,9 @@ impl ResponseAnalysis {
             (0..).zip(records).filter_map(|(plot, record)| Some((plot, response.value(&record.performance())?)));
         let (plots, values): (Vec<usize>, Vec<f64>) = with_value.unzip();
         let records = || plots.iter().map(|&plot| &records[plot]);
-        let design = Design::new(records().map(|record| (record.speed_km_h, record.spacing_cm)))
-            .at_levels(plots.iter().map(|&plot| levels_km_h[plot]).collect())
-            .in_blocks(records().map(|record| record.replication).collect());
+        let levels = plots.iter().map(|&plot| levels_km_h[plot]);
+        let factors = records().zip(levels).map(|(of, level)| (of.speed_km_h, of.spacing_cm, level, of.replication));
+        let design = Design::in_blocks(factors);
         let is_measured = if plots.is_empty() { Err(NoModel::NotMeasured) } else { Ok(()) };
         let model = is_measured.and_then(|()| LinearModel::fit(&design, &values));
         let counts: Vec<(u32, u32)> = records().filter_map(|record| response.count(record)).collect();

@@ -105,11 +105,10 @@ impl Analysis {
         if count == 0 {
             return format!("None of {of} plants was damaged: {share} % ({}).", share.kind());
         }
-        let percents = self.records.iter().map(|plot| plot.performance().plant_damage_percent);
-        let most = percents.clone().flatten().fold(0.0, f64::max);
-        let is_worst = |percent: &Option<f64>| percent.is_some_and(|percent| percent >= most);
-        let worst = self.records.iter().zip(percents).filter(|(_, percent)| is_worst(percent));
-        let place = |(plot, _): (&PlotRecord, _)| {
+        let percent = |plot: &PlotRecord| plot.performance().plant_damage_percent;
+        let most = self.records.iter().filter_map(percent).fold(0.0, f64::max);
+        let worst = self.records.iter().filter(|plot| percent(plot).is_some_and(|percent| percent >= most));
+        let place = |plot: &PlotRecord| {
             format!("replication {}, {} km/h, {} cm", plot.replication, plot.speed_km_h, plot.spacing_cm)
         };
         let worst: Vec<String> = worst.map(place).collect();
