@@ -58,32 +58,26 @@ impl Display for ResponseAnalysis {
     }
 }
 
-/// The measures of a plot or of a treatment, and what stands above them.
-const MEASURES: [&str; 6] = [
-    "plant damage, %",
-    "weeding efficiency, %",
-    "theoretical capacity, ha/h",
-    "effective capacity, ha/h",
-    "field efficiency, %",
-    "performance index",
+/// A measure of a plot or of a treatment: what stands above it, its decimals, and its value.
+type Measure = (&'static str, usize, fn(&Performance) -> Option<f64>);
+
+const MEASURES: [Measure; 6] = [
+    ("plant damage, %", 2, |of| of.plant_damage_percent),
+    ("weeding efficiency, %", 2, |of| of.weeding_efficiency_percent),
+    ("theoretical capacity, ha/h", 4, |of| of.theoretical_capacity_ha_h),
+    ("effective capacity, ha/h", 4, |of| of.effective_capacity_ha_h),
+    ("field efficiency, %", 2, |of| of.field_efficiency_percent),
+    ("performance index", 2, |of| of.performance_index),
 ];
 
-fn measures(performance: &Performance) -> [String; 6] {
-    let shown = |value, decimals| optional(value, |value| fixed(value, decimals));
-    [
-        shown(performance.plant_damage_percent, 2),
-        shown(performance.weeding_efficiency_percent, 2),
-        shown(performance.theoretical_capacity_ha_h, 4),
-        shown(performance.effective_capacity_ha_h, 4),
-        shown(performance.field_efficiency_percent, 2),
-        shown(performance.performance_index, 2),
-    ]
+fn measures(of: &Performance) -> [String; MEASURES.len()] {
+    MEASURES.map(|(_, decimals, value)| optional(value(of), |value| fixed(value, decimals)))
 }
 
 impl Analysis {
     /// The means by treatment.
     pub(crate) fn means(&self) -> Table {
-        let columns = ["treatment", "plots"].into_iter().chain(MEASURES);
+        let columns = ["treatment", "plots"].into_iter().chain(MEASURES.map(|(heading, ..)| heading));
         let mut table = Table::new("Means of the plots of each treatment", columns);
         for treatment in self.treatments() {
             let name = format!("{} km/h, {} cm", short(treatment.speed_km_h), short(treatment.spacing_cm));
@@ -101,7 +95,8 @@ impl Analysis {
 
     /// Each plot: its record and its measures.
     pub(crate) fn plots(&self) -> Table {
-        let columns = ["plot"].into_iter().chain(COLUMNS.map(|(_, heading, ..)| heading)).chain(MEASURES);
+        let counted = COLUMNS.map(|(_, heading, ..)| heading);
+        let columns = ["plot"].into_iter().chain(counted).chain(MEASURES.map(|(heading, ..)| heading));
         let mut table = Table::new("Each plot: counts, measurements and results", columns);
         for record in &self.records {
             let measures = measures(&record.performance());
