@@ -25,26 +25,23 @@ const SOFT_WHEEL_NUMERIC: f64 = 15.0;
 const TILLED_WHEEL_NUMERIC: f64 = 25.0;
 
 /// A line of interpretation, and whether it asks for a change.
-struct Sense {
-    words: String,
-    concern: bool,
-}
+type Sense = (String, bool);
 
 /// All is well.
 fn fine(words: String) -> Sense {
-    Sense { words, concern: false }
+    (words, false)
 }
 
 /// The machine should be changed.
 fn concern(words: String) -> Sense {
-    Sense { words, concern: true }
+    (words, true)
 }
 
 /// Makes the figures of a design, each from the field of its key: `key: name, equation, unit => sense`.
 macro_rules! figures {
     ($design:ident; $($key:ident: $name:literal, $equation:literal, $unit:ident => $sense:expr;)+) => {
         vec![$({
-            let Sense { words: sense, concern } = $sense;
+            let (sense, concern) = $sense;
             let (key, value) = (stringify!($key), $unit.value($design.$key));
             Figure { key, name: $name, equation: $equation, value, unit: $unit.name, sense, concern }
         }),+]

@@ -248,11 +248,7 @@ impl Experiment {
             let batch = first..rows.min(first + BATCH);
             let weeded: Vec<Vec<PlotOutcome>> = batch
                 .into_par_iter()
-                .map(|row| {
-                    let outcomes = self.weed_row(plot, row, engine)?;
-                    row_done();
-                    Ok(outcomes)
-                })
+                .map(|row| self.weed_row(plot, row, engine).inspect(|_| row_done()))
                 .collect::<Result<_>>()?;
             for row in weeded {
                 if outcomes.is_empty() {
