@@ -100,12 +100,9 @@ impl Page<'_> {
         }
         let from = self.parameters.iter().find(|(name, _)| ["field", "plots from"].contains(&name.as_str()));
         if let Some((name, value)) = from {
-            let assumed = if self.totals.is_empty() {
-                "counted by hand"
-            } else {
-                "simulated; its assumptions are under Repeat it"
-            };
-            rows.push(vec![name.clone(), value.clone(), assumed.to_owned()]);
+            let simulated = "simulated; its assumptions are under Repeat it";
+            let basis = if self.totals.is_empty() { "counted by hand" } else { simulated };
+            rows.push(vec![name.clone(), value.clone(), basis.to_owned()]);
         }
         Table { rows, is_prose: true, ..Table::new("Result", ["measure", "value", "interval and basis"]) }
     }
@@ -287,22 +284,19 @@ impl ResponseAnalysis {
     fn equation(&self) -> Result<String, NoModel> {
         let model = self.model.as_ref().map_err(|why| *why)?;
         let estimate = |name| model.term(name).map(|term| term.estimate);
-        let coefficients =
-            Coefficients { constant: estimate("constant"), per_km_h: estimate("speed"), per_cm: estimate("spacing") };
-        Ok(self.written(&coefficients, significant))
+        Ok(self.written(["constant", "speed", "spacing"].map(estimate), significant))
     }
 
     /// The paper's equation. Empty if it is illegible.
     fn published_equation(&self) -> String {
-        self.written(&self.published.equation, short)
+        let Coefficients { constant, per_km_h, per_cm } = self.published.equation;
+        self.written([constant, per_km_h, per_cm], short)
     }
 
     /// The measure as an equation. Empty if no coefficient is known.
-    fn written(&self, coefficients: &Coefficients, said: fn(f64) -> String) -> String {
-        let factors =
-            [(coefficients.constant, ""), (coefficients.per_km_h, " × speed"), (coefficients.per_cm, " × spacing")];
+    fn written(&self, coefficients: [Option<f64>; 3], said: fn(f64) -> String) -> String {
         let mut right = String::new();
-        for (value, factor) in factors {
+        for (value, factor) in coefficients.into_iter().zip(["", " × speed", " × spacing"]) {
             let Some(value) = value else { continue };
             let sign = match (value < 0.0, right.is_empty()) {
                 (true, true) => "\u{2212}",

@@ -39,10 +39,8 @@ impl Shard {
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
     /// The numbers of its plots, points or runs, ascending from 0.
-    pub fn numbers(self, all: u64) -> impl ExactSizeIterator<Item = u64> {
-        let count = all.saturating_sub(self.number - 1).div_ceil(self.of);
-        // A range of u64 is no exact-size iterator.
-        (0..usize::try_from(count).unwrap_or(usize::MAX)).map(move |turn| self.number - 1 + turn as u64 * self.of)
+    pub fn numbers(self, all: u64) -> impl Iterator<Item = u64> {
+        (self.number - 1..all).step_by(self.of as usize)
     }
 
     fn check(self) -> Result<Self> {

@@ -110,18 +110,9 @@ impl ResponseAnalysis {
     /// The coefficients with their errors, beside the paper's.
     pub(crate) fn terms(&self) -> Table {
         let Published { equation, text, equation_number, .. } = self.published;
-        let mut table = Table::new(
-            "Linear model",
-            [
-                "term",
-                "estimate",
-                "standard error",
-                "t",
-                "p",
-                &format!("paper, Eq. {equation_number}"),
-                "paper, in its text",
-            ],
-        );
+        let of_paper = format!("paper, Eq. {equation_number}");
+        let columns = ["term", "estimate", "standard error", "t", "p", &of_paper, "paper, in its text"];
+        let mut table = Table::new("Linear model", columns);
         let rows = [
             ("constant", "constant", equation.constant, text.constant),
             ("speed", "for each km/h", equation.per_km_h, text.per_km_h),
@@ -149,25 +140,17 @@ impl ResponseAnalysis {
         let published: Vec<String> = self.published.ranges.iter().map(range).collect();
         let share = |value| fixed(value, 4);
         let ours = |value: fn(&LinearModel) -> f64, said: fn(f64) -> String| optional(model.map(value), said);
-        let row = |what: &str, ours: String, paper: String| vec![what.to_owned(), ours, paper];
         let nothing = || NOTHING.to_owned();
-        let mut table = Table::new("Fit and range", ["", "this trial", "paper"]);
-        table.rows = vec![
-            row("R²", ours(|model| model.r_squared, share), share(self.published.r_squared)),
-            row(
-                "adjusted R²",
-                ours(|model| model.adjusted_r_squared, share),
-                optional(self.published.adjusted_r_squared, share),
-            ),
-            row("residual standard error", ours(|model| model.residual_standard_error, significant), nothing()),
-            row("degrees of freedom", ours(|model| model.degrees_of_freedom as f64, short), nothing()),
-            row(
-                &format!("range, {}", self.response.unit()),
-                self.range.as_ref().map_or_else(nothing, range),
-                published.join(",\n"),
-            ),
+        let adjusted = optional(self.published.adjusted_r_squared, share);
+        let what = format!("range, {}", self.response.unit());
+        let rows = [
+            ["R²".to_owned(), ours(|model| model.r_squared, share), share(self.published.r_squared)],
+            ["adjusted R²".to_owned(), ours(|model| model.adjusted_r_squared, share), adjusted],
+            ["residual standard error".to_owned(), ours(|model| model.residual_standard_error, significant), nothing()],
+            ["degrees of freedom".to_owned(), ours(|model| model.degrees_of_freedom as f64, short), nothing()],
+            [what, self.range.as_ref().map_or_else(nothing, range), published.join(",\n")],
         ];
-        table
+        Table { rows: rows.map(Vec::from).to_vec(), ..Table::new("Fit and range", ["", "this trial", "paper"]) }
     }
 
     /// Remarks on the models and the residuals, each sentence once.
@@ -213,13 +196,14 @@ impl BinomialModel {
                 let (least, greatest) = term.odds_interval;
                 format!("{} ({} to {})", fixed(term.odds_ratio), fixed(least), fixed(greatest))
             });
-            let cells = [
+            table.rows.push(vec![
+                name.to_owned(),
                 significant(term.estimate),
                 significant(term.standard_error),
                 fixed(term.statistic, 2),
                 probability(term.p),
-            ];
-            table.rows.push([name.to_owned()].into_iter().chain(cells).chain([times]).collect());
+                times,
+            ]);
         }
         table
     }
@@ -228,10 +212,8 @@ impl BinomialModel {
 impl AnalysisOfVariance {
     /// The part of the variation of each factor.
     pub(crate) fn table(&self) -> Table {
-        let mut table = Table::new(
-            "Analysis of variance",
-            ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"],
-        );
+        let columns = ["source", "degrees of freedom", "sum of squares", "mean square", "F", "p"];
+        let mut table = Table::new("Analysis of variance", columns);
         for source in &self.sources {
             table.rows.push(vec![
                 source.name.replace(" x ", " × "),

@@ -185,7 +185,7 @@ pub(super) fn scatter(values: &[f64]) -> f64 {
     values.iter().map(|value| (value - mean).powi(2)).sum()
 }
 
-pub(super) fn varies(values: &[f64]) -> bool {
+fn varies(values: &[f64]) -> bool {
     values.windows(2).any(|pair| pair[0] != pair[1])
 }
 
