@@ -157,7 +157,7 @@ impl Logs {
     /// # Errors
     /// At the first failure of a log.
     pub fn write(&mut self, row: usize, happening: &Happening) -> Result<(), LogError> {
-        self.logs[row].write(|writer| writer.write(happening))
+        self.logs[row].write(|writer| writer.write(writer.now_ms(), happening))
     }
 
     /// The time of a row's line written now, in milliseconds.

@@ -20,15 +20,6 @@ const LONGEST_TICKS: u32 = 1_000_000;
 /// The settings that make a count a distance, if the wheel is not calibrated.
 const NOMINAL: [Setting; 2] = [Setting::TicksPerRev, Setting::WheelMm];
 
-/// Millimetres in a tick of the encoder.
-pub fn tick_mm(settings: &Settings) -> f64 {
-    let value = |setting| f64::from(settings.get(setting));
-    match value(Setting::TicksPerM) {
-        0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
-        ticks_per_m => 1000.0 / ticks_per_m,
-    }
-}
-
 /// The settings in use, as far as the machine has shown them.
 #[derive(Clone, Debug)]
 pub struct InUse {
@@ -158,7 +149,6 @@ pub struct Follower {
     /// Commands without an answer so far.
     unanswered: VecDeque<Entry>,
     distance: Distance,
-    tick_mm: f64,
 }
 
 impl Follower {
@@ -177,7 +167,7 @@ impl Follower {
             Kind::Setting => Followed::Unread,
             Kind::Status => match Status::parse(&entry.text) {
                 Some(status) => {
-                    let goes_on = self.knows_wheel() && self.distance.take(status.position, self.tick_mm);
+                    let goes_on = self.knows_wheel() && self.distance.take(status.position, self.tick_mm());
                     Followed::Status(status, goes_on)
                 }
                 None => Followed::Unread,
@@ -186,7 +176,7 @@ impl Follower {
                 Some(event) => {
                     // A stretch may begin with an event.
                     if let (Some(position), None) = (position(&event), self.distance.last) {
-                        self.distance.take(position, self.tick_mm);
+                        self.distance.take(position, self.tick_mm());
                     }
                     Followed::Event(event)
                 }
@@ -213,7 +203,6 @@ impl Follower {
             },
             _ => Followed::Other,
         };
-        self.tick_mm = tick_mm(self.in_use.settings());
         if !self.knows_wheel() {
             self.distance = Distance::default();
         }
@@ -231,13 +220,17 @@ impl Follower {
         self.in_use.knows(&[Setting::TicksPerM]) && (is_calibrated || self.in_use.knows(&NOMINAL))
     }
 
-    /// Millimetres in a tick.
+    /// Millimetres in a tick of the encoder.
     pub fn tick_mm(&self) -> f64 {
-        self.tick_mm
+        let value = |setting| f64::from(self.in_use.settings().get(setting));
+        match value(Setting::TicksPerM) {
+            0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
+            ticks_per_m => 1000.0 / ticks_per_m,
+        }
     }
 
     /// The distance at a position near the last status, in mm. `None` if it is unknown.
     pub fn mm(&self, position: i32) -> Option<f64> {
-        self.distance.at(position, self.tick_mm)
+        self.distance.at(position, self.tick_mm())
     }
 }

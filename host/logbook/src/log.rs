@@ -118,19 +118,11 @@ impl LogWriter {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// Writes an event of the session.
+    /// Writes an event of the session, with this time.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&mut self, happening: &Happening) -> Result<(), LogError> {
-        self.write_at(self.now_ms(), happening)
-    }
-
-    /// Writes an event of the session, with a time from another clock.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn write_at(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
+    pub fn write(&mut self, time_ms: u64, happening: &Happening) -> Result<(), LogError> {
         match happening {
             Happening::Connected { version, shown, examples, .. } => {
                 self.line(time_ms, Kind::Connected, version)?;
@@ -220,6 +212,7 @@ pub fn parse(path: &Path, text: Vec<u8>) -> Result<Vec<Entry>, FileError> {
 }
 
 /// Reads a log in pieces, so that the whole text is not in memory.
+#[derive(Default)]
 pub struct Pieces {
     path: PathBuf,
     /// The header, and below it the wanted lines of a piece.
@@ -230,14 +223,13 @@ pub struct Pieces {
     cut: Vec<u8>,
     /// Lines that were read.
     lines: u64,
-    is_empty: bool,
+    has_entries: bool,
 }
 
 impl Pieces {
     /// A log before its first line. The path is for error messages.
     pub fn new(path: &Path) -> Self {
-        let (table, numbers, cut) = (String::new(), Vec::new(), Vec::new());
-        Self { path: path.into(), table, numbers, cut, lines: 0, is_empty: true }
+        Self { path: path.into(), ..Self::default() }
     }
 
     /// Parses the lines that end in the next bytes of the log, without the unwanted ones.
@@ -266,7 +258,7 @@ impl Pieces {
         let last = std::mem::take(&mut self.cut);
         let entries = self.lines(last, is_wanted)?;
         // For an empty log this returns the error for a missing header.
-        if self.is_empty { self.parse() } else { Ok(entries) }
+        if self.has_entries { Ok(entries) } else { self.parse() }
     }
 
     fn lines(&mut self, text: Vec<u8>, mut is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
@@ -285,7 +277,7 @@ impl Pieces {
         if self.numbers.len() < 2 {
             return Ok(Vec::new());
         }
-        self.is_empty = false;
+        self.has_entries = true;
         let entries = self.parse();
         self.table.truncate(self.table.find('\n').map_or(0, |end| end + 1));
         self.numbers.truncate(1);
@@ -313,11 +305,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let answer = "speed_mm_s,spacing_mm \"quoted\"";
-        LogWriter::open(&path).unwrap().write(&Happening::Answer(answer.to_owned())).unwrap();
+        LogWriter::open(&path).unwrap().write(0, &Happening::Answer(answer.to_owned())).unwrap();
         let mut cut = fs::read(&path).unwrap();
         cut.extend(b"17,sta");
         fs::write(&path, cut).unwrap();
-        LogWriter::open(&path).unwrap().write(&Happening::Lost("no\nport".to_owned())).unwrap();
+        LogWriter::open(&path).unwrap().write(0, &Happening::Lost("no\nport".to_owned())).unwrap();
         let entries: Vec<(u64, Kind, String)> =
             read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
         assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
@@ -328,10 +320,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         let lines = vec!["wheel_mm=410 mm from 200 to 800, default 400, saved 410".to_owned()];
-        LogWriter::open(&path)
-            .unwrap()
-            .write(&Happening::Settings(link::settings::Settings::new(), lines.clone()))
-            .unwrap();
+        let shown = Happening::Settings(link::settings::Settings::new(), lines.clone());
+        LogWriter::open(&path).unwrap().write(0, &shown).unwrap();
         let [entry] = &read(&path).unwrap()[..] else { panic!("one line") };
         assert_eq!((entry.kind, &entry.text), (Kind::Answer, &lines[0]));
     }

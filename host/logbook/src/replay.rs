@@ -212,19 +212,19 @@ fn play(stretch: &Stretch, pace: Pace, advance: &mut impl FnMut()) -> Result<Pla
                 }
                 logged.push(Heard { line: entry.number, steps: 0, event: *event, speed: player.speed(), is_given });
             }
-            Happened::Refused => {}
-            Happened::Command(line) => {
+            Happened::Command(None) => {}
+            Happened::Command(Some(command)) => {
                 // The status that shows the new state must come nearer to the command.
                 if stretch.is_reported_by_event(place) {
-                    starts_now |= link::command(line).is_ok_and(|command| command.action == Action::StartNow);
+                    starts_now |= command.action == Action::StartNow;
                     continue;
                 }
                 if let Some(at) = stretch.position_of_command((player.position(), last_ms), place) {
                     player.roll_to(at, stretch.next_status(place));
                     last_ms = entry.time_ms;
                 }
-                if !player.command(line) {
-                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, line));
+                if !player.command(command) {
+                    notes.push(format!("line {}: not replayed from `{}` on", entry.number, entry.text));
                     break;
                 }
             }

@@ -295,9 +295,8 @@ impl<'a> Player<'a> {
         is_given
     }
 
-    /// Executes a typed line. False if it cannot be replayed.
-    pub(super) fn command(&mut self, line: &str) -> bool {
-        let Ok(Command { action, setting, number, force }) = link::command(line) else { return true };
+    /// Executes a command. False if it cannot be replayed.
+    pub(super) fn command(&mut self, &Command { action, setting, number, force }: &Command) -> bool {
         match action {
             // If the log lacks the answer: the firmware refused what the replay refuses.
             Action::Start | Action::StartNow => _ = self.rig.start(action == Action::StartNow),
@@ -311,11 +310,10 @@ impl<'a> Player<'a> {
             Action::Feature => self.rig.enter_feature(number as u8),
             Action::TeachPlant => _ = self.rig.teach(label::PLANT),
             Action::TeachWeed => _ = self.rig.teach(label::WEED),
-            Action::Forget | Action::ForgetAll => return false,
-            _ => {
-                let word = line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase();
-                return !["servo", "calibrate", "test", "defaults", "revert"].contains(&&*word);
-            }
+            Action::Forget | Action::ForgetAll | Action::Defaults | Action::Revert => return false,
+            Action::CalibrateStart | Action::CalibrateServo | Action::Calibrate => return false,
+            Action::ServoIn | Action::ServoOut | Action::Servo | Action::TestRow | Action::TestWatchdog => return false,
+            _ => return true,
         }
         self.step();
         true
@@ -358,11 +356,9 @@ fn canopies(stretch: &Stretch) -> Vec<Canopy> {
                 let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
                 canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
             }
-            Happened::Command(line) => {
-                // Later holds have the new margin.
-                if let Ok(Command { action: Action::Set, setting, number, .. }) = link::command(line) {
-                    let _ = settings.change(setting, number);
-                }
+            // Later holds have the new margin.
+            Happened::Command(Some(Command { action: Action::Set, setting, number, .. })) => {
+                let _ = settings.change(*setting, *number);
             }
             _ => {}
         }

@@ -3,7 +3,7 @@
 
 use super::{DETECTION_TICKS, ReplayError};
 use crate::log::{Entry, Kind};
-use control::say::command::Action;
+use control::say::command::{Action, Command};
 use files::in_a_line;
 use link::examples::{Taught, taught};
 use link::settings::{Setting, Settings, shown};
@@ -11,12 +11,11 @@ use link::{ConsoleLine, EventLine, Mode, Status};
 use std::collections::VecDeque;
 
 /// The content of a log line.
-pub(super) enum Happened<'a> {
+pub(super) enum Happened {
     Status(Status),
     Event(EventLine),
-    Command(&'a str),
-    /// A command that the firmware answered with an error. It had no effect.
-    Refused,
+    /// A typed line; `None` if the firmware has refused it, or would: then it had no effect.
+    Command(Option<Command>),
 }
 
 /// A log from one start of the link to its end.
@@ -27,7 +26,7 @@ pub(super) struct Stretch<'a> {
     pub(super) built_in: usize,
     /// The first of its statuses.
     pub(super) first: Status,
-    pub(super) happened: Vec<(&'a Entry, Happened<'a>)>,
+    pub(super) happened: Vec<(&'a Entry, Happened)>,
     /// Notes on lines that only a newer version knows.
     pub(super) notes: Vec<String>,
 }
@@ -93,12 +92,12 @@ impl<'a> Stretch<'a> {
                 }
                 Kind::Command => {
                     unanswered.push_back(happened.len());
-                    happened.push((entry, Happened::Command(&entry.text)));
+                    happened.push((entry, Happened::Command(link::command(&entry.text).ok())));
                 }
                 Kind::Answer => {
                     let ConsoleLine::End { error } = ConsoleLine::parse(&entry.text) else { continue };
                     if let (Some(place), Some(_)) = (unanswered.pop_front(), error) {
-                        happened[place] = (happened[place].0, Happened::Refused);
+                        happened[place].1 = Happened::Command(None);
                     }
                 }
                 Kind::Connected | Kind::Started | Kind::Lost => {}
@@ -160,8 +159,7 @@ impl<'a> Stretch<'a> {
     /// The machine's position at a typed command that changes no state: between its last position, with that time, and
     /// the next status, by the PC's clock. `start now` at work lets the tool into the row at its next swing in.
     pub(super) fn position_of_command(&self, last: (i32, u64), place: usize) -> Option<i32> {
-        if let (_, Happened::Command(line)) = self.happened[place]
-            && link::command(line).is_ok_and(|command| command.action == Action::StartNow)
+        if let (_, Happened::Command(Some(Command { action: Action::StartNow, .. }))) = self.happened[place]
             && let Some((position, true)) = self.happened[place..].iter().find_map(swing_or_status)
         {
             return Some(position);
@@ -229,10 +227,10 @@ impl<'a> Stretch<'a> {
     /// Whether an event reports the change of state by a command. It comes after the answer, with at most one earlier
     /// requested status between them. At the end of a log it may be missing.
     pub(super) fn is_reported_by_event(&self, place: usize) -> bool {
-        let Happened::Command(line) = self.happened[place].1 else { return false };
-        let brings = match link::command(line).map(|command| command.action) {
-            Ok(Action::Start | Action::StartNow) => Mode::Work,
-            Ok(Action::Hold | Action::Clear) => Mode::Hold,
+        let Happened::Command(Some(command)) = self.happened[place].1 else { return false };
+        let brings = match command.action {
+            Action::Start | Action::StartNow => Mode::Work,
+            Action::Hold | Action::Clear => Mode::Hold,
             _ => return false,
         };
         let mut statuses = 0;
@@ -261,7 +259,7 @@ impl<'a> Stretch<'a> {
 }
 
 /// The position in a swing or a status, and whether it is a swing.
-fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)> {
+fn swing_or_status((_, happened): &(&Entry, Happened)) -> Option<(i32, bool)> {
     match happened {
         Happened::Event(EventLine::Swing { position, .. }) => Some((*position, true)),
         Happened::Status(status) => Some((status.position, false)),
@@ -270,6 +268,6 @@ fn swing_or_status((_, happened): &(&Entry, Happened<'_>)) -> Option<(i32, bool)
 }
 
 /// The status in a line of the log.
-fn status<'a>((_, happened): &'a (&Entry, Happened<'_>)) -> Option<&'a Status> {
+fn status<'a>((_, happened): &'a (&Entry, Happened)) -> Option<&'a Status> {
     if let Happened::Status(status) = happened { Some(status) } else { None }
 }
