@@ -106,7 +106,7 @@ fn merge_gap_mm(ticks: u16, settings: &[(Setting, u16)]) -> u16 {
         all.set(setting, value).expect("what a file says has been checked");
     }
     let millimetres = f64::from(ticks) * 1000.0 / f64::from(all.wheel().ticks(1000).0);
-    millimetres.round().min(Setting::MergeGapMm.description().greatest.into()) as u16
+    millimetres.round().min(Setting::MergeGapMm.greatest().into()) as u16
 }
 
 /// The value of an item for a setting, if it is valid.
@@ -114,9 +114,7 @@ fn value(setting: Setting, item: &Item) -> Option<u16> {
     if setting.is_switched() {
         return item.as_bool().map(u16::from);
     }
-    let description = setting.description();
-    let value = u16::try_from(item.as_integer()?).ok()?;
-    (description.least..=description.greatest).contains(&value).then_some(value)
+    u16::try_from(item.as_integer()?).ok().filter(|&value| setting.allows(value))
 }
 
 /// The valid values of a setting.
@@ -143,8 +141,11 @@ fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {
         (name(setting), shown.settings.get(setting), setting.is_switched(), comment)
     });
     let foreign = shown.others.iter().map(|OtherSetting { name, value, range, is_switched, unit }| {
-        let range =
-            if *is_switched { "true or false".to_owned() } else { format!("{} to {} {unit}", range.0, range.1) };
+        let range = if *is_switched {
+            "true or false".to_owned()
+        } else {
+            format!("{} to {} {unit}", range.start(), range.end())
+        };
         let comment =
             format!("\n# only the machine's firmware knows this setting, or this value\n# {}\n", range.trim_end());
         (name.clone(), *value, *is_switched, comment)
@@ -188,7 +189,7 @@ mod tests {
         let other = |name: &str, value, is_switched| OtherSetting {
             name: name.to_owned(),
             value,
-            range: (0, 1200),
+            range: 0..=1200,
             is_switched,
             unit: if is_switched { String::new() } else { "mm".to_owned() },
         };

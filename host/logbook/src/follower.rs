@@ -20,6 +20,15 @@ const LONGEST_TICKS: u32 = 1_000_000;
 /// The settings that make a count a distance, if the wheel is not calibrated.
 const NOMINAL: [Setting; 2] = [Setting::TicksPerRev, Setting::WheelMm];
 
+/// Millimetres in a tick of the encoder.
+pub fn tick_mm(settings: &Settings) -> f64 {
+    let value = |setting| f64::from(settings.get(setting));
+    match value(Setting::TicksPerM) {
+        0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
+        ticks_per_m => 1000.0 / ticks_per_m,
+    }
+}
+
 /// The settings in use, as far as the machine has shown them.
 #[derive(Clone, Debug)]
 pub struct InUse {
@@ -220,13 +229,9 @@ impl Follower {
         self.in_use.knows(&[Setting::TicksPerM]) && (is_calibrated || self.in_use.knows(&NOMINAL))
     }
 
-    /// Millimetres in a tick of the encoder.
+    /// Millimetres in a tick.
     pub fn tick_mm(&self) -> f64 {
-        let value = |setting| f64::from(self.in_use.settings().get(setting));
-        match value(Setting::TicksPerM) {
-            0.0 => PI * value(Setting::WheelMm) / value(Setting::TicksPerRev).max(1.0),
-            ticks_per_m => 1000.0 / ticks_per_m,
-        }
+        tick_mm(self.in_use.settings())
     }
 
     /// The distance at a position near the last status, in mm. `None` if it is unknown.
