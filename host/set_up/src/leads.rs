@@ -26,7 +26,8 @@ pub(crate) struct Timing {
 pub(crate) fn leads(timings: &[Timing], settings: &Settings) -> Vec<(Setting, u16)> {
     let Some([(_, longest_ms), (shortest_ms, _)]) = extremes(timings) else { return Vec::new() };
     let [saved_out_ms, saved_in_ms] = if keeps_stems(settings) {
-        let [top_mm_s, zone_mm] = [Setting::TopSpeedMmS, Setting::StemZoneMm].map(|setting| settings.get(setting).into());
+        let [top_mm_s, zone_mm] =
+            [Setting::TopSpeedMmS, Setting::StemZoneMm].map(|setting| settings.get(setting).into());
         saved_ms(top_mm_s, travel_ms(timings), zone_mm, circle::aside_mm(stroke_us(settings)))
     } else {
         [0, 0]

@@ -227,7 +227,8 @@ impl SetUp {
             (f64::from(farthest) / f64::from(in_use.max(1)) + SLIP) * beam_to_tool_mm
         };
         let timings = self.timed(settings);
-        let scatters_ms = extremes(&timings).into_iter().flatten().map(|(least_ms, greatest_ms)| greatest_ms - least_ms);
+        let scatters_ms =
+            extremes(&timings).into_iter().flatten().map(|(least_ms, greatest_ms)| greatest_ms - least_ms);
         let scatter_ms = scatters_ms.fold(SERVO_MS, u16::max);
         let speed_m_s = if keeps_stems(settings) { SLOW_M_S } else { SPEED_M_S };
         let stems_mm = keeps_stems(settings).then(|| STEM_SHARE * f64::from(settings.get(Setting::StemZoneMm)));

@@ -55,8 +55,6 @@ impl Witness {
 
 /// The firmware's classifier, with values from the log. A replay lists no examples, and ends where one is forgotten.
 pub(super) struct ReplayClassifier<'a> {
-    /// The built-in examples alone. A label must not contradict them.
-    built_in: Nearest<&'a [Taught], Volatile>,
     nearest: Nearest<&'a [Taught], Volatile>,
     witness: Rc<Witness>,
     /// The last detections: the replay's features, and the machine's features.
@@ -64,11 +62,15 @@ pub(super) struct ReplayClassifier<'a> {
 }
 
 impl<'a> ReplayClassifier<'a> {
-    /// A classifier with a log's examples. The first `built_in` of them are those of the firmware.
-    pub(super) fn new(examples: &'a [Taught], built_in: usize, witness: Rc<Witness>) -> Self {
-        let nearest = |examples| Nearest::new(examples, Volatile::new());
-        let (built_in, all) = (nearest(&examples[..built_in]), nearest(examples));
-        Self { built_in, nearest: all, witness, described: RefCell::default() }
+    /// A classifier with a log's built-in examples and those from the field.
+    pub(super) fn new(built_in: &'a [Taught], field: &[Taught], witness: Rc<Witness>) -> Self {
+        let mut nearest = Nearest::new(built_in, Volatile::new());
+        for &example in field {
+            // Any machine has room for as many.
+            let _ = nearest.keep(example);
+            while !nearest.carry_on() {}
+        }
+        Self { nearest, witness, described: RefCell::default() }
     }
 
     /// The machine's features for a detection with these features in the replay.
@@ -92,7 +94,7 @@ impl Classifier for ReplayClassifier<'_> {
     }
 
     fn built_in_class(&mut self, features: &Features) -> Class {
-        self.built_in.built_in_class(&self.by_machine(features))
+        self.nearest.built_in_class(&self.by_machine(features))
     }
 
     fn teach(&mut self, features: &Features, label: u8) -> Result<(), ExamplesFull> {
@@ -119,8 +121,7 @@ mod tests {
     fn a_label_is_refused_by_the_built_in_examples_alone() {
         let plant = Features::describe(556, 500, 150);
         let taught = Example::new(control::ground::examples::scale().quantise(plant.values()), label::WEED);
-        let examples = [&EXAMPLES[..], &[taught; 5]].concat();
-        let mut classifier = ReplayClassifier::new(&examples, EXAMPLES.len(), Rc::new(Witness::default()));
+        let mut classifier = ReplayClassifier::new(&EXAMPLES, &[taught; 5], Rc::new(Witness::default()));
         assert_eq!(classifier.classify(&plant, 3).class, Class::Weed, "the field has taught it so");
         assert_eq!(classifier.built_in_class(&plant), Class::Plant);
     }

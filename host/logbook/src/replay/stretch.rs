@@ -21,9 +21,9 @@ pub(super) enum Happened {
 /// A log from one start of the link to its end.
 pub(super) struct Stretch<'a> {
     pub(super) settings: Settings,
-    /// All examples, the built-in ones first, and the number of built-in ones.
-    pub(super) examples: Vec<Taught>,
-    pub(super) built_in: usize,
+    pub(super) built_in: Vec<Taught>,
+    /// The examples that were taught.
+    pub(super) field: Vec<Taught>,
     /// The first of its statuses.
     pub(super) first: Status,
     pub(super) happened: Vec<(&'a Entry, Happened)>,
@@ -35,7 +35,7 @@ impl<'a> Stretch<'a> {
     /// Reads a stretch. `None` if the machine sent nothing.
     pub(super) fn read(entries: &'a [Entry]) -> Result<Option<Self>, ReplayError> {
         let mut settings = Settings::new();
-        let (mut examples, mut built_in) = (Vec::new(), 0);
+        let (mut built_in, mut field) = (Vec::new(), Vec::new());
         let mut happened = Vec::new();
         let mut notes: Vec<String> = Vec::new();
         let mut skip = |entry: &Entry, what: &str| {
@@ -75,8 +75,7 @@ impl<'a> Stretch<'a> {
                         continue;
                     }
                     let (from_field, _, example) = taught(&entry.text).ok_or_else(|| wrong("no example"))?;
-                    examples.push(example);
-                    built_in += usize::from(!from_field);
+                    if from_field { &mut field } else { &mut built_in }.push(example);
                 }
                 Kind::Status => {
                     let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
@@ -106,7 +105,7 @@ impl<'a> Stretch<'a> {
             }
         }
         let first = happened.iter().find_map(status).cloned();
-        Ok(first.map(|first| Self { settings, examples, built_in, first, happened, notes }))
+        Ok(first.map(|first| Self { settings, built_in, field, first, happened, notes }))
     }
 
     /// The position from which the machine is replayed. If the log shows where watching began, it is that, or a little
@@ -175,14 +174,13 @@ impl<'a> Stretch<'a> {
     /// Without a swing the tool was already out: work then began as late, and ended as early, as the log allows. Or the
     /// log ends before the swing, which then came at its end.
     pub(super) fn position_of_change(&self, place: usize) -> Option<i32> {
-        let mode = match &self.happened[place].1 {
-            Happened::Event(EventLine::Alarm { position, .. }) => return Some(*position),
+        let mode = match self.happened[place].1 {
+            Happened::Event(EventLine::Alarm { position, .. }) => return Some(position),
             Happened::Event(EventLine::State { mode }) => mode,
             _ => return None,
         };
-        let is_state = |(_, happened): &&(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
         let next_status = || {
-            let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_state(happened));
+            let mut until_next = self.happened[place + 1..].iter().take_while(|happened| !is_change(happened));
             until_next.find_map(|happened| Some(status(happened)?.position))
         };
         let before = || self.happened[..place].iter().rev().find_map(swing_or_status).map(|(position, _)| position);
@@ -190,7 +188,7 @@ impl<'a> Stretch<'a> {
         let is_cut = || self.happened[place..].iter().filter_map(status).nth(1).is_none() && !self.was_out(place);
         match self.swing_of_change(place) {
             Some((_, position)) => Some(position),
-            None if *mode == Mode::Work || is_cut() => next_status().or_else(before),
+            None if mode == Mode::Work || is_cut() => next_status().or_else(before),
             None => before(),
         }
     }
@@ -247,8 +245,7 @@ impl<'a> Stretch<'a> {
 
     /// Whether a swing belongs to a change of state before it.
     pub(super) fn follows_change(&self, place: usize) -> bool {
-        let is_state = |(_, happened): &(_, _)| matches!(happened, Happened::Event(EventLine::State { .. }));
-        let change = self.happened[..place].iter().rposition(is_state);
+        let change = self.happened[..place].iter().rposition(is_change);
         change.and_then(|change| self.swing_of_change(change)).is_some_and(|(index, _)| index == place)
     }
 
@@ -256,6 +253,11 @@ impl<'a> Stretch<'a> {
     pub(super) fn next_status(&self, place: usize) -> Option<&Status> {
         self.happened[place..].iter().find_map(status)
     }
+}
+
+/// Whether it is a change of state.
+fn is_change((_, happened): &(&Entry, Happened)) -> bool {
+    matches!(happened, Happened::Event(EventLine::State { .. }))
 }
 
 /// The position in a swing or a status, and whether it is a swing.
