@@ -10,6 +10,7 @@ mod values;
 pub use self::field::{Field, Fields};
 pub use self::values::Values;
 use self::values::behind;
+use crate::console_line::is_name;
 use control::alarm::{Alarm, Warning};
 use control::ground::class::Class;
 use control::operate::calibration::{Outcome, SwingTimes};
@@ -244,8 +245,6 @@ impl Mode {
 
 /// Whether a line has the form of an event: its name, then a value with its key. No line of an answer has.
 fn is_event(line: &str) -> bool {
-    let is_name =
-        |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
     let is_value = |word: &str| word.split_once('=').is_some_and(|(key, value)| is_name(key) && !value.is_empty());
     let mut words = line.split(' ');
     line.bytes().all(|byte| matches!(byte, b' '..=b'~'))

@@ -96,11 +96,11 @@ impl Board {
         let path = Path::new(port);
         let ports = listed()?;
         // The list of ports has the link's present target.
-        let listed = ports.iter().find(|listed| is_same(&listed.port_name, port));
-        match listed {
-            Some(listed) if serial_number(listed).is_some() => Ok(of(listed, &ports, Path::new(BY_PLACE))),
+        match ports.iter().find(|listed| is_same(&listed.port_name, port)) {
             // A user's own link may lead to another port some day.
-            Some(listed) if listed.port_name == calling_out(port) => Ok(of(listed, &ports, Path::new(BY_PLACE))),
+            Some(listed) if serial_number(listed).is_some() || listed.port_name == calling_out(port) => {
+                Ok(of(listed, &ports, Path::new(BY_PLACE)))
+            }
             None if !path.exists() => Err(LinkError::Absent(port.to_owned())),
             // An absolute path is valid in any folder.
             _ => Ok(Self::Port(std::path::absolute(path).map_or(port.to_owned(), |path| path.display().to_string()))),

@@ -174,23 +174,17 @@ impl Follower {
             }
             Kind::Setting if self.in_use.show(&entry.text) => Followed::Other,
             Kind::Setting => Followed::Unread,
-            Kind::Status => match Status::parse(&entry.text) {
-                Some(status) => {
-                    let goes_on = self.knows_wheel() && self.distance.take(status.position, self.tick_mm());
-                    Followed::Status(status, goes_on)
+            Kind::Status => Status::parse(&entry.text).map_or(Followed::Unread, |status| {
+                let goes_on = self.knows_wheel() && self.distance.take(status.position, self.tick_mm());
+                Followed::Status(status, goes_on)
+            }),
+            Kind::Event => EventLine::parse(&entry.text).map_or(Followed::Unread, |event| {
+                // A stretch may begin with an event.
+                if let (Some(position), None) = (position(&event), self.distance.last) {
+                    self.distance.take(position, self.tick_mm());
                 }
-                None => Followed::Unread,
-            },
-            Kind::Event => match EventLine::parse(&entry.text) {
-                Some(event) => {
-                    // A stretch may begin with an event.
-                    if let (Some(position), None) = (position(&event), self.distance.last) {
-                        self.distance.take(position, self.tick_mm());
-                    }
-                    Followed::Event(event)
-                }
-                None => Followed::Unread,
-            },
+                Followed::Event(event)
+            }),
             Kind::Command => {
                 self.unanswered.push_back(entry.clone());
                 Followed::Other

@@ -51,11 +51,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Its name in the file.
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
     /// Whether the operator sees such a line: the receiver was connected, was lost, or has a fault.
     pub fn is_for_the_operator(self) -> bool {
         matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
@@ -162,7 +157,7 @@ impl LogWriter {
     fn line(&mut self, time_ms: u64, kind: Kind, line: &str) -> Result<(), LogError> {
         self.added += 1;
         // A record is one line of the table, even if the system's message about a lost port has several.
-        self.record([time_ms.to_string().as_str(), kind.name(), &in_a_line(line)])
+        self.record([time_ms.to_string().as_str(), kind.into(), &in_a_line(line)])
     }
 
     fn record<'a>(&mut self, fields: impl IntoIterator<Item = &'a str>) -> Result<(), LogError> {

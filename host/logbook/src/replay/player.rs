@@ -319,78 +319,71 @@ impl<'a> Player<'a> {
 
 /// Ground over which the beam was broken.
 struct Canopy {
+    /// Its place in the log's order.
+    number: usize,
     from: i32,
     to: i32,
     /// The log's values, if it was classified.
     seen: Option<Seen>,
 }
 
-impl Canopy {
-    fn is_over(&self, ground: i32) -> bool {
-        ground.wrapping_sub(self.from) >= 0 && ground.wrapping_sub(self.to) < 0
-    }
-}
-
-/// The ground over which the beam was broken, as far as the log shows it.
-fn canopies(stretch: &Stretch) -> Vec<Canopy> {
-    let mut settings = stretch.settings.clone();
-    let mut canopies = Vec::new();
-    for (_, happened) in &stretch.happened {
-        let wheel = settings.wheel();
-        match happened {
-            Happened::Event(EventLine::Detection { class, position, votes, spacing, hold, .. }) => {
-                let width = hold.wrapping_sub(2 * wheel.ticks(settings.get(Setting::MarginMm)).0);
-                let seen = Seen {
-                    vote: Vote { class: *class, votes: *votes },
-                    spacing_mm: wheel.millimetres(Ticks(*spacing)),
-                    width_mm: wheel.millimetres(Ticks(width)),
-                    is_given: position.wrapping_sub(stretch.first.position) < 0,
-                };
-                canopies.push(Canopy { from: *position, to: position.wrapping_add(width), seen: Some(seen) });
-            }
-            // It is latched when the detection exceeds the greatest width.
-            Happened::Event(EventLine::Alarm { alarm: Alarm::BeamBlocked, position }) => {
-                let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
-                canopies.push(Canopy { from, to: position.wrapping_add(1), seen: None });
-            }
-            // Later holds have the new margin.
-            Happened::Command(Some(Command { action: Action::Set, setting, number, .. })) => {
-                let _ = settings.change(*setting, *number);
-            }
-            _ => {}
-        }
-    }
-    canopies
-}
-
-/// The ground over which the beam was broken, in the log's order, with an index: a day has 200 000 plants.
+/// The ground over which the beam was broken, as far as the log shows it: by where it begins, because a day has 200 000
+/// plants.
 struct Canopies {
     canopies: Vec<Canopy>,
     /// The stretch's beginning. Ground is compared as ticks from here, because a position wraps.
     first: i32,
-    /// Their numbers, by where they begin.
-    by_from: Vec<usize>,
     /// The widest of them in ticks.
     widest: i32,
 }
 
 impl Canopies {
     fn of(stretch: &Stretch) -> Self {
-        let (canopies, first) = (canopies(stretch), stretch.first.position);
-        let mut by_from: Vec<usize> = (0..canopies.len()).collect();
-        by_from.sort_by_key(|&number| canopies[number].from.wrapping_sub(first));
+        let (mut settings, first) = (stretch.settings.clone(), stretch.first.position);
+        let mut canopies = Vec::new();
+        for (number, (_, happened)) in stretch.happened.iter().enumerate() {
+            let wheel = settings.wheel();
+            match happened {
+                Happened::Event(EventLine::Detection { class, position, votes, spacing, hold, .. }) => {
+                    let width = hold.wrapping_sub(2 * wheel.ticks(settings.get(Setting::MarginMm)).0);
+                    let seen = Seen {
+                        vote: Vote { class: *class, votes: *votes },
+                        spacing_mm: wheel.millimetres(Ticks(*spacing)),
+                        width_mm: wheel.millimetres(Ticks(width)),
+                        is_given: position.wrapping_sub(first) < 0,
+                    };
+                    canopies.push(Canopy {
+                        number,
+                        from: *position,
+                        to: position.wrapping_add(width),
+                        seen: Some(seen),
+                    });
+                }
+                // It is latched when the detection exceeds the greatest width.
+                Happened::Event(EventLine::Alarm { alarm: Alarm::BeamBlocked, position }) => {
+                    let from = position.wrapping_sub(settings.ticks(Setting::MaxWidthMm).0 + 1);
+                    canopies.push(Canopy { number, from, to: position.wrapping_add(1), seen: None });
+                }
+                // Later holds have the new margin.
+                Happened::Command(Some(Command { action: Action::Set, setting, number, .. })) => {
+                    let _ = settings.change(*setting, *number);
+                }
+                _ => {}
+            }
+        }
+        canopies.sort_by_key(|canopy| canopy.from.wrapping_sub(first));
         let widest = canopies.iter().map(|canopy| canopy.to.wrapping_sub(canopy.from)).max().unwrap_or(0);
-        Self { canopies, first, by_from, widest }
+        Self { canopies, first, widest }
     }
 
     /// The first of them in the log over this ground.
     fn over(&self, ground: i32) -> Option<&Canopy> {
         let ticks = ground.wrapping_sub(self.first);
-        let from = |&number: &usize| self.canopies[number].from.wrapping_sub(self.first);
-        let begun = self.by_from.partition_point(|number| from(number) <= ticks);
+        let from = |canopy: &Canopy| canopy.from.wrapping_sub(self.first);
+        let begun = self.canopies.partition_point(|canopy| from(canopy) <= ticks);
         let near =
-            self.by_from[..begun].iter().rev().take_while(|number| ticks.wrapping_sub(from(number)) < self.widest);
-        let over = near.filter(|&&number| self.canopies[number].is_over(ground));
-        over.min().map(|&number| &self.canopies[number])
+            self.canopies[..begun].iter().rev().take_while(|canopy| ticks.wrapping_sub(from(canopy)) < self.widest);
+        let is_over = |canopy: &&Canopy| ground.wrapping_sub(canopy.from) >= 0 && ground.wrapping_sub(canopy.to) < 0;
+        near.filter(is_over).min_by_key(|canopy| canopy.number)
     }
 }

@@ -45,6 +45,7 @@ impl<'a> Stretch<'a> {
                 notes.push(note);
             }
         };
+        let is_name = |text: &str| text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
         // Indices in `happened` of commands without an answer so far. Answers come in the order of commands.
         let mut unanswered = VecDeque::new();
         for entry in entries {
@@ -53,42 +54,30 @@ impl<'a> Stretch<'a> {
                 ReplayError::Line { line: entry.number, problem }
             };
             match entry.kind {
-                Kind::Setting => {
-                    let Some((setting, value)) = shown(&entry.text) else {
-                        let name = entry.text.split('=').next().unwrap_or_default();
-                        if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
-                            return Err(wrong("no setting"));
-                        }
-                        skip(entry, "the setting");
-                        continue;
-                    };
+                Kind::Setting => match shown(&entry.text) {
                     // With another value than the machine's, the decisions are others.
-                    settings.set(setting, value).map_err(|_| wrong("out of the range of this version"))?;
-                }
-                Kind::Example => {
-                    // The list may end with the number of damaged examples.
-                    if entry.text.starts_with("spoiled=") {
-                        continue;
+                    Some((setting, value)) => {
+                        settings.set(setting, value).map_err(|_| wrong("out of the range of this version"))?;
                     }
-                    if matches!(EventLine::parse(&entry.text), Some(EventLine::Newer { .. })) {
-                        skip(entry, "the event");
-                        continue;
-                    }
-                    let (from_field, _, example) = taught(&entry.text).ok_or_else(|| wrong("no example"))?;
-                    if from_field { &mut field } else { &mut built_in }.push(example);
-                }
+                    None if entry.text.split('=').next().is_some_and(is_name) => skip(entry, "the setting"),
+                    None => return Err(wrong("no setting")),
+                },
+                // The list may end with the number of damaged examples.
+                Kind::Example if entry.text.starts_with("spoiled=") => {}
+                Kind::Example => match (taught(&entry.text), EventLine::parse(&entry.text)) {
+                    (Some((true, _, example)), _) => field.push(example),
+                    (Some((false, _, example)), _) => built_in.push(example),
+                    (None, Some(EventLine::Newer { .. })) => skip(entry, "the event"),
+                    _ => return Err(wrong("no example")),
+                },
                 Kind::Status => {
                     let status = Status::parse(&entry.text).ok_or_else(|| wrong("no status"))?;
                     happened.push((entry, Happened::Status(status)));
                 }
-                Kind::Event => {
-                    let event = EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))?;
-                    if let EventLine::Newer { .. } = event {
-                        skip(entry, "the event");
-                        continue;
-                    }
-                    happened.push((entry, Happened::Event(event)));
-                }
+                Kind::Event => match EventLine::parse(&entry.text).ok_or_else(|| wrong("no event"))? {
+                    EventLine::Newer { .. } => skip(entry, "the event"),
+                    event => happened.push((entry, Happened::Event(event))),
+                },
                 Kind::Command => {
                     unanswered.push_back(happened.len());
                     happened.push((entry, Happened::Command(link::command(&entry.text).ok())));
