@@ -324,17 +324,15 @@ mod tests {
 
     #[test]
     fn every_line_of_the_firmwares_answers_is_read() {
-        let table = Setting::all().map(|setting| {
-            ConsoleLine::Setting {
-                name: settings::name(setting),
-                value: setting.default(),
-                unit: settings::unit(setting),
-                least: setting.least(),
-                greatest: setting.greatest(),
-                is_switched: setting.is_switched(),
-                default: setting.default(),
-                saved: None,
-            }
+        let table = Setting::all().map(|setting| ConsoleLine::Setting {
+            name: settings::name(setting),
+            value: setting.default(),
+            unit: settings::unit(setting),
+            least: setting.least(),
+            greatest: setting.greatest(),
+            is_switched: setting.is_switched(),
+            default: setting.default(),
+            saved: None,
         });
         assert_eq!(answer("get"), table.chain([DONE]).collect::<Vec<_>>());
         assert_matches!(&answer("version")[..], [ConsoleLine::Version { .. }, DONE]);

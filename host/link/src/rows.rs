@@ -44,7 +44,6 @@ pub enum What {
 /// Time in which a command must be typed.
 const WAIT: Duration = Duration::from_secs(3);
 
-/// An order to a row's thread.
 enum Order {
     /// A command and its deadline.
     Type(String, Moment),

@@ -154,7 +154,6 @@ impl Shown {
     }
 }
 
-/// This program's version.
 const OWN: &str = env!("CARGO_PKG_VERSION");
 
 /// Says that the machine's firmware has another version than this program, and what to do. `None` if it has this version

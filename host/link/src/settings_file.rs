@@ -9,7 +9,6 @@ use files::{FileError, bounded_file, whole_file};
 use std::path::Path;
 use toml_edit::{Decor, DocumentMut, Item, Key, TomlError, Value};
 
-/// The head of a new file.
 const HEAD: &str = "\
 # Settings of a weeder. `weeder settings push` sends them to the machine, `weeder settings diff` compares.
 # Settings that are not named here are not changed.
@@ -112,7 +111,6 @@ fn value(setting: Setting, item: &Item) -> Option<u16> {
     u16::try_from(item.as_integer()?).ok().filter(|&value| setting.allows(value))
 }
 
-/// The valid values of a setting.
 fn right(setting: Setting) -> String {
     let whole = if setting.is_switched() { "" } else { "a whole number, " };
     format!("{whole}{}", range(setting))

@@ -140,7 +140,6 @@ pub enum Followed {
     Unread,
 }
 
-/// The machine's position in an event.
 fn position(event: &EventLine) -> Option<i32> {
     match *event {
         EventLine::Detection { position, .. }

@@ -50,14 +50,6 @@ pub enum Kind {
     GpsMark,
 }
 
-impl Kind {
-    /// Whether the operator sees such a line: the receiver was connected, was lost, or has a fault.
-    pub fn is_for_the_operator(self) -> bool {
-        matches!(self, Self::GpsFound | Self::GpsLost | Self::GpsMark)
-    }
-}
-
-/// The first line of a log.
 const HEADER: &str = "time_ms,kind,line";
 
 /// Why a log cannot be written.
@@ -69,6 +61,11 @@ pub enum LogError {
     /// The file is no log.
     #[error("{0} exists already and is no log: choose another name")]
     NoLog(PathBuf),
+}
+
+/// The end of the last whole line.
+fn end(bytes: &[u8]) -> usize {
+    bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1)
 }
 
 /// Writes a log.
@@ -97,7 +94,7 @@ impl LogWriter {
             return Err(LogError::NoLog(path.into()));
         }
         // Removes a last line that a power failure has cut off. It would damage the next line.
-        let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+        let whole = end(&bytes);
         file.set_len(whole as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         let found = bytes[..whole].iter().filter(|&&byte| byte == b'\n').count().saturating_sub(1) as u64;
         let mut log =
@@ -232,16 +229,15 @@ impl Pieces {
     /// # Errors
     /// As [`read`], except for a log without lines.
     pub fn take(&mut self, bytes: &[u8], is_wanted: impl FnMut(&str) -> bool) -> Result<Vec<Entry>, FileError> {
-        let end = |bytes: &[u8]| bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-        let whole = end(bytes);
-        self.cut.extend_from_slice(&bytes[..whole]);
-        let mut text = if whole == 0 { Vec::new() } else { std::mem::take(&mut self.cut) };
+        let (whole, rest) = bytes.split_at(end(bytes));
+        self.cut.extend_from_slice(whole);
+        let mut text = if whole.is_empty() { Vec::new() } else { std::mem::take(&mut self.cut) };
         // The last line is complete only when the next one shows that no quotation mark is open.
         let last = end(&text[..text.len().saturating_sub(1)]);
         if text[last..].iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
             self.cut = text.split_off(last);
         }
-        self.cut.extend_from_slice(&bytes[whole..]);
+        self.cut.extend_from_slice(rest);
         self.lines(text, is_wanted)
     }
 
@@ -297,28 +293,26 @@ mod tests {
 
     #[test]
     fn a_log_is_read_back_and_continued_after_a_cut_line() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("log.csv");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let path = file.path();
         let answer = "speed_mm_s,spacing_mm \"quoted\"";
-        LogWriter::open(&path).unwrap().write(0, &Happening::Answer(answer.to_owned())).unwrap();
-        let mut cut = fs::read(&path).unwrap();
+        LogWriter::open(path).unwrap().write(0, &Happening::Answer(answer.to_owned())).unwrap();
+        let mut cut = fs::read(path).unwrap();
         cut.extend(b"17,sta");
-        fs::write(&path, cut).unwrap();
-        LogWriter::open(&path).unwrap().write(0, &Happening::Lost("no\nport".to_owned())).unwrap();
+        fs::write(path, cut).unwrap();
+        LogWriter::open(path).unwrap().write(0, &Happening::Lost("no\nport".to_owned())).unwrap();
         let entries: Vec<(u64, Kind, String)> =
-            read(&path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
+            read(path).unwrap().into_iter().map(|entry| (entry.number, entry.kind, entry.text)).collect();
         assert_eq!(entries, [(2, Kind::Answer, answer.to_owned()), (3, Kind::Lost, r"no\nport".to_owned())]);
     }
 
     #[test]
     fn what_the_machine_shows_after_a_change_is_in_the_log() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("log.csv");
-        let lines = vec!["wheel_mm=410 mm from 200 to 800, default 400, saved 410".to_owned()];
-        let shown = Happening::Settings(link::settings::Settings::new(), lines.clone());
-        LogWriter::open(&path).unwrap().write(0, &shown).unwrap();
-        let [entry] = &read(&path).unwrap()[..] else { panic!("one line") };
-        assert_eq!((entry.kind, &entry.text), (Kind::Answer, &lines[0]));
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let line = "wheel_mm=410 mm from 200 to 800, default 400, saved 410".to_owned();
+        let shown = Happening::Settings(link::settings::Settings::new(), vec![line.clone()]);
+        LogWriter::open(file.path()).unwrap().write(7, &shown).unwrap();
+        assert_eq!(read(file.path()).unwrap(), [Entry { number: 2, time_ms: 7, kind: Kind::Answer, text: line }]);
     }
 
     #[test]
@@ -337,11 +331,8 @@ mod tests {
                         entries.extend(pieces.end(|_| true)?);
                         Ok(entries)
                     };
-                    assert_eq!(
-                        in_pieces().map_err(|error: FileError| error.to_string()),
-                        as_one,
-                        "{text:?} by {length}"
-                    );
+                    let in_pieces = in_pieces().map_err(|error: FileError| error.to_string());
+                    assert_eq!(in_pieces, as_one, "{text:?} by {length}");
                 }
             }
         }

@@ -348,11 +348,10 @@ mod tests {
     #[test]
     fn servo_wheel_and_margin_come_one_after_the_other() {
         let next = |lines: &[&[&str]], changes: &[_]| heard(lines).next(&settings(changes)).expect("there is a step");
-        let leads = [(Setting::LeadOutMs, 150), (Setting::LeadInMs, 56)];
-        assert_eq!(next(&[&TIMED[..1]], &leads), Step::TimeServo(1));
-        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadOutMs, 158));
-        let leads = [(Setting::LeadOutMs, 158), (Setting::LeadInMs, 56)];
-        assert_eq!(next(&[TIMED], &leads), Step::SetLead(Setting::LeadInMs, 52));
+        let leads = |out_ms| [(Setting::LeadOutMs, out_ms), (Setting::LeadInMs, 56)];
+        assert_eq!(next(&[&TIMED[..1]], &leads(150)), Step::TimeServo(1));
+        assert_eq!(next(&[TIMED], &leads(150)), Step::SetLead(Setting::LeadOutMs, 158));
+        assert_eq!(next(&[TIMED], &leads(158)), Step::SetLead(Setting::LeadInMs, 52));
         let mut changes = worst_leads(Setting::TicksPerM, 0);
         assert_eq!(next(&[TIMED], &changes), Step::MeasureWheel(0));
         changes[2].1 = 1920;
@@ -461,23 +460,17 @@ mod tests {
 
     #[test]
     fn every_step_fits_on_a_line_of_80_characters() {
-        let margin = Margin {
-            slip_mm: 123.0,
-            servo_mm: 123.0,
-            firmware_mm: 123.0,
-            stems_mm: Some(123.0),
-            arm_mm: 0.0,
-            in_use_mm: 50,
-        };
-        let steps = [
+        let mm = 123.0;
+        let margin =
+            Margin { slip_mm: mm, servo_mm: mm, firmware_mm: mm, stems_mm: Some(mm), arm_mm: 0.0, in_use_mm: 50 };
+        for step in [
             Step::TimeServo(1),
             Step::SetLead(Setting::LeadOutMs, 158),
             Step::MeasureWheel(2),
             Step::PassPlants(11),
             Step::SetMargin(margin),
             Step::Ready(margin),
-        ];
-        for step in steps {
+        ] {
             assert!(step.to_string().len() <= 80, "{} in {step}", step.to_string().len());
         }
     }

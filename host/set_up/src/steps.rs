@@ -4,7 +4,6 @@
 
 use link::settings::{Setting, name};
 
-/// The manual's page.
 const PAGE: &str = include_str!("../../../docs/set-up.md");
 
 /// A step of the page.
