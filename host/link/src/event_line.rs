@@ -275,7 +275,7 @@ mod tests {
     use control::say::line::Line;
     use control::say::write_event;
     use control::units::{Instant, Position, Ticks};
-    use rand::{RngExt, SeedableRng};
+    use rand::{RngExt, SeedableRng, seq::IteratorRandom};
     use rand_chacha::ChaCha8Rng;
     use rig::{Beams, ByExamples, Rig};
     use std::collections::{BTreeMap, BTreeSet};
@@ -292,8 +292,7 @@ mod tests {
     /// Any event.
     fn any(chance: &mut ChaCha8Rng) -> Event {
         let position = Position::new(chance.random());
-        let alarms: Vec<Alarm> = (0..).map_while(Alarm::from_index).collect();
-        let alarm = alarms[chance.random_range(0..alarms.len())];
+        let alarm = (0..).map_while(Alarm::from_index).choose(chance).expect("there are alarms");
         match chance.random_range(0..9) {
             0 | 1 => {
                 let class = [Class::Plant, Class::Weed, Class::Unknown][chance.random_range(0..3)];
@@ -306,10 +305,7 @@ mod tests {
             4 => Event::Swing { out: chance.random(), position },
             5 => Event::State([State::Hold, State::Work, State::Alarm(alarm)][chance.random_range(0..3)]),
             6 => Event::Alarm { alarm, position },
-            7 => {
-                let warnings: Vec<Warning> = (0..).map_while(Warning::from_index).collect();
-                Event::Warning(warnings[chance.random_range(0..warnings.len())])
-            }
+            7 => Event::Warning((0..).map_while(Warning::from_index).choose(chance).expect("there are warnings")),
             _ => {
                 let times = SwingTimes { out_ms: chance.random(), in_ms: chance.random() };
                 let outcomes = [Outcome::Measured(times), Outcome::Shown, Outcome::Failed];
@@ -388,11 +384,10 @@ mod tests {
     fn every_status_is_read_as_the_firmware_writes_it() {
         let mut chance = ChaCha8Rng::seed_from_u64(28);
         let mut met = BTreeSet::new();
-        let causes: Vec<Cause> = (0..).map_while(Cause::from_index).collect();
         for _ in 0..100 {
-            let cause = causes[chance.random_range(0..causes.len())];
-            let (classifier, readings) =
-                (Nearest::new(&EXAMPLES[..], Volatile::new()), Readings::new(Instant::ZERO, Position::new(0)));
+            let cause = (0..).map_while(Cause::from_index).choose(&mut chance).expect("there are causes");
+            let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
+            let readings = Readings::new(Instant::ZERO, Position::new(0));
             let mut rig =
                 Rig::wake_from(classifier, Volatile::new(), readings, Beams::default(), cause, chance.random());
             for _ in 0..50 {

@@ -224,12 +224,9 @@ impl Hold {
             Held::Obeyed(time) => Some((time, name)),
             _ => None,
         });
-        let (count, all) = (obeyed.clone().count(), self.rows.len());
-        let last = obeyed.min_by_key(|&(time, _)| Reverse(time));
-        let mut parts = vec![match last {
-            Some((time, _)) => format!("HOLD {count} of {all} in {} ms", time.as_millis()),
-            None => format!("HOLD {count} of {all}"),
-        }];
+        let (count, last) = (obeyed.clone().count(), obeyed.min_by_key(|&(time, _)| Reverse(time)));
+        let time = last.map_or_else(String::new, |(time, _)| format!(" in {} ms", time.as_millis()));
+        let mut parts = vec![format!("HOLD {count} of {}{time}", self.rows.len())];
         for (what, state) in
             [("NOT THERE", Held::NotThere), ("REFUSED", Held::Refused), ("no answer yet", Held::Waiting)]
         {

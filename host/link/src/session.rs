@@ -294,12 +294,8 @@ impl Session {
         let (waited, is_silent) = (self.waited, std::mem::replace(&mut self.is_silent, true));
         let is_over = |since: Duration, patience: Duration| waited.saturating_sub(since) > patience;
         match &mut self.state {
-            State::Closed => {}
-            State::Starting { since } => {
-                if is_over(*since, BOOT) {
-                    self.settle();
-                }
-            }
+            State::Starting { since } if is_over(*since, BOOT) => self.settle(),
+            State::Closed | State::Starting { .. } => {}
             State::Settling { since, heard } => {
                 if !is_silent {
                     *heard = waited;
@@ -448,7 +444,7 @@ impl Session {
             }
             self.turn.happened.push(Happening::Answered { number, command, refusal });
         } else if let State::Asking(question) = self.state {
-            self.take_first_answer(question, command, answer, refusal);
+            self.take_first_answer(question, answer, refusal);
         } else if refusal.is_some() {
             // Noise has damaged the line: ask again.
             self.own.insert(command);

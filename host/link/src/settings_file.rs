@@ -59,30 +59,34 @@ fn parse(path: &Path, text: &str) -> Result<(DocumentMut, Named), FileError> {
     let mut old_merge_gap = None;
     for (key, item) in document.iter() {
         let wrong = |problem| FileError::at_key(path, text, key, problem);
+        let number = item.as_integer().and_then(|number| u16::try_from(number).ok());
         if key == OLD_MERGE_GAP {
-            let ticks = item.as_integer().and_then(|ticks| u16::try_from(ticks).ok()).filter(|&ticks| ticks <= 2000);
             let right = || wrong(format!("{key} has to be a whole number, 0 to 2000; now it is merge_gap_mm, in mm"));
-            old_merge_gap = Some(ticks.ok_or_else(right)?);
+            old_merge_gap = Some(number.filter(|&ticks| ticks <= 2000).ok_or_else(right)?);
             continue;
         }
-        let known = Setting::find(key.as_bytes());
-        if let Some(setting) = known
-            && let Some(value) = value(setting, item)
+        let (known, is_switch) = (Setting::find(key.as_bytes()), item.is_bool());
+        let value = number.or(item.as_bool().map(u16::from));
+        if let (Some(setting), Some(value)) = (known, value)
+            && setting.is_switched() == is_switch
+            && setting.allows(value)
         {
             settings.push((setting, value));
             continue;
         }
         let problem = wrong(match known {
-            Some(setting) => format!("{key} is `{}`: it has to be {}", item.to_string().trim(), right(setting)),
+            Some(setting) => {
+                let whole = if setting.is_switched() { "" } else { "a whole number, " };
+                format!("{key} is `{}`: it has to be {whole}{}", item.to_string().trim(), range(setting))
+            }
             None => {
                 let known: Vec<String> = Setting::all().map(name).collect();
                 format!("there is no setting `{key}`: there are {}", known.join(", "))
             }
         });
         // Another version may have the setting, or a wider range.
-        let number = item.as_integer().and_then(|value| u16::try_from(value).ok());
-        let value = number.filter(|_| known.is_none_or(|setting| !setting.is_switched()));
-        match value.or_else(|| item.as_bool().filter(|_| known.is_none()).map(u16::from)) {
+        let is_possible = known.is_none_or(|setting| !setting.is_switched() && !is_switch);
+        match value.filter(|_| is_possible) {
             Some(value) => foreign.push(Foreign { name: key.to_owned(), value, problem: problem.to_string() }),
             None => return Err(problem),
         }
@@ -101,19 +105,6 @@ fn merge_gap_mm(ticks: u16, settings: &[(Setting, u16)]) -> u16 {
     }
     let millimetres = f64::from(ticks) * 1000.0 / f64::from(all.wheel().ticks(1000).0);
     millimetres.round().min(Setting::MergeGapMm.greatest().into()) as u16
-}
-
-/// The value of an item for a setting, if it is valid.
-fn value(setting: Setting, item: &Item) -> Option<u16> {
-    if setting.is_switched() {
-        return item.as_bool().map(u16::from);
-    }
-    u16::try_from(item.as_integer()?).ok().filter(|&value| setting.allows(value))
-}
-
-fn right(setting: Setting) -> String {
-    let whole = if setting.is_switched() { "" } else { "a whole number, " };
-    format!("{whole}{}", range(setting))
 }
 
 fn updated(path: &Path, old: &str, shown: &Shown) -> Result<String, FileError> {

@@ -17,9 +17,6 @@ use std::f64::consts::PI;
 /// The longest distance between two statuses in ticks, some hundred metres.
 const LONGEST_TICKS: u32 = 1_000_000;
 
-/// The settings that make a count a distance, if the wheel is not calibrated.
-const NOMINAL: [Setting; 2] = [Setting::TicksPerRev, Setting::WheelMm];
-
 /// Millimetres in a tick of the encoder.
 pub fn tick_mm(settings: &Settings) -> f64 {
     let value = |setting| f64::from(settings.get(setting));
@@ -85,9 +82,8 @@ impl InUse {
         match action {
             Action::Set => {
                 if self.settings.change(setting, number).is_ok() {
-                    let is_set = |unknown: Setting| unknown == setting;
-                    let is_reset = |unknown| unknown == Setting::TicksPerM && setting.is_of_the_wheel();
-                    self.unknown.retain(|&unknown| !is_set(unknown) && !is_reset(unknown));
+                    let reset = setting.is_of_the_wheel().then_some(Setting::TicksPerM);
+                    self.unknown.retain(|&unknown| unknown != setting && Some(unknown) != reset);
                 }
             }
             Action::Save => self.saved = self.is_known().then(|| self.settings.clone()),
@@ -219,7 +215,8 @@ impl Follower {
     /// Whether the wheel's distance is known.
     pub fn knows_wheel(&self) -> bool {
         let is_calibrated = self.in_use.settings().get(Setting::TicksPerM) > 0;
-        self.in_use.knows(&[Setting::TicksPerM]) && (is_calibrated || self.in_use.knows(&NOMINAL))
+        let nominal = [Setting::TicksPerRev, Setting::WheelMm];
+        self.in_use.knows(&[Setting::TicksPerM]) && (is_calibrated || self.in_use.knows(&nominal))
     }
 
     /// Millimetres in a tick.

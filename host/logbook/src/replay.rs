@@ -73,11 +73,8 @@ pub struct Difference {
 
 impl fmt::Display for Difference {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { line, logged, replayed } = self;
-        match line {
-            Some(line) => write!(formatter, "line {line}: the log has {logged}, the replay {replayed}"),
-            None => write!(formatter, "the log has {logged}, the replay {replayed}"),
-        }
+        let line = self.line.map_or_else(String::new, |line| format!("line {line}: "));
+        write!(formatter, "{line}the log has {}, the replay {}", self.logged, self.replayed)
     }
 }
 
@@ -160,10 +157,7 @@ fn replay_stretch(stretch: &Stretch, replayed: &mut Replayed, advance: &mut impl
         ));
     }
 
-    let mut played = Vec::new();
-    for pace in Pace::ALL {
-        played.push(play(stretch, pace, advance)?);
-    }
+    let played = Pace::ALL.into_iter().map(|pace| play(stretch, pace, advance)).collect::<Result<Vec<_>, _>>()?;
     let heard: Vec<&[Heard]> = played.iter().map(|played| played.replayed.as_slice()).collect();
     // The logged values are the same at every pace.
     let Played { logged, notes, end, .. } = &played[0];

@@ -160,7 +160,6 @@ mod tests {
     fn a_stretch_has_its_time_distance_plants_and_swings_as_counted_by_hand() {
         let mut text = HEAD.to_owned();
         let mut line = |time_ms: u64, kind: &str, said: &str| {
-            let said = if said.contains(',') { format!("\"{said}\"") } else { said.to_owned() };
             writeln!(text, "{time_ms},{kind},{said}").expect("a string takes all");
         };
         let plant = |position| format!("plant pos={position} votes=3 spacing=500 delay=100 hold=300 actuation=400");

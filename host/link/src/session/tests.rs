@@ -22,15 +22,21 @@ const RESTARTS: &[u8] = b"weeder 0.2.0, reset by brown_out, state hold, tool out
 struct Talk {
     connection: Connection,
     board: ScriptedBoard,
+    /// How often the port was opened.
+    opened: Rc<Cell<usize>>,
     now: Moment,
 }
 
 impl Talk {
     /// A connection that waits for a board.
     fn waiting(board: ScriptedBoard) -> Self {
-        let port = board.clone();
-        let open = move || Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false));
-        Self { connection: Connection::waiting_for(open), board, now: Moment::default() }
+        let (port, opened) = (board.clone(), Rc::new(Cell::new(0)));
+        let count = Rc::clone(&opened);
+        let open = move || {
+            count.set(count.get() + 1);
+            Ok(Wire::over(port.open().ok_or(LinkError::Absent("it".to_owned()))?, false))
+        };
+        Self { connection: Connection::waiting_for(open), board, opened, now: Moment::default() }
     }
 
     /// A connection that has reported its machine.
@@ -180,22 +186,14 @@ fn an_uno_that_is_unplugged_or_never_was_there_is_lost_once_and_found_later() {
 
 #[test]
 fn an_answer_that_does_not_come_is_given_up_and_the_port_stays_open() {
-    let board = ScriptedBoard::plugged_in();
-    let (port, opened) = (board.clone(), Rc::new(Cell::new(0)));
-    let count = Rc::clone(&opened);
-    // Opening a real port resets its Uno, which may be at work.
-    let open = move || {
-        count.set(count.get() + 1);
-        Ok(Wire::over(port.open().expect("it is plugged in"), false))
-    };
-    let mut talk = Talk { connection: Connection::waiting_for(open), board, now: Moment::default() };
-    talk.second();
+    let mut talk = Talk::connected();
     assert!(talk.command("silence"));
     let happened: Vec<_> = (0..6).flat_map(|_| talk.second()).collect();
     let lost = happened.iter().position(|happening| matches!(happening, Happening::Lost(_)));
     let found = happened.iter().position(|happening| matches!(happening, Happening::Connected { .. }));
     assert!(lost.is_some() && lost < found, "{happened:?}");
-    assert_eq!((opened.get(), talk.session().is_idle()), (1, true));
+    // Opening a real port resets its Uno, which may be at work.
+    assert_eq!((talk.opened.get(), talk.session().is_idle()), (1, true));
 }
 
 #[test]

@@ -181,10 +181,8 @@ fn describe(heard: Option<&Heard>) -> String {
         EventLine::Detection { class, position, votes, hold, .. } => {
             format!("`{} pos={position} votes={votes} hold={hold}`", names::class(class))
         }
-        EventLine::Swing { out, position } => format!("`swing tool={} pos={position}`", if out { "out" } else { "in" }),
-        EventLine::Alarm { alarm, position } => {
-            format!("`alarm {} pos={position}`", advice::name(alarm))
-        }
+        EventLine::Swing { out, position } => format!("`swing tool={} pos={position}`", names::place(out)),
+        EventLine::Alarm { alarm, position } => format!("`alarm {} pos={position}`", advice::name(alarm)),
         _ => "something else".to_owned(),
     }
 }

@@ -1,7 +1,7 @@
 //! Drives the decisions along a log: the machine's motion, the beam's edges, and the typed commands.
 
 use super::DETECTION_TICKS;
-use super::classifier::{ReplayClassifier, Seen, Witness};
+use super::classifier::{ReplayClassifier, Seen};
 use super::compare::Heard;
 use super::stretch::{Happened, Stretch};
 use control::alarm::Alarm;
@@ -16,7 +16,6 @@ use control::{measure::readings::Readings, operate::state::State};
 use link::settings::{Setting, steps};
 use link::{EventLine, Mode, Status};
 use rig::{Beams, Rig};
-use std::rc::Rc;
 
 /// Time between two steps of a machine at rest.
 const REST_MS: u32 = 5;
@@ -78,7 +77,6 @@ impl Pace {
 pub(super) struct Player<'a> {
     pace: Pace,
     rig: Rig<ReplayClassifier<'a>>,
-    witness: Rc<Witness>,
     /// The ground over which the beam was broken.
     canopies: Canopies,
     /// Steps so far, the same at every pace.
@@ -108,8 +106,7 @@ impl<'a> Player<'a> {
             stack_free: u16::MAX,
         };
         let beams = Beams { broken, second_broken: false };
-        let witness = Rc::new(Witness::default());
-        let classifier = ReplayClassifier::new(&stretch.built_in, &stretch.field, Rc::clone(&witness));
+        let classifier = ReplayClassifier::new(&stretch.built_in, &stretch.field);
         let mut rig = Rig::wake_at(classifier, Volatile::new(), readings, beams, Cause::Unknown);
         rig.clear();
         for (setting, value) in steps(rig.settings(), &stretch.settings) {
@@ -120,7 +117,6 @@ impl<'a> Player<'a> {
             pace,
             steps: 0,
             rig,
-            witness,
             canopies,
             speed_mm_s: stretch.first.speed_mm_s,
             heard: Vec::new(),
@@ -164,7 +160,10 @@ impl<'a> Player<'a> {
             self.speed_mm_s = to.speed_mm_s;
             // A line between the two may have moved it here already.
             if f64::from(to.speed_mm_s.saturating_abs()) < SURE_MM_S {
-                self.rest(host_ms.min(LONGEST_REST_MS));
+                for _ in 0..host_ms.min(LONGEST_REST_MS).div_ceil(u64::from(REST_MS)) {
+                    self.wait(Interval::from_ms(REST_MS));
+                    self.step();
+                }
             }
         } else if distance.saturating_abs() <= LONGEST_DISTANCE {
             self.roll_by(distance, to.speed_mm_s, host_ms);
@@ -203,7 +202,7 @@ impl<'a> Player<'a> {
         let (from, to) = (f64::from(from_mm_s), f64::from(to_mm_s));
         let mean = (from + to) / 2.0;
         let by_speed_s = distance_mm / mean;
-        self.witness.speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
+        self.rig.classifier().speeds_mm_s.set((from_mm_s.min(to_mm_s), from_mm_s.max(to_mm_s)));
         let host_s = (host_ms as f64 / 1000.0).max(distance_mm.abs() / MOST_MM_S);
         let is_known = by_speed_s > 0.0 && (by_speed_s < 3.0 * host_s.max(0.1) || mean.abs() > SURE_MM_S);
         let steps = distance.unsigned_abs();
@@ -219,13 +218,6 @@ impl<'a> Player<'a> {
             self.step();
         }
         self.speed_mm_s = to_mm_s;
-    }
-
-    fn rest(&mut self, time_ms: u64) {
-        for _ in 0..time_ms.div_ceil(u64::from(REST_MS)) {
-            self.wait(Interval::from_ms(REST_MS));
-            self.step();
-        }
     }
 
     fn wait(&mut self, interval: Interval) {
@@ -244,15 +236,11 @@ impl<'a> Player<'a> {
         if let Some(canopy) = canopy
             && !before.broken
         {
-            self.witness.seen.set(canopy.seen);
+            self.rig.classifier().seen.set(canopy.seen);
         }
         // An end switch without a fault.
         self.rig.readings.end_switch_on = self.rig.tool_out();
         self.rig.turn();
-        self.listen();
-    }
-
-    fn listen(&mut self) {
         let speed = self.speed();
         while let Some(event) = self.rig.next_event() {
             match event {
