@@ -214,8 +214,9 @@ impl SetUp {
         if !missing.is_empty() {
             return Err(missing);
         }
-        let beam_to_tool_mm = f64::from(settings.get(Setting::BeamToToolMm));
-        let second_beam_mm = f64::from(settings.get(Setting::SecondBeamMm));
+        let [beam_to_tool_mm, second_beam_mm, zone_mm, top_mm_s] =
+            [Setting::BeamToToolMm, Setting::SecondBeamMm, Setting::StemZoneMm, Setting::TopSpeedMmS]
+                .map(|setting| f64::from(settings.get(setting)));
         let slip_mm = if second_beam_mm > 0.0 {
             // The firmware corrects each zone by the slip of the plants just before it. Only a change since then is left.
             let changes = self.slip_permille.iter().zip(self.slip_permille.iter().skip(1));
@@ -231,10 +232,8 @@ impl SetUp {
             extremes(&timings).into_iter().flatten().map(|(least_ms, greatest_ms)| greatest_ms - least_ms);
         let scatter_ms = scatters_ms.fold(SERVO_MS, u16::max);
         let speed_m_s = if keeps_stems(settings) { SLOW_M_S } else { SPEED_M_S };
-        let stems_mm = keeps_stems(settings).then(|| STEM_SHARE * f64::from(settings.get(Setting::StemZoneMm)));
         let arm_mm = self.trailing_tool_mm.map_or(0.0, |tool_mm| {
-            let (pulse_us, zone_mm) = (stroke_us(settings), f64::from(settings.get(Setting::StemZoneMm)));
-            let top_mm_s = settings.get(Setting::TopSpeedMmS).into();
+            let pulse_us = stroke_us(settings);
             let rolled_mm = circle::rolled_mm(top_mm_s, travel_ms(&timings), zone_mm, circle::aside_mm(pulse_us));
             circle::carried_by_stroke_mm(pulse_us, tool_mm.into(), zone_mm, rolled_mm)
         });
@@ -242,7 +241,7 @@ impl SetUp {
             slip_mm,
             servo_mm: f64::from(scatter_ms) * speed_m_s,
             firmware_mm: FIRMWARE_MM * speed_m_s / SPEED_M_S,
-            stems_mm,
+            stems_mm: keeps_stems(settings).then_some(STEM_SHARE * zone_mm),
             arm_mm,
             in_use_mm: settings.get(Setting::MarginMm),
         })
