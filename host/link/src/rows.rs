@@ -127,20 +127,21 @@ fn run(open: Opener, orders: &Receiver<Order>, tried: Sender<Option<LinkError>>,
     loop {
         loop {
             let session = &mut connection.session;
-            let (command, why) = match orders.try_recv() {
-                Ok(Order::Type(command, _)) if !session.is_connected() => (command, "the row is not there"),
-                Ok(Order::Type(command, deadline)) if session.command(&command, deadline).is_none() => {
-                    (command, "it is no command, or too many wait")
-                }
-                Ok(Order::Type(..)) => continue,
-                Ok(Order::Hold) => {
-                    session.hold();
-                    continue;
+            match orders.try_recv() {
+                Ok(Order::Hold) => drop(session.hold()),
+                Ok(Order::Type(command, deadline)) => {
+                    let why = if !session.is_connected() {
+                        "the row is not there"
+                    } else if session.command(&command, deadline).is_none() {
+                        "it is no command, or too many wait"
+                    } else {
+                        continue;
+                    };
+                    tell(What::NotTyped { command, why });
                 }
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => return,
-            };
-            tell(What::NotTyped { command, why });
+            }
         }
         if !connection.turn(Moment::now()).into_iter().all(|happening| tell(what(happening))) {
             return;
