@@ -324,15 +324,10 @@ mod tests {
 
     #[test]
     fn every_line_of_the_firmwares_answers_is_read() {
-        let table = Setting::all().map(|setting| ConsoleLine::Setting {
-            name: settings::name(setting),
-            value: setting.default(),
-            unit: settings::unit(setting),
-            least: setting.least(),
-            greatest: setting.greatest(),
-            is_switched: setting.is_switched(),
-            default: setting.default(),
-            saved: None,
+        let table = Setting::all().map(|setting| {
+            let (name, unit, is_switched) = (settings::name(setting), settings::unit(setting), setting.is_switched());
+            let (least, greatest, default) = (setting.least(), setting.greatest(), setting.default());
+            ConsoleLine::Setting { name, value: default, unit, least, greatest, is_switched, default, saved: None }
         });
         assert_eq!(answer("get"), table.chain([DONE]).collect::<Vec<_>>());
         assert_matches!(&answer("version")[..], [ConsoleLine::Version { .. }, DONE]);

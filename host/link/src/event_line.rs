@@ -454,12 +454,11 @@ mod tests {
             mode: Mode::Alarm,
             alarm: Some(Alarm::BeamBlocked),
             tool_out: true,
-            reason: None,
             position: -5,
             speed_mm_s: -3,
             zones: 2,
             unseen_mm: 400,
-            slip_permille: None,
+            ..Status::default()
         };
         // In the present format, and in that of version 0.1.
         for alarm in ["code=1-1 name=beam_blocked", "alarm=beam_blocked"] {
