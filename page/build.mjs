@@ -71,9 +71,9 @@ function faults() {
 /** Replaces the names behind `$` in the page's HTML by the English texts. */
 async function english() {
     const { outputFiles } = await build({ entryPoints: ["src/words/en.ts"], format: "esm", write: false });
-    const { en } = await import(`data:text/javascript,${encodeURIComponent(outputFiles[0]?.text ?? "")}`);
+    const { words } = await import(`data:text/javascript,${encodeURIComponent(outputFiles[0]?.text ?? "")}`);
     const text = (/** @type {string} */ name) => {
-        const text = en.words[name];
+        const text = words[name];
         if (text === undefined) throw new Error(`src/index.html names the text ${name}, which src/words/en.ts has not`);
         return text;
     };

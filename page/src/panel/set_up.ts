@@ -95,12 +95,13 @@ export class SetUp {
         this.#marks = steps.map((manual, at) => (manual.isShown ? make("p", "aside") : this.#box(at)));
         this.parts.html("set-up-steps").replaceChildren(
             ...steps.map((manual, at) => {
-                const [title, how] = step(manual.title, manual.how);
+                const text = step(manual.title) ?? `${manual.title}. ${manual.how}`;
+                const [title = ""] = text.split(".", 1);
                 const mark = this.#marks[at] ?? "";
                 return make(
                     "li",
                     "stack",
-                    make("span", "", make("b", "", title), ". ", how),
+                    make("span", "", make("b", "", title), text.slice(title.length)),
                     ...this.#tasks(manual.tasks),
                     manual.isShown ? mark : make("label", "", mark, say("markDone")),
                 );

@@ -5,21 +5,16 @@
 // by their own module.
 
 import { chosen, keep } from "../preferences.ts";
-import { en } from "./en.ts";
-import { es } from "./es.ts";
-import { fr } from "./fr.ts";
-import { hi } from "./hi.ts";
+import * as en from "./en.ts";
+import * as es from "./es.ts";
+import * as fr from "./fr.ts";
+import * as hi from "./hi.ts";
 import type { HeardWord, Holes, Language, Word } from "./language.ts";
 
 export type { Language, Plain, Word } from "./language.ts";
 
-/** The languages, each with its own name for itself. */
-export const LANGUAGES = {
-    en: { name: "English", table: { ...en, advice: {}, settings: {}, steps: {} } },
-    hi: { name: "हिन्दी", table: hi },
-    es: { name: "Español", table: es },
-    fr: { name: "Français", table: fr },
-} as const satisfies Readonly<Record<string, { name: string; table: Language }>>;
+/** The languages. */
+export const LANGUAGES = { en, hi, es, fr } as const satisfies Readonly<Record<string, Language>>;
 export type Code = keyof typeof LANGUAGES;
 
 /** The values of a text's placeholders; empty without any. Numbers are formatted for the language. */
@@ -39,7 +34,7 @@ function preferred(): Code {
 }
 
 let code: Code = preferred();
-let table: Language = LANGUAGES[code].table;
+let table: Language = LANGUAGES[code];
 const changes: (() => void)[] = [];
 const formats = new Map<string, Intl.NumberFormat>();
 
@@ -48,7 +43,7 @@ export const language = (): Code => code;
 /** Chooses a language, and writes all texts again that are not updated continuously. */
 export function speak(chosen: Code): void {
     keep("language", chosen);
-    [code, table] = [chosen, LANGUAGES[chosen].table];
+    [code, table] = [chosen, LANGUAGES[chosen]];
     formats.clear();
     for (const change of changes) change();
 }
@@ -146,13 +141,13 @@ export function told(english: unknown): string {
 }
 
 /** The advice for an alarm or a warning, if the language has its own. */
-export const advice = (name: string): string | undefined => table.advice[name];
+export const advice = (name: string): string | undefined => table.advice?.[name];
 
 /** A setting's description, if the language has its own. */
-export const settingHelp = (name: string): string | undefined => table.settings[name];
+export const settingHelp = (name: string): string | undefined => table.settings?.[name];
 
-/** A step of setting a machine up, from its title and its text in the manual. */
-export const step = (title: string, how: string): readonly [string, string] => table.steps[title] ?? [title, how];
+/** A step of setting a machine up, if the language has its own: its title as a sentence, and how. */
+export const step = (title: string): string | undefined => table.steps?.[title];
 
 const shown = new Map<Element, () => string>();
 onLanguage(() => {
