@@ -5,7 +5,7 @@ import { plain } from "../dom.ts";
 import type { EventLine, Line, Mode, Setting } from "../link/console_line.ts";
 import { read, tickMm } from "../link/grammar.ts";
 import type { Happening } from "../link/session.ts";
-import { advice, english, type Plain, quantity, say, told } from "../words/words.ts";
+import { english, type Plain, quantity, say, table, told } from "../words/words.ts";
 
 /** Objects that are remembered. */
 const OBJECTS = 50;
@@ -16,7 +16,7 @@ const OBJECTS = 50;
  */
 export function fault(name: string): { title: string; advice: string } {
     const found = faults.find((fault) => fault.name === name) ?? { title: name, advice: say("lookItUp") };
-    return { title: found.title, advice: advice(name) ?? found.advice };
+    return { title: found.title, advice: table.advice?.[name] ?? found.advice };
 }
 
 /** Why the tool is out at work, in words for the operator. */

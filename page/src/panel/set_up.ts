@@ -6,7 +6,7 @@ import { make, makeButton, type Parts, plain } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
 import { Rust } from "../rust.ts";
-import { language, quantity, say, show, step, told, type Word } from "../words/words.ts";
+import { language, quantity, say, show, table, told, type Word } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** The results of the session for the steps. */
@@ -95,7 +95,7 @@ export class SetUp {
         this.#marks = steps.map((manual, at) => (manual.isShown ? make("p", "aside") : this.#box(at)));
         this.parts.html("set-up-steps").replaceChildren(
             ...steps.map((manual, at) => {
-                const text = step(manual.title) ?? `${manual.title}. ${manual.how}`;
+                const text = table.steps?.[manual.title] ?? `${manual.title}. ${manual.how}`;
                 const [title = ""] = text.split(".", 1);
                 const mark = this.#marks[at] ?? "";
                 return make(

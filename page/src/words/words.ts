@@ -34,7 +34,8 @@ function preferred(): Code {
 }
 
 let code: Code = preferred();
-let table: Language = LANGUAGES[code];
+/** Its table. */
+export let table: Language = LANGUAGES[code];
 const changes: (() => void)[] = [];
 const formats = new Map<string, Intl.NumberFormat>();
 
@@ -139,15 +140,6 @@ export function told(english: unknown): string {
     }
     return text;
 }
-
-/** The advice for an alarm or a warning, if the language has its own. */
-export const advice = (name: string): string | undefined => table.advice?.[name];
-
-/** A setting's description, if the language has its own. */
-export const settingHelp = (name: string): string | undefined => table.settings?.[name];
-
-/** A step of setting a machine up, if the language has its own: its title as a sentence, and how. */
-export const step = (title: string): string | undefined => table.steps?.[title];
 
 const shown = new Map<Element, () => string>();
 onLanguage(() => {
