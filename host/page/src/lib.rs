@@ -16,11 +16,9 @@ mod simulation;
 #[cfg(target_arch = "wasm32")]
 use exports::progress;
 pub use record::take;
-pub use simulation::{hear, roll};
 
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::cell::RefCell;
 
 /// A question, as an object with one key.
 #[derive(Deserialize)]
@@ -40,6 +38,12 @@ enum Question {
     Begin(simulation::Begun),
     /// Change this on the way.
     Change(simulation::Different),
+    /// Roll on until this cycle of the Uno's clock. How do the pins change until then?
+    Roll(f64),
+    /// The Uno has sent its servo a pulse, by the cycles of its edges.
+    Hear(f64, f64),
+    /// What does the machine do now?
+    Look,
     /// What is the result for the plants and tall weeds behind the tool?
     Judge(simulation::Kept),
     /// Begin a log. True keeps all its lines.
@@ -60,20 +64,6 @@ enum Question {
 #[cfg(not(target_arch = "wasm32"))]
 fn progress(_share: f64) {}
 
-thread_local! {
-    /// What the log's picture shows, or what the rolling machine does, by the numbers in `record` and `simulation`.
-    static TABLES: RefCell<[Vec<f64>; 3]> = const { RefCell::new([const { Vec::new() }; 3]) };
-}
-
-/// A table, valid until it is replaced. Empty if there is no such table.
-pub fn table<Read>(number: usize, read: impl FnOnce(&[f64]) -> Read) -> Read {
-    TABLES.with_borrow(|tables| read(tables.get(number).map_or(&[], Vec::as_slice)))
-}
-
-fn put(number: usize, table: Vec<f64>) {
-    TABLES.with_borrow_mut(|tables| tables[number] = table);
-}
-
 /// Answers a question: `{"answer": ...}`, or `{"error": "..."}` if the question is invalid.
 pub fn answer(question: &[u8]) -> String {
     let answer =
@@ -85,6 +75,9 @@ pub fn answer(question: &[u8]) -> String {
             Question::SetUp(heard) => Ok(heard.advice()),
             Question::Begin(begun) => Ok(begun.begin()),
             Question::Change(different) => different.take(),
+            Question::Roll(cycle) => simulation::roll(cycle),
+            Question::Hear(rise, fall) => simulation::hear(rise, fall),
+            Question::Look => simulation::look(),
             Question::Judge(kept) => kept.judge(),
             Question::Log(is_whole) => Ok(record::begin(is_whole)),
             Question::Picture => Ok(record::picture()),

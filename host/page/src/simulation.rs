@@ -1,10 +1,8 @@
 //! The machine and the row of "Try it", for the page's virtual Uno: [`field::rolling`], with the verdicts of
 //! [`field::verdict`] on the ground behind the tool.
 //!
-//! There is one simulation, which [`Begun`] begins. [`roll`] and [`hear`] are called hundreds of times a second, so they are
-//! direct calls and no questions. Their results are in tables of numbers ([`crate::table`]).
+//! There is one simulation, which [`Begun`] begins.
 
-use crate::put;
 use field::machine::Machine;
 use field::motion::mm_s;
 use field::planting::{Planting, Sowing};
@@ -106,12 +104,6 @@ struct Simulation {
     told: usize,
 }
 
-/// The tables, by number: the machine's state, the changes at the pins (cycle, pin, level), and the sown canopies (0 for
-/// a plant and 1 for a weed, position, width).
-const NOW: usize = 0;
-const CHANGES: usize = 1;
-const SOWN: usize = 2;
-
 thread_local! {
     static TRIAL: RefCell<Option<Simulation>> = const { RefCell::new(None) };
 }
@@ -137,7 +129,7 @@ impl Begun {
         let mut sowing = Sowing::new(planting, weed_share, first_mm, seed);
         let mut row = Vec::new();
         sowing.sow(&mut row, SOWN_AHEAD_MM);
-        let mut simulation = Simulation {
+        let simulation = Simulation {
             rolling: Rolling::new(machine, row, 0.0, self.cycle),
             sowing,
             next: 0,
@@ -145,8 +137,6 @@ impl Begun {
             from_s: 0.0,
             told: 0,
         };
-        simulation.tell_now();
-        simulation.tell_sown();
         let dimensions = json!({
             "beamToToolMm": machine.beam_to_tool_mm, "toolWidthMm": machine.tool_width_mm,
         });
@@ -202,62 +192,55 @@ impl Kept {
     }
 }
 
-/// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it.
-pub fn roll(cycle: f64) {
-    let _ = with(|simulation| {
-        let changes = simulation.rolling.roll_until(cycle as u64);
-        let numbers = |change: &uno::PinChange| [change.cycle as f64, change.pin.number().into(), change.high.into()];
-        put(CHANGES, changes.iter().flat_map(numbers).collect());
-        let until_mm = simulation.rolling.place_mm() + SOWN_AHEAD_MM;
-        simulation.sowing.sow(&mut simulation.rolling.row, until_mm);
-        simulation.tell_now();
-        simulation.tell_sown();
-    });
+/// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it. Returns the changes at the pins: cycle,
+/// pin and level.
+pub fn roll(cycle: f64) -> Result<Value, String> {
+    with(|simulation| {
+        let Simulation { rolling, sowing, .. } = simulation;
+        let changes = rolling.roll_until(cycle as u64);
+        let until_mm = rolling.place_mm() + SOWN_AHEAD_MM;
+        sowing.sow(&mut rolling.row, until_mm);
+        changes.iter().map(|change| json!([change.cycle, change.pin.number(), change.high])).collect()
+    })
 }
 
-/// The Uno has sent its servo a pulse, by the cycles of its edges.
-pub fn hear(rise: f64, fall: f64) {
-    let _ = with(|simulation| {
-        simulation.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 });
-        simulation.tell_now();
-    });
+/// Passes a pulse of the Uno to its servo, by the cycles of its edges.
+pub fn hear(rise: f64, fall: f64) -> Result<Value, String> {
+    with(|simulation| json!(simulation.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 })))
 }
 
-impl Simulation {
-    /// Writes the machine's state into its table.
-    fn tell_now(&self) {
-        let Self { rolling, .. } = self;
+/// The machine's state, and the canopies that were sown since the last call.
+pub fn look() -> Result<Value, String> {
+    with(|Simulation { rolling, told, .. }| {
         let machine = &rolling.machine;
         let degrees = rolling.degrees();
         let across_mm = machine.across_mm(degrees);
-        let is_clear = degrees >= machine.clear_degrees();
-        let now = vec![
-            rolling.place_mm(),
-            rolling.tool_mm(),
-            rolling.speed_mm_s(),
-            degrees,
-            across_mm,
-            f64::from(is_clear),
-            f64::from(across_mm < machine.tool_width_mm / 2.0),
-            f64::from(rolling.is_beam_broken()),
-            rolling.ticks() as f64,
-            rolling.ground_mm_a_tick(),
-            rolling.commands as f64,
-        ];
-        put(NOW, now);
-    }
-
-    /// Writes the newly sown canopies into their table.
-    fn tell_sown(&mut self) {
-        let Self { rolling, told, .. } = self;
-        let numbers = |canopy: &Canopy| [f64::from(canopy.kind == Kind::Weed), canopy.position_mm, canopy.width_mm];
-        put(SOWN, rolling.row[*told..].iter().flat_map(numbers).collect());
+        let thing = |canopy: &Canopy| {
+            let kind = if canopy.kind == Kind::Weed { "weed" } else { "plant" };
+            json!({ "kind": kind, "placeMm": canopy.position_mm, "widthMm": canopy.width_mm })
+        };
+        let sown: Vec<Value> = rolling.row[*told..].iter().map(thing).collect();
         *told = rolling.row.len();
-    }
+        let state = json!({
+            "placeMm": rolling.place_mm(),
+            "toolMm": rolling.tool_mm(),
+            "speedMmS": rolling.speed_mm_s(),
+            "degrees": degrees,
+            "acrossMm": across_mm,
+            "isClear": degrees >= machine.clear_degrees(),
+            "isWeeding": across_mm < machine.tool_width_mm / 2.0,
+            "isBroken": rolling.is_beam_broken(),
+            "ticks": rolling.ticks(),
+            "groundMmATick": rolling.ground_mm_a_tick(),
+            "commands": rolling.commands,
+        });
+        json!({ "state": state, "sown": sown })
+    })
+}
 
+impl Simulation {
     fn levels(&self) -> Value {
-        let levels = self.rolling.levels().into_iter().map(|(pin, high)| json!([pin.number(), high]));
-        levels.collect()
+        self.rolling.levels().into_iter().map(|(pin, high)| json!([pin.number(), high])).collect()
     }
 
     fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {

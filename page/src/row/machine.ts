@@ -65,9 +65,6 @@ interface Begun {
     readonly levels: Levels;
 }
 
-/** The tables of host/page/src/simulation.rs. */
-const TABLE = { now: 0, changes: 1, sown: 2 } as const;
-
 export class Machine {
     readonly uno: Uno;
     readonly dimensions: Dimensions;
@@ -111,7 +108,7 @@ export class Machine {
         uno.onLevel = (pin, high, cycle) => {
             if (pin !== PIN.servo) return;
             if (high) this.#pulseRise = cycle;
-            else this.#rust.exports.hear(this.#pulseRise, cycle);
+            else this.#rust.ask({ hear: [this.#pulseRise, cycle] });
         };
     }
 
@@ -122,12 +119,10 @@ export class Machine {
     /** Rolls on until a future cycle, and lets the Uno's clock run until then. */
     runUntil(cycle: number): void {
         const { uno } = this;
-        this.#rust.exports.roll(cycle);
-        // A copy: the servo's pulses call the core, which changes its memory.
-        const changes = this.#rust.table(TABLE.changes).slice();
-        for (let at = 0; at < changes.length; at += 3) {
-            uno.runUntil(changes[at] ?? 0);
-            uno.set(changes[at + 1] ?? 0, changes[at + 2] === 1);
+        const changes = this.#rust.ask<[cycle: number, pin: number, high: boolean][]>({ roll: cycle });
+        for (const [at, pin, high] of changes) {
+            uno.runUntil(at);
+            uno.set(pin, high);
         }
         uno.runUntil(cycle);
         this.#look();
@@ -147,15 +142,8 @@ export class Machine {
 
     /** Reads the machine's state and the newly sown things. */
     #look(): void {
-        const now = this.#rust.table(TABLE.now);
-        const [placeMm = 0, toolMm = 0, speedMmS = 0, degrees = 0, acrossMm = 0] = now;
-        const [isClear, isWeeding, isBroken, ticks = 0, groundMmATick = 0, commands = 0] = now.subarray(5);
-        const numbers = { placeMm, toolMm, speedMmS, degrees, acrossMm, ticks, groundMmATick, commands };
-        Object.assign(this, numbers, { isClear: isClear === 1, isWeeding: isWeeding === 1, isBroken: isBroken === 1 });
-        const sown = this.#rust.table(TABLE.sown);
-        for (let at = 0; at < sown.length; at += 3) {
-            const [kind, placeMm = 0, widthMm = 0] = sown.subarray(at, at + 3);
-            this.things.push({ kind: kind === 0 ? "plant" : "weed", placeMm, widthMm });
-        }
+        const { state, sown } = this.#rust.ask<{ state: object; sown: Thing[] }>("look");
+        Object.assign(this, state);
+        this.things.push(...sown);
     }
 }
