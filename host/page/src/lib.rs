@@ -19,6 +19,7 @@ pub use record::take;
 
 use serde::Deserialize;
 use serde_json::{Value, json};
+use simulation::{Simulation, with};
 
 /// A question, as an object with one key.
 #[derive(Deserialize)]
@@ -74,11 +75,11 @@ pub fn answer(question: &[u8]) -> String {
             Question::Steps(change) => Ok(change.steps()),
             Question::SetUp(heard) => Ok(heard.advice()),
             Question::Begin(begun) => Ok(begun.begin()),
-            Question::Change(different) => different.take(),
-            Question::Roll(cycle) => simulation::roll(cycle),
-            Question::Hear(rise, fall) => simulation::hear(rise, fall),
-            Question::Look => simulation::look(),
-            Question::Judge(kept) => kept.judge(),
+            Question::Change(different) => with(|simulation| simulation.change(different)),
+            Question::Roll(cycle) => with(|simulation| simulation.roll(cycle)),
+            Question::Hear(rise, fall) => with(|simulation| simulation.hear(rise, fall)),
+            Question::Look => with(Simulation::look),
+            Question::Judge(kept) => with(|simulation| json!(simulation.judge(&kept))),
             Question::Log(is_whole) => Ok(record::begin(is_whole)),
             Question::Picture => Ok(record::picture()),
             Question::Replay => Ok(record::replayed(progress)),

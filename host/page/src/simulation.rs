@@ -85,13 +85,13 @@ pub struct Kept {
 /// plant, and the better one on a weed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(untagged)]
-enum Fate {
+pub enum Fate {
     Plant(Verdict),
     Weed(bool),
 }
 
 /// The machine with its row and its verdicts.
-struct Simulation {
+pub struct Simulation {
     rolling: Rolling,
     sowing: Sowing,
     /// The first canopy without a verdict, or to be judged again.
@@ -109,7 +109,7 @@ thread_local! {
 }
 
 /// Runs `act` on the simulation. Fails if there is none.
-fn with<Answer>(act: impl FnOnce(&mut Simulation) -> Answer) -> Result<Answer, String> {
+pub fn with<Answer>(act: impl FnOnce(&mut Simulation) -> Answer) -> Result<Answer, String> {
     let missing = || "no machine was put in front of a row".to_owned();
     TRIAL.with_borrow_mut(|simulation| simulation.as_mut().map(act).ok_or_else(missing))
 }
@@ -167,51 +167,39 @@ fn set_up(machine: &mut Machine) -> Vec<String> {
     commands
 }
 
-impl Different {
-    /// Applies the change. Returns the levels of the machine's pins.
-    pub fn take(self) -> Result<Value, String> {
-        with(|simulation| {
-            let Simulation { rolling, sowing, .. } = simulation;
-            match self {
-                Self::SpeedKmH(speed_km_h) => rolling.target_mm_s = mm_s(speed_km_h),
-                Self::Slip(share) => rolling.slip_by(share),
-                Self::BeamWireTorn(is_torn) => rolling.faults.beam_wire_torn = is_torn,
-                Self::EncoderDead(is_dead) => rolling.faults.encoder_dead = is_dead,
-                Self::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
-                Self::WeedShare(share) => sowing.weed_share = share,
-            }
-            simulation.levels()
-        })
+impl Simulation {
+    /// Applies a change. Returns the levels of the machine's pins.
+    pub fn change(&mut self, different: Different) -> Value {
+        let Self { rolling, sowing, .. } = self;
+        match different {
+            Different::SpeedKmH(speed_km_h) => rolling.target_mm_s = mm_s(speed_km_h),
+            Different::Slip(share) => rolling.slip_by(share),
+            Different::BeamWireTorn(is_torn) => rolling.faults.beam_wire_torn = is_torn,
+            Different::EncoderDead(is_dead) => rolling.faults.encoder_dead = is_dead,
+            Different::SpacingMm(spacing_mm) => sowing.planting.spacing_mm = spacing_mm,
+            Different::WeedShare(share) => sowing.weed_share = share,
+        }
+        self.levels()
     }
-}
 
-impl Kept {
-    /// Judges the canopies behind the tool that have no verdict yet. Returns a list of their numbers and verdicts.
-    pub fn judge(&self) -> Result<Value, String> {
-        with(|simulation| json!(simulation.judge(self)))
-    }
-}
-
-/// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it. Returns the changes at the pins: cycle,
-/// pin and level.
-pub fn roll(cycle: f64) -> Result<Value, String> {
-    with(|simulation| {
-        let Simulation { rolling, sowing, .. } = simulation;
+    /// Rolls the machine on until a cycle of the Uno's clock, and sows ahead of it. Returns the changes at the pins:
+    /// cycle, pin and level.
+    pub fn roll(&mut self, cycle: f64) -> Value {
+        let Self { rolling, sowing, .. } = self;
         let changes = rolling.roll_until(cycle as u64);
         let until_mm = rolling.place_mm() + SOWN_AHEAD_MM;
         sowing.sow(&mut rolling.row, until_mm);
         changes.iter().map(|change| json!([change.cycle, change.pin.number(), change.high])).collect()
-    })
-}
+    }
 
-/// Passes a pulse of the Uno to its servo, by the cycles of its edges.
-pub fn hear(rise: f64, fall: f64) -> Result<Value, String> {
-    with(|simulation| json!(simulation.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 })))
-}
+    /// Passes a pulse of the Uno to its servo, by the cycles of its edges.
+    pub fn hear(&mut self, rise: f64, fall: f64) -> Value {
+        json!(self.rolling.hear(Pulse { rise: rise as u64, fall: fall as u64 }))
+    }
 
-/// The machine's state, and the canopies that were sown since the last call.
-pub fn look() -> Result<Value, String> {
-    with(|Simulation { rolling, told, .. }| {
+    /// The machine's state, and the canopies that were sown since the last call.
+    pub fn look(&mut self) -> Value {
+        let Self { rolling, told, .. } = self;
         let machine = &rolling.machine;
         let degrees = rolling.degrees();
         let across_mm = machine.across_mm(degrees);
@@ -235,15 +223,14 @@ pub fn look() -> Result<Value, String> {
             "commands": rolling.commands,
         });
         json!({ "state": state, "sown": sown })
-    })
-}
+    }
 
-impl Simulation {
     fn levels(&self) -> Value {
         self.rolling.levels().into_iter().map(|(pin, high)| json!([pin.number(), high])).collect()
     }
 
-    fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {
+    /// Judges the canopies behind the tool that have no verdict yet. Returns their numbers and verdicts.
+    pub fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {
         let is_behind =
             |canopy: &Canopy| canopy.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
         let behind = self.rolling.row.partition_point(is_behind);

@@ -32,12 +32,11 @@ export interface Steps {
  * the machine reports their errors.
  */
 export function steps(from: readonly Setting[], to: ReadonlyMap<string, number>): Steps {
-    const canBe = (value: number) => Number.isInteger(value) && value >= 0 && value <= 65_535;
+    const isBad = ([, value]: readonly [string, number]) => !(Number.isInteger(value) && value >= 0 && value <= 65_535);
     const values = from.map(({ name, value }) => [name, value] as const);
-    const [good, bad] = [true, false].map((good) => [...to].filter(([, value]) => canBe(value) === good));
-    const change = { from: Object.fromEntries(values), to: Object.fromEntries(good ?? []) };
-    const { steps, ...rest } = ask<Steps>({ steps: change });
-    return { ...rest, steps: [...steps, ...(bad ?? [])] };
+    const good = [...to].filter((entry) => !isBad(entry));
+    const answer = ask<Steps>({ steps: { from: Object.fromEntries(values), to: Object.fromEntries(good) } });
+    return { ...answer, steps: [...answer.steps, ...[...to].filter(isBad)] };
 }
 
 /** Distance of an encoder count, by the values of the settings: of the calibrated wheel, or of its diameter. */

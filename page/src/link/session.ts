@@ -198,7 +198,7 @@ export class Session implements Link {
         if (this.#ended) return;
         this.#ended = true;
         const { news } = this.#request<Turn>({ close: { why } });
-        for (const one of news) if (one.is === "unanswered") this.#take({ ...one, because: why });
+        for (const one of news) if (one.is === "unanswered") this.#take(one, why);
         this.onHappening({ is: "lost", why, forGood: true, isWanted });
         void this.wire.close();
     }
@@ -217,12 +217,7 @@ export class Session implements Link {
         const why = failure && whyNone(failure);
         try {
             if (send !== "") this.wire.send(send);
-            for (const one of news) {
-                if (why === null) this.#take(one);
-                else if (one.is === "unanswered") this.#take({ ...one, because: why });
-                // `end` tells it.
-                else if (one.is !== "lost") this.#take(one);
-            }
+            for (const one of news) this.#take(one, why);
         } finally {
             this.#isTurning = false;
         }
@@ -245,9 +240,12 @@ export class Session implements Link {
         this.#askers.delete(number);
     }
 
-    #take(news: Turn["news"][number]): void {
+    /** Takes news. `why` is why the session ends, if it does. */
+    #take(news: Turn["news"][number], why: string | null): void {
         switch (news.is) {
             case "lost":
+                // `end` tells it.
+                if (why !== null) break;
                 this.#answer = [];
                 this.onHappening({ ...news, forGood: false, isWanted: false });
                 break;
@@ -267,7 +265,7 @@ export class Session implements Link {
                 break;
             }
             case "unanswered":
-                this.#fail(news.number, whyNot(news.why, news.because ?? ""));
+                this.#fail(news.number, whyNot(news.why, why ?? news.because ?? ""));
                 break;
             default:
                 tell(news, (happening) => this.onHappening(happening));
@@ -283,14 +281,7 @@ function whyNone({ is, about }: Failure): string {
 
 /** Why a command was not answered. */
 function whyNot(why: "late" | "held" | "notTyped" | "unknown", because: string): Error {
-    switch (why) {
-        case "late":
-            return new Refused(english("waitedTooLong"));
-        case "held":
-            return new Refused(english("holdFirst"));
-        case "notTyped":
-            return new NoMachine(because);
-        case "unknown":
-            return new NoMachine(english("mayBeDone", { why: because }));
-    }
+    if (why === "late") return new Refused(english("waitedTooLong"));
+    if (why === "held") return new Refused(english("holdFirst"));
+    return new NoMachine(why === "unknown" ? english("mayBeDone", { why: because }) : because);
 }

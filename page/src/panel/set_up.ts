@@ -6,7 +6,7 @@ import { make, makeButton, type Parts, plain } from "../dom.ts";
 import { read } from "../link/grammar.ts";
 import type { Ask, Happening } from "../link/session.ts";
 import { Rust } from "../rust.ts";
-import { language, quantity, say, show, table, told, type Word } from "../words/words.ts";
+import { language, type Plain, quantity, say, show, table, told } from "../words/words.ts";
 import type { Machine } from "./machine.ts";
 
 /** The results of the session for the steps. */
@@ -125,10 +125,10 @@ export class SetUp {
     #tasks(tasks: readonly string[]): HTMLElement[] {
         const said = make("p", "");
         said.role = "status";
-        const does = (text: string, use: () => Promise<unknown>, done: Word) => {
+        const does = (text: string, use: () => Promise<unknown>, done: Plain) => {
             const button = makeButton("needs-machine", () => {
                 use().then(
-                    () => show(said, () => say(done as "isSavedNow")),
+                    () => show(said, () => say(done)),
                     (error) => show(said, () => told(error)),
                 );
             });
