@@ -23,14 +23,14 @@ use simulation::{Simulation, with};
 
 /// A question, as an object with one key.
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
+#[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum Question {
     /// What does this line of the console say?
     Read(String),
     /// Begin a session over an open wire. True if opening it has reset the Uno.
     Open(bool),
     /// What does this session answer?
-    Session(session::Request),
+    Session { session: usize, what: session::What },
     /// Which values change these settings to those?
     Steps(console::Change),
     /// What is the next step of setting up this machine?
@@ -45,8 +45,9 @@ enum Question {
     Hear(f64, f64),
     /// What does the machine do now?
     Look,
-    /// What is the result for the plants and tall weeds behind the tool?
-    Judge(simulation::Kept),
+    /// What is the result for the plants and tall weeds behind the tool, by the firmware's margin on both sides of a
+    /// plant, and its stem zone? The zone is 0 for whole canopies.
+    Judge { margin_mm: u32, stem_zone_mm: u32 },
     /// Begin a log. True keeps all its lines.
     Log(bool),
     /// What does the log show?
@@ -71,7 +72,7 @@ pub fn answer(question: &[u8]) -> String {
         serde_json::from_slice(question).map_err(|error| error.to_string()).and_then(|question| match question {
             Question::Read(line) => Ok(console::read(&line)),
             Question::Open(resets) => Ok(session::open(resets)),
-            Question::Session(request) => request.take(),
+            Question::Session { session, what } => session::take(session, what),
             Question::Steps(change) => Ok(change.steps()),
             Question::SetUp(heard) => Ok(heard.advice()),
             Question::Begin(begun) => Ok(begun.begin()),
@@ -79,7 +80,9 @@ pub fn answer(question: &[u8]) -> String {
             Question::Roll(cycle) => with(|simulation| simulation.roll(cycle)),
             Question::Hear(rise, fall) => with(|simulation| simulation.hear(rise, fall)),
             Question::Look => with(Simulation::look),
-            Question::Judge(kept) => with(|simulation| json!(simulation.judge(&kept))),
+            Question::Judge { margin_mm, stem_zone_mm } => {
+                with(|simulation| json!(simulation.judge(margin_mm, stem_zone_mm)))
+            }
             Question::Log(is_whole) => Ok(record::begin(is_whole)),
             Question::Picture => Ok(record::picture()),
             Question::Replay => Ok(record::replayed(progress)),

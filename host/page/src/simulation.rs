@@ -34,25 +34,18 @@ const MARGIN_MM: u16 = 22;
 pub struct Begun {
     /// The Uno's cycle at this moment, with the beam at 0 mm.
     cycle: u64,
-    sowing: Sown,
+    /// The parameters of the endless row: its seed, the spacing of its plants, the share of the gaps with a tall weed, and
+    /// the position of the first plant.
+    seed: u64,
+    spacing_mm: f64,
+    weed_share: f64,
+    first_mm: f64,
     /// Whether it is set up by the manual, except for the second beam. Otherwise it is the machine from the box.
     #[serde(default)]
     is_set_up: bool,
     /// Distance from the beam back to a second one; 0 without one.
     #[serde(default)]
     second_beam_mm: f64,
-}
-
-/// The parameters of an endless row.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Sown {
-    seed: u64,
-    spacing_mm: f64,
-    /// Share of the gaps with a tall weed.
-    weed_share: f64,
-    /// The position of the first plant.
-    first_mm: f64,
 }
 
 /// A change from now on.
@@ -69,16 +62,6 @@ pub enum Different {
     SpacingMm(f64),
     /// The share of their gaps with a tall weed.
     WeedShare(f64),
-}
-
-/// The firmware's zone and margin of a plant.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Kept {
-    /// Ground on both sides.
-    margin_mm: u32,
-    /// 0 for whole canopies.
-    stem_zone_mm: u32,
 }
 
 /// The verdict on a plant, or whether a weed was cut. Of two passes the greater one counts: the worse verdict on a
@@ -124,9 +107,8 @@ impl Begun {
             ..Machine::default()
         };
         let set_up = if self.is_set_up { set_up(&mut machine) } else { Vec::new() };
-        let Sown { seed, spacing_mm, weed_share, first_mm } = self.sowing;
-        let planting = Planting { spacing_mm, ..Planting::default() };
-        let mut sowing = Sowing::new(planting, weed_share, first_mm, seed);
+        let planting = Planting { spacing_mm: self.spacing_mm, ..Planting::default() };
+        let mut sowing = Sowing::new(planting, self.weed_share, self.first_mm, self.seed);
         let mut row = Vec::new();
         sowing.sow(&mut row, SOWN_AHEAD_MM);
         let simulation = Simulation {
@@ -230,9 +212,9 @@ impl Simulation {
     }
 
     /// Judges the canopies behind the tool that have no verdict yet. Returns their numbers and verdicts.
-    pub fn judge(&mut self, kept: &Kept) -> Vec<(usize, Fate)> {
+    pub fn judge(&mut self, margin_mm: u32, stem_zone_mm: u32) -> Vec<(usize, Fate)> {
         let is_behind =
-            |canopy: &Canopy| canopy.span_mm().end + f64::from(kept.margin_mm) + BEHIND_MM < self.rolling.tool_mm();
+            |canopy: &Canopy| canopy.span_mm().end + f64::from(margin_mm) + BEHIND_MM < self.rolling.tool_mm();
         let behind = self.rolling.row.partition_point(is_behind);
         let first = std::mem::replace(&mut self.next, behind);
         let (Some(canopies), true) = (self.rolling.row.get(first..behind), first < behind) else {
@@ -241,7 +223,7 @@ impl Simulation {
         let Ok(row) = Row::new(canopies.to_vec()) else {
             return Vec::new();
         };
-        let timing = Timing { margin_mm: kept.margin_mm, stem_zone_mm: kept.stem_zone_mm, ..Timing::default() };
+        let timing = Timing { margin_mm, stem_zone_mm, ..Timing::default() };
         let (motion, pulses, start_cycle) = self.rolling.since(self.from_s);
         let judgement = judge(&row, &self.rolling.machine, &motion, timing, pulses, start_cycle);
         let mut plants = judgement.plants.iter().map(|plant| plant.verdict);

@@ -132,12 +132,6 @@ interface Turn {
     readonly failure: Failure | null;
 }
 
-/** Who waits for the end of a command. */
-interface Asker {
-    done(answer: string[]): void;
-    failed(error: Error): void;
-}
-
 export class Session implements Link {
     onHappening: (happening: Happening) => void = () => {};
     /** Its number in the Rust. */
@@ -146,8 +140,8 @@ export class Session implements Link {
     #received = "";
     #ended = false;
     #isTurning = false;
-    /** By the command's number. Several may wait for a `hold`. */
-    readonly #askers = new Map<number, Asker[]>();
+    /** Who waits for the end of a command, by its number. Several may wait for a `hold`. */
+    readonly #askers = new Map<number, { done(answer: string[]): void; failed(error: Error): void }[]>();
     /** The lines of the answer in progress. */
     #answer: string[] = [];
 

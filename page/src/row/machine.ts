@@ -24,12 +24,6 @@ export function span({ placeMm, widthMm }: Thing): { startMm: number; endMm: num
     return { startMm: placeMm - widthMm / 2, endMm: placeMm + widthMm / 2 };
 }
 
-/** The differences from the machine from the box: `Begun` in host/page/src/simulation.rs. */
-interface MachineKind {
-    readonly isSetUp?: boolean;
-    readonly secondBeamMm?: number;
-}
-
 /** The random row in front of the machine, which continues while the machine rolls. */
 export interface Sowing {
     readonly seed: number;
@@ -38,11 +32,6 @@ export interface Sowing {
     readonly weedShare: number;
     /** The first plant's position. */
     readonly firstMm: number;
-}
-
-export interface Dimensions {
-    readonly beamToToolMm: number;
-    readonly toolWidthMm: number;
 }
 
 /** The result for a plant: its margin was kept, the tool came nearer, or the tool was not out over its canopy. */
@@ -60,14 +49,14 @@ export type Change =
 type Levels = [pin: number, high: boolean][];
 
 interface Begun {
-    readonly dimensions: Dimensions;
+    readonly dimensions: { readonly beamToToolMm: number; readonly toolWidthMm: number };
     readonly setUp: readonly string[];
     readonly levels: Levels;
 }
 
 export class Machine {
     readonly uno: Uno;
-    readonly dimensions: Dimensions;
+    readonly dimensions: Begun["dimensions"];
     /** The commands that set up its firmware. */
     readonly setUp: readonly string[];
     /** The things in the row so far. */
@@ -95,10 +84,13 @@ export class Machine {
     readonly #rust = new Rust(module);
     #pulseRise = 0;
 
-    /** Places a standing machine in front of a row, at the Uno's cycle. */
-    constructor(uno: Uno, sowing: Sowing, kind: MachineKind = {}) {
+    /**
+     * Places a standing machine in front of a row, at the Uno's cycle. `kind` has the differences from the machine from
+     * the box: `Begun` in host/page/src/simulation.rs.
+     */
+    constructor(uno: Uno, sowing: Sowing, kind: { isSetUp?: boolean; secondBeamMm?: number } = {}) {
         this.uno = uno;
-        const begin = { cycle: uno.cycle, sowing, ...kind };
+        const begin = { cycle: uno.cycle, ...sowing, ...kind };
         const { dimensions, setUp, levels } = this.#rust.ask<Begun>({ begin });
         [this.dimensions, this.setUp] = [dimensions, setUp];
         this.#set(levels);
