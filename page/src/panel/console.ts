@@ -19,7 +19,6 @@ export class Console {
     /** Whether it was shown since it was hidden. A browser forgets how far a hidden element is scrolled. */
     #isShown = false;
 
-    /** `type` types a line to the machine. */
     constructor(parts: Parts, type: (line: string) => void) {
         const said = parts.html("said");
         this.#said = said;

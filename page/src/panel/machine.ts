@@ -40,7 +40,6 @@ const FRESH_MS = 1000;
 export class Machine {
     /** The firmware's version, if the machine is connected. */
     version: string | undefined;
-    /** Whether this page may start it. */
     mayStart = true;
     /** Why it is lost, in English. */
     #lost: string = english("noneConnected");
@@ -57,7 +56,6 @@ export class Machine {
     alarm: string | undefined;
     warning: string | undefined;
     status: Line<"status"> | undefined;
-    /** When the status came. */
     statusMs = 0;
     settings: readonly Setting[] = [];
     help: ReadonlyMap<string, string> = new Map();
@@ -147,7 +145,6 @@ export class Machine {
         return this.settings.find((setting) => setting.name === name)?.value ?? 0;
     }
 
-    /** Distance of an encoder count. */
     get tickMm(): number {
         return tickMm((name) => this.setting(name));
     }
@@ -156,7 +153,6 @@ export class Machine {
         return millimetres / Math.max(this.tickMm, 1e-6);
     }
 
-    /** How wide an object was. */
     widthMm({ hold }: Line<"detection">): number {
         return hold * this.tickMm - 2 * this.setting("margin_mm");
     }
@@ -221,7 +217,6 @@ export class Machine {
     }
 }
 
-/** A text as a sentence. */
 export function sentence(text: string): string {
     const shown = plain(text);
     return `${shown.charAt(0).toUpperCase()}${shown.slice(1)}${/[.!?।]$/.test(shown) ? "" : "."}`;

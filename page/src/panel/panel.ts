@@ -153,7 +153,6 @@ export class Panel {
         }
     }
 
-    /** Talks to this machine from now on. */
     connect(link: Link, nowMs: number): void {
         this.#now = nowMs;
         if (this.#holdPending) this.#holdPending.againMs = nowMs;

@@ -109,7 +109,6 @@ export class SetUp {
         );
     }
 
-    /** A box with which the operator marks a step. */
     #box(at: number): HTMLInputElement {
         const box = make("input", "");
         box.type = "checkbox";
@@ -121,7 +120,6 @@ export class SetUp {
         return box;
     }
 
-    /** The inputs and buttons for the tasks of a step. */
     #tasks(tasks: readonly string[]): HTMLElement[] {
         const said = make("p", "");
         said.role = "status";
@@ -154,7 +152,6 @@ export class SetUp {
         return [...parts, said];
     }
 
-    /** Sets and saves the values of a step. */
     async #save(names: readonly string[]): Promise<void> {
         for (const name of names) {
             const input = this.#inputs.get(name);

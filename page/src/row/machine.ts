@@ -59,7 +59,6 @@ export class Machine {
     readonly dimensions: Begun["dimensions"];
     /** The commands that set up its firmware. */
     readonly setUp: readonly string[];
-    /** The things in the row so far. */
     readonly things: Thing[] = [];
     /** The ground that the beam sees, and the ground under the tool. */
     placeMm = 0;
@@ -74,7 +73,6 @@ export class Machine {
     isClear = true;
     /** Whether the tool works the row's line. */
     isWeeding = false;
-    /** Whether the beam is broken. */
     isBroken = false;
     /** Net counts of a perfect encoder since the start, and the distance of one count. */
     ticks = 0;
@@ -132,7 +130,6 @@ export class Machine {
         for (const [pin, high] of levels) this.uno.set(pin, high);
     }
 
-    /** Reads the machine's state and the newly sown things. */
     #look(): void {
         const { state, sown } = this.#rust.ask<{ state: object; sown: Thing[] }>("look");
         Object.assign(this, state);

@@ -78,7 +78,6 @@ export class Uno {
         this.#chip.set(pin, high);
     }
 
-    /** Whether the firmware drives a pin high. */
     isHigh(pin: number): boolean {
         return this.#driven.get(pin) ?? false;
     }
