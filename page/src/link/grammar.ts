@@ -4,12 +4,7 @@
 // Commands are composed where they are typed. Their words are in the firmware's help.
 
 import { ask } from "../core.ts";
-import type { ConsoleLine, EventLine, Line, Setting } from "./console_line.ts";
-
-/** Whether it is an event, and not a part of an answer. */
-export function isEvent(said: ConsoleLine): said is EventLine {
-    return "isEvent" in said;
-}
+import type { ConsoleLine, Line, Setting } from "./console_line.ts";
 
 export function read(line: string): ConsoleLine {
     return ask<ConsoleLine>({ read: line });

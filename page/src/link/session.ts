@@ -6,7 +6,7 @@
 import { ask } from "../core.ts";
 import { english } from "../words/words.ts";
 import type { EventLine, Line, Setting } from "./console_line.ts";
-import { isEvent, linesOf, read } from "./grammar.ts";
+import { linesOf, read } from "./grammar.ts";
 
 /** Types a command, and returns its answer without the `ok`. Throws `Refused` if the machine refuses it. */
 export type Ask = (command: string) => Promise<string[]>;
@@ -108,7 +108,7 @@ export function tell(news: News, onHappening: (happening: Happening) => void): v
         default: {
             const [line, said] = [news.said, read(news.said)];
             if (said.is === "status") onHappening({ is: "status", status: said, line });
-            else if (isEvent(said)) onHappening({ is: "event", event: said, line });
+            else if ("isEvent" in said) onHappening({ is: "event", event: said, line });
         }
     }
 }
