@@ -1,13 +1,11 @@
 //! Faults in the wires and in the weeder: the check finds each, and names it.
 
-mod common;
-
+use crate::common::{boards, boards_with};
 use check_board::alarms::SCENES;
 use check_board::pair::Wiring;
 use check_board::rates::Turning;
 use check_board::resets::{Kept, ResetBy};
 use check_board::{row, servo};
-use common::{boards, boards_with};
 use control::alarm::Alarm;
 use field::wiring as pins;
 use object::{File, Object, ObjectSection};

@@ -9,7 +9,7 @@ use uno::Pin;
 
 #[test]
 fn the_page_s_table_has_every_wire() {
-    let page = include_str!("../../../docs/check-board.md");
+    let page = include_str!("../../../../docs/check-board.md");
     let (_, behind) = page.split_once("<!-- tester wires -->\n\n").expect("there is a table");
     let (table, _) = behind.split_once("\n\n<!-- tester wires end -->").expect("it ends");
     let row = |wire: &tester_core::pins::Wire| format!("| {} | {} | {} |", wire.name, wire.tester, wire.weeder);
@@ -58,5 +58,5 @@ fn every_report_of_a_board_has_the_report_s_form() {
 
 #[test]
 fn the_drawing_has_every_wire() {
-    expect_file!["../../../docs/check-board.svg"].assert_eq(&(check_board::drawing::wires().to_string() + "\n"));
+    expect_file!["../../../../docs/check-board.svg"].assert_eq(&(check_board::drawing::wires().to_string() + "\n"));
 }
