@@ -140,18 +140,17 @@ impl Conditions {
     }
 
     /// What is likely wrong with these conditions, in sentences.
-    pub fn warnings(&self) -> Vec<String> {
+    pub fn warning(&self) -> Option<String> {
         let room_mm = self.machine.sweep_from_mm - self.crop.protected_mm / 2.0 - self.crop.across_scatter_mm;
         let strays_mm = self.driving.steering_mm;
         let strays_too_far = self.machine.sweeps_a_side > 0 && strays_mm > room_mm;
-        let warning = strays_too_far.then(|| {
+        strays_too_far.then(|| {
             format!(
                 "driving.steering_mm is {strays_mm}, but the sweeps leave {room_mm:.1} mm: they cut plants. \
                  Set machine.sweep_from_mm to {:.0} or more.",
                 (self.machine.sweep_from_mm + strays_mm - room_mm).ceil()
             )
-        });
-        warning.into_iter().collect()
+        })
     }
 
     /// The same field and machine before anything is fitted, set or measured.

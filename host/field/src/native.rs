@@ -26,7 +26,6 @@ use control::operate::{state::State, tool};
 use control::settings::Setting;
 use control::units::{Instant, Interval, Position};
 use rig::{Beams, ByExamples, Rig};
-use std::collections::VecDeque;
 use thiserror::Error;
 use uno::{CYCLES_PER_SECOND, Pulse};
 
@@ -257,12 +256,9 @@ pub fn weed(pass: &Pass, sensors: &Sensors) -> Result<Weeded, Refused> {
 /// # Errors
 /// As [`weed`].
 pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refused> {
-    let (mut slips, mut tells) = (Vec::new(), false);
+    let mut slips = Vec::new();
     run(pass, sensors, |weeder| {
-        if !tells {
-            weeder.enable_events(true);
-            tells = true;
-        }
+        weeder.enable_events(true);
         while let Some(event) = weeder.next_event() {
             if let Event::Slip { permille } = event {
                 slips.push(permille);
@@ -318,7 +314,7 @@ struct Why<'a> {
     zone: Option<((Position, Position), Part)>,
     is_guarding: bool,
     /// The middles of the guarded zones that are still ahead of the tool, or at it.
-    guarded: VecDeque<Position>,
+    guarded: Vec<Position>,
 }
 
 impl<'a> Why<'a> {
@@ -335,7 +331,7 @@ impl<'a> Why<'a> {
             in_since_s: None,
             zone: None,
             is_guarding,
-            guarded: VecDeque::new(),
+            guarded: Vec::new(),
         })
     }
 
@@ -346,7 +342,7 @@ impl<'a> Why<'a> {
             && let Some(event) = weeder.next_event()
         {
             if let Event::Guarded(middle) = event {
-                self.guarded.push_back(middle);
+                self.guarded.push(middle);
             }
         }
         if !is_in {

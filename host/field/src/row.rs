@@ -4,7 +4,7 @@
 //! A [`Row`] comes from a list, from a CSV file of measured plants, or from a seed
 //! ([`Planting`](crate::planting::Planting)). Canopies in a row do not overlap: those that touch are one detection of
 //! the beam, and one canopy of the row. Weeds below the beam are not in the row: they are part of the ground that the
-//! tool works. Dust, clods and insects that break the beam may be added ([`Row::with_dust`]).
+//! tool works. Dust, clods and insects that break the beam may be added.
 //!
 //! All positions are millimetres along the ground, from an origin of the row's own.
 
@@ -162,13 +162,14 @@ const COLUMNS: [&str; 3] = ["position_mm", "width_mm", "kind"];
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     canopies: Vec<Canopy>,
-    dust_mm: Vec<Range<f64>>,
+    /// The stretches over which dust breaks the beam.
+    pub dust_mm: Vec<Range<f64>>,
     /// The stretches where each beam is broken, if the leaves move between the beams.
-    swayed_mm: Option<[Vec<Range<f64>>; 2]>,
+    pub(crate) swayed_mm: Option<[Vec<Range<f64>>; 2]>,
     /// The crop's stems, if they do not stand in the middle of their canopies.
-    stems: Option<Vec<Stem>>,
+    pub stems: Option<Vec<Stem>>,
     /// Its ends, if they are known.
-    ground_mm: Option<Range<f64>>,
+    pub(crate) ground_mm: Option<Range<f64>>,
 }
 
 impl Row {
@@ -204,33 +205,12 @@ impl Row {
             };
             return Err((*mark, problem));
         }
-        Ok(Self {
-            canopies: canopies.into_iter().map(|(_, canopy)| canopy).collect(),
-            dust_mm: Vec::new(),
-            swayed_mm: None,
-            stems: None,
-            ground_mm: None,
-        })
+        Ok(Self::of(canopies.into_iter().map(|(_, canopy)| canopy).collect(), None))
     }
 
-    /// The same row, with the ends of this ground.
-    pub fn on_ground(self, ground_mm: Range<f64>) -> Self {
-        Self { ground_mm: Some(ground_mm), ..self }
-    }
-
-    /// The same row with dust that breaks the beam over these stretches.
-    pub fn with_dust(self, dust_mm: Vec<Range<f64>>) -> Self {
-        Self { dust_mm, ..self }
-    }
-
-    /// The same row, with leaves that break each beam over other stretches, because they move.
-    pub(crate) fn swayed(self, swayed_mm: [Vec<Range<f64>>; 2]) -> Self {
-        Self { swayed_mm: Some(swayed_mm), ..self }
-    }
-
-    /// The same row, with these stems.
-    pub fn with_stems(self, stems: Vec<Stem>) -> Self {
-        Self { stems: Some(stems), ..self }
+    /// A row of these canopies alone.
+    fn of(canopies: Vec<Canopy>, ground_mm: Option<Range<f64>>) -> Self {
+        Self { canopies, dust_mm: Vec::new(), swayed_mm: None, stems: None, ground_mm }
     }
 
     /// The stems of its plants. If none are known, one stands in the middle of each canopy.
@@ -257,23 +237,12 @@ impl Row {
         let end_mm = self.span_mm().start + length_mm;
         let canopies: Vec<Canopy> =
             self.canopies.iter().filter(|canopy| canopy.span_mm().end < end_mm).cloned().collect();
-        (!canopies.is_empty()).then_some(Self {
-            canopies,
-            dust_mm: Vec::new(),
-            swayed_mm: None,
-            stems: None,
-            ground_mm: Some(self.span_mm().start..end_mm),
-        })
+        (!canopies.is_empty()).then(|| Self::of(canopies, Some(self.span_mm().start..end_mm)))
     }
 
     /// Everything that stands in the row, by position.
     pub fn canopies(&self) -> &[Canopy] {
         &self.canopies
-    }
-
-    /// The stretches over which dust breaks the beam.
-    pub fn dust_mm(&self) -> &[Range<f64>] {
-        &self.dust_mm
     }
 
     /// The crop plants, by position.

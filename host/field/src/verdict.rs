@@ -201,7 +201,6 @@ pub fn judge(
         let mut passings = motion.passings(place_mm + machine.beam_to_tool_mm);
         passings.any(|passing| stroke.degrees(passing.time_s) < machine.line_degrees())
     };
-    let swings = Swing::all(&commands, motion, start_cycle);
 
     let mut plants: Vec<PlantOutcome> =
         row.plants().map(|plant| plant_outcome(plant, &closed, &over_zone, machine, timing)).collect();
@@ -214,8 +213,9 @@ pub fn judge(
         }
     }
     let mut idle_swings = 0;
-    for swing in &swings {
-        let passed = machine.worked_mm(motion, &swing.during_s);
+    for swing in Swing::all(&commands, start_cycle) {
+        let during_s = swing.out_s.unwrap_or(0.0)..swing.in_s.unwrap_or(whole_s.end);
+        let passed = machine.worked_mm(motion, &during_s);
         // Plants stand in ascending order, and apart.
         let first = plants.partition_point(|plant| plant.plant.span_mm().end <= passed.start);
         let behind = plants.partition_point(|plant| plant.plant.span_mm().start < passed.end);

@@ -240,7 +240,7 @@ impl Simulation {
             f64::from(is_clear),
             f64::from(across_mm < machine.tool_width_mm / 2.0),
             f64::from(rolling.is_beam_broken()),
-            rolling.ticks() as f64,
+            rolling.ticks as f64,
             rolling.ground_mm_a_tick(),
             rolling.commands as f64,
         ];

@@ -149,10 +149,8 @@ impl Sweep {
     ///
     /// # Errors
     /// If an axis has an invalid value.
-    pub fn warnings(&self) -> Result<Vec<String>> {
-        let places = self.places()?;
-        let warnings = places.iter().map(|place| place.experiment.conditions.warnings());
-        Ok(warnings.into_iter().find(|warnings| !warnings.is_empty()).unwrap_or_default())
+    pub fn warning(&self) -> Result<Option<String>> {
+        Ok(self.places()?.iter().find_map(|place| place.experiment.conditions.warning()))
     }
 
     /// Weeds a plot at each of a shard's points.
