@@ -256,9 +256,12 @@ pub fn weed(pass: &Pass, sensors: &Sensors) -> Result<Weeded, Refused> {
 /// # Errors
 /// As [`weed`].
 pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refused> {
-    let mut slips = Vec::new();
+    let (mut slips, mut tells) = (Vec::new(), false);
     run(pass, sensors, |weeder| {
-        weeder.enable_events(true);
+        if !tells {
+            weeder.enable_events(true);
+            tells = true;
+        }
         while let Some(event) = weeder.next_event() {
             if let Event::Slip { permille } = event {
                 slips.push(permille);

@@ -41,18 +41,13 @@ impl<F: FnMut(Option<&str>) -> Option<Vec<u8>>> Write for ScriptedPort<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         for &byte in bytes {
             match byte {
-                b'\n' => {}
-                0x08 => {
-                    self.typed.pop();
-                    continue;
+                b'\n' => {
+                    let line = String::from_utf8(std::mem::take(&mut self.typed)).map_err(io::Error::other)?;
+                    self.to_read.extend((self.script)(Some(&line)).unwrap_or_default());
                 }
-                _ => {
-                    self.typed.push(byte);
-                    continue;
-                }
+                0x08 => drop(self.typed.pop()),
+                _ => self.typed.push(byte),
             }
-            let line = String::from_utf8(std::mem::take(&mut self.typed)).map_err(io::Error::other)?;
-            self.to_read.extend((self.script)(Some(&line)).unwrap_or_default());
         }
         Ok(bytes.len())
     }

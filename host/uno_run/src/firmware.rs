@@ -26,7 +26,7 @@ const INSIDE: Option<&[(&str, &[u8])]> = include!(concat!(env!("OUT_DIR"), "/ins
 static WRITTEN: OnceLock<Result<PathBuf, String>> = OnceLock::new();
 
 /// A program for the chip.
-struct Program {
+pub struct Program {
     /// Its package, which is also its binary's name, and the alias that builds it.
     package: &'static str,
     alias: &'static str,
@@ -35,8 +35,10 @@ struct Program {
 }
 
 static FIRMWARE: Program = Program::new("weeder-firmware", "firmware");
-static BENCH: Program = Program::new("knn-bench", "bench-firmware");
-static TESTER: Program = Program::new("tester-firmware", "tester-firmware");
+/// The classifier's bench, which [`bench`](mod@crate::bench) runs.
+pub static BENCH: Program = Program::new("knn-bench", "bench-firmware");
+/// The firmware of the tester, the Uno that checks another one.
+pub static TESTER: Program = Program::new("tester-firmware", "tester-firmware");
 
 /// Variables of an outer cargo or a shell that would change how the firmware is compiled.
 const FOREIGN_SETTINGS: [&str; 9] = [
@@ -56,31 +58,12 @@ const FOREIGN_SETTINGS: [&str; 9] = [
     "WEEDER_COMMIT",
 ];
 
-/// The firmware's ELF: that inside this program, or else that of this workspace, which is built.
-///
-/// Cargo runs at most once a process; later calls return the first one's answer. Its progress and the compiler's
-/// messages go to standard error.
+/// The firmware's ELF.
 ///
 /// # Errors
-/// Where it can neither be written nor built: cargo cannot be started, fails, or makes no ELF.
+/// As [`Program::elf`].
 pub fn build() -> Result<PathBuf> {
-    FIRMWARE.build_once()
-}
-
-/// Builds the classifier's bench, which [`bench`](mod@crate::bench) runs, and returns the path of its ELF.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_bench() -> Result<PathBuf> {
-    BENCH.build_once()
-}
-
-/// Builds the firmware of the tester, the Uno that checks another one. Returns the path of its ELF.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_tester() -> Result<PathBuf> {
-    TESTER.build_once()
+    FIRMWARE.elf()
 }
 
 impl Program {
@@ -88,7 +71,14 @@ impl Program {
         Self { package, alias, built: OnceLock::new() }
     }
 
-    fn build_once(&self) -> Result<PathBuf> {
+    /// The program's ELF: that inside this program, or else that of this workspace, which is built.
+    ///
+    /// Cargo runs at most once a process; later calls return the first one's answer. Its progress and the compiler's
+    /// messages go to standard error.
+    ///
+    /// # Errors
+    /// If it can neither be written nor built: cargo cannot be started, fails, or makes no ELF.
+    pub fn elf(&self) -> Result<PathBuf> {
         if let Some(folder) = inside()? {
             return Ok(folder.join(self.package).with_extension("elf"));
         }
