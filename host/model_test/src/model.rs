@@ -327,15 +327,15 @@ impl Model {
     pub fn has_canopy_near(&self, place: i64, reach: i64) -> bool {
         let (before, behind) =
             self.stretches.split_at(self.stretches.partition_point(|stretch| stretch.leading <= place));
-        let next = behind.first().copied().unwrap_or(Stretch::closed(self.frontier, self.frontier, 0));
-        if before.last().is_some_and(|before| self.may_be_one(before, &next)) {
+        let at_frontier = Stretch::closed(self.frontier, self.frontier, 0);
+        let next = behind.first().unwrap_or(&at_frontier);
+        if before.last().is_some_and(|before| self.may_be_one(before, next)) {
             return true;
         }
         let is_near = |stretch: &Stretch| {
             let reach = reach + self.slack + 2 * stretch.blur;
             stretch.leading - reach <= place && place <= stretch.trailing + reach
         };
-        let at_frontier = Stretch::closed(self.frontier, self.frontier, 0);
         self.may_be_broken_at_frontier && is_near(&at_frontier)
             || self.stretches.iter().chain(&self.guarded).any(is_near)
     }

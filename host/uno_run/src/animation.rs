@@ -133,25 +133,22 @@ struct Run {
 impl Run {
     /// An attribute that takes these values at these shares of the row.
     fn value(&self, attribute: &str, frames: &[(f64, String)], mode: &str) -> Animate {
-        let mut animation = Animate::new().set("attributeName", attribute).set("calcMode", mode);
-        self.schedule(&mut animation, frames);
-        animation
+        self.scheduled(Animate::new().set("attributeName", attribute).set("calcMode", mode), frames)
     }
 
     /// The animation of a part's position.
     fn transform(&self, kind: &str, frames: &[(f64, String)]) -> AnimateTransform {
-        let mut animation = AnimateTransform::new().set("attributeName", "transform").set("type", kind);
-        self.schedule(&mut animation, frames);
-        animation
+        self.scheduled(AnimateTransform::new().set("attributeName", "transform").set("type", kind), frames)
     }
 
-    fn schedule(&self, animation: &mut impl Node, frames: &[(f64, String)]) {
+    fn scheduled<Animation: Node>(&self, mut animation: Animation, frames: &[(f64, String)]) -> Animation {
         let times: Vec<String> = frames.iter().map(|(share, _)| format!("{share:.4}")).collect();
         let values: Vec<&str> = frames.iter().map(|(_, value)| value.as_str()).collect();
         animation.assign("keyTimes", times.join(";"));
         animation.assign("values", values.join(";"));
         animation.assign("dur", format!("{:.1}s", self.seconds));
         animation.assign("repeatCount", "indefinite");
+        animation
     }
 }
 

@@ -160,18 +160,17 @@ impl Course {
     }
 }
 
-/// The distance travelled: the total before the present run, the start time of that run, and its motion.
+/// The distance travelled: the total before the last run, the start time of that run, and its motion.
 struct Way {
     before_mm: f64,
-    since: Option<(f64, Motion)>,
+    set_off_s: f64,
+    motion: Motion,
 }
 
 impl Way {
     /// The distance travelled at a time, in metres.
     fn rolled_m(&self, time_s: f64) -> f64 {
-        let since_mm = self.since.as_ref().map_or(0.0, |(set_off_s, motion)| {
-            motion.position_mm((time_s - set_off_s).clamp(0.0, motion.duration_s())) - motion.start_mm()
-        });
+        let since_mm = self.motion.position_mm(time_s - self.set_off_s) - self.motion.start_mm();
         (self.before_mm + since_mm) / 1000.0
     }
 }
@@ -311,7 +310,7 @@ impl LiveUno {
             sets_off: STANDING_S * CYCLES_PER_SECOND,
             course: setup.course,
             runs: setup.runs,
-            way: Way { before_mm: 0.0, since: None },
+            way: Way { before_mm: 0.0, set_off_s: 0.0, motion: Motion::starting_at(0.0) },
             eeprom,
             unread: VecDeque::new(),
             resets_when_opened: !setup.keeps_running_when_opened,
@@ -394,7 +393,7 @@ impl LiveUno {
             self.uno.drive(course.machine.pin_changes(&course.row, &motion, self.sets_off));
             let end = cycle_at(self.sets_off, motion.duration_s());
             let set_off_s = self.sets_off as f64 / CYCLES_PER_SECOND as f64;
-            self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), since: Some((set_off_s, motion)) };
+            self.way = Way { before_mm: 1000.0 * self.way.rolled_m(set_off_s), set_off_s, motion };
             self.sets_off = end + if self.runs.is_some() { 0 } else { STANDING_S * CYCLES_PER_SECOND };
         }
     }

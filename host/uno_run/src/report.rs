@@ -190,7 +190,7 @@ pub struct PlantRecord {
     out_error_ticks: Option<f64>,
     in_error_ticks: Option<f64>,
     swings: usize,
-    verdict: &'static str,
+    verdict: String,
 }
 
 /// The result for a tall weed, as a line of a table.
@@ -213,25 +213,19 @@ pub fn plants(outcome: &Outcome) -> Vec<PlantRecord> {
         out_error_ticks: plant.out_error_ticks,
         in_error_ticks: plant.in_error_ticks,
         swings: plant.swings,
-        verdict: match plant.verdict {
-            Verdict::Kept => "kept",
-            Verdict::MarginCut => "margin_cut",
-            Verdict::Reached => "zone_reached",
-            Verdict::Damaged => "damaged",
-        },
+        verdict: plant.verdict.to_string().to_lowercase().replace(' ', "_"),
     };
     outcome.judgement.plants.iter().map(record).collect()
 }
 
 /// A line per tall weed.
 pub fn weeds(outcome: &Outcome) -> Vec<WeedRecord> {
-    let weeds = outcome.judgement.weeds.iter();
     let record = |weed: &WeedOutcome| WeedRecord {
         position_mm: weed.weed.position_mm,
         width_mm: weed.weed.width_mm,
         cut: weed.cut,
     };
-    weeds.map(record).collect()
+    outcome.judgement.weeds.iter().map(record).collect()
 }
 
 /// Writes [`plants`] or [`weeds`] as a CSV table.
