@@ -18,6 +18,7 @@ use crate::row::Row;
 use crate::servo::Servo;
 use crate::sight::half_covered;
 use crate::wiring;
+use control::measure::quadrature::{Channels, Quadrature, Step};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::PI;
@@ -302,6 +303,27 @@ pub fn encoder_edge(cycle: u64, from_ticks: i64, to_ticks: i64) -> PinChange {
     PinChange { cycle, pin, high }
 }
 
+/// The firmware's count before the first of these pin changes, which is 0, and after each. `first_levels` are the levels
+/// before.
+pub fn counts(first_levels: &[PinChange], changes: &[PinChange]) -> Vec<i64> {
+    let after = |levels: Channels, change: &PinChange| {
+        let bit = match change.pin {
+            wiring::ENCODER_A => 0b10,
+            wiring::ENCODER_B => 0b01,
+            _ => 0,
+        };
+        if change.high { levels | bit } else { levels & !bit }
+    };
+    let mut levels = first_levels.iter().fold(0, after);
+    let (mut decoder, mut count) = (Quadrature::new(levels), 0);
+    let counted = changes.iter().map(|change| {
+        levels = after(levels, change);
+        count += if let Step::Ticks(ticks) = decoder.step(levels) { i64::from(ticks) } else { 0 };
+        count
+    });
+    [0].into_iter().chain(counted).collect()
+}
+
 /// The cycle of the Uno's clock at a motion's time.
 pub fn cycle_at(start_cycle: u64, time_s: f64) -> u64 {
     start_cycle.saturating_add_signed((time_s * CYCLES_PER_SECOND as f64).round() as i64)
@@ -329,26 +351,9 @@ pub(crate) mod tests {
         ticks - PULSE_TICKS * (hidden(0..pulse) - hidden(pulse..0)) - in_pulse
     }
 
-    /// Counts of a decoder that takes each pair of levels as they come.
+    /// The firmware's count after these changes.
     fn decode(changes: &[PinChange]) -> i64 {
-        const FORWARD: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
-        let phase = |levels| FORWARD.iter().position(|&pair| pair == levels).unwrap();
-        let (mut levels, mut count) = ((false, false), 0);
-        for change in changes {
-            let before = phase(levels);
-            match change.pin {
-                wiring::ENCODER_A => levels.0 = change.high,
-                wiring::ENCODER_B => levels.1 = change.high,
-                _ => continue,
-            }
-            count += match (phase(levels) + 4 - before) % 4 {
-                0 => 0,
-                1 => 1,
-                3 => -1,
-                _ => panic!("both channels changed at once"),
-            };
-        }
-        count
+        counts(&[], changes).last().copied().unwrap()
     }
 
     fn of_pin(changes: &[PinChange], pin: Pin) -> Vec<PinChange> {

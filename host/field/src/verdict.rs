@@ -359,22 +359,11 @@ mod tests {
         Motion::steady(-500.0, 1000.0, mm_s(2.5), 3000.0)
     }
 
-    /// Frames 20 ms apart. A frame restarts where the width changes: out at power-up, in at the first position of the
-    /// machine, out at the second, and so on.
+    /// The first pulse of each width: out at power-up, in at the first position of the machine, out at the second, and so on.
     fn pulses(motion: &Motion, changes_mm: &[f64]) -> Vec<Pulse> {
-        let times_s = changes_mm.iter().map(|&mm| motion.passings(mm).next().unwrap().time_s);
-        let mut edges = vec![0];
-        edges.extend(times_s.map(|time_s| cycle_at(START_CYCLE, time_s)));
-        edges.push(cycle_at(START_CYCLE, motion.duration_s()));
-        let mut pulses = Vec::new();
-        for (index, edge) in edges.windows(2).enumerate() {
-            let width_us = if index % 2 == 0 { 2000 } else { 1500 };
-            for rise in (edge[0]..edge[1]).step_by(CYCLES_PER_SECOND as usize / 50) {
-                let fall = rise + width_us * CYCLES_PER_SECOND / 1_000_000;
-                pulses.push(Pulse { rise, fall });
-            }
-        }
-        pulses
+        let rises = changes_mm.iter().map(|&mm| cycle_at(START_CYCLE, motion.passings(mm).next().unwrap().time_s));
+        let widths = [2000, 1500].map(|us| us * CYCLES_PER_SECOND / 1_000_000).into_iter().cycle();
+        [0].into_iter().chain(rises).zip(widths).map(|(rise, width)| Pulse { rise, fall: rise + width }).collect()
     }
 
     /// Positions of the machine at which the swings of [`row`] should be commanded, with these leads.
