@@ -121,10 +121,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let count = arguments.rows;
     let rows = (0..count as u64).map(|number| arguments.course.nth_row(number)).collect::<Result<Vec<_>>>()?;
     let conditions = arguments.course.conditions_of(&arguments.course.field)?;
-    let courses = Course::of_rows(rows, conditions.machine(arguments.course.seed), mm_s(arguments.course.speed))
-        .into_iter()
-        .map(|course| course.slipping(conditions.ground.slip_percent / 100.0))
-        .collect::<Vec<_>>();
+    let (machine, speed_mm_s) = (conditions.machine(arguments.course.seed), mm_s(arguments.course.speed));
+    let courses = Course::of_rows(rows, machine, speed_mm_s, conditions.ground.slip_percent / 100.0);
     ensure!(!arguments.roll || count == 1, "--roll is for one row: leave out --rows");
     if arguments.roll {
         let Machine { wheel_mm, beam_to_tool_mm, second_beam_mm, tool_width_mm, .. } = conditions.machine(0);

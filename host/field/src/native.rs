@@ -48,14 +48,14 @@ const SERVO_FRAME_S: f64 = 0.020;
 /// Cycles in a step of Timer1, whose prescaler is 8.
 const CYCLES_A_STEP: u64 = 8;
 
-/// The decisions refused a setting or the start.
+/// The firmware or its decisions refused a line.
 #[derive(Debug, Error, PartialEq)]
 #[error("the firmware answers `{command}` with `{answer}`")]
 pub struct Refused {
     /// The typed line.
-    command: String,
-    /// The console's answer.
-    answer: String,
+    pub command: String,
+    /// The console's answer, which begins with `error:`.
+    pub answer: String,
 }
 
 /// The servo's line: the pulses for the widths that the loop commands.

@@ -132,21 +132,13 @@ pub enum Problem {
     /// The width is out of range.
     #[error("width_mm is {0}: it has to be above 0 and at most {MAX_WIDTH_MM} mm")]
     Width(f64),
-    /// Two canopies overlap.
+    /// A canopy overlaps an earlier one.
     #[error(
-        "the {kind} at {position_mm} mm and the {other} at {other_mm} mm overlap: \
-         each has to end before the next begins (plants that have grown together are one line)"
+        "the {} at {} mm and the {} at {} mm overlap: \
+         each has to end before the next begins (plants that have grown together are one line)",
+        .0[0].kind, .0[0].position_mm, .0[1].kind, .0[1].position_mm
     )]
-    Overlap {
-        /// The later canopy.
-        kind: Kind,
-        /// The later canopy's position.
-        position_mm: f64,
-        /// The earlier canopy.
-        other: Kind,
-        /// The earlier canopy's position.
-        other_mm: f64,
-    },
+    Overlap(Box<[Canopy; 2]>),
     /// The row is too long.
     #[error("the row is {} m long: it has to be at most {} m", (.0 / 1000.0).ceil(), MAX_LENGTH_MM / 1000.0)]
     Length(f64),
@@ -192,12 +184,7 @@ impl Row {
             let ((_, before), (mark, canopy)) = (&pair[0], &pair[1]);
             let length_mm = canopy.position_mm - canopies[0].1.position_mm;
             let problem = if before.span_mm().end >= canopy.span_mm().start {
-                Problem::Overlap {
-                    kind: canopy.kind,
-                    position_mm: canopy.position_mm,
-                    other: before.kind,
-                    other_mm: before.position_mm,
-                }
+                Problem::Overlap(Box::new([canopy.clone(), before.clone()]))
             } else if length_mm > MAX_LENGTH_MM {
                 Problem::Length(length_mm)
             } else {

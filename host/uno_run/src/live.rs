@@ -114,18 +114,12 @@ const TICKS_IN_A_PERIOD: f64 = 4.0;
 
 impl Course {
     /// A machine with one or several rows and one wheel: one course for each row. All rows roll along the same ground at
-    /// the same time.
-    pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64) -> Vec<Self> {
+    /// the same time. The wheel turns farther than the machine rolls by the share `slip` of its distance.
+    pub fn of_rows(rows: Vec<Row>, machine: Machine, speed_mm_s: f64, slip: f64) -> Vec<Self> {
         let spans = || rows.iter().map(Row::span_mm);
         let start = spans().map(|span| span.start).fold(f64::INFINITY, f64::min);
         let end = spans().map(|span| span.end).fold(f64::NEG_INFINITY, f64::max);
-        rows.into_iter().map(|row| Self { row, machine, speed_mm_s, span_mm: start..end, slip: 0.0 }).collect()
-    }
-
-    /// The same, with a wheel that turns farther than the machine rolls by this share of its distance.
-    #[must_use]
-    pub fn slipping(self, slip: f64) -> Self {
-        Self { slip, ..self }
+        rows.into_iter().map(|row| Self { row, machine, speed_mm_s, span_mm: start..end, slip }).collect()
     }
 
     /// How far the machine rolls each time.
