@@ -251,13 +251,11 @@ impl Motion {
 
     /// The stretch that the machine rolled over during a time.
     pub fn stretch_mm(&self, times_s: &Range<f64>) -> Range<f64> {
-        let first = self.pieces.partition_point(|piece| piece.start_s < times_s.start);
-        let turns =
-            self.pieces[first..].iter().take_while(|piece| piece.start_s < times_s.end).map(|piece| piece.start_mm);
-        let end_mm = self.position_mm(times_s.end);
+        let pieces = self.pieces_since(times_s.start).iter().take_while(|piece| piece.start_s < times_s.end);
         let from_mm = self.position_mm(times_s.start);
-        turns
-            .chain([end_mm])
+        pieces
+            .map(|piece| piece.start_mm)
+            .chain([self.position_mm(times_s.end)])
             .fold(from_mm..from_mm, |stretch, place_mm| stretch.start.min(place_mm)..stretch.end.max(place_mm))
     }
 

@@ -248,7 +248,7 @@ pub fn beams_before(pass: &Pass) -> Beams {
 /// # Errors
 /// If they refuse a setting or the start.
 pub fn weed(pass: &Pass, sensors: &Sensors) -> Result<Weeded, Refused> {
-    run(pass, sensors, |_| ())
+    run(pass, sensors, false, |_| ())
 }
 
 /// The slip that the second beam measures, in thousandths, plant by plant.
@@ -256,12 +256,8 @@ pub fn weed(pass: &Pass, sensors: &Sensors) -> Result<Weeded, Refused> {
 /// # Errors
 /// As [`weed`].
 pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refused> {
-    let (mut slips, mut tells) = (Vec::new(), false);
-    run(pass, sensors, |weeder| {
-        if !tells {
-            weeder.enable_events(true);
-            tells = true;
-        }
+    let mut slips = Vec::new();
+    run(pass, sensors, true, |weeder| {
         while let Some(event) = weeder.next_event() {
             if let Event::Slip { permille } = event {
                 slips.push(permille);
@@ -271,9 +267,14 @@ pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refuse
     Ok(slips)
 }
 
-/// Weeds the row. Calls `listen` after each turn.
+/// Weeds the row. Calls `listen` after each turn, with events if `is_told`.
 #[inline(always)]
-fn run(pass: &Pass, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
+fn run(
+    pass: &Pass,
+    sensors: &Sensors,
+    is_told: bool,
+    mut listen: impl FnMut(&mut Weeder),
+) -> Result<Weeded, Refused> {
     let readings = Readings::new(instant(0), Position::new(0));
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
     let mut weeder: Weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(pass), Cause::PowerOn);
@@ -287,7 +288,19 @@ fn run(pass: &Pass, sensors: &Sensors, mut listen: impl FnMut(&mut Weeder)) -> R
     }
     type_line(&mut weeder, if pass.start == Start::Now { "start now" } else { "start" })?;
 
-    let mut why = Why::new(pass, &mut weeder)?;
+    let is_guarding = weeder.settings().get(Setting::GuardSpacingMm) > 0;
+    if is_guarding || is_told {
+        type_line(&mut weeder, "events on")?;
+    }
+    let mut why = Why {
+        pass,
+        reasons: Reasons::default(),
+        slowest_s: pass.machine.servo.slowest_s() + SERVO_FRAME_S,
+        in_since_s: None,
+        zone: None,
+        is_guarding,
+        guarded: Vec::new(),
+    };
     let orders = weeder.orders();
     let mut line = ServoLine::new(orders.pulse, orders.gap_ms);
     for (turn, Turn { time_s, position, edges }) in (0..=turns(pass, TURN_S)).zip(sensors.turns()) {
@@ -320,24 +333,7 @@ struct Why<'a> {
     guarded: Vec<Position>,
 }
 
-impl<'a> Why<'a> {
-    fn new(pass: &'a Pass, weeder: &mut Weeder) -> Result<Self, Refused> {
-        let is_guarding = weeder.settings().get(Setting::GuardSpacingMm) > 0;
-        if is_guarding {
-            type_line(weeder, "events on")?;
-        }
-        let slowest_s = pass.machine.servo.slowest_s() + SERVO_FRAME_S;
-        Ok(Self {
-            pass,
-            reasons: Reasons::default(),
-            slowest_s,
-            in_since_s: None,
-            zone: None,
-            is_guarding,
-            guarded: Vec::new(),
-        })
-    }
-
+impl Why<'_> {
     /// Records the present reason after a turn. Not inlined, which makes the loop faster.
     #[inline(never)]
     fn look(&mut self, weeder: &mut Weeder, is_in: bool, time_s: f64) {
