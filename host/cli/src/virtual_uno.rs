@@ -232,11 +232,10 @@ fn of_row(path: &Path, row: usize, count: usize) -> PathBuf {
 fn cost(ran: Ran, count: usize) -> String {
     let rows = if count == 1 { "a row".to_owned() } else { format!("{count} rows") };
     let threads = if ran.threads == 1 { "one thread".to_owned() } else { format!("{} threads", ran.threads) };
+    let [simulated_s, took_s, cores_s] = [ran.simulated, ran.took, ran.cores].map(|time| time.as_secs_f64());
     format!(
-        "{rows} in {threads}: {:.1} s of their own time took {:.1} s, which is {:.2} times real time; in real time a row takes {:.2} of a core",
-        ran.simulated.as_secs_f64(),
-        ran.took.as_secs_f64(),
-        ran.times_real_time(),
-        ran.cores_in_real_time() / count as f64
+        "{rows} in {threads}: {simulated_s:.1} s of their own time took {took_s:.1} s, which is {:.2} times real time; in real time a row takes {:.2} of a core",
+        simulated_s / took_s.max(f64::EPSILON),
+        cores_s / simulated_s.max(f64::EPSILON) / count as f64
     )
 }
