@@ -69,7 +69,11 @@ fn the_rest_of_a_half_seen_plant_is_no_weed_after_an_alarm() {
                     800 + seen_mm
                 ),
             ));
-            assert_eq!((drive.machine().state(), drive.machine().tool_out()), (State::Work, false), "the machine continues to work");
+            assert_eq!(
+                (drive.machine().state(), drive.machine().tool_out()),
+                (State::Work, false),
+                "the machine continues to work"
+            );
         }
     }
 }

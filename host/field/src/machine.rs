@@ -167,8 +167,7 @@ impl Machine {
     /// The level of each beam's line at power-up, before the motion begins: the first beam's, and the second one's if
     /// there is one.
     pub fn beams_before(&self, row: &Row, motion: &Motion) -> Vec<PinChange> {
-        let leaves_mm = self.leaves_mm(row);
-        self.beams(leaves_mm.each_ref().map(Vec::as_slice), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
+        self.beams(&self.leaves_mm(row), motion.start_mm(), 0).iter().map(|beam| beam.last).collect()
     }
 
     /// The stretches over which each beam's sensor reports it as broken.
@@ -177,9 +176,9 @@ impl Machine {
     }
 
     /// The sensors of the beams of a machine at `start_mm`, each over its leaves.
-    pub(crate) fn beams(&self, leaves_mm: [&[Range<f64>]; 2], start_mm: f64, start_cycle: u64) -> Vec<Sensor> {
+    pub(crate) fn beams(&self, leaves_mm: &[Vec<Range<f64>>; 2], start_mm: f64, start_cycle: u64) -> Vec<Sensor> {
         let second = self.has_second_beam().then_some((wiring::SECOND_BEAM, self.second_beam_mm));
-        let beam = |((pin, behind_mm), leaves_mm): ((Pin, f64), &[Range<f64>])| {
+        let beam = |((pin, behind_mm), leaves_mm): ((Pin, f64), &Vec<Range<f64>>)| {
             let is_broken = leaves_mm.iter().any(|leaf| leaf.contains(&(start_mm - behind_mm)));
             let last = PinChange { cycle: start_cycle, pin, high: !is_broken };
             Sensor { last, behind_mm, response_s: self.beam_response_ms / 1000.0, changed_s: None }
@@ -229,11 +228,10 @@ impl Machine {
     /// of the first beam, then those of the second.
     pub fn beam_changes(&self, row: &Row, motion: &Motion, start_cycle: u64) -> Vec<PinChange> {
         let leaves_mm = self.leaves_mm(row);
-        let beams = self.beams(leaves_mm.each_ref().map(Vec::as_slice), motion.start_mm(), 0).into_iter();
         let changes = |(mut beam, leaves_mm): (Sensor, &Vec<Range<f64>>)| {
             beam.changes(leaves_mm, motion, 0.0..f64::INFINITY, start_cycle)
         };
-        beams.zip(&leaves_mm).flat_map(changes).collect()
+        self.beams(&leaves_mm, motion.start_mm(), 0).into_iter().zip(&leaves_mm).flat_map(changes).collect()
     }
 }
 

@@ -269,12 +269,7 @@ pub fn slips_permille(pass: &Pass, sensors: &Sensors) -> Result<Vec<i16>, Refuse
 
 /// Weeds the row. Calls `listen` after each turn, with events if `is_told`.
 #[inline(always)]
-fn run(
-    pass: &Pass,
-    sensors: &Sensors,
-    is_told: bool,
-    mut listen: impl FnMut(&mut Weeder),
-) -> Result<Weeded, Refused> {
+fn run(pass: &Pass, sensors: &Sensors, is_told: bool, mut listen: impl FnMut(&mut Weeder)) -> Result<Weeded, Refused> {
     let readings = Readings::new(instant(0), Position::new(0));
     let classifier = Nearest::new(&EXAMPLES[..], Volatile::new());
     let mut weeder: Weeder = Rig::wake_at(classifier, Volatile::new(), readings, beams_before(pass), Cause::PowerOn);

@@ -56,7 +56,7 @@ impl Rolling {
     pub fn new(machine: Machine, row: Vec<Canopy>, start_mm: f64, start_cycle: u64) -> Self {
         let leaves_mm = half_covered(union(row.iter().flat_map(Canopy::blocks_mm).collect()), machine.beam_mm);
         Self {
-            beams: machine.beams([&leaves_mm; 2], start_mm, start_cycle),
+            beams: machine.beams(&[leaves_mm.clone(), leaves_mm], start_mm, start_cycle),
             row,
             commands: 0,
             motion: Motion::starting_at(start_mm),

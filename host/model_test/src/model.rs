@@ -45,7 +45,7 @@ fn blur(stretches: &[Stretch]) -> i64 {
 }
 
 /// The ground as the beam has seen it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Model {
     /// Ground behind this position is unknown.
     known_from: i64,
@@ -81,23 +81,7 @@ pub struct Model {
 impl Model {
     /// A model that knows only the beam's level.
     pub fn new(place: i64, broken: bool) -> Self {
-        let mut model = Self {
-            known_from: place,
-            begin: place,
-            frontier: place,
-            broken,
-            is_growing: false,
-            may_be_broken_at_frontier: false,
-            stretches: Vec::new(),
-            guarded: Vec::new(),
-            merge_gaps: Vec::new(),
-            stem_zones: Vec::new(),
-            narrow: 0,
-            slack: 0,
-            resolution_slack: 0,
-            is_shifted: false,
-            may_have_forgotten: false,
-        };
+        let mut model = Self { known_from: place, begin: place, frontier: place, broken, ..Self::default() };
         model.touch(0);
         model
     }

@@ -255,7 +255,8 @@ impl<M: Machine> Field<M> {
         self.set_up()?;
         self.row_end = run.period();
         while self.drive.position() < self.row_end && self.drive.time_s() < last_s {
-            let most = most_slip(self.drive.machine().settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
+            let most =
+                most_slip(self.drive.machine().settings().get(Setting::MarginMm).into(), machine.beam_to_tool_mm);
             let permille = (1000.0 * self.rng.random_range(-most..=most)) as i32;
             self.execute(&Step::Slip { permille })?;
             let (mm_s, leg_s) = self.draw_leg();

@@ -86,10 +86,7 @@ fn draw_lane(row: &Row, judgement: &Judgement, ground: &Range<f64>, clip: &str) 
         drawn = drawn.add(canopy(&plant.plant, x(plant.plant.position_mm), plant.verdict));
     }
     // Between two pieces over this ground the path may go on beyond an end, where the clip cuts it.
-    let is_over = |piece: &&[(f64, f64)]| {
-        let (from_mm, to_mm) = (piece[0].0.min(piece[1].0), piece[0].0.max(piece[1].0));
-        from_mm <= ground.end && ground.start <= to_mm
-    };
+    let is_over = |piece: &&[(f64, f64)]| is_here(&(piece[0].0.min(piece[1].0)..piece[0].0.max(piece[1].0)));
     let point = |&(place_mm, degrees): &(f64, f64)| format!("{:.1},{:.1}", x(place_mm), angle_y(degrees));
     let mut points: Vec<String> = judgement.path.windows(2).filter(is_over).flatten().map(point).collect();
     points.dedup();
