@@ -211,7 +211,6 @@ struct Arm {
     /// The pulses that commanded another angle than the one before.
     pulses: Vec<Pulse>,
     stroke: Option<Stroke>,
-    is_out: bool,
 }
 
 /// Swings in memory: enough for a day. After that their random values repeat.
@@ -220,10 +219,10 @@ const SWINGS: usize = 10_000;
 impl Arm {
     fn of(machine: &Machine) -> Self {
         let Machine { servo, clear_within_degrees, .. } = *machine;
-        Self { servo, clear_within_degrees, rise: None, pulses: Vec::new(), stroke: None, is_out: false }
+        Self { servo, clear_within_degrees, rise: None, pulses: Vec::new(), stroke: None }
     }
 
-    /// Takes pin changes. Returns whether the arm is fully out at a cycle, if this has changed.
+    /// Takes pin changes. Returns whether the arm is fully out at a cycle; `None` before the first pulse.
     fn turn(&mut self, changes: &[PinChange], cycle: u64) -> Option<bool> {
         for change in changes.iter().filter(|change| change.pin == wiring::SERVO) {
             match (change.high, self.rise.take()) {
@@ -235,10 +234,7 @@ impl Arm {
         let degrees = self.stroke.as_ref()?.degrees(time_at_s(0, cycle));
         // The firmware's stroke may differ from the machine's. Fully out is the angle of the firmware's pulse.
         let out_degrees = self.servo.stroke_degrees().min(self.farthest_degrees());
-        let is_out = degrees >= out_degrees - self.clear_within_degrees;
-        let changes = is_out != self.is_out;
-        self.is_out = is_out;
-        changes.then_some(is_out)
+        Some(degrees >= out_degrees - self.clear_within_degrees)
     }
 
     /// The greatest angle that was asked for lately.
