@@ -109,11 +109,10 @@ impl Program {
         let mut elf = None;
         if let Some(messages) = cargo.stdout.take() {
             for message in Message::parse_stream(BufReader::new(messages)) {
-                match message.context("cargo's messages could not be read")? {
-                    Message::CompilerArtifact(artifact) if artifact.target.name == self.package => {
-                        elf = artifact.executable.map(PathBuf::from).or(elf);
-                    }
-                    _ => {}
+                if let Message::CompilerArtifact(artifact) = message.context("cargo's messages could not be read")?
+                    && artifact.target.name == self.package
+                {
+                    elf = artifact.executable.map(PathBuf::from).or(elf);
                 }
             }
         }
